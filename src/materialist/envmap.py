@@ -22,6 +22,21 @@ def texel_directions(height: int, width: int) -> Array:
     ).astype(np.float32)
 
 
+def sh_basis(direction: Array, degree: int) -> Array:
+    """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
+    from scipy.special import sph_harm_y
+
+    x, y, z = direction[..., 2], direction[..., 0], direction[..., 1]
+    theta, phi = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
+    columns = []
+    for order in range(degree + 1):
+        for m in range(-order, order + 1):
+            value = sph_harm_y(order, abs(m), theta, phi)
+            part = value.real if m >= 0 else value.imag
+            columns.append(part if m == 0 else np.sqrt(2) * part)
+    return np.stack(columns, -1).astype(np.float32)
+
+
 def environment(direction: Array, envmap: Array) -> Array:
     """[N, 3] bilinear lookup of an envmap [h, 2h, 3] in unit directions [N, 3]."""
     height, width = envmap.shape[:2]

@@ -103,6 +103,8 @@ class Prediction:
     warnings: tuple[str, ...] = ()
     sources: dict[str, str] = field(default_factory=dict)
     """Map -> where it comes from, where several predictors or weights are behind them; empty: all of `predictor`."""
+    light: Array | None = None
+    """[h, 2h, 4] float32 environment map: linear radiance, and the scale of the error of its logarithm."""
 
 
 @dataclass(frozen=True)

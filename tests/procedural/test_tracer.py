@@ -7,6 +7,7 @@ import pytest
 from disney_reference import diffuse_coefficients, specular_split
 from made_worlds import X, Z, plain, reference, room, still
 
+from materialist.envmap import texel_directions
 from materialist.procedural import packing, sample, tiles, tracer
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import shapes as s
@@ -133,3 +134,32 @@ def test_texture_is_not_printed_into_the_shading():
     assert texture.std() > 0.4 * texture.mean(), "the floor has a texture to print"
     assert abs(np.corrcoef(texture.ravel(), shading.ravel())[0, 1]) < 0.15
     assert shading.std() < 0.04 * shading.mean()
+
+
+def test_the_light_around_a_ground_under_the_sky_is_the_sky():
+    """Every point of the ground sees the upper half, and none the lower one, which the ground itself hides."""
+    ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((0.5, 0.5, 0.5), 0.8))
+    sky = np.full((16, 32, 3), 2.0, np.float32)
+    sky[:4] = [4, 3, 1]
+    world = World([ground], sky, look((0, 1, 1), (0, 0, 0), 40))
+    traced = tracer_of(world)
+    light = traced.light(traced.probe(sample.PROBE), rows=8, spp=64, seed=0)
+    up = texel_directions(8, 16) @ (world.view.to_scene.T @ [0, 1, 0])
+    np.testing.assert_allclose(light[up > 0.25, 3], 1)
+    np.testing.assert_allclose(light[up < -0.25, 3], 0)
+    np.testing.assert_allclose(light[up > 0.95, :3], np.broadcast_to([4, 3, 1], (np.sum(up > 0.95), 3)), rtol=0.02)
+    low = (up > 0.25) & (up < 0.5)
+    np.testing.assert_allclose(light[low, :3], 2, rtol=0.05)
+    behind = traced.light(traced.probe(sample.PROBE), rows=8, spp=64, seed=0, hidden=0.1)
+    np.testing.assert_allclose(behind[up < -0.25, 3], 0.1, rtol=1e-5)
+    np.testing.assert_allclose(behind[up < -0.25, :3], 2, rtol=1e-3)
+
+
+def test_the_light_around_a_lit_room_has_the_lamp_but_not_what_is_seen():
+    traced = tracer_of(room(window=False, lamp=True, sky=0.0), 32)
+    light = traced.light(traced.probe(sample.PROBE), rows=16, spp=256, seed=0)
+    d = texel_directions(16, 32)
+    assert light[..., 0].max() > 3 * np.median(light[..., 0])  # the lamp in the ceiling, spread: it is near
+    brightest = d.reshape(-1, 3)[light[..., 0].argmax()]
+    assert brightest[1] > 0.5
+    assert light[..., 3].min() < 0.3 < light[..., 3].max()  # what is seen is no light

@@ -15,7 +15,9 @@ from materialist.train.refraction import RefractionTask
 from materialist.train.schedule import Budget
 from materialist.train.trainer import RunOptions, Trainer
 
-NETWORK = BundledArchitecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+NETWORK = BundledArchitecture(
+    widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8, light=16
+)
 SMALL = {"side": 32, "batch": 2, "warm_up": 2, "bfloat16": False}
 WIDTHS = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 

@@ -52,16 +52,3 @@ def test_flips_mirror_the_geometry(sample):
     twice = augment.flip(mirrored)
     for name in ("image", "normal", "rays", "depth"):
         np.testing.assert_array_equal(getattr(twice, name), getattr(sample, name))
-
-
-def test_recolouring_is_the_render_of_the_new_albedo(sample):
-    new = augment.recolour(sample, np.random.default_rng(0))
-    surface = sample.mask > 0
-    assert new.albedo.min() >= 0 and new.albedo.max() <= 1
-    dielectric = (1 - sample.metallic)[..., None]
-    rest = sample.image - sample.albedo * dielectric * sample.shading
-    expected = new.albedo * dielectric * sample.shading + rest
-    np.testing.assert_allclose(new.image[surface], expected[surface], atol=1e-5)
-    metal = sample.metallic > 0.5
-    np.testing.assert_array_equal(new.albedo[metal], sample.albedo[metal])
-    np.testing.assert_array_equal(new.image[~surface], sample.image[~surface])

@@ -77,3 +77,22 @@ def test_all_losses_have_finite_gradients_at_zero_error():
         predicted = true.clone().requires_grad_()
         loss(predicted, true, mask).backward()
         assert torch.isfinite(predicted.grad).all(), loss.__name__
+
+
+def test_the_loss_of_the_light_is_that_of_the_weighted_directions():
+    """A map of radiance 2 above and 1 below, of which only the upper half counts."""
+    true = torch.ones(1, 4, 8, 16)
+    true[:, :3, :4] = 2
+    true[:, 3, 4:] = 0
+    found = torch.zeros(1, 4, 8, 16)
+    found[:, :3] = np.log(2)
+    likelihood, irradiance = losses.light(found, true)
+    assert likelihood.item() == pytest.approx(0, abs=1e-6) and irradiance.item() == pytest.approx(0, abs=1e-6)
+    found[:, :3] += np.log(1.5)
+    likelihood, irradiance = losses.light(found, true)
+    assert likelihood.item() == pytest.approx(np.log(1.5), rel=1e-5)
+    assert irradiance.item() == pytest.approx(0.5, rel=1e-5)  # half as much again in every coefficient
+    found[:, 3] = np.log(np.log(1.5))  # the scale that fits the error best
+    assert losses.light(found, true)[0].item() == pytest.approx(1 + np.log(np.log(1.5)), rel=1e-5)
+    both = losses.light(found.expand(2, -1, -1, -1), torch.cat([true, 0 * true]))
+    assert both[1].item() == pytest.approx(0.5, rel=1e-5), "a light that is not known does not count"

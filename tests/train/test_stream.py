@@ -25,11 +25,18 @@ def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
     assert "0000002.npz" in caplog.text
 
 
+def test_a_set_of_bad_files_ends_a_run(tmp_path):
+    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
+    spoil(tmp_path)
+    with pytest.raises(InputError, match="cannot be read"):
+        list(epoch(examples, batch=2, **ARGS))
+
+
 def test_the_error_of_a_loading_worker_is_one_sentence_and_ends_them(tmp_path):
     """Not the worker's traceback; and no process is left that could keep the command from ending."""
     import multiprocessing
 
-    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
+    examples = maps.Pictures(SampleFolder(made_samples.write_set(tmp_path, 4)), lambda sample, *_: sample)
     spoil(tmp_path)
     with pytest.raises(InputError, match="cannot be read") as caught:
         list(epoch(examples, workers=1, batch=2, **ARGS))

@@ -146,7 +146,7 @@ def test_checkpoints_are_whole_or_refused(tmp_path):
 
 
 def test_pictures_grow_with_the_run(data, tmp_path):
-    assert [RECIPE.side_at(p) for p in (0, 0.59, 0.6, 0.79, 0.8, 1)] == [128, 128, 192, 192, 256, 256]
+    assert [RECIPE.side_at(p) for p in (0, 0.29, 0.3, 0.74, 0.75, 1)] == [128, 128, 192, 192, 256, 256]
     assert RECIPE.changed(side=96).side_at(0) == 96
     task = made_runs.bundled(data, side=64, growth=((0.5, 32),))
     trainer = made_runs.trainer(task, tmp_path / "run", steps=6)

@@ -9,13 +9,11 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-import numpy as np
 import torch
-from scipy.special import sph_harm_y
 from torch import nn
 from torch.nn import functional
 
-from materialist.envmap import texel_directions
+from materialist.envmap import sh_basis, texel_directions
 
 
 def positional_encoding(x: torch.Tensor, bands: int) -> torch.Tensor:
@@ -77,20 +75,10 @@ class EnvmapSH(nn.Module):
         self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
-        return functional.softplus(sh_basis(texel_directions(height, 2 * height), self.degree) @ self.coefficients)
+        return functional.softplus(self._basis(height) @ self.coefficients)
 
-
-def sh_basis(direction, degree: int) -> torch.Tensor:
-    """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
-    x, y, z = direction[..., 2], direction[..., 0], direction[..., 1]
-    theta, phi = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
-    columns = []
-    for order in range(degree + 1):
-        for m in range(-order, order + 1):
-            value = sph_harm_y(order, abs(m), theta, phi)
-            part = value.real if m >= 0 else value.imag
-            columns.append(part if m == 0 else np.sqrt(2) * part)
-    return torch.from_numpy(np.stack(columns, -1).astype(np.float32))
+    def _basis(self, height: int) -> torch.Tensor:
+        return torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree))
 
 
 def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:

@@ -11,7 +11,7 @@ import torch
 from materialist.camera import pixel_rays
 from materialist.envmap import texel_directions
 from materialist.fit.engine import Engine, prepared_envmap
-from materialist.fit.light import envmap_field, fit_light, start_radiance
+from materialist.fit.light import envmap_field, fit_light, start_light
 from materialist.fit.losses import CLIPPED
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress
@@ -40,6 +40,8 @@ class Fit:
     engine: Engine
     settings: FitSettings
     envmap_height: int = 256
+    light: Array | None = None
+    """What is predicted of it; see `Prediction.light`."""
     mask: Array | None = None
     """[H, W] bool: roughness and metallic are one value inside."""
     strategy: str = "default"
@@ -65,9 +67,10 @@ class Fit:
 
     def _fit_light(self, state: FitState, materials: Materials) -> None:
         start, settings, photo = time.perf_counter(), self.settings.light, self._photo()
-        light = envmap_field(settings, seed=self.seed, start=start_radiance(photo, settings))
         problem = self.engine.light_problem(materials)
-        result = fit_light(problem, photo, light, settings, seed=self.seed, progress=self.progress)
+        begin = start_light(photo, settings, self.light, problem)
+        light = envmap_field(settings, seed=self.seed, start=begin.radiance)
+        result = fit_light(problem, photo, light, settings, start=begin, seed=self.seed, progress=self.progress)
         envmap = prepared_envmap(light(max(settings.height, 16)), self.envmap_height)
         white = HDR_CLIP if self.photo.hdr else CLIPPED
         state.envmap = paste_visible_sky(envmap, self.photo.linear, self._surface(), self.photo.camera, white=white)

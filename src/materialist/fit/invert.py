@@ -85,8 +85,8 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
 
     fit = Fit(
-        photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height, mask=setup.mask,
-        strategy=setup.strategy, seed=setup.seed, progress=progress,
+        photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height, light=prior.light,
+        mask=setup.mask, strategy=setup.strategy, seed=setup.seed, progress=progress,
     )  # fmt: skip
     return PreparedFit(geometry, renderer, fit, tuple(stages))
 

@@ -2,28 +2,55 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
 import torch
 from torch import nn
 
+from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
-from materialist.fit.losses import log_chroma, log_total_variation, rendering_loss, residual
+from materialist.fit.losses import CLIPPED, log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import LightSettings
 from materialist.transport.light import LightMatrix
+from materialist.types import Array
 
 
-def start_radiance(photo: torch.Tensor, settings: LightSettings) -> float:
-    """Grey level at which texels start for a photo [..., 3] linear.
+@dataclass(frozen=True)
+class LightStart:
+    """What the light is before the fit."""
 
-    Texels that hardly reach anything stay near it, and must not be brighter than what lights the photo.
+    radiance: torch.Tensor
+    """[h, 2h, 3] linear."""
+    scale: torch.Tensor | None
+    """[h, 2h, 1] scale of the error of its logarithm (Laplace); None where nothing is known of it."""
+
+
+def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | None, problem: LightProblem) -> LightStart:
+    """Where the light begins, and how far it is trusted.
+
+    Without a prior it is grey: as bright as the photo [P, 3] linear demands of an ordinary albedo, since texels that
+    hardly reach anything stay near it. The prior is that of `Prediction.light`; it gets the exposure that renders the
+    photo best.
     """
-    return float(min(max(float(photo.mean()) / settings.start_albedo, 1e-3), settings.start))
+    if prior is None or settings.field != "texels":
+        grey = float(min(max(float(photo.mean()) / settings.start_albedo, 1e-3), settings.start))
+        return LightStart(torch.full((settings.height, 2 * settings.height, 3), grey), None)
+    light, scale = torch.from_numpy(np.ascontiguousarray(prior[..., :3])), torch.from_numpy(prior[..., 3:].copy())
+    radiance = resize_envmap(light, settings.height).clamp_min(1e-3)
+    target = photo[problem.pixels]
+    with torch.no_grad():
+        rendered = problem.render(resize_envmap(radiance, problem.height))
+    known = target < CLIPPED
+    exposure = (target * rendered)[known].sum() / rendered[known].square().sum().clamp_min(1e-9)
+    return LightStart(radiance * exposure, resize_envmap(scale.expand(-1, -1, 3), settings.height)[..., :1])
 
 
-def envmap_field(settings: LightSettings, *, seed: int = 0, start: float | torch.Tensor | None = None) -> nn.Module:
-    """A fresh field of the kind the settings name; texels begin at `start`, a grey level or a map [h, 2h, 3]."""
+def envmap_field(settings: LightSettings, *, seed: int = 0, start: torch.Tensor | None = None) -> nn.Module:
+    """A fresh field of the kind the settings name; texels begin at `start`, a map [h, 2h, 3]."""
     torch.manual_seed(seed)
     if settings.field == "mlp":
         return EnvmapMLP()
@@ -32,10 +59,9 @@ def envmap_field(settings: LightSettings, *, seed: int = 0, start: float | torch
     if settings.field == "sh":
         return EnvmapSH(3)
     if settings.field == "texels":
-        if isinstance(start, torch.Tensor):
-            return EnvmapTexels(resize_envmap(start, settings.height))
-        grey = settings.start if start is None else start
-        return EnvmapTexels(torch.full((settings.height, 2 * settings.height, 3), grey))
+        if start is None:
+            start = torch.full((settings.height, 2 * settings.height, 3), settings.start)
+        return EnvmapTexels(resize_envmap(start, settings.height))
     raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
 
 
@@ -45,15 +71,23 @@ def fit_light(
     field: nn.Module,
     settings: LightSettings,
     *,
+    start: LightStart | None = None,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> StageResult:
     """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
 
+    Beyond the paper, what the light differs from `start` by is kept smooth, white and small.
+
     Args:
         photo: [H * W, 3] linear.
     """
     target = photo[problem.pixels]
+    before = 0.0 if start is None else resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log()
+    trust = None
+    if start is not None and start.scale is not None:
+        angle = torch.from_numpy(row_solid_angle(problem.height)).float().view(-1, 1, 1)
+        trust = angle / angle.mean() / resize_envmap(start.scale.expand(-1, -1, 3), problem.height)
     weight = None if problem.matrix is None else hidden_weights(problem.matrix, settings)
     jitter = torch.Generator().manual_seed(seed)
 
@@ -62,9 +96,11 @@ def fit_light(
         error = residual(problem.render(envmap), target, settings.encoding, clipped=settings.clipped)
         value = rendering_loss(error)
         if settings.smooth or settings.chroma:
-            log = envmap.clamp_min(1e-6).log()
-            value = value + settings.smooth * log_total_variation(log, weight)
-            value = value + settings.chroma * log_chroma(log, settings.warm_cool)
+            change = envmap.clamp_min(1e-6).log() - before
+            value = value + settings.smooth * log_total_variation(change, weight)
+            value = value + settings.chroma * log_chroma(change, settings.warm_cool)
+            if trust is not None:
+                value = value + settings.prior * (trust * change.abs()).mean()
         return value
 
     return optimise("light", field.parameters(), loss, settings.schedule, progress=progress)

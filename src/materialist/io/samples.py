@@ -45,6 +45,9 @@ class Sample:
     """[H, W, 2] float32 x and y of the camera rays at z = -1: what a crop keeps of its camera."""
     shading: Array | None = None
     """[H, W, 3] float32 with image = albedo (1 - metallic) shading + rest; None where it is not known."""
+    light: Array | None = None
+    """[h, 2h, 4] float32 mean radiance that reaches the visible surfaces from what is not visible, equirectangular,
+    camera frame, in the units of `image`; last the share of the surfaces that each direction reaches."""
 
     def truth(self) -> Prediction:
         return Prediction(
@@ -154,7 +157,7 @@ def _decode(arrays: dict[str, Array]) -> Sample:
     height, width = image.shape[:2]
     normal = arrays["normal"].astype(np.float32)
     length = np.sqrt(np.einsum("hwc,hwc->hw", normal, normal))[..., None]
-    shading = arrays.get("shading")
+    shading, light = arrays.get("shading"), arrays.get("light")
     return Sample(
         image=np.nan_to_num(image, posinf=6e4),
         albedo=_DECODED[arrays["albedo"]],
@@ -165,6 +168,7 @@ def _decode(arrays: dict[str, Array]) -> Sample:
         mask=surface.astype(np.float32),
         rays=pixel_rays(Camera(width, height, float(arrays["fov"])))[..., :2].copy(),
         shading=None if shading is None else np.nan_to_num(shading.astype(np.float32), posinf=6e4),
+        light=None if light is None else np.nan_to_num(light.astype(np.float32), posinf=6e4),
     )
 
 

@@ -27,6 +27,8 @@ class MapSet:
     sources: dict[str, str]
     """Name -> origin of the map, for the scene's provenance."""
     warnings: tuple[str, ...] = ()
+    light: Array | None = None
+    """That of `Prediction`, from the source of the albedo, whose exposure it shares."""
 
 
 class Predictor(ABC):
@@ -66,7 +68,7 @@ class Predictor(ABC):
         if not known.any():
             sources["normal"] = f"derived from the depth of {sources['depth']}"
         materials = Materials(maps["albedo"], maps["roughness"], maps["metallic"])
-        return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources)
+        return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources, part.light)
 
 
 class MixedPredictor(Predictor):
@@ -91,6 +93,7 @@ class MixedPredictor(Predictor):
         maps: dict[str, Array] = {}
         sources: dict[str, str] = {}
         warnings: tuple[str, ...] = ()
+        light = None
         # The source of the depth comes last: a known normal map helps to scale a relative depth.
         for spec in sorted(self.sources, key=lambda spec: spec == self.depth_spec):
             names = [name for name in self.shares[spec] if name in wanted]
@@ -99,4 +102,5 @@ class MixedPredictor(Predictor):
                 maps |= part.maps
                 sources |= part.sources
                 warnings += part.warnings
-        return MapSet(maps, sources, warnings)
+                light = part.light if part.light is not None else light
+        return MapSet(maps, sources, warnings, light)

@@ -19,9 +19,10 @@ from materialist.io.samples import Progress, SampleFolder, claim, described, wri
 from materialist.procedural.objects import things
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
+from materialist.render.variant import setup
 
 FORMAT = 1
-CONTENT = 7
+CONTENT = 8
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")
@@ -49,6 +50,8 @@ def produce(
     folder = Path(folder)
     if count < 1 or workers < 1:
         raise InputError(f"count is {count} and workers is {workers}; give at least 1 of each.")
+    if options.mesh_files:
+        setup(options.device)
     for path in options.mesh_files:  # a damaged one must not end a long run
         things.mesh(path)
     if not resume and folder.is_dir() and any(folder.iterdir()):

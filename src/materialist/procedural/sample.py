@@ -15,13 +15,19 @@ from materialist.types import Array, Camera
 
 PROBE = 4
 """Label rays a pixel and axis."""
+LIGHT_ROWS = 16
+"""Rows of the map of the light around a scene."""
+LIGHT_SPP = 128
+"""Rays of each of its texels."""
+LIGHT_HIDDEN = 0.1
+"""Weight, in it, of the sky behind visible surfaces, where there is a sky."""
 ATTEMPTS = 6
 """Cameras that see too little are thrown away at most that often."""
 MAKERS: dict[str, tuple[Callable[..., World], float]] = {
-    "room": (rooms.room, 0.45),
-    "table": (rooms.table_top, 0.175),
-    "still-life": (outdoors.still_life, 0.15),
-    "outdoor": (outdoors.outdoor, 0.225),
+    "room": (rooms.room, 0.38),
+    "table": (rooms.table_top, 0.22),
+    "still-life": (outdoors.still_life, 0.2),
+    "outdoor": (outdoors.outdoor, 0.2),
 }
 """Kind of scene -> its maker, and its share of a set."""
 
@@ -31,6 +37,9 @@ def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
 
     Raises SetupError where Mitsuba or the denoiser is missing.
     """
+    from materialist.render.variant import setup
+
+    setup(options.device)  # before a mesh is read, which would choose for itself
     from materialist.procedural.tracer import SampleTracer
 
     for attempt in range(ATTEMPTS):
@@ -71,6 +80,13 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: D
     shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, device=tracer.device)
     labels = labels_of(probe)
     gain = exposure(image, rng) * balance(shading, rng)
+    light = tracer.light(
+        probe,
+        rows=LIGHT_ROWS,
+        spp=LIGHT_SPP,
+        seed=int(rng.integers(2**31)),
+        hidden=LIGHT_HIDDEN if world.kind in ("outdoor", "still life") else 0,
+    )
     byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
     half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
     return {
@@ -78,7 +94,7 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: D
         "albedo": byte(linear_to_srgb(labels["albedo"])), "roughness": byte(labels["roughness"]),
         "metallic": byte(labels["metallic"]), "normal": np.rint(labels["normal"] * 127).astype(np.int8),
         "depth": half(labels["depth"]), "mask": labels["mask"].astype(np.uint8), "fov": np.float32(world.view.fov),
-        "thing": things_of(world, probe), "kind": np.array(world.kind),
+        "light": half(light * [*gain, 1]), "thing": things_of(world, probe), "kind": np.array(world.kind),
     }  # fmt: skip
 
 

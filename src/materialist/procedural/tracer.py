@@ -16,6 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from materialist.buffers import floats, integers
+from materialist.camera import project, unproject
 from materialist.errors import InputError
 from materialist.procedural import shading, tiles
 from materialist.procedural.packing import Packed
@@ -114,6 +115,54 @@ class SampleTracer:
         dr.eval(*(x for v in out.values() for x in (v if isinstance(v, list) else [v])))
         shape = lambda v: np.array(v, np.float32).reshape(h, w, n)  # noqa: E731
         return {k: np.stack([shape(c) for c in v], -1) if isinstance(v, list) else shape(v) for k, v in out.items()}
+
+    def light(self, probe: dict[str, Array], *, rows: int, spp: int, seed: int, hidden: float = 0) -> Array:
+        """[rows, 2 rows, 4] the light that reaches what the camera sees from what it does not see.
+
+        Radiance (linear, equirectangular, camera frame) in three channels: the mean over visible surface points from
+        which a direction is not blocked by a visible surface. The last channel is the share of such points.
+
+        probe: what `probe` returned. spp: rays a texel, each from a random point. hidden: weight of the
+        light from afar behind visible surfaces, which counts as well where it is above 0.
+        """
+        h, w = self.camera.height, self.camera.width
+        centre = probe["owner"].shape[2] // 2
+        owner, depth = (np.ascontiguousarray(probe[k][..., centre]) for k in ("owner", "depth"))
+        normal = probe["normal"][:, :, centre].reshape(-1, 3)
+        seen = np.flatnonzero(owner.ravel() >= 0)
+        if not len(seen):
+            return np.zeros((rows, 2 * rows, 4), np.float32)
+        texels = 2 * rows * rows
+        rng = np.random.default_rng(seed)
+        chosen = seen[rng.integers(len(seen), size=texels * spp)]
+        place = rng.random((2, texels * spp))
+        # Lanes of a vector are neighbours: one ray of every texel, then the next of every texel.
+        texel = np.tile(np.arange(texels), spp)
+        theta = (texel // (2 * rows) + place[0]) / rows * np.pi
+        phi = ((texel % (2 * rows) + place[1]) / rows - 1) * np.pi
+        d = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)])
+        points = unproject(depth, self.camera).reshape(-1, 3)[chosen]
+        points += normal[chosen] * (0.002 * depth.ravel()[chosen, None])
+        ray = mi.Ray3f(mi.Point3f(*(floats(mi, c) for c in points.T)), mi.Vector3f(*(floats(mi, c) for c in d)))
+        lane = dr.arange(mi.UInt32, texels * spp)
+        hit = self._hit(ray, mi.Bool(True))
+        found = np.stack([np.array(c) for c in hit.p], -1)
+        screen, far = project(found, self.camera)
+        column, row = (np.clip(np.nan_to_num(screen[:, k]), 0, size - 1).astype(int) for k, size in ((0, w), (1, h)))
+        inside = (far > 0) & (screen >= 0).all(-1) & (screen[:, 0] < w) & (screen[:, 1] < h)
+        same = owner[row, column] == np.array(hit.owner).astype(int)
+        near = np.abs(depth[row, column] - far) < 0.05 * far
+        below = (normal[chosen] * d.T).sum(-1) <= 0  # into the surface itself
+        open_ = ~((np.array(hit.valid) & inside & same & near) | below)
+        random = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))  # type: ignore[operator]
+        total, _ = self._paths(ray, lane % texels, lane // texels, random, dr.opaque(mi.UInt32, seed))
+        behind = self.lights.sky(ray.d)
+        channels = lambda colour: np.stack([np.array(colour[k]) for k in range(3)])  # noqa: E731
+        radiance = np.where(open_, channels(total), channels(behind))
+        weight = np.where(open_, 1, hidden).reshape(spp, texels, 1).astype(np.float32)
+        count = weight.sum(0)
+        mean = (radiance.T.reshape(spp, texels, 3) * weight).sum(0) / np.maximum(count, 1e-6)
+        return np.concatenate([mean, count / spp], -1).reshape(rows, 2 * rows, 4).astype(np.float32)
 
     def _camera_ray(self, pixel, place):
         """Rays through `place` in [0, 1)^2 of pixels, from the origin along -Z."""

@@ -1,8 +1,4 @@
-"""Samples changed at random, so that few pictures teach as many: crops, flips, new colours, exposure.
-
-Every change keeps labels and picture true to each other: a crop keeps its camera rays, a flip mirrors normals, and a
-new colour of a surface changes the picture through its stored shading.
-"""
+"""Samples cut, resampled and mirrored so that labels, rays and picture stay true to each other."""
 
 from __future__ import annotations
 
@@ -14,33 +10,6 @@ import numpy as np
 from materialist.camera import rays_at
 from materialist.io.samples import Sample
 from materialist.types import Array
-
-LEAST_CROP = 0.55
-"""Smallest crop, as a part of the picture's shorter side."""
-BRIGHTEST = 0.92
-"""Albedo that recolouring does not exceed."""
-
-
-def augment(sample: Sample, size: int, rng: np.random.Generator) -> Sample:
-    """A random variant of size x size pixels: crop, flip, colours of surfaces, exposure. Not yet a photo."""
-    if rng.random() > 0.75:
-        sample = replace(sample, shading=None)
-    sample = crop(sample, size, rng)
-    if rng.random() < 0.5:
-        sample = flip(sample)
-    if sample.shading is not None:
-        sample = recolour(sample, rng)
-    # A narrow spread: the mean brightness of a photo carries what little is known of absolute albedo.
-    return replace(sample, image=sample.image * np.float32(2 ** rng.normal(0, 0.35)), shading=None)
-
-
-def crop(sample: Sample, size: int, rng: np.random.Generator) -> Sample:
-    """A random square of the picture, at least LEAST_CROP of its shorter side, as size x size pixels."""
-    height, width = sample.depth.shape
-    shorter = min(height, width)
-    side = round(shorter * (1 if rng.random() < 0.3 else rng.uniform(LEAST_CROP, 1)))
-    top, left = int(rng.integers(0, height - side + 1)), int(rng.integers(0, width - side + 1))
-    return resized(window(sample, top, left, side, side), size, size)
 
 
 def window(sample: Sample, top: int, left: int, height: int, width: int) -> Sample:
@@ -80,52 +49,8 @@ def flip(sample: Sample, axis: int = 1) -> Sample:
     return replace(mirrored, normal=mirrored.normal * mirror, rays=mirrored.rays * mirror[:2])
 
 
-def recolour(sample: Sample, rng: np.random.Generator) -> Sample:
-    """Surfaces of other colours under the same light: image = albedo (1 - metallic) shading + rest.
-
-    Pixels are grouped by the likeness of their albedo, and every group is multiplied by one random colour or brought to
-    a random one. Metals keep theirs, since it also colours their reflections, which `rest` holds.
-    """
-    assert sample.shading is not None
-    group, count = _groups(sample.albedo, rng)
-    gains = np.ones((count, 3), np.float32)
-    for k in range(count):
-        here = sample.albedo[::3, ::3][(group == k)[::3, ::3] & (sample.mask[::3, ::3] > 0)]
-        if len(here) and rng.random() < 0.8:
-            gains[k] = _gain(here, rng)
-    dielectric = (sample.mask * (1 - sample.metallic))[..., None]
-    albedo = np.minimum(sample.albedo * (1 + (gains[group] - 1) * dielectric), 1)
-    change = (albedo - sample.albedo) * dielectric * sample.shading
-    return replace(sample, albedo=albedo, image=np.maximum(sample.image + change, 0))
-
-
-def _groups(albedo: Array, rng: np.random.Generator) -> tuple[Array, int]:
-    """[H, W] number of the random pixel, of 1 to 6, whose albedo is most like each pixel's, and how many there are."""
-    height, width = albedo.shape[:2]
-    count = int(rng.integers(1, 7))
-    places = rng.integers(0, height, count), rng.integers(0, width, count)
-    even = np.sqrt(albedo)  # equal steps look about equally large
-    # |a - c|^2 = |a|^2 - 2 a c + |c|^2, and |a|^2 is the same for all c.
-    centres = even[places]  # [count, 3]
-    distance = (centres**2).sum(-1) - 2 * even @ centres.T  # [H, W, count]
-    return distance.argmin(-1), count
-
-
-def _gain(albedo: Array, rng: np.random.Generator) -> Array:
-    """[3] factor for a group of albedos [n, 3], so that none of it (but outliers) exceeds BRIGHTEST."""
-    mean = np.maximum(albedo.mean(0), 0.01)
-    if rng.random() < 0.5:
-        # A colour of its own: any brightness, mostly muted, as paint and cloth are.
-        hue = rng.dirichlet(np.ones(3)) * 3
-        colour = rng.uniform(0.03, 0.9) * (1 + (hue - 1) * rng.beta(1, 2.5))
-        gain = colour / mean
-    else:
-        gain = np.exp(rng.normal(0, 0.3) + rng.normal(0, 0.15, 3))
-    bright = np.percentile(albedo, 98, axis=0) * gain
-    return (gain * min(1.0, BRIGHTEST / max(float(bright.max()), 1e-6))).astype(np.float32)
-
-
 def _each(sample: Sample, work) -> Sample:
-    """The sample with `work(array, name)` applied to every array it has."""
-    arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__}
-    return replace(sample, **{name: work(array, name) for name, array in arrays.items() if array is not None})
+    """The sample with `work(array, name)` applied to every map it has, without its light."""
+    arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__ if name != "light"}
+    changed = {name: work(array, name) for name, array in arrays.items() if array is not None}
+    return replace(sample, light=None, **changed)

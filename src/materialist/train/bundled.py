@@ -5,25 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor, nn
 
 from materialist.io.samples import Sample, Source
 from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
-from materialist.procedural.photographic import as_photo
+from materialist.predict.network import shared_tensors
+from materialist.predict.weights import load_weights, read_state
 from materialist.train import losses
-from materialist.train.augment import augment
 from materialist.train.maps import MapsTask
+from materialist.train.pictures import DevicePictures
 from materialist.train.task import Batch, Recipe
 from materialist.types import Prediction
 
 RECIPE = Recipe(
     side=256, batch=8, rate=1e-3, warm_up=300, last_rate=0.02, ema=0.999, bfloat16=True,
-    growth=((0.6, 128), (0.8, 192)),
+    growth=((0.3, 128), (0.75, 192)),
 )  # fmt: skip
-ARCHITECTURE = BundledArchitecture(encoder="lite2")
+ARCHITECTURE = BundledArchitecture(encoder="lite2", light=16)
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class BundledLoss:
     depth_gradient: float = 1.5
     slopes: float = 0.5  # normals of the depth surface against the true ones
     mask: float = 0.2  # cross-entropy of where there is a surface
+    light: float = 0.3  # negative log likelihood of the log radiance around the scene
+    irradiance: float = 0.3  # relative error of its spherical harmonics
 
 
 class BundledTask(MapsTask):
@@ -62,14 +64,22 @@ class BundledTask(MapsTask):
     ):  # fmt: skip
         super().__init__(source, recipe, init=init, score_samples=score_samples)
         self.architecture = architecture
+        self.examples = DevicePictures(source, torch.device("cpu"))
 
     def make(self) -> BundledNetwork:
         network = BundledNetwork(self.architecture)
         return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
-    def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
-        """Crop, flip, recolour, expose, photograph."""
-        return as_photo(augment(sample, side, rng), rng)
+    def network(self) -> BundledNetwork:
+        """A network to begin from; weights that know no light begin with a fresh head for it."""
+        network = self.make()
+        if self.init is not None:
+            own = {k: v for k, v in network.state_dict().items() if k.startswith("light.")}
+            load_weights(network, own | read_state(self.init) | shared_tensors(network), self.init)
+        return network
+
+    def to(self, device: torch.device) -> None:
+        self.examples = DevicePictures(self.source, device)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Losses of all maps; see `BundledLoss`."""
@@ -82,7 +92,11 @@ class BundledTask(MapsTask):
 
         roughness, metallic = batch["roughness"], batch["metallic"]
         level = (out["depth"] - depth).abs().clamp(max=2)
-        return {
+        terms = {}
+        if "light" in out:
+            likelihood, irradiance = losses.light(out["light"], batch["light"])
+            terms = {"light": w.light * likelihood, "irradiance": w.irradiance * irradiance}
+        return terms | {
             "albedo": w.albedo_l1 * losses.l1(out["albedo"], albedo, mask)
             + w.albedo_l2 * losses.l2(out["albedo"], albedo, mask),
             "albedo_scaled": w.albedo_scaled * losses.scaled_l1(out["albedo"] ** 2.2, albedo**2.2, mask),

@@ -6,6 +6,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from materialist.envmap import row_solid_angle, sh_basis, texel_directions
+
 SILOG_LAMBDA = 0.5
 """Weight of the mean term (paper, equation of L_D): 1 would not see the scale at all, 0 fully."""
 SILOG_RANGE = (1e-3, 20.0)
@@ -99,3 +101,34 @@ def slopes(log_depth: Tensor, rays: Tensor, true_normal: Tensor, mask: Tensor, s
     whole = 1 - F.max_pool2d(1 - F.avg_pool2d(mask, step), 3, 1)
     alike = (true.norm(dim=1, keepdim=True) > 0.97).float() * (whole > 0.99).float()
     return mean(1 - F.cosine_similarity(normal, true, dim=1, eps=1e-8).unsqueeze(1), alike)
+
+
+DARKEST = 0.01
+"""Radiance below which the logarithm of a light does not tell maps apart; white in the photo is 1."""
+
+
+def light(predicted: Tensor, true: Tensor) -> tuple[Tensor, Tensor]:
+    """(likelihood, irradiance) losses of the light around a scene.
+
+    The first is the negative log likelihood of log radiance under a Laplace distribution of the predicted scale, the
+    second the error of spherical harmonics of radiance up to degree 3, relative to those of the truth. Directions count
+    by their solid angle and the share of the surfaces that they reach.
+
+    predicted: [B, 4, h, 2h] log radiance and log scale. true: [B, 4, h, 2h] radiance and share; all 0 where it is not
+    known.
+    """
+    rows = true.shape[-2]
+    angle = torch.as_tensor(row_solid_angle(rows), dtype=true.dtype, device=true.device).view(1, 1, -1, 1)
+    weight = true[:, 3:] * angle
+    known = (weight.flatten(1).sum(1) > 0).float()
+    under = weight.flatten(1).sum(1).clamp(min=1e-6)
+    log, scale = predicted[:, :3].clamp(-8, 8), predicted[:, 3:].clamp(-4, 3)
+    error = (log - true[:, :3].clamp(min=DARKEST).log()).abs()
+    likelihood = ((error * (-scale).exp() + scale).mean(1, keepdim=True) * weight).flatten(1).sum(1) / under
+    basis = torch.as_tensor(sh_basis(texel_directions(rows, 2 * rows), 3), dtype=true.dtype, device=true.device)
+    project = lambda map_: torch.einsum("bchw,hwk->bck", map_ * weight, basis)  # noqa: E731
+    aim = project(true[:, :3])
+    relative = (project(log.exp()) - aim).flatten(1).norm(dim=1) / aim.flatten(1).norm(dim=1).clamp(min=1e-6)
+    irradiance = torch.where(relative < 1, relative, 1 + relative.clamp(min=1).log())
+    count = known.sum().clamp(min=1)
+    return (likelihood * known).sum() / count, (irradiance * known).sum() / count

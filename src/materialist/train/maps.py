@@ -60,9 +60,9 @@ class MapsTask(Task):
         self.source, self.score_samples = source, score_samples
         self.notes = (*self.notes, *source.notes())
 
-    @abstractmethod
     def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
-        """A random variant of a sample at side x side pixels."""
+        """A random variant of a sample at side x side pixels, where examples come one by one."""
+        raise NotImplementedError
 
     @abstractmethod
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
@@ -95,7 +95,7 @@ class MapsTask(Task):
 
 def arrays_of(sample: Sample) -> dict[str, Array]:
     """[C, H, W] float32: image, rays, albedo (linear), roughness, metallic, normal, depth, mask."""
-    arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__ if name != "shading"}
+    arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__ if name not in ("shading", "light")}
     return {
         name: np.ascontiguousarray(np.moveaxis(a, -1, 0) if a.ndim == 3 else a[None], np.float32)
         for name, a in arrays.items()

@@ -13,7 +13,7 @@ import torch
 from torch.utils.data import DataLoader, Dataset, default_collate
 
 from materialist.errors import InputError
-from materialist.train.task import Examples
+from materialist.train.task import Batch, Examples
 from materialist.types import Array
 
 ATTEMPTS = 4
@@ -45,7 +45,7 @@ class _Drawn(Dataset):
 
 def epoch(
     examples: Examples, *, number: int, side: int, batch: int, seed: int, skip: int = 0, workers: int = 0,
-) -> Generator[dict[str, torch.Tensor], None, None]:  # fmt: skip
+) -> Generator[Batch, None, None]:  # fmt: skip
     """Batches of one pass over all examples in a random order, without the first `skip` of them.
 
     Order and variants depend on (seed, number) alone, for any number of workers. A small set is repeated so that a
@@ -53,6 +53,9 @@ def epoch(
     Raises InputError where ATTEMPTS examples in a row cannot be read.
     """
     examples.refresh()
+    if (own := examples.batches(side=side, batch=batch, seed=(seed, number), skip=skip)) is not None:
+        yield from own
+        return
     order = np.random.default_rng((seed, number)).permutation(len(examples))
     order = np.tile(order, -(-batch // len(order)))
     order = order[: len(order) // batch * batch]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import torch
 from torch import Tensor, nn
 
 from materialist.errors import InputError
@@ -72,6 +73,10 @@ class Examples(ABC):
     def draw(self, index: int, side: int, rng: Any) -> dict[str, Array]:
         """A random variant of example `index` at side x side pixels, float32; raises InputError when it is damaged."""
 
+    def batches(self, *, side: int, batch: int, seed: Sequence[int], skip: int) -> Iterator[Batch] | None:
+        """One pass without its first `skip` batches [B, ...], of examples that make batches themselves; else None."""
+        return None
+
     def refresh(self) -> None:  # noqa: B027 (examples in memory do not change)
         """Look again: a set on disk may grow while it is used."""
 
@@ -99,6 +104,9 @@ class Task(ABC):
     @abstractmethod
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
+
+    def to(self, device: torch.device) -> None:  # noqa: B027 (examples that come one by one know no device)
+        """Make ready what is learned from on the device of the training."""
 
     def network(self) -> StoredNetwork:
         """A network to begin from. Raises WeightsError for weights that are damaged or of another architecture."""

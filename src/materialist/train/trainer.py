@@ -58,6 +58,8 @@ class Trainer:
         self.options, self.device = options or RunOptions(), torch.device(device)
         state = checkpoint.resumed(folder, task.kind, resume=resume, device=self.device)
         torch.manual_seed(self.options.seed)
+        torch.backends.cudnn.benchmark = self.device.type == "cuda"
+        task.to(self.device)
         self.network = task.network().to(self.device)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False).eval()
         self._learnt = [p for p in self.network.parameters() if p.requires_grad]
@@ -171,7 +173,8 @@ class Trainer:
         if bool(torch.isfinite(norm)):
             self.optimizer.step()
             self._average()
-        return {"loss": total.item(), "norm": norm.item(), **{k: v.item() for k, v in terms.items()}}
+        values = torch.stack([total.detach(), norm, *(v.detach() for v in terms.values())]).tolist()
+        return dict(zip(("loss", "norm", *terms), values, strict=True))
 
     @torch.no_grad()
     def _average(self) -> None:

@@ -51,11 +51,12 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
         rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
 
     Returns:
-        A Prediction without a name: albedo linear, depth with a fixed median, 0 where there is no surface.
+        A Prediction without a name: albedo linear, depth with a fixed median, 0 where there is no surface; light where
+        the network knows it.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    maps = _mean_answer(network, linear, rays, device)
+    maps, light = _mean_answer(network, linear, rays, device)
     surface = _without_specks(_surface(maps["mask"]))
     if not surface.any():
         surface[:] = True
@@ -65,7 +66,7 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
-    return Prediction(materials, normal, depth)
+    return Prediction(materials, normal, depth, light=light)
 
 
 def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple[Array, Array]:
@@ -92,8 +93,11 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     return depth, normal
 
 
-def _mean_answer(network: BundledNetwork, linear: Array, rays: Array, device: Any) -> dict[str, Array]:
-    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes."""
+def _mean_answer(
+    network: BundledNetwork, linear: Array, rays: Array, device: Any
+) -> tuple[dict[str, Array], Array | None]:
+    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes; and
+    of its logarithms of the light, as `Prediction.light`."""
     sizes = sorted({_network_size(linear.shape[:2], side) for side in SETTINGS.sides})
     answers = []
     for size in sizes:
@@ -105,7 +109,9 @@ def _mean_answer(network: BundledNetwork, linear: Array, rays: Array, device: An
         answers.append(found | {"normal": found["normal"] * _MIRROR})
     for answer in answers:  # what depth is relative to is every answer's own
         answer["depth"] = answer["depth"] - np.median(answer["depth"])
-    return {n: np.mean([resample.values(a[n], sizes[-1]) for a in answers], axis=0) for n in answers[0]}
+    lights = [answer.pop("light") for answer in answers if "light" in answer]
+    light = np.exp(np.mean(lights, axis=0)).astype(np.float32) if lights else None
+    return {n: np.mean([resample.values(a[n], sizes[-1]) for a in answers], axis=0) for n in answers[0]}, light
 
 
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:
@@ -120,7 +126,8 @@ def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dic
     tensors = [torch.from_numpy(x).permute(2, 0, 1)[None].to(device) for x in (padded, extended)]
     with torch.inference_mode():
         maps = network(tensors[0].contiguous(memory_format=torch.channels_last), tensors[1])
-    arrays = {name: m[0, :, :height, :width].permute(1, 2, 0).float().cpu().numpy() for name, m in maps.items()}
+    rows = {name: m[0] if name == "light" else m[0, :, :height, :width] for name, m in maps.items()}
+    arrays = {name: m.permute(1, 2, 0).float().cpu().numpy() for name, m in rows.items()}
     return {n: np.ascontiguousarray(a[..., 0] if a.shape[-1] == 1 else a) for n, a in arrays.items()}
 
 

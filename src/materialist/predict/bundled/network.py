@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from materialist.envmap import texel_directions
 from materialist.predict.efficientnet import shipped, unit_power
 from materialist.predict.network import STRIDE, Architecture, ResidualBlock, StoredNetwork, group_norm
 
@@ -41,6 +42,8 @@ class BundledArchitecture(Architecture):
     """Channels at 1/2."""
     encoder: str = ""
     """Variant of EfficientNet-Lite (`predict.efficientnet`) whose features are read beside the photo; "" for none."""
+    light: int = 0
+    """Rows of the map of the light that it answers with as well; 0 for none."""
 
 
 class BundledNetwork(StoredNetwork):
@@ -70,6 +73,8 @@ class BundledNetwork(StoredNetwork):
             self.told = nn.ModuleList(nn.Conv2d(c, w[k], 1) for k, c in enumerate(self.encoder.channels))
             for parameter in self.told.parameters():
                 nn.init.zeros_(parameter)
+        if a.light:
+            self.light = LightHead(a.light, w[2])
         _same_subpixels(self.fine)
         _same_subpixels(self.head)
 
@@ -84,21 +89,25 @@ class BundledNetwork(StoredNetwork):
         Returns:
             albedo [B, 3, H, W] sRGB-encoded in [0, 1]; roughness and metallic [B, 1, H, W] in [0, 1]; normal
             [B, 3, H, W] unit; depth [B, 1, H, W] natural logarithm of planar depth, up to a constant; mask
-            [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid.
+            [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid; where the
+            architecture has it, light [B, 4, h, 2h], see `LightHead`.
         """
-        picture, told = encode(image), self._told(image)
+        picture, more = encode(image), self._told(image)
         x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), _shrink(rays, 4)], 1))
-        x, skips = self.levels[0](x + told[0]), []
+        x, skips, told = self.levels[0](x + more[0]), [], x
         for k in range(3):
             skips.append(x)
-            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + told[k + 1])
+            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + more[k + 1])
         x = self._context(x, _shrink(rays, STRIDE))
         for k in (2, 1, 0):
             x = F.interpolate(self.ups[k](x), scale_factor=2, mode="nearest")
             x = self.decoders[k](x + self.skips[k](skips[k]))
+            if k == 2:
+                told = x
         x = F.pixel_shuffle(self.fine(x), 2)
         x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
-        return _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
+        maps = _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
+        return maps | ({"light": self.light(told, picture, rays, maps)} if self.architecture.light else {})
 
     def _told(self, image: Tensor) -> list[Tensor | float]:
         """What the classifier's features add at each level; nothing where there is no encoder."""
@@ -190,3 +199,74 @@ class _AttentionBlock(nn.Module):
         seen = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2])
         x = x + self.out(seen.transpose(1, 2).reshape(batch, cells, channels))
         return x + self.down(F.gelu(self.up(self.norm2(x))))
+
+
+class LightHead(nn.Module):
+    """The light around a scene from a photo of it: every direction of a map attends to the cells of the photo.
+
+    A cell is told by its features, its colour, and the normal, albedo, depth and ray that belong to it, so that
+    brightness against normal, the classical evidence for the light, is there to be read.
+    """
+
+    STRIDE = 16
+    """Pixels on a side of a cell."""
+    TOLD = 17
+    """Channels of a cell beside its features."""
+
+    def __init__(self, rows: int, features: int, channels: int = 128, blocks: int = 3):
+        super().__init__()
+        self.rows = rows
+        self.cells = nn.Linear(features + self.TOLD, channels)
+        self.directions = nn.Sequential(nn.Linear(_HARMONICS, channels), nn.GELU(), nn.Linear(channels, channels))
+        self.blocks = nn.ModuleList(_LightBlock(channels) for _ in range(blocks))
+        self.norm, self.out = nn.LayerNorm(channels), nn.Linear(channels, 4)
+        nn.init.zeros_(self.out.weight)
+        nn.init.zeros_(self.out.bias)
+        harmonics = _harmonics(torch.from_numpy(texel_directions(rows, 2 * rows)).reshape(-1, 3))
+        self.register_buffer("harmonics", harmonics, persistent=False)
+
+    def forward(self, features: Tensor, picture: Tensor, rays: Tensor, maps: dict[str, Tensor]) -> Tensor:
+        """[B, 4, h, 2h] float32 of features [B, C, H / 16, W / 16] and the photo's own maps [B, ., H, W].
+
+        Natural logarithm of radiance in the photo's units (white 1), camera frame, equirectangular; last the logarithm
+        of its scale of error (of a Laplace distribution).
+        """
+        depth = maps["depth"] - maps["depth"].flatten(1).mean(1).view(-1, 1, 1, 1)
+        slant = rays.square().sum(1, True)
+        told = [picture, rays, maps["albedo"], maps["normal"], maps["mask"].sigmoid(), depth, slant]
+        cells = F.avg_pool2d(torch.cat([t.detach().to(features.dtype) for t in told], 1), self.STRIDE)
+        x = self.cells(torch.cat([features, cells], 1).flatten(2).transpose(1, 2))
+        asked = self.directions(self.harmonics.to(x.dtype)).expand(len(x), -1, -1)
+        for block in self.blocks:
+            asked = block(asked, x)
+        found = self.out(self.norm(asked)).float().transpose(1, 2)
+        return found.view(-1, 4, self.rows, 2 * self.rows)
+
+
+class _LightBlock(nn.Module):
+    """Directions [B, n, C] attend to cells [B, m, C], and to each other."""
+
+    def __init__(self, channels: int, head_size: int = 32):
+        super().__init__()
+        self.heads = channels // head_size
+        self.norm, self.cell_norm = nn.LayerNorm(channels), nn.LayerNorm(channels)
+        self.query, self.keys = nn.Linear(channels, channels), nn.Linear(channels, 2 * channels)
+        self.out = nn.Linear(channels, channels)
+        self.among = _AttentionBlock(channels, head_size)
+
+    def forward(self, asked: Tensor, cells: Tensor) -> Tensor:
+        batch, count, channels = asked.shape
+        split = lambda t: t.view(batch, t.shape[1], self.heads, -1).transpose(1, 2)  # noqa: E731
+        key, value = self.keys(self.cell_norm(cells)).chunk(2, -1)
+        seen = F.scaled_dot_product_attention(split(self.query(self.norm(asked))), split(key), split(value))
+        return self.among(asked + self.out(seen.transpose(1, 2).reshape(batch, count, channels)))
+
+
+_FREQUENCIES = (1, 2, 4)
+_HARMONICS = 3 + 6 * len(_FREQUENCIES)
+
+
+def _harmonics(d: Tensor) -> Tensor:
+    """[n, _HARMONICS] unit directions [n, 3] and sines and cosines of their coordinates."""
+    waves = [f(k * torch.pi * d / 2) for k in _FREQUENCIES for f in (torch.sin, torch.cos)]
+    return torch.cat([d, *waves], 1)

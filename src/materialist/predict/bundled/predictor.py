@@ -65,4 +65,5 @@ class BundledPredictor(Predictor):
             maps["normal"] = np.where(sky[..., None], 0, found.normal).astype(np.float32)
         elif sky.any():
             warnings = (f"{sky.mean():.0%} of the picture was taken for sky and has no surface.",)
-        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings)
+        light = found.light if "albedo" in wanted else None
+        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings, light)

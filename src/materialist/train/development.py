@@ -1,0 +1,162 @@
+"""What lies between radiance and the pixels of a JPEG, on batches of tensors: the twin of `procedural.photographic`."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+_LUMINANCE = (0.2126, 0.7152, 0.0722)
+
+
+def developed(image: Tensor, random: torch.Generator) -> tuple[Tensor, Tensor]:
+    """(photos, gains): the pictures [B, 3, H, W] as 8-bit photos would decode, linear in [0, 1], and white balance and
+    exposure [B, 3, 1, 1] that they got.
+
+    Sides are multiples of 16. White balance, exposure, blur, vignetting, noise, tone curve, saturation, 8 bits and
+    JPEG, each at random and often weak. `image` is linear Rec.709 radiance, exposed so that white is 1.
+    """
+    draw = _Draw(len(image), image.device, random)
+    picture = image.nan_to_num(posinf=1e4).clamp(min=0)
+    gains = _gains(picture, draw) * torch.exp2(draw.normal() * 0.2)
+    picture = _vignetted(_blurred((picture * gains).clamp(max=8), draw), draw)
+    encoded = _tone(_noisy(picture, draw), draw)
+    encoded = _compressed(encoded, draw)
+    linear = torch.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    return linear, gains
+
+
+class _Draw:
+    """Random numbers of pictures, [B, channels, 1, 1]."""
+
+    def __init__(self, count: int, device: torch.device, random: torch.Generator):
+        self.count, self.device, self.random = count, device, random
+
+    def uniform(self, low: float = 0.0, high: float = 1.0, channels: int = 1) -> Tensor:
+        shape = self.count, channels, 1, 1
+        return low + (high - low) * torch.rand(shape, generator=self.random, device=self.device)
+
+    def normal(self, channels: int = 1) -> Tensor:
+        return torch.randn((self.count, channels, 1, 1), generator=self.random, device=self.device)
+
+    def chance(self, probability: float) -> Tensor:
+        return self.uniform() < probability
+
+    def noise(self, like: Tensor) -> Tensor:
+        return torch.randn(like.shape, generator=self.random, device=self.device)
+
+
+def _gains(image: Tensor, draw: _Draw) -> Tensor:
+    grey = image.clamp(max=1).square().mean((2, 3), keepdim=True).sqrt() + 1e-4
+    gains = (grey.mean(1, keepdim=True) / grey) ** draw.uniform(0, 0.35)
+    gains = gains.clamp(0.4, 2.5) * torch.exp(draw.normal(3) * 0.04)
+    warm, green = draw.normal() * 0.16, draw.normal() * 0.03
+    cast = torch.exp(torch.cat([warm, green, -warm], 1))
+    gains = torch.where(draw.chance(0.35), gains * cast, gains)
+    return gains * grey.sum(1, keepdim=True) / (gains * grey).sum(1, keepdim=True)
+
+
+def _smoothed(image: Tensor, sigma: Tensor, radius: int = 4) -> Tensor:
+    """Gaussian blur by sigma [B, 1, 1, 1] pixels."""
+    batch, channels, height, width = image.shape
+    place = torch.arange(-radius, radius + 1, device=image.device)
+    kernel = torch.exp(-place.square() / (2 * sigma.view(-1, 1) ** 2))
+    kernel = (kernel / kernel.sum(1, keepdim=True)).repeat_interleave(channels, 0)  # [B C, n]
+    flat = F.pad(image.reshape(1, -1, height, width), (radius,) * 4, mode="reflect")
+    flat = F.conv2d(flat, kernel[:, None, None], groups=batch * channels)
+    return F.conv2d(flat, kernel[:, None, :, None], groups=batch * channels).view_as(image)
+
+
+def _blurred(image: Tensor, draw: _Draw) -> Tensor:
+    soft = _smoothed(image, draw.uniform(0.25, 0.9))
+    softer = _smoothed(soft.clamp(max=1), draw.uniform(0.7, 1.5))
+    sharp = (soft + draw.uniform(0.1, 0.6) * (soft.clamp(max=1) - softer)).clamp(min=0)
+    changed = torch.where(draw.chance(0.3), sharp, soft)
+    return torch.where(draw.chance(0.3), image, changed)
+
+
+def _vignetted(image: Tensor, draw: _Draw) -> Tensor:
+    height, width = image.shape[2:]
+    y = (torch.arange(height, device=image.device) + 0.5) / height - 0.5
+    x = (torch.arange(width, device=image.device) + 0.5) / width - 0.5
+    r2 = 2 * (y[:, None] ** 2 + x[None] ** 2)
+    amount = torch.where(draw.chance(0.5), torch.zeros_like(draw.uniform()), draw.uniform(0, 0.33))
+    return image * (1 - amount * r2)
+
+
+def _noisy(image: Tensor, draw: _Draw) -> Tensor:
+    shot, read = 10 ** draw.uniform(-4.8, -2.9), 10 ** draw.uniform(-4, -2.2)
+    noise = draw.noise(image)
+    blotched = _smoothed(noise, draw.uniform(0.4, 0.8), 2) * 1.6
+    noise = torch.where(draw.chance(0.4), blotched, noise)
+    deviation = (shot * image.clamp(max=1) + (read * 0.3) ** 2).sqrt()
+    return torch.where(draw.chance(0.25), image, (image + noise * deviation).clamp(min=0))
+
+
+def _tone(image: Tensor, draw: _Draw) -> Tensor:
+    """sRGB-encoded values in [0, 1]: plain, with a shoulder for highlights, with contrast and saturation."""
+    kind, knee = draw.uniform(), draw.uniform(0.5, 0.9)
+    bent = knee + (1 - knee) * (1 - torch.exp(-(image - knee) / (1 - knee)))
+    image = torch.where((kind >= 0.35) & (image > knee), bent, image)
+    weight = image.new_tensor(_LUMINANCE).view(1, 3, 1, 1)
+    grey = (image * weight).sum(1, keepdim=True)
+    image = (grey + (image - grey) * draw.uniform(0.8, 1.3)).clamp(0, 1)
+    encoded = torch.where(image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
+    curve = encoded * encoded * (3 - 2 * encoded)
+    encoded = torch.where(kind >= 0.5, encoded + draw.uniform(-0.25, 0.8) * (curve - encoded), encoded)
+    gamma = torch.exp(draw.normal() * 0.12)
+    return torch.where(draw.chance(0.4), encoded.clamp(min=1e-6) ** gamma, encoded).clamp(0, 1)
+
+
+def _compressed(encoded: Tensor, draw: _Draw) -> Tensor:
+    """8 bits and, mostly, JPEG with chroma at half resolution."""
+    pixels = (encoded * 255).round()
+    quality = torch.where(draw.chance(0.5), draw.uniform(55, 98), draw.uniform(85, 100)).floor()
+    scale = torch.where(quality < 50, 50 / quality, 2 - quality / 50)
+    luma, chroma, turn = _tables(encoded.device)
+    ycc = torch.einsum("ij,bjhw->bihw", turn, pixels)
+    bright = _coded(ycc[:, :1] - 128, luma, scale) + 128
+    colours = _coded(F.avg_pool2d(ycc[:, 1:], 2), chroma, scale)
+    colours = F.interpolate(colours, scale_factor=2, mode="bilinear", align_corners=False)
+    back = torch.einsum("ij,bjhw->bihw", torch.linalg.inv(turn), torch.cat([bright, colours], 1))
+    return torch.where(draw.chance(0.75), back.round().clamp(0, 255), pixels) / 255
+
+
+def _coded(plane: Tensor, table: Tensor, scale: Tensor) -> Tensor:
+    """Planes [B, C, H, W] after the quantisation of the cosine transform of their 8 x 8 blocks."""
+    batch, channels, height, width = plane.shape
+    cosine = _cosine(plane.device)
+    blocks = plane.view(batch, channels, height // 8, 8, width // 8, 8)
+    found = torch.einsum("ui,bcyixj,vj->bcyuxv", cosine, blocks, cosine)
+    step = (table * scale.view(-1, 1, 1)).round().clamp(1, 255).view(batch, 1, 1, 8, 1, 8)
+    found = (found / step).round() * step
+    return torch.einsum("ui,bcyuxv,vj->bcyixj", cosine, found, cosine).reshape(plane.shape)
+
+
+@lru_cache(maxsize=4)
+def _cosine(device: torch.device) -> Tensor:
+    """[8, 8] orthonormal DCT-II."""
+    k = torch.arange(8, dtype=torch.float64)
+    matrix = torch.cos(torch.pi * (2 * k[None] + 1) * k[:, None] / 16) / 2
+    matrix[0] /= 2**0.5
+    return matrix.float().to(device)
+
+
+@lru_cache(maxsize=4)
+def _tables(device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
+    """Quantisation of luma and chroma [8, 8] (JPEG, Annex K), and RGB to YCbCr (JFIF) without offset."""
+    luma = [
+        16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56,
+        14, 17, 22, 29, 51, 87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113, 92,
+        49, 64, 78, 87, 103, 121, 120, 101, 72, 92, 95, 98, 112, 100, 103, 99,
+    ]  # fmt: skip
+    chroma = torch.full((8, 8), 99.0)
+    chroma[:4, :4] = torch.tensor([[17, 18, 24, 47], [18, 21, 26, 66], [24, 26, 56, 99], [47, 66, 99, 99]])
+    turn = [[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]]
+    return (
+        torch.tensor(luma, dtype=torch.float32).view(8, 8).to(device),
+        chroma.to(device),
+        torch.tensor(turn).to(device),
+    )
