@@ -66,7 +66,7 @@ def test_the_page_has_the_papers_figures_beside_ours_and_says_what_was_not_run(s
     text, page = ((out / f"report.{kind}").read_text("utf-8") for kind in ("md", "html"))
     head = next(line for line in text.splitlines() if "envmap SSIM" in line)
     assert head.count("|") == text.splitlines()[text.splitlines().index(head) + 1].count("|")
-    assert "| w/ mat | paper | 0.52 | 0.811 | 17.175 | 20.048 |" in text
+    assert "| w/ mat | published | 0.52 | 0.811 | 17.175 | 20.048 |" in text
     assert "| w/ mat | paper predicted | – | – | – | 31.25 |" in text
     assert "Not run: it needs --data DIR with iiw." in text and "Not run yet." in text and "They need people." in text
     assert "No <glass> here." in text and "No &lt;glass&gt; here." in page

@@ -67,12 +67,12 @@ class Table:
 
     def grid(self, columns: dict[str, Column], row: dict[str, Any]) -> Iterator[list[str]]:
         """The head of the table, then for every line the paper's figures and ours."""
-        yield ["row", "whose", *(columns[key].title for key in self.columns), "samples"]
+        yield ["row", "method here", *(columns[key].title for key in self.columns), "samples"]
         means: dict[str, dict[str, float]] = row.get("means", {})
         for label, paper, methods in self.lines:
             if paper:
                 told = [*paper, *[None] * len(self.columns)][: len(self.columns)]
-                yield [str(label), "paper", *("–" if x is None else f"{x:g}" for x in told), ""]
+                yield [str(label), "published", *("–" if x is None else f"{x:g}" for x in told), ""]
             for method in filter(means.__contains__, methods):
                 found = [means[method].get(key) for key in self.columns]
                 cells = ("–" if x is None else f"{x:.{columns[k].digits}f}" for k, x in zip(self.columns, found))
