@@ -46,6 +46,8 @@ def test_predicted_maps_on_predicted_geometry_and_one_colour_of_light(sample):
     assert np.array_equal(neutral.depth, predicted.depth) and (neutral.materials.roughness == 0.5).all()
     found, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
     colours = np.unique(found.reshape(-1, 3), axis=0, return_counts=True)[1]
+    prior, none, _ = light.fit(sample, light.METHODS["prior predicted"], "auto", device="cpu")
+    assert none == 0 and prior.shape == found.shape and prior.std() > 0.05 * prior.mean() > 0
     assert steps == 0 and colours.max() > 0.5 * found.shape[0] * found.shape[1] and found.min() >= 0
 
 

@@ -16,10 +16,7 @@ from materialist.procedural.objects import shapes
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 from materialist.types import Array, Body, Prediction, Scene
 
-SHIFTS = {
-    "roughness+": ("roughness", 0.5), "roughness-": ("roughness", -0.5),
-    "metallic+": ("metallic", 0.5), "metallic-": ("metallic", -0.5),
-}  # fmt: skip
+SHIFTS = {f"{name}{sign}": (name, float(f"{sign}0.5")) for name in ("roughness", "metallic") for sign in "+-"}
 """The paper's "high" and "low" (Material Editing): what is shifted, and by how much."""
 ROOM = 0.25
 """What is left of a shift in [0, 1], at the least."""
@@ -140,8 +137,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator
     (body,) = insert(true_scene(sample), model, at).bodies
     placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
     cup = Item(placed, np.tile(body.surface.albedo, (2, 2, 1)), float(body.surface.roughness.mean()), 0.0)
-    glassy = kind != "insert"
-    cup, material = (_of_glass(cup, stage), "glass") if glassy else (cup, "as-is")
+    cup, material = (cup, "as-is") if kind == "insert" else (_of_glass(cup, stage), "glass")
     truth = staged(stage, [*stage.items, cup])
     mask = truth.seen == len(stage.items)
     yield Edit(kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask)

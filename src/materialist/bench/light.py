@@ -46,7 +46,8 @@ class Method:
     shape: str = "true"
     """The depth and normals that are given: `true` or `predicted`."""
     field: str | None = None
-    """Another light field than the preset's: mlp, mlp-uv, texels, sh; `constant` is one colour."""
+    """Another light field than the preset's: mlp, mlp-uv, texels, sh; without a fit `constant`, one colour, and
+    `prior`, the light that the network predicts."""
     height: int | None = None
     """Another height of the field's map than the preset's."""
     path_height: int = 256
@@ -62,6 +63,7 @@ METHODS = {
     "paper predicted": Method("paper", maps="predicted", shape="predicted"),
     "paper predicted w/o mat": Method("paper", maps="neutral", shape="predicted"),
     "constant predicted": Method(maps="predicted", shape="predicted", field="constant"),
+    "prior predicted": Method(maps="predicted", shape="predicted", field="prior"),
     "paper path": Method("paper", "path"),
     "paper path w/o mat": Method("paper", "path", maps="neutral"),
     "paper path 128x64": Method("paper", "path", path_height=64),
@@ -200,7 +202,7 @@ def fit(
     from materialist.fit.engine import PathEngine, prepared_envmap
     from materialist.fit.inversion import paste_visible_sky
     from materialist.fit.invert import FitSetup, prepare
-    from materialist.fit.light import envmap_field, fit_light
+    from materialist.fit.light import envmap_field, fit_light, start_light
     from materialist.fit.settings import preset
 
     photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
@@ -213,16 +215,18 @@ def fit(
         setup = FitSetup(photo, given, named, completion, envmap_height=height, seed=seed, device=device)
         prepared = prepare(setup)
         engine, mesh = prepared.fit.engine, prepared.renderer
-    problem, pixels_of_photo = engine.light_problem(given.materials), torch.from_numpy(photo.linear.reshape(-1, 3))
-    if method.field == "constant":
-        steps, envmap = 0, constant_light(problem, pixels_of_photo, height)
+    problem, target = engine.light_problem(given.materials), torch.from_numpy(photo.linear.reshape(-1, 3))
+    begin: Any = None if given.light is None else start_light(target, named.light, given.light, problem)
+    if method.field in ("constant", "prior"):
+        steps, found = 0, begin.radiance if method.field == "prior" else constant_light(problem, target)
     else:
         light = named.light
         light = replace(light, field=method.field or light.field, height=method.height or light.height)
-        field = envmap_field(light, seed=seed)
-        steps = fit_light(problem, pixels_of_photo, field, light, seed=seed).steps
-        envmap = prepared_envmap(field(max(light.height, 16)), height)
-    return paste_visible_sky(envmap, photo.linear, given.depth > 0, photo.camera), steps, mesh
+        field = envmap_field(light, seed=seed, start=begin and begin.radiance)
+        steps = fit_light(problem, target, field, light, start=begin, seed=seed).steps
+        found = field(max(light.height, 16))
+    envmap = paste_visible_sky(prepared_envmap(found, height), photo.linear, given.depth > 0, photo.camera)
+    return envmap, steps, mesh
 
 
 def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:
@@ -238,14 +242,14 @@ def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: st
     return replace(source[method.shape], materials=Materials(*(np.full_like(m, v) for m, v in maps)))
 
 
-def constant_light(problem: Any, photo: Any, height: int) -> Array:
-    """[height, 2 height, 3] of the colour that explains the photo [H W, 3] with the least square error."""
+def constant_light(problem: Any, photo: Any) -> Any:
+    """[h, 2h, 3] tensor of the colour that explains the photo [H W, 3] with the least square error."""
     import torch
 
     dark, lit = (problem.render(torch.full((problem.height, 2 * problem.height, 3), v)) for v in (0.0, 1.0))
     gain, missing = lit - dark, photo[problem.pixels] - dark
     colour = ((missing * gain).sum(0) / (gain**2).sum(0)).clamp(min=0)
-    return np.ascontiguousarray(colour.expand(height, 2 * height, 3).numpy())
+    return colour.expand(problem.height, 2 * problem.height, 3)
 
 
 def mirrored(sample: SyntheticSample) -> SyntheticSample:
