@@ -56,7 +56,7 @@ def test_nothing_is_asked_of_anyone_else(page, running):
     opened(page, running[0])
     for name in ("Open", "Light", "Objects", "Take away", "Look"):
         page.get_by_role("tab", name=name).click()
-    page.wait_for_selector("#report >> text=close to the photo")
+    page.wait_for_selector("#report >> text=dB from the photo")
     outside = [u for u in page.requested if not u.startswith((running[0], "data:", "blob:"))]
     assert not outside and len(page.requested) > 20 and not page.errors
     assert any("/heartbeat/" in url for url in page.requested)  # else it would be forgotten within a minute

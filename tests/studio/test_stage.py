@@ -9,7 +9,7 @@ from materialist.studio import stage, tasks
 
 def test_the_report_is_plain_and_harmless():
     text = stage.report(room())
-    assert "close to the photo" in text and "31.5 dB" in text and "too dark" in text and "40.0°" in text
+    assert "31.5 dB from the photo" in text and "too dark" in text and "40.0°" in text
     assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in stage.maps(room())) and len(stage.maps(room())) == 8
 
 

@@ -120,6 +120,7 @@ DEFAULT = FitSettings(
         ),
     ),
     light_grid=24,
+    rerender_spp=32,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
 

@@ -120,8 +120,8 @@ def report(scene: Scene) -> str:
     """How good the scene is, in Markdown and plain words."""
     metrics = scene.report.metrics
     value = metrics.get("rerender_psnr_path", float("nan"))
-    verdict = "close to the photo" if value > 28 else "only roughly the photo"
-    lines = [f"The re-rendering is **{verdict}** ({value:.1f} dB)."] if np.isfinite(value) else []
+    told = f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. Edits start from the photo."
+    lines = [told] if np.isfinite(value) else []
     camera = scene.camera
     source = {"exif": "from the photo's EXIF data", "default": "assumed", "option": "as chosen"}.get(
         scene.photo.fov_source, f"from the {scene.photo.fov_source}"
