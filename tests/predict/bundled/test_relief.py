@@ -33,3 +33,15 @@ def test_an_edge_stays_where_it_is_sharp():
     sharp = far.copy()
     sharp[10:40, 20:40] -= 0.5
     np.testing.assert_allclose(with_relief(sharp, normals, RAYS), sharp, atol=0.05)
+
+
+def test_a_steep_side_that_the_depth_flattens_has_no_steps():
+    """Normals that ask for more slope than the depth has mark no border of two surfaces: the side stays smooth."""
+    true, normals = _plane((1, 0, 0.7), 3.0)
+    rng = np.random.default_rng(0)
+    flat = 0.4 * true + 0.004 * rng.standard_normal(true.shape).astype(np.float32)
+    slope = np.diff(with_relief(flat, normals, RAYS), axis=1)
+    asked = np.diff(true, axis=1)
+    assert (np.abs(asked) > 0.015).any()
+    assert np.abs(slope - asked).max() < 0.6 * np.abs(asked).max()
+    assert np.abs(np.diff(slope, axis=1)).max() < 0.01

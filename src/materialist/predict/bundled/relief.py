@@ -12,7 +12,7 @@ from materialist.geometry.slopes import between, least_squares_change, slopes
 from materialist.types import Array
 
 STEP = 0.015
-"""Change of log depth from pixel to pixel, beyond the slope's, above which two surfaces meet; tuned by eye."""
+"""Change of log depth from pixel to pixel, beyond what the normals demand, above which two surfaces meet; by eye."""
 OPEN = 1e-3
 """Weight of such a pair; larger joins the two surfaces."""
 LENGTH = 10.0
@@ -39,8 +39,10 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
     pairs = []
     for near, far, asked in between(slopes(normal, rays)):
         both = known[near] & known[far]
-        wanted = (asked - (sharp[far] - sharp[near]))[both].astype(np.float64)
-        pairs.append((index[near][both], index[far][both], wanted, np.where(np.abs(wanted) > STEP, OPEN, 1.0)))
+        change = (sharp[far] - sharp[near])[both].astype(np.float64)
+        slope = asked[both].astype(np.float64)
+        weight = np.where(np.abs(change) > STEP + np.abs(slope), OPEN, 1.0)
+        pairs.append((index[near][both], index[far][both], slope - change, weight))
     first, second, wanted, weight = (np.concatenate(column) for column in zip(*pairs, strict=True))
     pull = np.full(int(known.sum()), LENGTH**-2)
     found = np.array(sharp, np.float32)
