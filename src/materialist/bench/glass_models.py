@@ -60,18 +60,19 @@ def true_background(scene: GlassScene, room: Array, envmap: Array) -> Background
 def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: float = 1.0) -> Background:
     """What the photo [H, W, 3] linear shows around the object, continued behind it as `edits.remove` does.
 
-    Surfaces go on as planes, the picture and the albedo by patches of their own; `gain` is the photo's exposure. The
-    albedo is found with the object there, closed as the photo tells, so that its shadow is not part of it.
+    Surfaces go on as planes, the picture by patches, the albedo with it; `gain` is the photo's exposure. The albedo
+    is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
     from scipy.ndimage import binary_dilation
 
-    from materialist.edits.remove.behind import SKY, behind
-    from materialist.edits.remove.filling import find_filling
+    from materialist.edits.remove.behind import behind
+    from materialist.edits.remove.patches import patched
+    from materialist.edits.remove.remove import carried
 
     hole = binary_dilation(scene.mask, np.ones((3, 3), bool))  # with the rim of mixed pixels
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
-    label, things = np.full(hole.shape, SKY), None
+    label, things = np.zeros(hole.shape, int), None
     if depth.any():
         plane = _planes(scene, depth, normal)
         continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
@@ -79,9 +80,9 @@ def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: f
         found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
         things = {"object": mesh(_body(scene, found, depth), painted(scene.item.albedo))}
     albedo = _albedo(scene, depth, normal, photo, envmap, things)
-    filling = find_filling(albedo, np.clip(photo * gain, 0, 1), hole, label, depth, scene.camera)
-    exposed, albedo = filling.radiance(photo * gain), filling.radiance(albedo)
-    return Background(np.where(hole[..., None], exposed / gain, photo).astype(np.float32), depth, normal, albedo)
+    filled = patched(np.clip(photo * gain, 0, 1), hole, ~hole, depth, label)
+    shown = np.where(hole[..., None], filled / gain, photo).astype(np.float32)
+    return Background(shown, depth, normal, np.minimum(carried(albedo, filled, hole), 1))
 
 
 def _albedo(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene, tetrahedron
 
+from materialist.color import srgb_levels
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.region import body_coverage
 from materialist.edits.remove.remove import remove
@@ -52,8 +53,41 @@ def test_the_composite_shows_the_wall_and_keeps_the_rest():
     wall = scene.photo.linear[far_from(MASK, 4)].mean(0)
     assert np.abs(picture[MASK].mean(0) / wall - 1).max() < 0.08
     far = far_from(MASK, 8)
-    same = (picture == scene.photo.original).all(-1)
-    assert same[far].mean() > 0.5 and np.abs(picture - scene.photo.original)[far].max() < 0.1
+    np.testing.assert_array_equal(picture[far], scene.photo.original[far])
+
+
+def levels_off(picture, photo, where):
+    """Share of the pixels of a mask that differ by 3 of 255 levels or more."""
+    return (np.abs(srgb_levels(picture).astype(int) - srgb_levels(photo)).max(-1) >= 3)[where].mean()
+
+
+@pytest.mark.parametrize("white", [False, True])
+def test_outside_the_hole_the_photo_stays(white):
+    """Also where it is clipped, so that the hole is filled with what was there."""
+    scene = rendered_scene(native=2)
+    if white:
+        photo = scene.photo
+        lit = np.maximum(photo.linear, np.where(MASK, 0, 1)[..., None]).astype(np.float32)
+        lit[14:18, 14:20] = 1
+        original = np.kron(lit, np.ones((2, 2, 1), np.float32))
+        scene = replace(scene, photo=replace(photo, linear=lit, original=original))
+    removed = remove(scene, MASK, shadow=0)
+    picture = composite(scene, removed, spp=8)
+    far = np.kron(far_from(MASK, 3), np.ones((2, 2), bool))
+    assert levels_off(picture, scene.photo.original, far) == 0
+    np.testing.assert_array_equal(picture[far], scene.photo.original[far])
+
+
+def test_a_hole_that_little_is_known_of_is_told():
+    scene = flat_scene()
+    assert not remove(scene, MASK).report.warnings
+    large, cut = np.zeros((36, 48), bool), np.zeros((36, 48), bool)
+    large[6:30, 8:40] = True
+    cut[30:, 10:20] = True
+    for mask, words in ((large, "of the photo. What"), (cut, "of its outline lies on the frame")):
+        (note,) = remove(scene, mask).report.warnings
+        assert words in note and "give it as the background" in note
+    assert not remove(scene, large, background=scene.photo.linear).report.warnings
 
 
 def test_what_was_put_before_it_stays_whole():

@@ -90,6 +90,7 @@ def compared(scene: Scene, edited: Scene) -> Scene:
     if edited.photo is scene.photo:
         return base
     hole = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
+    hole |= (edited.rerender != scene.rerender).any(-1)  # white may be filled with white
     old, new = scene.materials, edited.materials
     materials = Materials(
         np.where(hole[..., None], new.albedo, old.albedo),

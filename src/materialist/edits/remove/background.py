@@ -1,23 +1,23 @@
-"""A picture of what is behind the object, given or made by a diffusion model (paper, Background Inpainting)."""
+"""A picture of what is behind the object: patches of the photo, a given one, or a diffusion model's (paper, Background
+Inpainting)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from materialist.color import srgb_levels, srgb_to_linear
-from materialist.edits.core.renderer import EditRenderer, denoised
-from materialist.edits.remove.filling import Filling
-from materialist.edits.remove.native import laid, outline, resized
+from materialist.edits.remove.behind import HiddenGeometry
+from materialist.edits.remove.native import resized
+from materialist.edits.remove.patches import patched
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.io.image import same_aspect
 from materialist.options import Removal
 from materialist.predict.weights import INSTEAD
-from materialist.types import Array, Materials, Photo, Scene
+from materialist.types import Array, Scene
 
 Inpaint = Callable[[Array, Array], Array]
 """inpaint(photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear picture without the hole."""
@@ -27,21 +27,24 @@ LONGEST = 768
 """Longer side at which the model works; it was trained at 512."""
 
 
-def given_picture(scene: Scene, options: Removal, hole: Array) -> tuple[Array | None, list[str]]:
-    """([h, w, 3] linear picture of what is behind a hole [H, W] bool, None for none; warnings of its file).
+def picture_behind(
+    scene: Scene, options: Removal, hole: Array, usable: Array, found: HiddenGeometry
+) -> tuple[Array, str, list[str]]:  # fmt: skip
+    """([h, w, 3] linear picture of what is behind a hole [H, W] bool, what made it, warnings of its file).
 
-    Raises InputError for a picture that is none of this view; see `inpainter`.
+    usable [H, W] bool: what patches may come from. found: what stands there. Raises InputError for a picture that
+    is none of this view; see `inpainter` and `patches.patched`.
     """
     background, inpaint = options.background, options.inpaint
-    notes: list[str] = []
     if background is not None and inpaint is not None:
         raise InputError("Give a background or an inpainter, not both.")
     if inpaint is not None:
         if isinstance(inpaint, str):
             inpaint = inpainter(inpaint, seed=options.seed, device=options.device)
-        return np.asarray(inpaint(scene.photo.linear, hole), np.float32), notes
+        return np.asarray(inpaint(scene.photo.linear, hole), np.float32), "inpainter", []
     if background is None:
-        return None, notes
+        return patched(scene.photo.original, hole, usable, found.depth, found.label, options.seed), "patches", []
+    notes: list[str] = []
     if isinstance(background, str | Path):
         from materialist.io.photo import decode_photo
 
@@ -56,39 +59,7 @@ def given_picture(scene: Scene, options: Removal, hole: Array) -> tuple[Array | 
         )
     if not (np.isfinite(picture).all() and picture.min() >= 0):
         raise InputError("The background has negative or infinite values; give a linear or sRGB picture.")
-    return picture, notes
-
-
-def with_picture(scene: Scene, filling: Filling, picture: Array) -> tuple[Materials, Photo, Array]:
-    """Materials, photo and re-rendering with a picture [h, w, 3] linear in the hole.
-
-    A picture says nothing about shine: what it shows is matt. The albedo is a first guess, see `matched`.
-    """
-    hole, old = filling.hole, filling.materials(scene.materials)
-    rough = np.where(hole, np.maximum(old.roughness, 0.6), old.roughness).astype(np.float32)
-    metal = np.where(hole, 0, old.metallic).astype(np.float32)
-    albedo = np.where(hole[..., None], np.maximum(old.albedo, 0.05), old.albedo).astype(np.float32)
-    linear = np.where(hole[..., None], resized(picture, hole.shape), scene.photo.linear).astype(np.float32)
-    share = outline(hole, scene.photo.original.shape[:2])
-    original = laid(resized(picture, share.shape), share, scene.photo.original)
-    return Materials(albedo, rough, metal), replace(scene.photo, linear=linear, original=original), linear
-
-
-def matched(removed: Scene, hole: Array, picture: Array, fitted: Scene) -> Scene:
-    """The scene with the albedo in a hole [H, W] bool that makes it look like a picture [h, w, 3] in the fitted light.
-
-    A rendering says how far a guess is off; for a matt surface the radiance goes with the albedo.
-    """
-    known = replace(removed, envmap=fitted.envmap, lamps=fitted.lamps, bodies=fitted.bodies)
-    wanted = resized(picture, hole.shape)
-    for _ in range(3):
-        render, _ = EditRenderer(known).pair(known)
-        seen = denoised(render(24, 1), removed.materials.albedo, removed.normal)
-        factor = np.clip((wanted + 0.005) / (seen + 0.005), 0.1, 10)
-        albedo = np.where(hole[..., None], known.materials.albedo * factor, known.materials.albedo)
-        albedo = np.clip(albedo, 0.005, 1).astype(np.float32)
-        known = replace(known, materials=replace(known.materials, albedo=albedo))
-    return replace(removed, materials=known.materials)
+    return picture, "background", notes
 
 
 def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30) -> Inpaint:

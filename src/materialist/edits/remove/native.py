@@ -1,4 +1,4 @@
-"""A hole filled at working size, at the photo's native size with the detail of its sources."""
+"""A picture in a hole of the photo, at working and at native size."""
 
 from __future__ import annotations
 
@@ -6,35 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edits.composite.upsample import strips
 from materialist.geometry.silhouette import window
 from materialist.types import Array, Photo
 
 
-def with_hole(photo: Photo, linear: Array, hole: Array, source: Array | None) -> Photo:
-    """The photo with a hole [H, W] bool filled by `linear` [H, W, 3], at native size with the detail of its sources.
-
-    `source` [H, W] int: row-major source of each pixel, None where nothing is copied.
-    """
-    native, linear = photo.original.shape[:2], linear.astype(np.float32)
-    if native == hole.shape:
-        return replace(photo, linear=linear, original=np.where(hole[..., None], linear, photo.original))
-    share, original = outline(hole, native), photo.original.copy()
-    box, columns = window(hole, native)
-    for rows in strips(box.stop, start=box.start):
-        part = (rows, columns)
-        picture = np.maximum(_enlarged(photo, linear, source, np.mgrid[part]), 0)
-        original[part] = laid(picture, share[part], photo.original[part])
+def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
+    """The photo with a picture [h, w, 3] linear of any size in the hole [H, W] bool; elsewhere bit for bit itself."""
+    original, share = photo.original.copy(), outline(hole, photo.original.shape[:2])
+    box = window(hole, share.shape)
+    over, large = share[box][..., None], resized(picture, share.shape)[box]
+    original[box] = np.where(over > 0, over * large + (1 - over) * original[box], original[box])
+    linear = np.where(hole[..., None], resized(picture, hole.shape), photo.linear).astype(np.float32)
     return replace(photo, linear=linear, original=original)
 
 
-def laid(picture: Array, share: Array, photo: Array) -> Array:
-    """[H0, W0, 3] a picture over the photo by its share [H0, W0]; bit for bit the photo where that is 0."""
-    over = share[..., None]
-    return np.where(over > 0, over * picture + (1 - over) * photo, photo).astype(np.float32)
-
-
-def outline(mask: Array, native: tuple[int, int]) -> Array:
+def outline(mask: Array, native: tuple[int, ...]) -> Array:
     """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards."""
     import cv2
 
@@ -56,24 +42,3 @@ def resized(picture: Array, shape: tuple[int, ...]) -> Array:
         return picture.copy()
     how = cv2.INTER_AREA if picture.shape[0] > shape[0] else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(np.ascontiguousarray(picture, np.float32), shape[1::-1], interpolation=how))
-
-
-def _enlarged(photo: Photo, linear: Array, source: Array | None, pixels: Array) -> Array:
-    """[h, w, 3] `linear` at native `pixels` [2, h, w], with what the photo has beyond working size at their sources."""
-    working, native = np.array(linear.shape[:2]), np.array(photo.original.shape[:2])
-    picture = _sampled(linear, pixels, native)
-    if source is None:
-        return picture
-    own = tuple(np.minimum((v * w) // n, w - 1) for v, w, n in zip(pixels, working, native))
-    shifts = np.stack(np.divmod(source[own], working[1])) - np.stack(own)
-    limits = native[:, None, None] - 1
-    at = np.clip(pixels + np.round(shifts * (native / working)[:, None, None]).astype(int), 0, limits)
-    return picture + photo.original[at[0], at[1]] - _sampled(photo.linear, at, native)
-
-
-def _sampled(values: Array, pixels: Array, native: Array) -> Array:
-    """[h, w, 3] a working picture [H, W, 3] at native pixels [2, h, w], linearly."""
-    import cv2
-
-    y, x = (((v + 0.5) * w / n - 0.5).astype(np.float32) for v, w, n in zip(pixels, values.shape, native))
-    return np.asarray(cv2.remap(np.ascontiguousarray(values), x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))

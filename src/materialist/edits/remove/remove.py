@@ -10,58 +10,68 @@ import numpy as np
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import denoised
-from materialist.edits.remove.background import given_picture, matched, with_picture
+from materialist.edits.remove.background import picture_behind
 from materialist.edits.remove.behind import behind
-from materialist.edits.remove.filling import find_filling
-from materialist.edits.remove.hole import make_hole
+from materialist.edits.remove.hole import evidence_notes, make_hole
 from materialist.edits.remove.native import with_hole
+from materialist.geometry.membrane import membrane
 from materialist.options import Removal
-from materialist.types import Array, Scene
+from materialist.types import Array, Materials, Scene
+
+FLOOR = 0.05
+"""Radiance up to which an albedo or a re-rendering differs from the photo by a sum, beyond it by a factor (by eye)."""
 
 
 def remove(
     scene: Scene, mask: Array, options: Removal | None = None, *, fitted: Scene | None = None, **values: Any
 ) -> Scene:
-    """The scene without the object under a mask: surfaces go on behind it, and so do materials and the photo.
+    """The scene without the object under a mask: photo, surfaces and materials go on behind it.
 
-    In the result `photo` and `rerender` are filled alike, from the same places: their difference is what the fit
-    misses of the surroundings. `composite` takes both as they are.
+    In the result `photo` and `rerender` are filled alike: their difference is what the fit misses of the
+    surroundings. `composite` takes both as they are, so that outside the hole the photo stays bit for bit.
 
     mask: [H, W] bool, or weights in [0, 1], at working size. options, values: `Removal`, or single fields of it.
-    fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
+    fitted: the scene before its edits: the photo does not show what they put there.
     Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
-    of the photo; a background of another aspect. SetupError, WeightsError: a diffusion model that is not there.
+    of the photo; a background of another aspect. SetupError, WeightsError: a library or model that is not there.
     """
     from materialist.geometry.build import rebuilt
 
     options, fitted = Removal.given(options, **values), fitted or scene
-    photographed = replace(scene, bodies=fitted.bodies)  # the photo does not show what edits since then put there
+    photographed = replace(scene, bodies=fitted.bodies)
     bodies = body_coverage(photographed) > 0 if photographed.bodies else np.zeros(scene.depth.shape, bool)
     hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow, bodies=bodies)
     front = np.where(hole.object, scene.depth, 0)
     found = behind(scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera)
-    filling = find_filling(
-        scene.materials.albedo, scene.photo.linear, hole.painted, found.label, found.depth, scene.camera,
-        seed=options.seed, usable=~bodies,
-    )  # fmt: skip
-    picture, warnings = given_picture(scene, options, hole.painted)
-    if picture is not None:
-        materials, photo, rerender = with_picture(scene, filling, picture)
-    else:
-        shown = denoised(scene.rerender, scene.materials.albedo, scene.normal)
-        materials = filling.materials(scene.materials)
-        photo = with_hole(scene.photo, filling.radiance(scene.photo.linear), hole.painted, filling.source)
-        rerender = filling.radiance(shown)
-    geometry = rebuilt(scene, found.depth, found.normal, scene.camera)
+    picture, how, warnings = picture_behind(scene, options, hole.painted, ~bodies, found)
+    photo = with_hole(scene.photo, picture, hole.painted)
+    shown = denoised(scene.rerender, scene.materials.albedo, scene.normal)
     removed = replace(
-        scene, materials=materials, depth=found.depth, normal=found.normal, geometry=geometry, photo=photo,
-        rerender=rerender,
+        scene, photo=photo, depth=found.depth, normal=found.normal,
+        geometry=rebuilt(scene, found.depth, found.normal, scene.camera),
+        materials=carried_materials(scene.materials, photo.linear, hole.painted),
+        rerender=np.where(hole.painted[..., None], carried(shown, photo.linear, hole.painted), scene.rerender),
     )  # fmt: skip
-    if picture is not None:
-        removed = matched(removed, hole.painted, picture, fitted)
-    how = "background" if options.background is not None else ("inpainter" if options.inpaint else "patches")
     what = {
         "filled_by": how, "pixels": int(hole.object.sum()), "grow": options.grow,
         "shadow": "auto" if options.shadow is None else options.shadow,
     }  # fmt: skip
+    if how == "patches":
+        warnings += evidence_notes(hole)
     return noted(warned(removed, *warnings), "remove", what)
+
+
+def carried(values: Array, photo: Array, hole: Array) -> Array:
+    """[H, W, 3] float32 albedo or radiance with the hole [H, W] bool filled as a filled photo [H, W, 3] is.
+
+    Their ratio around the hole is spanned over it: light is smooth, and the texture is the photo's.
+    """
+    ratio = membrane(np.log((values + FLOOR) / (photo + FLOOR)), ~hole)
+    told = np.maximum((photo + FLOOR) * np.exp(ratio) - FLOOR, 0)
+    return np.where(hole[..., None], told, values).astype(np.float32)
+
+
+def carried_materials(old: Materials, photo: Array, hole: Array) -> Materials:
+    """Materials with the hole filled as the photo [H, W, 3] is; roughness and metallic are spanned."""
+    spanned = (membrane(np.clip(v, 0, 1), ~hole) for v in (old.roughness, old.metallic))
+    return Materials(np.minimum(carried(old.albedo, photo, hole), 1), *spanned)
