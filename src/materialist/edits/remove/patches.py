@@ -52,7 +52,9 @@ def patched(
     shape = tuple(max(1, round(n * scale)) for n in native)
     picture = resized(photo, shape)
     near = grown(hole, max(8, round(SETTINGS.near * float(np.sqrt(hole.sum())))))
-    usable = usable & (near | np.isin(label, np.unique(label[hole])))
+    behind = np.unique(label[hole])
+    planes = behind[behind >= 0]  # the rest is many things
+    usable = usable & (near | np.isin(label, planes if planes.size else behind))
     gap, kept = (resized(m.astype(np.float32), shape) > 0 for m in (hole, ~usable & ~hole))
     kept &= ~gap
     top = max(1.0, float(picture.max()))
