@@ -1,112 +1,187 @@
-"""What lies between radiance and the pixels of a JPEG: camera, developing, compression; all numpy, one picture."""
+"""What lies between radiance and the pixels of a JPEG: camera, developing, compression; batches of tensors."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
 
-from materialist.color import linear_to_srgb, luminance, srgb_to_linear
 from materialist.io.samples import Sample
 from materialist.types import Array
 
+_MULTIPLE = 16
+"""Sides of pictures are multiples of this: JPEG's blocks of chroma."""
+_LUMINANCE = (0.2126, 0.7152, 0.0722)
 
-def photographic(image: Array, rng: np.random.Generator) -> Array:
-    """The picture [H, W, 3] as an 8-bit photo of the scene would decode: float32 linear in [0, 1].
 
-    White balance, exposure, lens blur, vignetting, sensor noise, a tone curve, saturation, 8 bits and JPEG, each at
-    random and often weak, then back to linear by the sRGB curve: what a reader of photos hands to a predictor. `image`
-    is linear Rec.709 radiance, >= 0, exposed so that white is 1; may exceed 1.
-    """
-    picture = np.nan_to_num(np.asarray(image, np.float32), posinf=1e4)
-    picture = white_balanced(picture, rng) * np.float32(2 ** rng.normal(0, 0.2))
-    picture = _vignetted(_blurred(np.minimum(picture, 8), rng), rng)
-    picture = _noisy(picture, rng)
-    return srgb_to_linear(_compressed(_developed(picture, rng), rng))
+def photographic(image: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+    """(photo, gains) of one picture [H, W, 3] of any size, as `developed`; [H, W, 3] and [3] float32."""
+    height, width = image.shape[:2]
+    more = -height % _MULTIPLE, -width % _MULTIPLE
+    padded = np.pad(np.asarray(image, np.float32), ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
+    random = torch.Generator().manual_seed(int(rng.integers(2**63)))
+    photo, gains = developed(torch.from_numpy(padded).permute(2, 0, 1)[None], random)
+    shown = photo[0].permute(1, 2, 0)[:height, :width]
+    return np.ascontiguousarray(shown.numpy()), gains.view(3).numpy()
 
 
 def as_photo(sample: Sample, rng: np.random.Generator) -> Sample:
-    """The sample with its picture as `photographic` makes it, without its shading, which no longer fits."""
-    return replace(sample, image=np.clip(photographic(sample.image, rng), 0, 1).astype(np.float32), shading=None)
+    """The sample with its picture as a photo, its light in the photo's units, and no shading, which no longer fits."""
+    image, gains = photographic(sample.image, rng)
+    light = None if sample.light is None else sample.light * np.append(gains, np.float32(1))
+    return replace(sample, image=image, shading=None, light=light)
 
 
-def white_balanced(image: Array, rng: np.random.Generator) -> Array:
-    """Gains that pull the picture a little towards grey, as cameras guess; now and then a cast of the light stays.
+def developed(image: Tensor, random: torch.Generator) -> tuple[Tensor, Tensor]:
+    """(photos, gains): the pictures [B, 3, H, W] as 8-bit photos would decode, linear in [0, 1], and white balance and
+    exposure [B, 3, 1, 1] that they got.
 
-    Samples are balanced already.
+    Sides are multiples of 16. White balance, exposure, blur, vignetting, noise, tone curve, saturation, 8 bits and
+    JPEG, each at random and often weak. `image` is linear Rec.709 radiance, exposed so that white is 1.
     """
-    lit = np.minimum(image, 1)
-    grey = np.mean(lit**2, (0, 1)) ** 0.5 + 1e-4  # bright areas count more, as they do in cameras
-    gains = (grey.mean() / grey) ** rng.uniform(0.0, 0.35)
-    gains = np.clip(gains, 0.4, 2.5) * np.exp(rng.normal(0, 0.04, 3))
-    if rng.random() < 0.35:  # a cast from amber to blue, as lamps and shade leave it, or a little to green
-        warm, green = rng.normal(0, 0.16), rng.normal(0, 0.03)
-        gains = gains * np.exp([warm, green, -warm])
-    gains = gains / (gains * grey).sum() * grey.sum()
-    return (image * gains).astype(np.float32)
+    draw = _Draw(len(image), image.device, random)
+    picture = image.nan_to_num(posinf=1e4).clamp(min=0)
+    gains = _gains(picture, draw) * torch.exp2(draw.normal() * 0.2)
+    picture = _vignetted(_blurred((picture * gains).clamp(max=8), draw), draw)
+    encoded = _tone(_noisy(picture, draw), draw)
+    encoded = _compressed(encoded, draw)
+    linear = torch.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+    return linear, gains
 
 
-def _blurred(image: Array, rng: np.random.Generator) -> Array:
-    """Lens and scaling: none or a little softness; at times sharpened again."""
-    import cv2
+class _Draw:
+    """Random numbers of pictures, [B, channels, 1, 1]."""
 
-    if rng.random() < 0.3:
-        return image
-    image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.25, 0.9))
-    if rng.random() < 0.3:
-        soft = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.7, 1.5))
-        image = np.maximum(image + rng.uniform(0.1, 0.6) * (np.minimum(image, 1) - np.minimum(soft, 1)), 0)
-    return image
+    def __init__(self, count: int, device: torch.device, random: torch.Generator):
+        self.count, self.device, self.random = count, device, random
 
+    def uniform(self, low: float = 0.0, high: float = 1.0, channels: int = 1) -> Tensor:
+        shape = self.count, channels, 1, 1
+        return low + (high - low) * torch.rand(shape, generator=self.random, device=self.device)
 
-def _vignetted(image: Array, rng: np.random.Generator) -> Array:
-    """Darker towards the corners, by up to a third."""
-    if rng.random() < 0.5:
-        return image
-    h, w = image.shape[:2]
-    y, x = (np.arange(h) + 0.5) / h - 0.5, (np.arange(w) + 0.5) / w - 0.5
-    r2 = 2 * (y[:, None] ** 2 + x[None] ** 2)  # 1 in the corners
-    return image * (1 - rng.uniform(0, 0.33) * r2)[..., None].astype(np.float32)
+    def normal(self, channels: int = 1) -> Tensor:
+        return torch.randn((self.count, channels, 1, 1), generator=self.random, device=self.device)
+
+    def chance(self, probability: float) -> Tensor:
+        return self.uniform() < probability
+
+    def noise(self, like: Tensor) -> Tensor:
+        return torch.randn(like.shape, generator=self.random, device=self.device)
 
 
-def _noisy(image: Array, rng: np.random.Generator) -> Array:
-    """Shot noise and read noise, a part of it in blotches as denoising cameras leave it."""
-    if rng.random() < 0.25:
-        return image
-    import cv2
-
-    shot, read = 10 ** rng.uniform(-4.8, -2.9), 10 ** rng.uniform(-4, -2.2)
-    noise = rng.standard_normal(image.shape, np.float32)
-    if rng.random() < 0.4:
-        noise = cv2.GaussianBlur(noise, (0, 0), rng.uniform(0.4, 0.8)) * 1.6
-    deviation = np.sqrt(shot * np.minimum(image, 1) + (read * 0.3) ** 2)
-    return np.maximum(image + noise * deviation, 0).astype(np.float32)
+def _gains(image: Tensor, draw: _Draw) -> Tensor:
+    grey = image.clamp(max=1).square().mean((2, 3), keepdim=True).sqrt() + 1e-4
+    gains = (grey.mean(1, keepdim=True) / grey) ** draw.uniform(0, 0.35)
+    gains = gains.clamp(0.4, 2.5) * torch.exp(draw.normal(3) * 0.04)
+    warm, green = draw.normal() * 0.16, draw.normal() * 0.03
+    cast = torch.exp(torch.cat([warm, green, -warm], 1))
+    gains = torch.where(draw.chance(0.35), gains * cast, gains)
+    return gains * grey.sum(1, keepdim=True) / (gains * grey).sum(1, keepdim=True)
 
 
-def _developed(image: Array, rng: np.random.Generator) -> Array:
+def _smoothed(image: Tensor, sigma: Tensor, radius: int = 4) -> Tensor:
+    """Gaussian blur by sigma [B, 1, 1, 1] pixels."""
+    batch, channels, height, width = image.shape
+    place = torch.arange(-radius, radius + 1, device=image.device)
+    kernel = torch.exp(-place.square() / (2 * sigma.view(-1, 1) ** 2))
+    kernel = (kernel / kernel.sum(1, keepdim=True)).repeat_interleave(channels, 0)  # [B C, n]
+    flat = F.pad(image.reshape(1, -1, height, width), (radius,) * 4, mode="reflect")
+    flat = F.conv2d(flat, kernel[:, None, None], groups=batch * channels)
+    return F.conv2d(flat, kernel[:, None, :, None], groups=batch * channels).view_as(image)
+
+
+def _blurred(image: Tensor, draw: _Draw) -> Tensor:
+    soft = _smoothed(image, draw.uniform(0.25, 0.9))
+    softer = _smoothed(soft.clamp(max=1), draw.uniform(0.7, 1.5))
+    sharp = (soft + draw.uniform(0.1, 0.6) * (soft.clamp(max=1) - softer)).clamp(min=0)
+    changed = torch.where(draw.chance(0.3), sharp, soft)
+    return torch.where(draw.chance(0.3), image, changed)
+
+
+def _vignetted(image: Tensor, draw: _Draw) -> Tensor:
+    height, width = image.shape[2:]
+    y = (torch.arange(height, device=image.device) + 0.5) / height - 0.5
+    x = (torch.arange(width, device=image.device) + 0.5) / width - 0.5
+    r2 = 2 * (y[:, None] ** 2 + x[None] ** 2)
+    amount = torch.where(draw.chance(0.5), torch.zeros_like(draw.uniform()), draw.uniform(0, 0.33))
+    return image * (1 - amount * r2)
+
+
+def _noisy(image: Tensor, draw: _Draw) -> Tensor:
+    shot, read = 10 ** draw.uniform(-4.8, -2.9), 10 ** draw.uniform(-4, -2.2)
+    noise = draw.noise(image)
+    blotched = _smoothed(noise, draw.uniform(0.4, 0.8), 2) * 1.6
+    noise = torch.where(draw.chance(0.4), blotched, noise)
+    deviation = (shot * image.clamp(max=1) + (read * 0.3) ** 2).sqrt()
+    return torch.where(draw.chance(0.25), image, (image + noise * deviation).clamp(min=0))
+
+
+def _tone(image: Tensor, draw: _Draw) -> Tensor:
     """sRGB-encoded values in [0, 1]: plain, with a shoulder for highlights, with contrast and saturation."""
-    kind = rng.random()
-    if kind >= 0.35:
-        knee = rng.uniform(0.5, 0.9)  # values above bend towards white instead of being cut
-        bent = knee + (1 - knee) * (1 - np.exp(-(image - knee) / (1 - knee)))
-        image = np.where(image > knee, bent, image)
-    grey = luminance(image)[..., None]
-    encoded = linear_to_srgb(np.maximum(grey + (image - grey) * rng.uniform(0.8, 1.3), 0))
-    if kind >= 0.5:
-        curve = encoded * encoded * (3 - 2 * encoded)
-        encoded = encoded + rng.uniform(-0.25, 0.8) * (curve - encoded)
-    if rng.random() < 0.4:
-        encoded = encoded ** np.float32(np.exp(rng.normal(0, 0.12)))
-    return np.clip(encoded, 0, 1)
+    kind, knee = draw.uniform(), draw.uniform(0.5, 0.9)
+    bent = knee + (1 - knee) * (1 - torch.exp(-(image - knee) / (1 - knee)))
+    image = torch.where((kind >= 0.35) & (image > knee), bent, image)
+    weight = image.new_tensor(_LUMINANCE).view(1, 3, 1, 1)
+    grey = (image * weight).sum(1, keepdim=True)
+    image = (grey + (image - grey) * draw.uniform(0.8, 1.3)).clamp(0, 1)
+    encoded = torch.where(image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
+    curve = encoded * encoded * (3 - 2 * encoded)
+    encoded = torch.where(kind >= 0.5, encoded + draw.uniform(-0.25, 0.8) * (curve - encoded), encoded)
+    gamma = torch.exp(draw.normal() * 0.12)
+    return torch.where(draw.chance(0.4), encoded.clamp(min=1e-6) ** gamma, encoded).clamp(0, 1)
 
 
-def _compressed(encoded: Array, rng: np.random.Generator) -> Array:
-    """8 bits and, mostly, JPEG; [H, W, 3] in [0, 1]."""
-    import cv2
+def _compressed(encoded: Tensor, draw: _Draw) -> Tensor:
+    """8 bits and, mostly, JPEG with chroma at half resolution."""
+    pixels = (encoded * 255).round()
+    quality = torch.where(draw.chance(0.5), draw.uniform(55, 98), draw.uniform(85, 100)).floor()
+    scale = torch.where(quality < 50, 50 / quality, 2 - quality / 50)
+    luma, chroma, turn = _tables(encoded.device)
+    ycc = torch.einsum("ij,bjhw->bihw", turn, pixels)
+    bright = _coded(ycc[:, :1] - 128, luma, scale) + 128
+    colours = _coded(F.avg_pool2d(ycc[:, 1:], 2), chroma, scale)
+    colours = F.interpolate(colours, scale_factor=2, mode="bilinear", align_corners=False)
+    back = torch.einsum("ij,bjhw->bihw", torch.linalg.inv(turn), torch.cat([bright, colours], 1))
+    return torch.where(draw.chance(0.75), back.round().clamp(0, 255), pixels) / 255
 
-    pixels = (encoded * 255 + 0.5).astype(np.uint8)
-    if rng.random() < 0.75:
-        quality = int(rng.uniform(55, 98) if rng.random() < 0.5 else rng.uniform(85, 100))
-        _, packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-        return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR), np.float32)[..., ::-1] / 255
-    return pixels.astype(np.float32) / 255
+
+def _coded(plane: Tensor, table: Tensor, scale: Tensor) -> Tensor:
+    """Planes [B, C, H, W] after the quantisation of the cosine transform of their 8 x 8 blocks."""
+    batch, channels, height, width = plane.shape
+    cosine = _cosine(plane.device)
+    blocks = plane.view(batch, channels, height // 8, 8, width // 8, 8)
+    found = torch.einsum("ui,bcyixj,vj->bcyuxv", cosine, blocks, cosine)
+    step = (table * scale.view(-1, 1, 1)).round().clamp(1, 255).view(batch, 1, 1, 8, 1, 8)
+    found = (found / step).round() * step
+    return torch.einsum("ui,bcyuxv,vj->bcyixj", cosine, found, cosine).reshape(plane.shape)
+
+
+@lru_cache(maxsize=4)
+def _cosine(device: torch.device) -> Tensor:
+    """[8, 8] orthonormal DCT-II."""
+    k = torch.arange(8, dtype=torch.float64)
+    matrix = torch.cos(torch.pi * (2 * k[None] + 1) * k[:, None] / 16) / 2
+    matrix[0] /= 2**0.5
+    return matrix.float().to(device)
+
+
+@lru_cache(maxsize=4)
+def _tables(device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
+    """Quantisation of luma and chroma [8, 8] (JPEG, Annex K), and RGB to YCbCr (JFIF) without offset."""
+    luma = [
+        16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56,
+        14, 17, 22, 29, 51, 87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113, 92,
+        49, 64, 78, 87, 103, 121, 120, 101, 72, 92, 95, 98, 112, 100, 103, 99,
+    ]  # fmt: skip
+    chroma = torch.full((8, 8), 99.0)
+    chroma[:4, :4] = torch.tensor([[17, 18, 24, 47], [18, 21, 26, 66], [24, 26, 56, 99], [47, 66, 99, 99]])
+    turn = [[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]]
+    return (
+        torch.tensor(luma, dtype=torch.float32).view(8, 8).to(device),
+        chroma.to(device),
+        torch.tensor(turn).to(device),
+    )

@@ -84,7 +84,7 @@ def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None
         arrays, rng = read_arrays(path), np.random.default_rng([int(path.stem), 4])
         if "thing" not in arrays:
             raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
-        linear = np.clip(photographic(read_sample(path).image, rng), 0, 1).astype(np.float32)
+        linear, _ = photographic(read_sample(path).image, rng)
         camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
         found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
         return {

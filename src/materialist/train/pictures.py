@@ -1,7 +1,6 @@
 """Batches of the bundled network, made where it is trained: pictures in memory, changed at random by whole batches.
 
-What `augment` and `procedural.photographic` do to one picture with numpy, here on [B, C, H, W] tensors: a card that
-waits for processors learns nothing.
+All on [B, C, H, W] tensors of the training's device: a card that waits for processors learns nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from materialist.errors import InputError
 from materialist.io.samples import Source
-from materialist.train.development import developed
+from materialist.procedural.photographic import developed
 from materialist.train.maps import Pictures
 from materialist.train.stream import ATTEMPTS
 from materialist.train.task import Batch
