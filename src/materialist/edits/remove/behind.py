@@ -25,7 +25,7 @@ class ContinuationSettings:
 
     ring: float = 0.1  # width, in sizes, of the ring around the hole whose surfaces may go on
     share: float = 0.01  # least part of that ring of a surface that goes on
-    firm: float = 0.5  # part of the ring from which planes leave nothing hidden to what is no plane; 12 pasted objects
+    firm: float = 0.5  # part of the ring from which planes leave nothing hidden to what is no plane; 22 pasted objects
     window: float = 0.4  # width, in sizes, of the surroundings that are looked at
     fades: float = 0.2  # distance from the hole, in sizes, at which a pixel counts 1 / e for lines between surfaces
     straight: float = 0.9  # least part of the surroundings that such lines must sort rightly; else a membrane does
