@@ -203,8 +203,8 @@ class _Run:
 
     def _end(self, task: PhotoTask, event: str, facts: dict[str, Any]) -> None:
         tries = self._tries.get(task.id, 0)
+        self._ended[task.id] = event  # first, as in the ledger: Ctrl-C may come while the entry goes to the disk
         self._ledger.append(event, id=task.id, name=task.name, attempts=tries, **{**self._known(task), **facts})
-        self._ended[task.id] = event
         if event == FAILED:
             line = f"failed: {facts['reason']}"
         else:
