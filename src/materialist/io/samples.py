@@ -23,6 +23,10 @@ Progress = Callable[[str, int, int], None]
 """Told (what, how many are done, how many there are)."""
 
 
+LIGHT_ROWS = 16
+"""Rows of the map of the light around a sample."""
+
+
 @dataclass(frozen=True)
 class Sample:
     """One picture and its true maps, in the conventions of the project."""

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from materialist.color import linear_to_srgb, luminance
+from materialist.io.samples import LIGHT_ROWS
 from materialist.procedural import outdoors, packing, rooms
 from materialist.procedural.options import SPLITS, DataSetOptions
 from materialist.procedural.world import World
@@ -15,8 +16,6 @@ from materialist.types import Array, Camera
 
 PROBE = 4
 """Label rays a pixel and axis."""
-LIGHT_ROWS = 16
-"""Rows of the map of the light around a scene."""
 LIGHT_SPP = 128
 """Rays of each of its texels."""
 LIGHT_HIDDEN = 0.1

@@ -62,9 +62,9 @@ class BundledTask(MapsTask):
         self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
         architecture: BundledArchitecture = ARCHITECTURE,
     ):  # fmt: skip
-        super().__init__(source, recipe, init=init, score_samples=score_samples)
+        pictures = DevicePictures(source, torch.device("cpu"))
+        super().__init__(source, pictures, recipe, init=init, score_samples=score_samples)
         self.architecture = architecture
-        self.examples = DevicePictures(source, torch.device("cpu"))
 
     def make(self) -> BundledNetwork:
         network = BundledNetwork(self.architecture)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -117,18 +119,23 @@ def light(predicted: Tensor, true: Tensor) -> tuple[Tensor, Tensor]:
     predicted: [B, 4, h, 2h] log radiance and log scale. true: [B, 4, h, 2h] radiance and share; all 0 where it is not
     known.
     """
-    rows = true.shape[-2]
-    angle = torch.as_tensor(row_solid_angle(rows), dtype=true.dtype, device=true.device).view(1, 1, -1, 1)
+    angle, basis = _light_basis(true.shape[-2], true.device)
     weight = true[:, 3:] * angle
     known = (weight.flatten(1).sum(1) > 0).float()
     under = weight.flatten(1).sum(1).clamp(min=1e-6)
     log, scale = predicted[:, :3].clamp(-8, 8), predicted[:, 3:].clamp(-4, 3)
     error = (log - true[:, :3].clamp(min=DARKEST).log()).abs()
     likelihood = ((error * (-scale).exp() + scale).mean(1, keepdim=True) * weight).flatten(1).sum(1) / under
-    basis = torch.as_tensor(sh_basis(texel_directions(rows, 2 * rows), 3), dtype=true.dtype, device=true.device)
     project = lambda map_: torch.einsum("bchw,hwk->bck", map_ * weight, basis)  # noqa: E731
     aim = project(true[:, :3])
     relative = (project(log.exp()) - aim).flatten(1).norm(dim=1) / aim.flatten(1).norm(dim=1).clamp(min=1e-6)
     irradiance = torch.where(relative < 1, relative, 1 + relative.clamp(min=1).log())
     count = known.sum().clamp(min=1)
     return (likelihood * known).sum() / count, (irradiance * known).sum() / count
+
+
+@lru_cache(maxsize=4)
+def _light_basis(rows: int, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Solid angle [1, 1, h, 1] of the texels of a map of that many rows, and their harmonics [h, 2h, 16]."""
+    angle = torch.from_numpy(row_solid_angle(rows)).float().view(1, 1, -1, 1)
+    return angle.to(device), torch.from_numpy(sh_basis(texel_directions(rows, 2 * rows), 3)).to(device)

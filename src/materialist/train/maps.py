@@ -52,17 +52,17 @@ class MapsTask(Task):
 
     kind: ClassVar[str] = "matnet"
 
-    def __init__(self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12):
-        """`init`: weights to begin from. `score_samples`: how many held-out samples are scored; 0 for none."""
+    def __init__(
+        self, source: Source, examples: Examples, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12
+    ):
+        """`examples`: what is learned from, of the source. `init`: weights to begin from. `score_samples`: how many
+        held-out samples are scored; 0 for none.
+        """
         if score_samples < 0:
             raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
-        super().__init__(Pictures(source, self.prepare), recipe, init)
+        super().__init__(examples, recipe, init)
         self.source, self.score_samples = source, score_samples
         self.notes = (*self.notes, *source.notes())
-
-    def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
-        """A random variant of a sample at side x side pixels, where examples come one by one."""
-        raise NotImplementedError
 
     @abstractmethod
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:

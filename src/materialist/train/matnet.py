@@ -20,7 +20,7 @@ from materialist.predict.matnet.inference import infer
 from materialist.predict.matnet.network import MatNet, Size
 from materialist.predict.weights import read_state
 from materialist.train import augment, losses
-from materialist.train.maps import MapsTask
+from materialist.train.maps import MapsTask, Pictures
 from materialist.train.task import Batch, Recipe
 from materialist.types import Materials, Prediction
 
@@ -51,7 +51,7 @@ class PaperTask(MapsTask):
             else "Albedo: L1 and gradients at four scales in place of LPIPS, which is not installed."
         )  # fmt: skip
         self.notes = (perceptual, start)
-        super().__init__(source, recipe, init=init, score_samples=score_samples)
+        super().__init__(source, Pictures(source, self.prepare), recipe, init=init, score_samples=score_samples)
 
     def make(self) -> MatNet:
         """MatNet, its encoder frozen and of its depth decoder all but the RefineNet layers."""

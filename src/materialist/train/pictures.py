@@ -17,14 +17,13 @@ from torch.nn import functional as F
 from torch.utils.data import DataLoader, Dataset
 
 from materialist.errors import InputError
-from materialist.io.samples import Source
+from materialist.io.samples import LIGHT_ROWS, Source
 from materialist.procedural.photographic import developed
 from materialist.train.maps import Pictures
 from materialist.train.stream import ATTEMPTS
 from materialist.train.task import Batch
 
 _PLANES = ("image", "shading", "albedo", "roughness", "metallic", "normal", "depth", "mask")
-LIGHT_ROWS = 16
 
 
 @dataclass(frozen=True)
