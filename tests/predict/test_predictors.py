@@ -73,7 +73,7 @@ def test_the_constant_predictor_is_neutral_and_says_so(photo):
 
 def test_auto_is_the_bundled_network():
     assert get_predictor("auto").name == get_predictor("bundled").name
-    with pytest.raises(WeightsError, match="no weights of the bundled network"):
+    with pytest.raises(WeightsError, match="no weights of BundledNetwork"):
         get_predictor("bundled:nowhere.safetensors")
 
 

@@ -156,7 +156,7 @@ def _train(
     `minutes` are those of a run that names neither steps nor minutes. Errors that make a run impossible are raised
     before `make_task` is called, which may take long.
     """
-    from materialist.predict.device import on_gpu
+    from materialist.predict.protocol import on_gpu
     from materialist.train import checkpoint
     from materialist.train.schedule import Budget
     from materialist.train.trainer import RunOptions, Trainer

@@ -1,18 +1,38 @@
-"""What the hub predictors share: their libraries, and loading a model whole or not at all."""
+"""Predictors that optional libraries run: Marigold through diffusers, Depth Anything V2 through transformers.
+
+A model is loaded whole or not at all, and nothing is downloaded here.
+"""
 
 from __future__ import annotations
 
 import importlib
+import json
 from collections.abc import Collection
 from pathlib import Path
 from typing import Any, ClassVar
 
+import cv2
+import numpy as np
+
+from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import SetupError, WeightsError
 from materialist.predict.models import locate
-from materialist.predict.protocol import Predictor
+from materialist.predict.protocol import MapSet, MixedPredictor, Predictor, on_gpu
+from materialist.predict.relative import planar
 from materialist.predict.weights import CHECKSUMS, INSTEAD, reason, verify_folder
+from materialist.types import Array, Photo
 
 INSTALL = "pip install 'materialist[hub]'"
+GIVES = {
+    "MarigoldIntrinsicsPipeline": ("albedo", "roughness", "metallic"),
+    "MarigoldNormalsPipeline": ("normal",),
+    "MarigoldDepthPipeline": ("depth",),
+}
+"""Pipeline class, as model_index.json names it -> the maps it gives."""
+MODELS = ("marigold-appearance", "marigold-normals", "marigold-depth")
+"""The published models, in the order of `GIVES`."""
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+"""Of sRGB values in [0, 1], as the network was trained."""
 
 
 def library(name: str) -> Any:
@@ -28,11 +48,7 @@ def library(name: str) -> Any:
 
 
 class HubPredictor(Predictor):
-    """A model that optional libraries run.
-
-    Args:
-        where: a folder with a model, a hub id, or "" for the default.
-    """
+    """A model in a folder, of a hub id, or, where `where` is "", the default one."""
 
     default: ClassVar[str] = ""
     libraries: ClassVar[tuple[str, ...]]
@@ -40,11 +56,140 @@ class HubPredictor(Predictor):
     def __init__(self, where: str = "", *, device: str = "auto"):
         self.where, self.device = where or self.default, device
 
+    @property
+    def folder(self) -> Path:
+        """Where the model lies. Raises WeightsError where it does not."""
+        return locate(self.where, self.default)
+
     def prepare(self, wanted: Collection[str]) -> None:
         """Raise SetupError or WeightsError where a library or the model is missing."""
-        locate(self.where, self.default)
+        _ = self.folder
         for name in self.libraries:
             library(name)
+
+
+def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
+    """The Marigold model in a folder or of a hub id; all maps from the three published ones where `where` is "".
+
+    Raises WeightsError where `where` is no Marigold model on this machine.
+    """
+    if where:
+        return Marigold(where, GIVES[_pipeline_class(locate(where, ""))], device=device)
+    parts = {model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())}
+    return MixedPredictor({name: model for model, part in parts.items() for name in part.gives}, parts)
+
+
+class Marigold(HubPredictor):
+    """One Marigold model: a folder with a pipeline of diffusers or a hub id, and the maps that it gives."""
+
+    libraries = ("diffusers", "transformers")
+
+    def __init__(self, where: str, gives: tuple[str, ...], *, device: str = "auto"):
+        super().__init__(where, device=device)
+        self.gives, self.name = gives, f"marigold ({where})"
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+        """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
+        import torch
+
+        folder = self.folder
+        source = f"marigold ({folder.name.replace('--', '/')}){checked(folder)}"
+        kind, gpu = _pipeline_class(folder), on_gpu(self.device)
+        made = pipeline(kind, folder, gpu)
+        generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
+        output = made(linear_to_srgb(photo.linear)[None], generator=generator, output_type="np").prediction
+        notes: tuple[str, ...] = ()
+        if kind == "MarigoldIntrinsicsPipeline":
+            maps = appearance(output, made.target_properties or {})
+        elif kind == "MarigoldNormalsPipeline":
+            maps = {"normal": unit_normals(output[0])}
+        else:
+            inverse = made.config.prediction_type == "disparity"
+            depth, note, notes = planar(output[0, ..., 0], photo.camera, normal, inverse=inverse, name=self.name)
+            maps, source = {"depth": depth}, source + note
+        lacking = [name for name in wanted if name not in maps]
+        if lacking:
+            raise WeightsError(f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it.")
+        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, source), notes)
+
+
+def appearance(output: Array, properties: dict) -> dict[str, Array]:
+    """Albedo, and roughness and metallic where they are among the targets, of output [T, H, W, 3] in [0, 1].
+
+    `properties`: the pipeline's `target_properties`: the order of the targets, what their channels are
+    (`sub_target_names`), and whether the albedo is linear or sRGB (`prediction_space`; sRGB unless said).
+    """
+    maps: dict[str, Array] = {}
+    ours = {"metallicity": "metallic", "roughness": "roughness"}
+    for name, picture in zip(properties.get("target_names", ("albedo",)), output):
+        about = properties.get(name) or {}
+        channels = about.get("sub_target_names")
+        if channels:
+            maps |= {ours[part]: picture[..., k] for k, part in enumerate(channels) if part in ours}
+        elif name == "albedo":
+            maps[name] = picture if about.get("prediction_space") == "linear" else srgb_to_linear(picture)
+    return {name: np.ascontiguousarray(np.clip(values, 0, 1), np.float32) for name, values in maps.items()}
+
+
+def unit_normals(output: Array) -> Array:
+    """[H, W, 3] unit normals. Marigold's frame is ours: +X right, +Y up, +Z to the viewer; interpolation shortens."""
+    length = np.linalg.norm(output, axis=-1, keepdims=True)
+    ahead = np.array([0, 0, 1], np.float32)
+    return np.where(length > 1e-3, output / np.maximum(length, 1e-3), ahead).astype(np.float32)
+
+
+def _pipeline_class(folder: Path) -> str:
+    """The kind of pipeline in a folder. Raises WeightsError unless it is a Marigold."""
+    try:
+        kind = json.loads((folder / "model_index.json").read_text("utf-8")).get("_class_name")
+    except (OSError, ValueError, AttributeError) as error:
+        raise WeightsError(f"{folder} holds no readable model_index.json, as diffusers writes it ({error}).") from error
+    if kind not in GIVES:
+        raise WeightsError(f"{folder} holds a {kind}; Marigold models are {', '.join(GIVES)}.")
+    return kind
+
+
+class DepthAnything(HubPredictor):
+    """Gives depth alone; by default Depth Anything V2 Small."""
+
+    gives = ("depth",)
+    default, libraries = "depth-anything", ("transformers",)
+
+    def __init__(self, where: str = "", *, device: str = "auto"):
+        super().__init__(where, device=device)
+        self.name = f"depth-anything ({where or 'V2 Small'})"
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+        """Planar depth. The network sees sRGB values; a metric model's depth is in metres and taken as it is, a
+        relative one gives inverse depth without scale and shift, see `relative.from_relative`.
+        """
+        folder = self.folder
+        digest = checked(folder)
+        model = load(library("transformers").DepthAnythingForDepthEstimation, folder)
+        values = _run(model, photo.linear, on_gpu(self.device))
+        if model.config.depth_estimation_type == "metric":
+            return MapSet({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
+        depth, note, warnings = planar(values, photo.camera, normal, inverse=True, name=self.name)
+        return MapSet({"depth": depth}, {"depth": f"{self.name}{digest}{note}"}, warnings)
+
+
+def _run(model, linear: Array, gpu: bool) -> Array:
+    """The network's output [H, W] for a linear picture [H, W, 3]: the shorter side is seen at 518 pixels."""
+    import torch
+    from torch.nn import functional as F
+
+    from materialist.predict.matnet.predictor import network_size
+
+    height, width = linear.shape[:2]
+    rows, columns = network_size(height, width)
+    small = cv2.resize(linear_to_srgb(linear), (columns, rows), interpolation=cv2.INTER_CUBIC)
+    pixels = ((small - MEAN) / DEVIATION).astype(np.float32)
+    model = model.to("cuda" if gpu else "cpu", torch.float32).eval()
+    image = torch.from_numpy(pixels).permute(2, 0, 1)[None].to(model.device)
+    with torch.inference_mode():
+        output = model(pixel_values=image).predicted_depth[:, None]
+        full = F.interpolate(output, (height, width), mode="bilinear", align_corners=True)
+    return full[0, 0].float().cpu().numpy()
 
 
 def checked(folder: Path) -> str:

@@ -1,7 +1,8 @@
-"""The predictor `maps:DIR`: maps that another tool has written (docs/predictors.md)."""
+"""The predictors `maps:DIR` and `moge:DIR`: maps that another tool has written (docs/predictors.md)."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +13,10 @@ from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.io.image import read_map as read_data
 from materialist.predict import resample
-from materialist.predict.protocol import MAPS, NEUTRAL_METALLIC, NEUTRAL_ROUGHNESS, MapSet, Predictor
+from materialist.predict.protocol import CONSTANT, MAPS, MapSet, Predictor
 from materialist.types import Array, Photo
 
-NEUTRAL = {"roughness": NEUTRAL_ROUGHNESS, "metallic": NEUTRAL_METALLIC}
+MOGE = "write it with: moge infer -i PHOTO -o DIR --maps"
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class MapsPredictor(Predictor):
         self.folder = Path(folder).expanduser()
         if not self.folder.is_dir():
             raise InputError(f"There is no folder {self.folder} to read maps from.")
-        self.source = f"maps:{self.folder}"
+        self.name = f"maps:{self.folder}"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted maps. A missing roughness or metallic is the paper's neutral start, a missing normal is unknown.
@@ -57,9 +58,9 @@ class MapsPredictor(Predictor):
             elif name == "normal":
                 warnings.append("There is no normal map: the normals were derived from depth.")
                 maps[name] = np.zeros((*size, 3), np.float32)
-            elif name in NEUTRAL:
-                warnings.append(f"There is no {name} map: the neutral {name} {NEUTRAL[name]} was used everywhere.")
-                maps[name] = np.full(size, NEUTRAL[name], np.float32)
+            elif name in ("roughness", "metallic"):
+                warnings.append(f"There is no {name} map: the neutral {name} {CONSTANT[name]} was used everywhere.")
+                maps[name] = np.full(size, CONSTANT[name], np.float32)
             else:
                 raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
         return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
@@ -67,6 +68,45 @@ class MapsPredictor(Predictor):
     def read(self, name: str, path: Path, warnings: list[str]) -> Array:
         """The values of a map at their own size, checked and mended. Raises InputError."""
         return _CHECKS[name](read_map(path, name), path, warnings)
+
+
+class MogeFolder(MapsPredictor):
+    """What `moge infer --maps` (Wang et al. 2025) has written: depth.exr, mask.png, normal.png, fov.json.
+
+    They lie in the folder, or in the one folder in it that has them.
+
+    Depth is in metres (in MoGe's second version), and no surface where the mask is empty or depth is infinite. MoGe
+    looks down +Z with +Y down, but encodes its normals the usual way (red to the right, green up, blue to the viewer),
+    which is our frame; its first version writes none.
+    """
+
+    gives = ("normal", "depth")
+
+    def __init__(self, folder: str | Path):
+        if not str(folder):
+            raise InputError(f"moge: needs a folder, as in --depth moge:DIR; {MOGE}")
+        super().__init__(folder)
+        found = [path.parent for path in sorted((*self.folder.glob("depth.exr"), *self.folder.glob("*/depth.exr")))]
+        if self.folder not in found and len(found) != 1:
+            names = ", ".join(path.name for path in found[:3])
+            several = f"several results ({names}); name one of them" if found else f"no depth.exr; {MOGE}"
+            raise InputError(f"{self.folder} holds {several}.")
+        self.folder = self.folder if self.folder in found else found[0]
+        self.field_of_view = _field_of_view(self.folder / "fov.json")
+        self.name = f"moge:{self.folder}"
+
+    def read(self, name: str, path: Path, warnings: list[str]) -> Array:
+        """The values of a map at their own size; depth is 0 where mask.png is."""
+        values, mask = super().read(name, path, warnings), self.folder / "mask.png"
+        if name != "depth" or not mask.is_file():
+            return values
+        pixels = read_data(mask)
+        if pixels.shape[:2] != values.shape:
+            raise InputError(f"{mask} is of another size than depth.exr; {MOGE}")
+        values = np.where(pixels.reshape(*values.shape, -1)[..., 0] > 0.5, values, 0)
+        if not (values > 0).any():
+            raise InputError(f"{path} has no surface anywhere; {MOGE}")
+        return values
 
 
 def _fitted(values: Array, name: str, size: tuple[int, int], path: Path, warnings: list[str]) -> Array:
@@ -92,16 +132,14 @@ def read_map(path: Path, name: str) -> Array:
     values = read_data(path)
     if path.suffix != ".exr":
         values = srgb_to_linear(values) if name == "albedo" else 2 * values - 1 if name == "normal" else values
-    if values.ndim == 3 and values.shape[2] == 1:
-        values = values[..., 0]
     if name in ("albedo", "normal"):
         if values.ndim == 2 and name == "albedo":
             values = np.repeat(values[..., None], 3, -1)
-        if values.ndim != 3 or values.shape[2] < 3:
+        if values.ndim != 3:
             raise InputError(f"{path} has one channel, but a {name} map needs three.")
-        return np.ascontiguousarray(values[..., :3])
+        return np.ascontiguousarray(values)
     if values.ndim == 3:
-        if np.nanmax(np.ptp(values[..., :3], axis=-1)) > 0.01 * max(1.0, float(np.nanmax(np.abs(values[..., :3])))):
+        if np.nanmax(np.ptp(values, axis=-1)) > 0.01 * max(1.0, float(np.nanmax(np.abs(values)))):
             raise InputError(f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey.")
         values = values[..., 0]
     return np.ascontiguousarray(values)
@@ -174,3 +212,16 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
 
 
 _CHECKS = dict.fromkeys(MAPS[:3], _unit_range) | {"depth": _depth_range, "normal": _unit_normals}
+
+
+def _field_of_view(path: Path) -> float | None:
+    """Horizontal field of view in degrees; None without a file. Raises InputError when it cannot be meant."""
+    if not path.is_file():
+        return None
+    try:
+        angle = float(json.loads(path.read_text("utf-8"))["fov_x"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} does not say fov_x in degrees ({error}); {MOGE}") from error
+    if not 1 < angle < 170:
+        raise InputError(f"{path} says a field of view of {angle:g} degrees; it must be between 1 and 170.")
+    return angle

@@ -1,4 +1,4 @@
-"""What a predictor is: names of the maps, the base class of all predictors, and a prior from several of them."""
+"""What a predictor is: names of the maps, the base class, the constant predictor, and a prior from several of them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.errors import SetupError
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Array, Materials, Photo, Prediction
 
@@ -39,13 +40,8 @@ class Predictor(ABC):
     field_of_view: float | None = None
     """Horizontal, degrees, where the predictor knows it."""
 
-    source: str
+    name: str
     """What the report calls it: name, file or folder, and the start of the weights' checksum."""
-
-    @property
-    def name(self) -> str:
-        """The name of the predictor in the report."""
-        return self.source
 
     @abstractmethod
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
@@ -71,6 +67,30 @@ class Predictor(ABC):
         return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources, part.light)
 
 
+CONSTANT = {
+    "albedo": (0.5, 0.5, 0.5),
+    "roughness": NEUTRAL_ROUGHNESS,
+    "metallic": NEUTRAL_METALLIC,
+    "normal": (0.0, 0.0, 0.0),
+    "depth": 3.0,
+}
+"""Grey paint, the paper's neutral roughness and metallic, and a plane across the view (depth in scene units)."""
+
+
+class ConstantPredictor(Predictor):
+    """`constant`: neutral materials on a plane that faces the camera, the same for every photo, as a baseline."""
+
+    name = "constant"
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+        """The wanted maps, with a warning that names them; the normals are unknown, and so follow from the depth."""
+        size = photo.linear.shape[:2]
+        values = {name: np.asarray(CONSTANT[name], np.float32) for name in wanted}
+        maps = {name: np.broadcast_to(value, (*size, *value.shape)).copy() for name, value in values.items()}
+        note = f"The constant predictor knows nothing of the photo: {', '.join(wanted)} are neutral everywhere."
+        return MapSet(maps, dict.fromkeys(wanted, self.name), (note,))
+
+
 class MixedPredictor(Predictor):
     """Every map from its own source."""
 
@@ -81,7 +101,7 @@ class MixedPredictor(Predictor):
         self.depth_spec = chosen["depth"]
         self.field_of_view = sources[self.depth_spec].field_of_view
         # As in 'albedo: marigold; roughness, metallic, normal, depth: bundled'.
-        self.source = "; ".join(f"{', '.join(names)}: {sources[spec].name}" for spec, names in self.shares.items())
+        self.name = "; ".join(f"{', '.join(names)}: {sources[spec].name}" for spec, names in self.shares.items())
 
     def prepare(self, wanted: Collection[str]) -> None:
         for spec, names in self.shares.items():
@@ -104,3 +124,13 @@ class MixedPredictor(Predictor):
                 warnings += part.warnings
                 light = part.light if part.light is not None else light
         return MapSet(maps, sources, warnings, light)
+
+
+def on_gpu(device: str) -> bool:
+    """Whether 'auto', 'cpu' or 'cuda' means the GPU here. Raises SetupError for a CUDA device that is not there."""
+    import torch
+
+    there = torch.cuda.is_available()
+    if device == "cuda" and not there:
+        raise SetupError("There is no CUDA device that PyTorch can use; choose --device cpu.")
+    return device != "cpu" and there

@@ -12,11 +12,11 @@ CLASSES = {
     "auto": "bundled.predictor:BundledPredictor",
     "bundled": "bundled.predictor:BundledPredictor",
     "matnet": "matnet.predictor:MatNetPredictor",
-    "marigold": "marigold:open_marigold",
-    "depth-anything": "depth_anything:DepthAnything",
-    "moge": "moge:MogeFolder",
+    "marigold": "hub:open_marigold",
+    "depth-anything": "hub:DepthAnything",
+    "moge": "maps:MogeFolder",
     "maps": "maps:MapsPredictor",
-    "constant": "constant:ConstantPredictor",
+    "constant": "protocol:ConstantPredictor",
 }
 """Name before the colon of a spec -> module and what makes it of the text behind the colon."""
 NETWORKS = ("auto", "bundled", "matnet", "marigold", "depth-anything")

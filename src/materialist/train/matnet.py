@@ -15,9 +15,8 @@ from materialist.errors import WeightsError
 from materialist.io.samples import Sample, Source
 from materialist.metrics.lpips import backbone
 from materialist.predict.bundled.network import srgb
-from materialist.predict.matnet.encoder import PATCH
-from materialist.predict.matnet.inference import infer
-from materialist.predict.matnet.network import MatNet, Size
+from materialist.predict.matnet.network import PATCH, MatNet, Size
+from materialist.predict.matnet.predictor import infer
 from materialist.predict.weights import read_state
 from materialist.train import augment, losses
 from materialist.train.maps import MapsTask, Pictures

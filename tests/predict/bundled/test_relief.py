@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist.camera import pixel_rays
-from materialist.predict.bundled.relief import with_relief
+from materialist.predict.bundled.edges import with_relief
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 50.0)

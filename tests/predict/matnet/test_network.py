@@ -4,8 +4,8 @@ import pytest
 import torch
 from made_matnet import TINY, made_network
 
-from materialist.predict.matnet.encoder import PATCH
-from materialist.predict.matnet.inference import network_size
+from materialist.predict.matnet.network import PATCH
+from materialist.predict.matnet.predictor import network_size
 
 
 def test_attention_is_the_textbook_one():

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import torch
 
-from materialist.predict.matnet.inference import infer
 from materialist.predict.matnet.network import MatNet
+from materialist.predict.matnet.predictor import infer
 
 PARITY = Path(__file__).parents[4] / "shared" / "parity"
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")

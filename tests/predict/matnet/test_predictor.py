@@ -11,9 +11,8 @@ from safetensors.torch import save_file
 
 from materialist.errors import WeightsError
 from materialist.predict import get_predictor
-from materialist.predict.matnet.inference import infer, planar_depth
 from materialist.predict.matnet.network import MatNet
-from materialist.predict.matnet.predictor import MatNetPredictor
+from materialist.predict.matnet.predictor import MatNetPredictor, infer, planar_depth
 from materialist.predict.weights import write_weights
 
 

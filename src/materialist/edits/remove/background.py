@@ -71,8 +71,8 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     if kind != "sd":
         raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
     from materialist.predict import hub
-    from materialist.predict.device import on_gpu
     from materialist.predict.models import locate
+    from materialist.predict.protocol import on_gpu
 
     gpu = on_gpu(device)
     try:

@@ -29,7 +29,7 @@ def segment(
     import torch
 
     from materialist.predict import hub
-    from materialist.predict.device import on_gpu
+    from materialist.predict.protocol import on_gpu
 
     try:
         from transformers import Sam2Model

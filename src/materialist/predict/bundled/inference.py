@@ -13,9 +13,8 @@ from skimage.morphology import remove_small_holes, remove_small_objects
 from materialist.camera import rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.predict import resample
-from materialist.predict.bundled.edges import GuidedFilter, weighted_median
+from materialist.predict.bundled.edges import GuidedFilter, weighted_median, with_relief
 from materialist.predict.bundled.network import BundledNetwork
-from materialist.predict.bundled.relief import with_relief
 from materialist.predict.network import STRIDE
 from materialist.types import Array, Materials, Prediction
 

@@ -10,13 +10,14 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
-from materialist.predict.bundled import WEIGHTS
 from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import BundledNetwork
-from materialist.predict.device import on_gpu
-from materialist.predict.protocol import MAPS, MapSet, Predictor
+from materialist.predict.protocol import MAPS, MapSet, Predictor, on_gpu
 from materialist.predict.weights import sha256
 from materialist.types import Array, Photo
+
+WEIGHTS = Path(__file__).with_name("weights.safetensors")
+"""The weights that ship with the package."""
 
 
 class BundledPredictor(Predictor):
@@ -33,21 +34,11 @@ class BundledPredictor(Predictor):
 
     def __init__(self, where: str | Path = "", *, device: str = "auto"):
         path = Path(where).expanduser() if str(where) else WEIGHTS
-        if not path.is_file():
-            raise WeightsError(
-                f"There are no weights of the bundled network at {path}; install materialist again, or train "
-                "some (materialist train matnet)."
-            )
         self.device = torch.device("cuda" if on_gpu(device) else "cpu")
         network, self.facts = BundledNetwork.load(path)
         self.network = network.to(self.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         own = "" if path == WEIGHTS else f" {path.name}"
-        self.source = f"bundled{own} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"
-
-    @property
-    def name(self) -> str:
-        """What the report calls it: how long it was trained, and the start of its checksum."""
-        return self.source
+        self.name = f"bundled{own} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
         """The wanted of the network's maps at the photo's size; deterministic, `seed` changes nothing.
@@ -58,7 +49,7 @@ class BundledPredictor(Predictor):
         found = infer(self.network, photo.linear, pixel_rays(photo.camera)[..., :2].copy(), device=self.device)
         maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
         if not all(np.isfinite(maps[name]).all() for name in MAPS):
-            raise WeightsError(f"The network gave values that are not finite; check its weights ({self.source}).")
+            raise WeightsError(f"The network gave values that are not finite; check its weights ({self.name}).")
         sky = found.depth == 0
         warnings: tuple[str, ...] = ()
         if "depth" not in wanted:  # there may be a surface in the depth of another source
