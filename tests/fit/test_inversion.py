@@ -10,11 +10,12 @@ from transport_scenes import furnished_room, windowed_sky
 from materialist import metrics
 from materialist.envmap import texel_directions
 from materialist.fit.engine import PathEngine, TransportEngine
-from materialist.fit.inversion import Fit, paste_visible_sky
+from materialist.fit.invert import Fit, FitSetup
+from materialist.fit.light import paste_visible_sky
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
 from materialist.render.scene import RenderScene
 from materialist.transport.cache import CacheSettings
-from materialist.types import Camera, Materials, Photo
+from materialist.types import Camera, Materials, Photo, Prediction
 
 ENVMAP_HEIGHT = 16
 
@@ -45,8 +46,11 @@ class Room:
         engine = TransportEngine(
             self.geometry, self.camera, self.photo.linear, light_height=settings.light_grid, cache=CacheSettings(32, 8)
         )  # fmt: skip
-        options = {"envmap_height": ENVMAP_HEIGHT, **options}
-        return Fit(self.photo, options.pop("prior", self.prior), engine, settings, **options)
+        return Fit(self.setup(settings, **options), engine)
+
+    def setup(self, settings: FitSettings, prior: Materials | None = None, **options) -> FitSetup:
+        maps = Prediction(prior or self.prior, np.zeros_like(self.photo.linear), np.ones(self.photo.linear.shape[:2]))
+        return FitSetup(self.photo, maps, settings, envmap_height=ENVMAP_HEIGHT, **options)
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +168,7 @@ def test_papers_engine_runs_the_same_fit(room):
     settings = replace(
         short(PAPER, 6), light=replace(PAPER.light, height=ENVMAP_HEIGHT, schedule=Schedule(max_steps=6))
     )
-    fit = Fit(room.photo, room.prior, engine, settings, envmap_height=ENVMAP_HEIGHT)
+    fit = Fit(room.setup(settings), engine)
     state = fit.run()
     assert [s["name"] for s in state.stages] == ["light", "roughness+metallic", "materials"]
     assert state.stages[0]["loss_last"] < state.stages[0]["loss_first"]

@@ -6,7 +6,6 @@ import numpy as np
 import torch
 from scipy.optimize import minimize_scalar
 
-from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import MaterialMaps
 from materialist.fit.losses import encode
 from materialist.fit.materials import fit_materials
@@ -22,7 +21,7 @@ def fitted(light, photo, prior, clipped=False):
         DEFAULT.materials, weights=(WEIGHT, 1.0, 1.0), clipped=clipped, stages=(MaterialStage(("albedo",), schedule),)
     )
     field = MaterialMaps(prior)
-    fit_materials(MaterialProblem(lambda maps: maps[:, :3] * light), photo, field, prior, settings)
+    fit_materials(lambda maps: maps[:, :3] * light, photo, field, prior, settings)
     return field().detach()
 
 

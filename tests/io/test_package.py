@@ -228,7 +228,7 @@ def test_missing_and_unknown_packages(scene, tmp_path):
         load_scene(root)
     (root / "scene.json").write_text(json.dumps(meta))
     write_exr(root / "maps/albedo.exr", scene.materials.albedo[:-1])
-    with pytest.raises(SceneError, match=r"albedo.exr is 33 x 23 pixels, the scene 33 x 24"):
+    with pytest.raises(SceneError, match=r"albedo.exr is \[23, 33, 3\], the scene needs \[24, 33, 3\]"):
         load_scene(root)
 
 

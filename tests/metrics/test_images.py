@@ -71,17 +71,6 @@ def test_linear_map_is_degree_one_with_norm_of_its_gradient(axis):
     assert np.abs(np.delete(coefficients, [1, 2, 3])).max() < 2e-3
 
 
-def test_basis_is_orthonormal_up_to_degree_three():
-    """Projecting a map made of one basis function (from its Cartesian form) finds that function and no other."""
-    x, y, _ = np.moveaxis(directions(H), -1, 0)
-    third = np.sqrt(7 / (16 * np.pi)) * y * (5 * y**2 - 3)  # Y_30 about +Y
-    second = np.sqrt(15 / (4 * np.pi)) * x * y  # |Y_2,-1| about +Y
-    for value, index in ((third, 12), (second, 5)):
-        c = metrics.sh_coefficients(np.repeat(value[..., None], 3, 2))[:, 0]
-        assert abs(c[index]) == pytest.approx(1, abs=2e-3)
-        assert np.abs(np.delete(c, index)).max() < 3e-3
-
-
 def test_sh_error_of_constant_maps_is_the_difference_times_root_four_pi():
     a, b = np.full((H, 2 * H, 3), 1.0), np.full((16, 32, 3), 3.0)
     assert metrics.sh_error(a, b) == pytest.approx(2 * np.sqrt(4 * np.pi), rel=1e-4)

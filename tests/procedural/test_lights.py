@@ -18,8 +18,7 @@ def test_a_tilted_camera_sees_the_sky_tilted():
     assert (looking_down @ [0, 0, -1])[1] < 0
     _, first, second, third = sh_coefficients(lights.envmap(radiance, looking_down))[:4, 0]
     found = np.array([first, second, third]) / np.linalg.norm([first, second, third])
-    # Orders -1, 0, 1 go with sin, pole, cos of the azimuth from -Z: x, y, -z.
-    assert np.allclose(found, [up_in_camera[0], up_in_camera[1], -up_in_camera[2]], atol=1e-3)
+    assert np.allclose(found, [-up_in_camera[0], up_in_camera[1], -up_in_camera[2]], atol=1e-3)
 
 
 def test_skies_have_a_mean_of_one_and_are_lighter_above():

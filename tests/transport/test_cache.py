@@ -167,7 +167,7 @@ def test_continued_planes_have_slots_of_their_own():
     np.testing.assert_array_equal(slots[:size], radiance.reshape(-1, 3))
     np.testing.assert_array_equal(slots[size:], radiance.reshape(-1, 3)[[WALL_PIXEL, WALL_PIXEL]])
     assert not cache.slot_radiance(None).any()
-    hits = np.array(cache._hits[0])
+    hits = np.array(cache.trace()[0])
     assert set(np.unique(hits)) <= {0, size, size + 1, MISS}
 
 

@@ -123,14 +123,14 @@ class _Photo:
         seen: list[float] = []
 
         def render(maps: torch.Tensor) -> torch.Tensor:
-            radiance = problem.render(maps)
+            radiance = problem(maps)
             with torch.no_grad():
                 error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
                 seen.append(float(rendering_loss(error, settings.loss)))
             return radiance
 
         model = material_field(held, settings, engine.pixels, self.camera, seed=seed)
-        results = fit_materials(replace(problem, render=render), photo, model, held, settings)
+        results = fit_materials(render, photo, model, held, settings)
         with torch.no_grad():
             maps = model()
             render(maps)

@@ -116,8 +116,7 @@ def lit(
     import mitsuba as mi
 
     from materialist.buffers import tensor
-    from materialist.geometry.build import build_geometry
-    from materialist.render.scene import part
+    from materialist.geometry.build import build_geometry, part
 
     shapes: dict[str, Any] = {}
     if behind.depth.any():

@@ -209,7 +209,7 @@ def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
 
     def seconds(problem: Any, steps: int) -> list[float]:
         def step() -> None:
-            (problem.render(maps.clone().requires_grad_()) - target).abs().mean().backward()
+            (problem(maps.clone().requires_grad_()) - target).abs().mean().backward()
 
         return [timed(step)[1]["seconds"] for _ in range(steps)]
 

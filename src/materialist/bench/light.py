@@ -200,9 +200,8 @@ def fit(
     import torch
 
     from materialist.fit.engine import PathEngine, prepared_envmap
-    from materialist.fit.inversion import paste_visible_sky
     from materialist.fit.invert import FitSetup, prepare
-    from materialist.fit.light import envmap_field, fit_light, start_light
+    from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
     from materialist.fit.settings import preset
 
     photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]

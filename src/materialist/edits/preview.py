@@ -112,7 +112,7 @@ class Preview:
         guide, pixels = self._engine.guide, torch.from_numpy(self._engine.cache.pixels.astype(np.int64))
         grid = torch.zeros(guide.scale.numel(), 9)
         grid[pixels] = lobes
-        smooth = joint_filter(grid.view(*guide.scale.shape, 9), guide, known=self._taps).view(-1, 9)[pixels]
+        smooth = joint_filter(grid.view(*guide.scale.shape, 9), self._taps).view(-1, 9)[pixels]
         # Levels below the first filtered one stay sharp; the one before it is where that begins.
         first = first_filtered()
         low, high = ROUGHNESS_LEVELS[first - 1], ROUGHNESS_LEVELS[first]

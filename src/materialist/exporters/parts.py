@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.render.scene import part
+from materialist.geometry.build import part
 from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene, Surface
 
 FEWEST = 100

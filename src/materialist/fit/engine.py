@@ -19,6 +19,10 @@ from materialist.transport.light import LightMatrix, bilinear, light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
 
+LIGHT_PIXELS, LEAST_PIXELS = 4096, 256
+"""Pixels of a whole picture that the light is fitted to, of which a surface before the sky gets its share; and how many
+it gets at least, where it has them."""
+
 
 @dataclass(frozen=True)
 class LightProblem:
@@ -34,12 +38,9 @@ class LightProblem:
     """The transport behind `render`, where the engine has one."""
 
 
-@dataclass(frozen=True)
-class MaterialProblem:
-    """Rendering as a function of the materials of P surface pixels, light fixed."""
-
-    render: Callable[[torch.Tensor], torch.Tensor]
-    """[P, 5] (albedo, roughness, metallic) -> radiance [P, 3], differentiable."""
+MaterialProblem = Callable[[torch.Tensor], torch.Tensor]
+"""Rendering as a function of the materials of P surface pixels, light fixed: [P, 5] albedo, roughness and metallic to
+radiance [P, 3], differentiable."""
 
 
 class TransportEngine:
@@ -48,38 +49,23 @@ class TransportEngine:
     Args:
         radiance: [H, W, 3] what the surfaces send to each other: the photograph.
         light_height: rows of the environment map inside the light fit.
-        light_pixels, least_pixels: size of the pixel subset of the light fit: the first is a share of the whole
-            picture, so that a small surface before the sky would get few; it gets at least the second, where it can.
     """
 
-    name = "transport"
-
     def __init__(
-        self,
-        geometry: Geometry,
-        camera: Camera,
-        radiance: Array,
-        *,
-        seed: int = 0,
-        light_height: int = 32,
-        light_pixels: int = 4096,
-        least_pixels: int = 256,
-        cache: CacheSettings | None = None,
-        progress=None,
-    ):
-        self.cache = TransportCache(geometry, camera, cache or CacheSettings(), seed=seed, progress=progress)
-        self.camera, self.seed = camera, seed
-        self.light_height, self.light_pixels, self.least_pixels = light_height, light_pixels, least_pixels
-        self.radiance = radiance
+        self, geometry: Geometry, camera: Camera, radiance: Array, *, seed: int = 0, light_height: int = 32,
+        cache: CacheSettings | None = None, progress=None,
+    ):  # fmt: skip
+        self.cache = TransportCache(geometry, camera, cache, seed=seed, progress=progress)
+        self.camera, self.seed, self.light_height, self.radiance = camera, seed, light_height, radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
 
     def light_problem(self, materials: Materials) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
-        share = self.light_pixels / (self.camera.width * self.camera.height)
+        share = LIGHT_PIXELS / (self.camera.width * self.camera.height)
         count = len(self.cache.pixels)
-        rows = _subset(rng, count, min(1.0, max(share, self.least_pixels / max(count, 1))))
+        rows = _subset(rng, count, min(1.0, max(share, LEAST_PIXELS / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
         matrix = light_matrix(self.cache, materials, rows, self.light_height)
         indirect = matrix.indirect(torch.from_numpy(self.cache.slot_radiance(self.radiance)))
@@ -101,7 +87,7 @@ class TransportEngine:
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
         tables = self.tables(envmap)
-        return MaterialProblem(lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4]))
+        return lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
 
 
 class PathEngine:
@@ -111,19 +97,10 @@ class PathEngine:
         scene: `materialist.render.scene.RenderScene`.
     """
 
-    name = "path"
-
     def __init__(
-        self,
-        scene,
-        camera: Camera,
-        pixels: Array,
-        *,
-        spp: int = 64,
-        max_depth: int = 4,
-        envmap_height: int = 256,
+        self, scene, camera: Camera, pixels: Array, *, spp: int = 64, max_depth: int = 4, envmap_height: int = 256,
         seed: int = 0,
-    ):
+    ):  # fmt: skip
         self.scene, self.camera, self.spp, self.max_depth = scene, camera, spp, max_depth
         self.pixels = torch.from_numpy(pixels.astype(np.int64))
         self.envmap_height, self.seed, self._step = envmap_height, seed, 0
@@ -135,10 +112,7 @@ class PathEngine:
         )
 
     def light_problem(self, materials: Materials) -> LightProblem:
-        maps = [
-            torch.from_numpy(np.ascontiguousarray(m))
-            for m in (materials.albedo, materials.roughness, materials.metallic)
-        ]
+        maps = [torch.from_numpy(np.ascontiguousarray(values)) for values in vars(materials).values()]
         everything = torch.arange(self.camera.width * self.camera.height)
         return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
 
@@ -148,12 +122,10 @@ class PathEngine:
 
         def render(maps: torch.Tensor) -> torch.Tensor:
             full = torch.zeros(h * w, 5).index_copy(0, self.pixels, maps).view(h, w, 5)
-            image = self._render(
-                full[..., :3].contiguous(), full[..., 3].contiguous(), full[..., 4].contiguous(), light
-            )
-            return image.reshape(-1, 3)[self.pixels]
+            parts = [part.contiguous() for part in (full[..., :3], full[..., 3], full[..., 4])]
+            return self._render(*parts, light).reshape(-1, 3)[self.pixels]
 
-        return MaterialProblem(render)
+        return render
 
 
 Engine = TransportEngine | PathEngine

@@ -75,10 +75,8 @@ class EnvmapSH(nn.Module):
         self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
-        return functional.softplus(self._basis(height) @ self.coefficients)
-
-    def _basis(self, height: int) -> torch.Tensor:
-        return torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree))
+        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree))
+        return functional.softplus(basis @ self.coefficients)
 
 
 def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:

@@ -1,19 +1,23 @@
-"""An inversion from the prior to the re-rendering: geometry, light, materials."""
+"""An inversion from the prior to the re-rendering: geometry, light with the prior's materials, materials under it."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import torch
 
-from materialist.fit.engine import Engine, PathEngine, TransportEngine
-from materialist.fit.inversion import Fit
+from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
+from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
+from materialist.fit.losses import CLIPPED
+from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress
-from materialist.fit.settings import FitSettings
+from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import build_geometry
+from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
 
@@ -30,11 +34,105 @@ class FitSetup:
     envmap_height: int = 256
     tau: float = 6.0
     mask: Array | None = None
+    """[H, W] bool: roughness and metallic are one value inside."""
     strategy: str = "default"
+    """`default`: light, then materials. `white-light-first`: under a white map, roughness and metallic from 0.5,
+    then light, then albedo (paper, Material Editing Settings)."""
     seed: int = 0
     device: str = "auto"
     spp: int | None = None
     """Paths a pixel of the re-rendering; None: `settings.rerender_spp`."""
+
+
+@dataclass
+class FitState:
+    """What the fit has found so far."""
+
+    maps: torch.Tensor
+    """[P, 5] albedo, roughness, metallic of the surface pixels."""
+    envmap: Array
+    """[h, 2h, 3]."""
+    stages: list[dict] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One inverse problem: what is asked, and an engine to render with."""
+
+    setup: FitSetup
+    engine: Engine
+    progress: Progress | None = None
+
+    def run(self) -> FitState:
+        """Fit; returns maps and light."""
+        setup, height = self.setup, self.setup.envmap_height
+        state = FitState(self.prior_maps(), np.ones((height, 2 * height, 3), np.float32))
+        if setup.strategy == "white-light-first":
+            return self._white_light_first(state)
+        settings = setup.settings.materials
+        if setup.mask is not None:  # what the mask makes one value moves, too
+            last = replace(settings.stages[-1], targets=tuple(COLUMNS))
+            settings = replace(settings, stages=(*settings.stages[:-1], last))
+        self._fit_light(state, setup.prior.materials)
+        self._fit_materials(state, settings)
+        return state
+
+    def _fit_light(self, state: FitState, materials: Materials) -> None:
+        start, setup, photo = time.perf_counter(), self.setup, self._photo()
+        settings, problem = setup.settings.light, self.engine.light_problem(materials)
+        begin = start_light(photo, settings, setup.prior.light, problem)
+        light = envmap_field(settings, seed=setup.seed, start=begin.radiance)
+        result = fit_light(problem, photo, light, settings, start=begin, seed=setup.seed, progress=self.progress)
+        envmap = prepared_envmap(light(max(settings.height, 16)), setup.envmap_height)
+        surface = np.zeros(len(photo), bool)
+        surface[self.engine.pixels.numpy()] = True
+        surface, white = surface.reshape(setup.photo.linear.shape[:2]), HDR_CLIP if setup.photo.hdr else CLIPPED
+        state.envmap = paste_visible_sky(envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
+        state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
+
+    def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
+        """From the state's maps, which L_cons holds on to."""
+        start, setup = time.perf_counter(), self.setup
+        problem, pixels = self.engine.material_problem(state.envmap), self.engine.pixels
+        held = remapped(state.maps) if settings.remap else state.maps
+        inside = None if setup.mask is None else torch.from_numpy(setup.mask.reshape(-1)[pixels.numpy()])
+        model = material_field(held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed)
+        results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
+        summaries = [r.summary() for r in results]
+        for first in summaries[:1]:  # the tables are its
+            first["seconds"] += round(time.perf_counter() - start - sum(r.seconds for r in results), 3)
+        state.stages += summaries
+        state.maps = model().detach()
+
+    def _white_light_first(self, state: FitState) -> FitState:
+        """Roughness and metallic start at 0.5, and nothing is remapped on the way."""
+        settings = replace(self.setup.settings.materials, remap=False)
+        schedule = settings.stages[0].schedule
+        state.maps[:, 3:] = 0.5
+        self._fit_materials(state, replace(settings, stages=(MaterialStage(("roughness", "metallic"), schedule),)))
+        self._fit_light(state, self.materials(state))
+        self._fit_materials(state, replace(settings, stages=(MaterialStage(("albedo",), schedule),)))
+        return state
+
+    def materials(self, state: FitState) -> Materials:
+        """Full-size maps of the state; the prior's values where there is no surface."""
+        out = _stacked(self.setup.prior.materials)
+        out[self.engine.pixels.numpy()] = state.maps.numpy()
+        out = out.reshape(*self.setup.photo.linear.shape[:2], 5)
+        return Materials(np.ascontiguousarray(out[..., :3]), out[..., 3].copy(), out[..., 4].copy())
+
+    def prior_maps(self) -> torch.Tensor:
+        """[P, 5] the prior's albedo, roughness and metallic of the surface pixels."""
+        return torch.from_numpy(_stacked(self.setup.prior.materials))[self.engine.pixels]
+
+    def _photo(self) -> torch.Tensor:
+        return torch.from_numpy(np.ascontiguousarray(self.setup.photo.linear.reshape(-1, 3)))
+
+
+def _stacked(materials: Materials) -> Array:
+    """[H * W, 5] float32 albedo, roughness, metallic."""
+    maps = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
+    return np.concatenate(maps, -1).reshape(-1, 5).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -83,12 +181,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
     ))  # fmt: skip
     renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
-
-    fit = Fit(
-        photo, prior.materials, engine, setup.settings, envmap_height=setup.envmap_height, light=prior.light,
-        mask=setup.mask, strategy=setup.strategy, seed=setup.seed, progress=progress,
-    )  # fmt: skip
-    return PreparedFit(geometry, renderer, fit, tuple(stages))
+    return PreparedFit(geometry, renderer, Fit(setup, engine, progress), tuple(stages))
 
 
 def invert(

@@ -61,7 +61,7 @@ def fit_materials(
         def loss(_: int, held=held) -> torch.Tensor:
             values = field()
             values = torch.cat([held.get(name, values[:, c]) for name, c in COLUMNS.items()], 1)
-            error = residual(problem.render(values), photo, settings.encoding, clipped=settings.clipped)
+            error = residual(problem(values), photo, settings.encoding, clipped=settings.clipped)
             return rendering_loss(error, settings.loss) + consistency(values, prior, settings)
 
         def into_range() -> None:
@@ -70,10 +70,6 @@ def fit_materials(
                 base.maps.clamp_(0, 1)
 
         name = "+".join(stage.targets) if held else "materials"
-        results.append(
-            optimise(
-                name, field.parameters(), loss, stage.schedule, after_step=into_range,
-                progress=progress,
-            )
-        )  # fmt: skip
+        stepped = {"after_step": into_range, "progress": progress}
+        results.append(optimise(name, field.parameters(), loss, stage.schedule, **stepped))
     return results

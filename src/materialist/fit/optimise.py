@@ -38,21 +38,20 @@ class StageResult:
 
 def optimise(
     name: str,
-    parameters: Iterable,
+    parameters: Iterable[torch.Tensor],
     loss: Callable[[int], torch.Tensor],
     schedule: Schedule,
     *,
     after_step: Callable[[], None] | None = None,
     progress: Progress | None = None,
 ) -> StageResult:
-    """Minimise `loss(step)` over `parameters` (tensors, or Adam parameter groups) in place.
+    """Minimise `loss(step)` over the tensors `parameters` in place.
 
     The loss that counts for early stopping is the best of each window of `patience` steps.
     """
-    groups = list(parameters)
-    optimiser = torch.optim.Adam(groups, lr=schedule.learning_rate)
+    tensors = list(parameters)
+    optimiser = torch.optim.Adam(tensors, lr=schedule.learning_rate)
     scheduler = torch.optim.lr_scheduler.StepLR(optimiser, schedule.decay_every, schedule.decay)
-    tensors = [p for group in optimiser.param_groups for p in group["params"]]
     best, kept = float("inf"), [t.detach().clone() for t in tensors] if schedule.keep_best else []
     start, losses = time.perf_counter(), []
     for step in range(schedule.max_steps):

@@ -110,6 +110,13 @@ def pixel_corners(mesh: Mesh, surface: Array) -> Array:
     return corner
 
 
+def part(mesh: Mesh, plane: int) -> Mesh:
+    """The faces of one plane's continuation, or (-1) of the depth surface, with the vertices they use."""
+    chosen = mesh.face_plane == plane
+    faces = {name: getattr(mesh, name)[chosen] for name in ("faces", "face_pixel", "face_plane")}
+    return _tidy(replace(mesh, **faces))
+
+
 def _tidy(mesh: Mesh) -> Mesh:
     """The mesh without vertices that no face has."""
     used, number = np.unique(mesh.faces, return_inverse=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+from scipy.ndimage import binary_propagation
+from skimage.morphology import remove_small_objects
 
 from materialist.camera import pixel_rays, unit
 from materialist.geometry.boundary import check_maps
@@ -179,10 +180,7 @@ def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
     calm = wide.copy()
     calm[:, 1:] &= ~jump_x
     calm[1:] &= ~jump_y
-    patches, count = ndimage.label(calm)
-    has_core = np.bincount(patches[core & calm], minlength=count + 1) > 0
-    has_core[0] = False
-    return core | has_core[patches]
+    return core | binary_propagation(core & calm, mask=calm)
 
 
 def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
@@ -195,19 +193,11 @@ def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
         label = np.where(error < nearest, k, label)
         nearest = np.minimum(nearest, error)
     planes = []
+    speck = int(np.ceil(DEFAULT.speck * surface.size)) - 1  # pixels of the largest patch that is chance
     for k, fit in enumerate(found):
-        mask = _without_specks(label == k)
+        mask = remove_small_objects(label == k, max_size=speck)
         if mask.sum() < DEFAULT.least * surface.sum():
             continue
         size = float(np.linalg.norm(fit.coefficients))
         planes.append(Plane(-fit.coefficients / size, -1 / size, mask))
     return sorted(planes, key=lambda plane: -int(plane.mask.sum()))
-
-
-def _without_specks(mask: Array) -> Array:
-    """[H, W] bool without connected patches smaller than `PlaneSettings.speck` of the picture."""
-    patches, count = ndimage.label(mask)
-    sizes = np.bincount(patches.ravel(), minlength=count + 1)
-    keep = sizes >= DEFAULT.speck * mask.size
-    keep[0] = False
-    return keep[patches]

@@ -1,9 +1,6 @@
-"""Depth and normals of one surface: the slopes each of them demands of the other."""
+"""Slopes of a depth map, and the normals of a surface that is seen from within."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -12,57 +9,8 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import spacing
 from materialist.types import Array
 
-Pairs = tuple[Array, Array, Array, Array]
-"""Linked neighbours, [P] each: the first, the second, the step wanted between them, and its weight."""
 SHARP = 0.5
 """Least standard deviation of the window of `depth_slopes`, pixels: hardly more than the four neighbours; by eye."""
-
-
-def slopes(normal: Array, rays: Array, steepest: float = 0.12) -> tuple[Array, Array]:
-    """[H, W] change of log depth from one pixel to the next that the normals demand, to the right and downwards.
-
-    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). steepest: smallest n.v that is followed.
-
-    normal: [H, W, 3] unit, camera frame. rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
-    """
-    x, y = rays[..., 0], rays[..., 1]
-    across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
-    down = float(y[-1, 0] - y[0, 0]) / max(y.shape[0] - 1, 1)
-    facing = normal[..., 0] * x + normal[..., 1] * y - normal[..., 2]
-    facing = np.minimum(facing, -steepest * np.sqrt(x**2 + y**2 + 1))  # n . r < 0 where the surface is seen
-    return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
-
-
-def between(demanded: tuple[Array, Array]) -> Iterator[tuple[Any, Any, Array]]:
-    """Neighbours in a row, then in a column: index of the first, index of the second, and the slope midway.
-
-    Args:
-        demanded: [H, W] both, as `slopes` gives them; the slope midway is [H, W - 1], then [H - 1, W].
-    """
-    for slope, near, far in (
-        (demanded[0], np.s_[:, :-1], np.s_[:, 1:]),
-        (demanded[1], np.s_[:-1], np.s_[1:]),
-    ):
-        yield near, far, (slope[near] + slope[far]) / 2
-
-
-def least_squares_change(
-    first: Array, second: Array, wanted: Array, weight: Array, pull: Array, *, rtol: float, maxiter: int
-) -> Array:
-    """[N] float64, min over u of sum of weight |u_second - u_first - wanted|^2 + sum of pull |u|^2.
-
-    Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say. first, second: [P] which
-    of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
-    """
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import cg
-
-    rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
-    entries = (np.concatenate([-root, root]), (rows, np.concatenate([first, second])))
-    step = coo_matrix(entries, (len(first), len(pull))).tocsr()
-    system = (step.T @ step + diags(pull)).tocsr()
-    change, _ = cg(system, step.T @ (root * wanted), rtol=rtol, maxiter=maxiter, M=diags(1 / system.diagonal()))
-    return change
 
 
 def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Array, Array]:

@@ -74,8 +74,14 @@ def decode(path: Path) -> Decoded:
     try:
         with path.open("rb") as file:
             head = file.read(32)
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {error.strerror}.") from error
+    except IsADirectoryError as error:
+        raise InputError(f"{path} is a folder; give one photo in it.") from error
+    except (FileNotFoundError, NotADirectoryError, ValueError) as error:
+        raise InputError(f"There is no picture at {path}.") from error
+    except OSError as error:  # a folder one may not enter, a name that is too long
+        raise InputError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}.") from error
+    if not head:
+        raise InputError(f"{path} is empty (0 bytes); copy it again.")
     try:
         if path.suffix.lower() in RAW_SUFFIXES:
             return _raw(path)
@@ -87,9 +93,7 @@ def decode(path: Path) -> Decoded:
         if head.startswith(_TIFF) and is_float_tiff(path):
             return read_float_tiff(path)
         return read_bitmap(path)
-    except MaterialistError:
-        raise
-    except (MemoryError, KeyboardInterrupt):
+    except (MaterialistError, MemoryError):
         raise
     except Exception as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error

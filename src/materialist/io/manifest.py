@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from materialist.errors import InputError, SceneError
+import numpy as np
+
+from materialist.errors import InputError, MaterialistError, SceneError
 from materialist.io.decode import RAW_SUFFIXES, image_size
-from materialist.io.exr import exr_headers, exr_size
-from materialist.types import Camera
+from materialist.io.exr import exr_headers, exr_size, read_exr
+from materialist.types import Array
 
 LONGEST = 8192
 """Pixels along the longer side of any map: the largest working size, environment map or texture there is."""
@@ -19,20 +21,17 @@ RAW_GROWS = 12
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
 
 
-def check_files(folder: Path, camera: Camera, original: str, bodies: int, most: float) -> None:
-    """Check that the files are there, lie in the folder, have the camera's size, and decode to at most `most` bytes.
-
-    Raises SceneError.
-    """
-    size = (camera.width, camera.height)
-    sized = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS] + ["photo.exr", "rerender.exr"]
-    free = ["envmap.exr", *(f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3])]
+def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
+    """Raise SceneError unless the files are there, lie in the folder, and decode to at most `most` bytes."""
+    pictures = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS]
+    pictures += ["photo.exr", "rerender.exr", "envmap.exr"]
+    pictures += [f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3]]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
     try:
-        total = sum(_exr_bytes(_inside(folder, name), size if name in sized else None) for name in (*sized, *free))
+        total = sum(_exr_bytes(_inside(folder, name)) for name in pictures)
         total += sum(_inside(folder, name).stat().st_size for name in meshes)
         total += _photo_bytes(_inside(folder, original))
-        _check_size(label := _inside(folder, "plane_label.png"), image_size(label), size)
+        _check_size(label := _inside(folder, "plane_label.png"), image_size(label))
     except SceneError:
         raise
     except Exception as error:  # readers of damaged files raise anything
@@ -44,12 +43,25 @@ def check_files(folder: Path, camera: Camera, original: str, bodies: int, most: 
         )
 
 
-def _exr_bytes(file: Path, size: tuple[int, int] | None) -> int:
-    """Bytes of all channels once decoded, of an EXR of a size, or of any up to the largest."""
+def read_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
+    """A map of a known shape, or of any. Raises SceneError for another one, and for NaN."""
+    try:
+        array = read_exr(path)
+    except MaterialistError as error:
+        raise SceneError(f"The scene package is damaged: {error}") from error
+    if shape is not None and array.shape != shape:
+        raise SceneError(f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged.")
+    if not np.isfinite(array).all():
+        raise SceneError(f"{path} has values that are NaN or infinite; the package is damaged.")
+    return array
+
+
+def _exr_bytes(file: Path) -> int:
+    """Bytes of all channels once decoded."""
     headers = exr_headers(file)
     if any("deep" in str(header.get("type")) for header in headers):
         raise InputError(f"{file} holds deep pixels; save it as a plain picture.")
-    _check_size(file, exr_size(headers[0]), size)
+    _check_size(file, exr_size(headers[0]))
     return 4 * sum(math.prod(exr_size(header)) * len(header["channels"]) for header in headers)
 
 
@@ -58,14 +70,11 @@ def _photo_bytes(file: Path) -> int:
     if file.suffix.lower() in RAW_SUFFIXES:
         return RAW_GROWS * file.stat().st_size
     if file.suffix.lower() == ".exr":
-        return _exr_bytes(file, None)
+        return _exr_bytes(file)
     return 12 * math.prod(image_size(file))
 
 
-def _check_size(file: Path, found: tuple[int, int], size: tuple[int, int] | None) -> None:
-    if size is not None and found != size:
-        shown = [f"{width} x {height}" for width, height in (found, size)]
-        raise SceneError(f"{file} is {shown[0]} pixels, the scene {shown[1]}; the package is damaged.")
+def _check_size(file: Path, found: tuple[int, int]) -> None:
     if not 1 <= min(found) <= max(found) <= LONGEST and file.stem != "original":
         raise SceneError(f"{file} is {found[0]} x {found[1]} pixels; {LONGEST} on a side is the limit.")
 

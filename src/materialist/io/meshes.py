@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from materialist.errors import InputError, SceneError
+from materialist.errors import SceneError
 from materialist.io.atomic import writing
-from materialist.io.exr import read_exr, write_exr
+from materialist.io.exr import write_exr
+from materialist.io.manifest import MAPS, read_map
 from materialist.types import Body, Mesh, Surface
 
 _FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
@@ -93,7 +94,7 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
     for k, body in enumerate(bodies):
         surface = body.surface
         write_ply(folder / "bodies" / f"{k}.ply", body.mesh)
-        for name in ("albedo", "roughness", "metallic"):
+        for name in MAPS[:3]:
             write_exr(folder / "bodies" / f"{k}.{name}.exr", getattr(surface, name))
         entries.append({"name": body.name, **{key: getattr(surface, key) for key in _OF_GLASS}})
     return entries
@@ -106,15 +107,9 @@ def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, 
 
 def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
     mesh = read_ply(folder / f"{number}.ply")
-    try:
-        albedo, roughness, metallic = (
-            read_exr(folder / f"{number}.{name}.exr") for name in ("albedo", "roughness", "metallic")
-        )
-    except InputError as error:
-        raise SceneError(f"{error} Save the scene again.") from error
-    finite = all(np.isfinite(one).all() for one in (albedo, roughness, metallic))
-    if not finite or (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
-        raise SceneError(f"The maps of body {number} have values that are NaN, or are no maps; it is damaged.")
+    albedo, roughness, metallic = (read_map(folder / f"{number}.{name}.exr") for name in MAPS[:3])
+    if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
+        raise SceneError(f"The maps of body {number} have other channels than they need; the package is damaged.")
     told: dict[str, Any] = {key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None}
     surface = Surface(albedo, roughness, metallic, **told)
     return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))

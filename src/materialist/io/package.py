@@ -15,7 +15,7 @@ from materialist.errors import InputError, MaterialistError, SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
-from materialist.io.manifest import MAPS, MOST, check_files
+from materialist.io.manifest import MAPS, MOST, check_files, read_map
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -47,7 +47,7 @@ def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
     meta = _read_meta(folder)
     try:
         camera, prior = Camera(**meta["camera"]), meta["prior"]
-        check_files(folder, camera, Path(meta["photo"]["original"]).name, len(meta.get("bodies", ())), most)
+        check_files(folder, Path(meta["photo"]["original"]).name, len(meta.get("bodies", ())), most)
         shape = (camera.height, camera.width)
         before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
         label = _read_labels(folder / "plane_label.png", shape)
@@ -59,8 +59,8 @@ def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
             normal=normal,
             depth=depth,
             geometry=Geometry(read_ply(folder / "mesh.ply"), label),
-            envmap=_exr(folder / "envmap.exr", None),
-            rerender=_exr(folder / "rerender.exr", (*shape, 3)),
+            envmap=read_map(folder / "envmap.exr"),
+            rerender=read_map(folder / "rerender.exr", (*shape, 3)),
             report=_read_report(folder / "report.json"),
             provenance=meta["provenance"],
             lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
@@ -147,27 +147,14 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     except (MaterialistError, OSError) as error:
         raise SceneError(f"The original photo in {folder} cannot be read: {error}") from error
     return Photo(
-        _exr(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"], meta["fov_source"],
-        meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
+        read_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
+        meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
     )  # fmt: skip
 
 
 def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
-    maps = [_exr(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in MAPS]
+    maps = [read_map(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in MAPS]
     return Materials(*maps[:3]), maps[3], maps[4]
-
-
-def _exr(path: Path, shape: tuple[int, ...] | None) -> Array:
-    """A map of a known shape. Raises SceneError."""
-    try:
-        array = read_exr(path)
-    except MaterialistError as error:
-        raise SceneError(f"The scene package is damaged: {error}") from error
-    if shape is not None and array.shape != shape:
-        raise SceneError(f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged.")
-    if not np.isfinite(array).all():
-        raise SceneError(f"{path} has values that are NaN or infinite; the package is damaged.")
-    return array
 
 
 def _read_labels(path: Path, shape: tuple[int, int]) -> Array:

@@ -109,17 +109,6 @@ def _stops(linear: Array) -> int:
 
 def decode_photo(file: Path) -> Decoded:
     """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise."""
-    try:
-        folder, there = file.is_dir(), file.exists()
-        empty = file.is_file() and file.stat().st_size == 0
-    except OSError as error:  # a folder one may not enter, a name that is too long
-        raise InputError(f"{file} cannot be read: {(error.strerror or str(error)).lower()}.") from error
-    if folder:
-        raise InputError(f"{file} is a folder; give one photo in it.")
-    if not there:
-        raise InputError(f"There is no picture at {file}.")
-    if empty:
-        raise InputError(f"{file} is empty (0 bytes); copy it again.")
     decoded = decode(file)
     pixels = decoded.linear
     if decoded.scene_linear:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.envmap import row_solid_angle
+from materialist.envmap import row_solid_angle, sh_basis, texel_directions
 from materialist.errors import InputError
 from materialist.types import Array
 
@@ -69,37 +69,22 @@ def ssim_of_values(a: Array, b: Array, *, mask: Array | None = None) -> float:
     return float(structural_similarity(a, b, full=True, **how)[1][mask].mean())
 
 
-def sh_coefficients(envmap: Array, degree: int = 3) -> Array:
-    """Real spherical harmonic coefficients [(degree + 1)**2, 3] float64 of an envmap [h, 2h, 3] (linear radiance).
+def sh_coefficients(envmap: Array) -> Array:
+    """Real spherical harmonic coefficients [16, 3] float64, to degree 3, of an envmap [h, 2h, 3] (linear radiance).
 
-    Orthonormal basis about +Y, ordered (l, m) = (0,0), (1,-1), (1,0), (1,1), ...; every texel is weighted with its
-    exact solid angle, so a constant map L has the single coefficient L sqrt(4 pi).
+    Ordered (l, m) = (0,0), (1,-1), (1,0), (1,1), ... as `envmap.sh_basis`; every texel is weighted with its exact solid
+    angle, so a constant map L has the single coefficient L sqrt(4 pi).
     """
-    from scipy.special import sph_harm_y
-
     envmap = np.asarray(envmap, np.float64)
     if envmap.ndim != 3 or envmap.shape[2] != 3 or envmap.shape[1] != 2 * envmap.shape[0]:
         raise InputError(f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}.")
-    h, w = envmap.shape[:2]
-    weight = row_solid_angle(h)  # [h] steradian per texel
-    theta = (np.arange(h) + 0.5) * np.pi / h  # [h]
-    phi = ((np.arange(w) + 0.5) / w - 0.5) * 2 * np.pi  # [w] azimuth from -Z towards +X
-    # The basis is a product of a row and a column function: sum the columns once per order m.
-    rows = [np.einsum("hwc,w->hc", envmap, np.cos(m * phi)) for m in range(degree + 1)]
-    rows_sin = [np.einsum("hwc,w->hc", envmap, np.sin(m * phi)) for m in range(degree + 1)]
-    coefficients = []
-    for l in range(degree + 1):  # noqa: E741 (l and m are the names in the literature)
-        for m in range(-l, l + 1):
-            k = abs(m)
-            # Without the Condon-Shortley sign: degree 1 is then (x, y, -z).
-            legendre = (np.sqrt(2) if k else 1) * (-1) ** k * sph_harm_y(l, k, theta, 0).real  # [h]
-            coefficients.append((legendre * weight) @ (rows_sin[k] if m < 0 else rows[k]))
-    return np.stack(coefficients)
+    basis = sh_basis(texel_directions(*envmap.shape[:2]), 3)
+    return np.tensordot(basis * row_solid_angle(len(envmap))[:, None, None], envmap, ([0, 1], [0, 1]))
 
 
-def sh_error(a: Array, b: Array, degree: int = 3) -> float:
+def sh_error(a: Array, b: Array) -> float:
     """RMS over RGB of the Euclidean distance of the SH coefficients of envmaps [h, 2h, 3], whose sizes may differ."""
-    return _rms_norm(sh_coefficients(a, degree) - sh_coefficients(b, degree))
+    return _rms_norm(sh_coefficients(a) - sh_coefficients(b))
 
 
 def sh_error_relative(estimate: Array, truth: Array) -> float:

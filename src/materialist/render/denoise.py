@@ -32,7 +32,7 @@ def denoise(image: Array, *, albedo: Array, normal: Array, device: str = "cpu") 
         ) from error
     height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
-    pictures: list[Any] = [_at_least(p, _SMALLEST) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
+    pictures: list[Any] = [_padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
     if device == "cuda":
         import torch
 
@@ -46,7 +46,7 @@ _SMALLEST = 32
 """Pixels a side below which the filter invents light (a constant 1x1 picture comes out at a quarter of its value)."""
 
 
-def _at_least(image: Array, size: int) -> Array:
-    """float32 copy of [H, W, 3], its last row and column repeated until it has `size` of each."""
-    missing = [max(0, size - n) for n in image.shape[:2]]
+def _padded(image: Array) -> Array:
+    """float32 copy of [H, W, 3], its last row and column repeated until it has `_SMALLEST` of each."""
+    missing = [max(0, _SMALLEST - n) for n in image.shape[:2]]
     return np.pad(np.asarray(image, np.float32), ((0, missing[0]), (0, missing[1]), (0, 0)), mode="edge")

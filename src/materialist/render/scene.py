@@ -9,6 +9,7 @@ import numpy as np
 
 from materialist.buffers import floats, integers, tensor
 from materialist.errors import InputError
+from materialist.geometry.build import part
 from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
 from materialist.render.envmap import check_envmap, emitter, on_mitsuba_grid
 from materialist.render.variant import setup
@@ -152,17 +153,6 @@ def _check_options(spp: int, max_depth: int) -> None:
         raise InputError(f"spp is {spp}; give at least 1 sample per pixel.")
     if max_depth < 1:
         raise InputError(f"max_depth is {max_depth}; give at least 1 (2 for direct light).")
-
-
-def part(mesh: Mesh, plane: int) -> Mesh:
-    """The faces of one plane's continuation, or (-1) of the depth surface, with the vertices they use."""
-    chosen = mesh.face_plane == plane
-    faces = mesh.faces[chosen]
-    used, renumbered = np.unique(faces, return_inverse=True)
-    return Mesh(
-        mesh.vertices[used], renumbered.reshape(faces.shape).astype(np.int32), mesh.normals[used], mesh.uv[used],
-        mesh.face_pixel[chosen], mesh.face_plane[chosen],
-    )  # fmt: skip
 
 
 def _stratified(spp: int) -> int:

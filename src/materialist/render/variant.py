@@ -26,7 +26,6 @@ _PLACES = (
     "/usr/lib/libLLVM*.so*",
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
-    "C:/Program Files/LLVM/bin/LLVM-C.dll",
     f"{sys.prefix}/lib/libLLVM*.so*",
     f"{sys.prefix}/lib/libLLVM*.dylib",
 )
@@ -65,8 +64,6 @@ def find_llvm() -> LLVM:
 def _remedy() -> str:
     if sys.platform == "darwin":
         return "install one with: brew install llvm@19"
-    if sys.platform == "win32":
-        return "install one from https://github.com/llvm/llvm-project/releases"
     return "install one with: sudo apt install libllvm19 (Fedora: sudo dnf install llvm-libs)"
 
 
@@ -117,11 +114,9 @@ def cuda_usable() -> bool:
     """Whether an NVIDIA driver answers and has OptiX, which traces Mitsuba's rays; Mitsuba itself is not started."""
     import ctypes
 
-    windows = sys.platform == "win32"
     try:
-        driver = ctypes.CDLL("nvcuda.dll" if windows else "libcuda.so.1")
-        if not windows:
-            ctypes.CDLL(os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1"))
+        driver = ctypes.CDLL("libcuda.so.1")
+        ctypes.CDLL(os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1"))
     except OSError:
         return False
     count = ctypes.c_int()

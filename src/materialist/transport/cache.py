@@ -78,11 +78,16 @@ class TransportCache:
     ):
         self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
         self.settings = settings or CacheSettings()
+        s = self.settings
+        narrow = [max(1, round(share * s.specular_samples)) for share in s.level_share]
+        alphas = [float(alpha_of(roughness)) for roughness in ROUGHNESS_LEVELS]
+        self.lobes = [(s.diffuse_samples, 1.0), *zip(narrow, alphas, strict=True)]
+        """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each roughness level."""
         self.scene = build_scene(geometry.mesh)
         self.slots = _radiance_slots(geometry.mesh, camera)
         self._slots = integers(mi, self.slots)
         self._primary()
-        self._traced: list[mi.UInt32] = []
+        self._hits: list[mi.UInt32] = []
         self._progress = progress
 
     def _primary(self) -> None:
@@ -109,41 +114,27 @@ class TransportCache:
         self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
         dr.eval(self.position, self.geometric_normal, self.face, self.normal, self.frame, self.wo, self.shift)
 
-    def _count(self, k: int) -> int:
-        if k == 0:
-            return self.settings.diffuse_samples
-        return max(1, round(self.settings.level_share[k - 1] * self.settings.specular_samples))
-
-    def _alpha(self, k: int) -> float:
-        return 1.0 if k == 0 else float(alpha_of(ROUGHNESS_LEVELS[k - 1]))
-
-    def _trace(self, k: int) -> mi.UInt32:
-        """Hits of lobe `k` (0 diffuse, else roughness level k-1): [N * P] radiance slots, sample-major."""
-        count, width = self._count(k), len(self.pixels)
+    def _trace(self, count: int, alpha: float, diffuse: bool) -> mi.UInt32:
+        """[count * P] radiance slots that a lobe's rays meet, sample-major."""
+        width = len(self.pixels)
         hits = dr.empty(mi.UInt32, count * width)
         _trace_loop(
             self.scene, self._slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
             self.face, self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count),
-            dr.opaque(mi.Float, self._alpha(k)), k == 0,
+            dr.opaque(mi.Float, alpha), diffuse,
         )  # fmt: skip
         dr.eval(hits)
         return hits
 
-    def trace(self) -> None:
-        """Find what every lobe's rays meet, unless that is known; the light fit never asks."""
-        lobes = len(ROUGHNESS_LEVELS) + 1
-        if len(self._traced) == lobes:
-            return
-        for k in range(len(self._traced), lobes):
-            self._traced.append(self._trace(k))
-            if self._progress is not None:
-                self._progress("trace", k + 1, lobes)
+    def trace(self) -> list[mi.UInt32]:
+        """What the rays of every lobe meet, found on first use; the light fit never asks."""
+        for k, (count, alpha) in enumerate(self.lobes):
+            if k == len(self._hits):
+                self._hits.append(self._trace(count, alpha, diffuse=k == 0))
+                if self._progress is not None:
+                    self._progress("trace", k + 1, len(self.lobes))
         dr.sync_thread()  # so that whoever measures this sees it
-
-    @property
-    def _hits(self) -> list[mi.UInt32]:
-        self.trace()
-        return self._traced
+        return self._hits
 
     def gather(self, envmap: Array, radiance: Array | None) -> Tables:
         """Tables for one light, an envmap [h, 2h, 3] of linear radiance.
@@ -155,13 +146,12 @@ class TransportCache:
         slots = floats(mi, self.slot_radiance(radiance))
         width = len(self.pixels)
         out = []
-        for k in range(len(ROUGHNESS_LEVELS) + 1):
-            count, alpha = self._count(k), self._alpha(k)
+        for k, (hits, (count, alpha)) in enumerate(zip(self.trace(), self.lobes, strict=True)):
             # Diffuse lobes are sampled alike in every tile: what falls between their few directions would be missing
             # from the whole picture, or be in all of it twice.
             env = pyramid.level(4 * np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
             args = (
-                self._hits[k], slots, env, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
+                hits, slots, env, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
                 dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha),
             )  # fmt: skip
             sums = _gather_diffuse(*args) if k == 0 else _gather_specular(*args)

@@ -7,7 +7,7 @@ levels keep their detail.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import torch
@@ -49,11 +49,10 @@ def taps(guide: Guide) -> Iterator[Tap]:
             yield dy, dx, wy * wx * guide_weights(guide, dy, dx)
 
 
-def joint_filter(values: torch.Tensor, guide: Guide, known: list[Tap] | None = None) -> torch.Tensor:
-    """Average `values` [H, W, C] over neighbours (`taps`, unless `known`) that lie on the same surface."""
-    total = torch.zeros_like(values)
-    norm = torch.zeros_like(guide.scale)
-    for dy, dx, weight in known or taps(guide):
+def joint_filter(values: torch.Tensor, neighbours: Iterable[Tap]) -> torch.Tensor:
+    """Average `values` [H, W, C] over neighbours that lie on the same surface, as `taps` gives them."""
+    total, norm = torch.zeros_like(values), torch.zeros(values.shape[:2])
+    for dy, dx, weight in neighbours:
         total.addcmul_(_shifted(values, dy, dx), weight[..., None])
         norm += weight
     return total / norm.clamp_min(1e-6)[..., None]
@@ -78,7 +77,7 @@ def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables
     grid = torch.zeros(guide.scale.numel(), stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
-    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
+    smooth = joint_filter(grid.view(*guide.scale.shape, -1), taps(guide)).view(len(grid), -1)[pixels]
     levels = [*tables.specular[:kept], *smooth[:, 9:].split(6, -1)]
     return Tables(smooth[:, :9].contiguous(), torch.stack(list(levels)))
 

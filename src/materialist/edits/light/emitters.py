@@ -18,8 +18,8 @@ from materialist.edits.core.surfaces import (
     with_emitters,
 )
 from materialist.errors import InputError
+from materialist.geometry.build import part
 from materialist.geometry.silhouette import disc
-from materialist.render.scene import part
 from materialist.types import Array, Body, Photo, Scene
 
 

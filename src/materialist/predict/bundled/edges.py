@@ -13,7 +13,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from materialist.geometry.slopes import between, least_squares_change, slopes
 from materialist.types import Array
 
 STEP = 0.015
@@ -101,11 +100,12 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
     if known.sum() < 9:
         return sharp
     index = np.cumsum(known.ravel()).reshape(known.shape) - 1
-    pairs = []
-    for near, far, asked in between(slopes(normal, rays)):
+    pairs, across, down = [], np.s_[:, :-1], np.s_[:-1]
+    neighbours = (across, np.s_[:, 1:]), (down, np.s_[1:])
+    for demanded, (near, far) in zip(slopes(normal, rays), neighbours, strict=True):
         both = known[near] & known[far]
         change = (sharp[far] - sharp[near])[both].astype(np.float64)
-        slope = asked[both].astype(np.float64)
+        slope = ((demanded[near] + demanded[far]) / 2)[both].astype(np.float64)
         weight = np.where(np.abs(change) > STEP + np.abs(slope), OPEN, 1.0)
         pairs.append((index[near][both], index[far][both], slope - change, weight))
     first, second, wanted, weight = (np.concatenate(column) for column in zip(*pairs, strict=True))
@@ -113,3 +113,37 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
     found = np.array(sharp, np.float32)
     found[known] += least_squares_change(first, second, wanted, weight, pull, rtol=1e-3, maxiter=100)
     return found
+
+
+def slopes(normal: Array, rays: Array, steepest: float = 0.12) -> tuple[Array, Array]:
+    """[H, W] change of log depth from one pixel to the next that the normals demand, to the right and downwards.
+
+    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). steepest: smallest n.v that is followed.
+
+    normal: [H, W, 3] unit, camera frame. rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
+    """
+    x, y = rays[..., 0], rays[..., 1]
+    across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
+    down = float(y[-1, 0] - y[0, 0]) / max(y.shape[0] - 1, 1)
+    facing = normal[..., 0] * x + normal[..., 1] * y - normal[..., 2]
+    facing = np.minimum(facing, -steepest * np.sqrt(x**2 + y**2 + 1))  # n . r < 0 where the surface is seen
+    return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
+
+
+def least_squares_change(
+    first: Array, second: Array, wanted: Array, weight: Array, pull: Array, *, rtol: float, maxiter: int
+) -> Array:
+    """[N] float64, min over u of sum of weight |u_second - u_first - wanted|^2 + sum of pull |u|^2.
+
+    Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say. first, second: [P] which
+    of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
+    """
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import cg
+
+    rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
+    entries = (np.concatenate([-root, root]), (rows, np.concatenate([first, second])))
+    step = coo_matrix(entries, (len(first), len(pull))).tocsr()
+    system = (step.T @ step + diags(pull)).tocsr()
+    change, _ = cg(system, step.T @ (root * wanted), rtol=rtol, maxiter=maxiter, M=diags(1 / system.diagonal()))
+    return change
