@@ -46,9 +46,8 @@ radiance [P, 3], differentiable."""
 class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
-    Args:
-        radiance: [H, W, 3] what the surfaces send to each other: the photograph.
-        light_height: rows of the environment map inside the light fit.
+    radiance: [H, W, 3] what the surfaces send to each other: the photograph.
+    light_height: rows of the environment map inside the light fit.
     """
 
     def __init__(
@@ -91,11 +90,7 @@ class TransportEngine:
 
 
 class PathEngine:
-    """The paper's engine: Mitsuba's PRB integrator, a fresh seed in every step.
-
-    Args:
-        scene: `materialist.render.scene.RenderScene`.
-    """
+    """The paper's engine: Mitsuba's PRB integrator on a `RenderScene`, a fresh seed in every step."""
 
     def __init__(
         self, scene, camera: Camera, pixels: Array, *, spp: int = 64, max_depth: int = 4, envmap_height: int = 256,

@@ -189,9 +189,7 @@ def invert(
 ) -> FitResult:
     """Geometry, light, materials and the path-traced re-rendering of one photo.
 
-    Args:
-        progress: called as progress(stage, done, total).
-        found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
+    found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
     """
     prepared = prepare(setup, progress)
     fit, stages, seed = prepared.fit, list(prepared.stages), setup.seed

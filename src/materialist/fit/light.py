@@ -67,21 +67,12 @@ def envmap_field(settings: LightSettings, *, seed: int = 0, start: torch.Tensor 
 
 
 def fit_light(
-    problem: LightProblem,
-    photo: torch.Tensor,
-    field: nn.Module,
-    settings: LightSettings,
-    *,
-    start: LightStart | None = None,
-    seed: int = 0,
-    progress: Progress | None = None,
-) -> StageResult:
+    problem: LightProblem, photo: torch.Tensor, field: nn.Module, settings: LightSettings, *,
+    start: LightStart | None = None, seed: int = 0, progress: Progress | None = None,
+) -> StageResult:  # fmt: skip
     """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
 
-    Beyond the paper, what the light differs from `start` by is kept smooth, white and small.
-
-    Args:
-        photo: [H * W, 3] linear.
+    Beyond the paper, what the light differs from `start` by is kept smooth, white and small. photo: [H * W, 3] linear.
     """
     target = photo[problem.pixels]
     before = 0.0 if start is None else resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log()

@@ -39,21 +39,10 @@ def material_field(
 
 
 def fit_materials(
-    problem: MaterialProblem,
-    photo: torch.Tensor,
-    field: nn.Module,
-    prior: torch.Tensor,
-    settings: MaterialSettings,
-    *,
-    progress: Progress | None = None,
-) -> list[StageResult]:
-    """Move `field` stage by stage: argmin L_re + delta L_cons.
-
-    Args:
-        problem: rendering under a fixed light.
-        photo: [P, 3] linear.
-        prior: [P, 5] the maps that L_cons holds on to.
-    """
+    problem: MaterialProblem, photo: torch.Tensor, field: nn.Module, prior: torch.Tensor, settings: MaterialSettings,
+    *, progress: Progress | None = None,
+) -> list[StageResult]:  # fmt: skip
+    """Move `field` stage by stage: argmin L_re + delta L_cons; photo: [P, 3] linear, prior: [P, 5] as there."""
     results = []
     for stage in settings.stages:
         held = {name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets}

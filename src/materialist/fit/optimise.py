@@ -37,14 +37,9 @@ class StageResult:
 
 
 def optimise(
-    name: str,
-    parameters: Iterable[torch.Tensor],
-    loss: Callable[[int], torch.Tensor],
-    schedule: Schedule,
-    *,
-    after_step: Callable[[], None] | None = None,
-    progress: Progress | None = None,
-) -> StageResult:
+    name: str, parameters: Iterable[torch.Tensor], loss: Callable[[int], torch.Tensor], schedule: Schedule, *,
+    after_step: Callable[[], None] | None = None, progress: Progress | None = None,
+) -> StageResult:  # fmt: skip
     """Minimise `loss(step)` over the tensors `parameters` in place.
 
     The loss that counts for early stopping is the best of each window of `patience` steps.

@@ -27,7 +27,7 @@ class Architecture:
     """Widths and depths of a network."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Lists, numbers and texts, for JSON."""
+        """As JSON gives them back."""
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
     @classmethod

@@ -29,9 +29,8 @@ def get_predictor(spec: str = "auto", *, device: str = "auto", **parts: str | No
     `parts`: albedo, roughness, metallic, normal or depth = the spec of the source of this map alone, as in
     `get_predictor("matnet", albedo="marigold")`; None means `spec`. Nothing is ever downloaded here.
 
-    Raises:
-        InputError: an unknown name, a folder that is not there, or a source that does not give its map.
-        SetupError: an optional library is missing. WeightsError: weights are missing or damaged.
+    Raises InputError for an unknown name, a folder that is not there, or a source that does not give its map;
+    SetupError where an optional library is missing, WeightsError where weights are missing or damaged.
     """
     if unknown := [name for name in parts if name not in MAPS]:
         raise InputError(f"There is no map '{unknown[0]}'; a predictor can be named for {', '.join(MAPS)}.")

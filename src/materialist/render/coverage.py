@@ -52,12 +52,10 @@ def only(scene, names: Sequence[str]):
 def first_hits(
     scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box | None = None
 ) -> FirstHits:
-    """See `FirstHits`.
+    """See `FirstHits`; of a Mitsuba scene (`RenderScene.mi_scene`).
 
-    Args:
-        scene: a Mitsuba scene (`RenderScene.mi_scene`).
-        bodies: by the names of their shapes; None for one without a material, as lamps, which is taken as white.
-        size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
+    bodies: by the names of their shapes; None for one without a material, as lamps, which is taken as white.
+    size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
     """
     rows, columns = box or (slice(0, size[0]), slice(0, size[1]))
     step = max(1, _RAYS // max(columns.stop - columns.start, 1))

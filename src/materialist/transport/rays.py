@@ -15,13 +15,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from materialist.bsdf.disney import (
-    base_reflectance,
-    diffuse_coefficients,
-    half_vector_density,
-    quadratic,
-    schlick,
-)
+from materialist.bsdf.disney import base_reflectance, diffuse_coefficients, half_vector_density, quadratic, schlick
 from materialist.bsdf.ggx import alpha_of, smith_g1
 from materialist.bsdf.lobes import half_vector, lifted, visible_normal
 from materialist.buffers import floats, integers
@@ -53,10 +47,8 @@ def rays(
 ) -> Iterator[Rays]:  # fmt: skip
     """All rays of the surface pixels `cache.pixels[rows]`, in parts.
 
-    Args:
-        rows: [Q]. rough, metallic: [Q]; perceptual roughness.
-        shape: (h, 2h) of the envmap. per_texel: rays of a row through each texel.
-        specular: rays of a row along the visible normals of its specular lobe.
+    rows: [Q]. rough, metallic: [Q]; perceptual roughness. shape: (h, 2h) of the envmap. per_texel: rays of a row
+    through each texel. specular: rays of a row along the visible normals of its specular lobe.
     """
     texels = shape[0] * shape[1] * per_texel
     at_once = max(1, LANES // max(texels, specular))

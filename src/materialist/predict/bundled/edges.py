@@ -19,20 +19,17 @@ STEP = 0.015
 """Change of log depth from pixel to pixel, beyond what the normals demand, above which two surfaces meet; by eye."""
 OPEN = 1e-3
 """Weight of such a pair; larger joins the two surfaces."""
+STEEPEST = 0.12
+"""Least n.v of a normal that depth follows."""
 LENGTH = 10.0
 """Pixels above which the depth decides, below which the normals do; tuned by eye."""
 
 
 class GuidedFilter:
-    """The photo as a guide: weights W_ij = mean over windows k of 1 + (I_i - m_k)^T (S_k + eps)^-1 (I_j - m_k).
+    """A photo [H, W, 3] sRGB as a guide: W_ij = mean over windows k of 1 + (I_i - m_k)^T (S_k + eps)^-1 (I_j - m_k).
 
     m_k and S_k are mean and covariance of colours in the window, so that pixels on one side of an edge count for each
-    other, and those across it do not.
-
-    Args:
-        photo: [H, W, 3] float32 sRGB-encoded.
-        radius: of the windows, pixels.
-        eps: variance of colour that is not yet an edge.
+    other, and those across it do not. radius: of the windows, pixels. eps: variance of colour that is not yet an edge.
     """
 
     def __init__(self, photo: Array, *, radius: int, eps: float = 1e-3):
@@ -59,15 +56,12 @@ class GuidedFilter:
         return cv2.blur(plane, self.window, borderType=cv2.BORDER_REFLECT)
 
 
-def weighted_median(values: Array, guide: GuidedFilter, *, known: Array | None = None, bins: int = 32) -> Array:
+def weighted_median(values: Array, guide: GuidedFilter, known: Array, *, bins: int = 32) -> Array:
     """[H, W] float32: at every pixel the median of the values around it, weighted by `guide`.
 
     Values between their 0.5 and 99.5 percentiles are told apart by `bins` steps and by linear interpolation within.
-
-    Args:
-        known: [H, W] bool: pixels whose values count; the others keep theirs.
+    Those of pixels that are not known [H, W] bool do not count, and stay.
     """
-    known = np.ones(values.shape, bool) if known is None else known
     low, high = np.percentile(values[known], [0.5, 99.5]) if known.any() else (0.0, 0.0)
     if not high > low:
         return values.astype(np.float32)
@@ -84,17 +78,13 @@ def weighted_median(values: Array, guide: GuidedFilter, *, known: Array | None =
 
 
 def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
-    """Logarithm of depth that follows the normals in the small, and `sharp` in the large and at its steps.
+    """[H, W] float32 log depth that follows the normals in the small, and `sharp` in the large and at its steps.
 
     Solves min over u of sum of w |u_q - u_p - g_pq|^2 over neighbours + sum |u_p - sharp_p|^2 / LENGTH^2, where g is
-    the slope that the normals demand: n . d(z r) = 0 gives d log z = -n . dr / (n . r).
+    the slope that the normals demand (`slopes`).
 
-    Args:
-        sharp: [H, W] logarithm of depth with edges, NaN where there is no surface.
-        normal: [H, W, 3] unit. rays: [H, W, 2] x and y of the rays at z = -1.
-
-    Returns:
-        [H, W] float32, NaN where `sharp` is.
+    sharp: [H, W] logarithm of depth with edges, NaN where there is no surface; so is the result. normal: [H, W, 3]
+    unit. rays: [H, W, 2] x and y of the rays at z = -1.
     """
     known = np.isfinite(sharp)
     if known.sum() < 9:
@@ -115,18 +105,17 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
     return found
 
 
-def slopes(normal: Array, rays: Array, steepest: float = 0.12) -> tuple[Array, Array]:
+def slopes(normal: Array, rays: Array) -> tuple[Array, Array]:
     """[H, W] change of log depth from one pixel to the next that the normals demand, to the right and downwards.
 
-    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). steepest: smallest n.v that is followed.
-
-    normal: [H, W, 3] unit, camera frame. rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
+    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). normal: [H, W, 3] unit, camera frame.
+    rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
     """
     x, y = rays[..., 0], rays[..., 1]
     across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
     down = float(y[-1, 0] - y[0, 0]) / max(y.shape[0] - 1, 1)
     facing = normal[..., 0] * x + normal[..., 1] * y - normal[..., 2]
-    facing = np.minimum(facing, -steepest * np.sqrt(x**2 + y**2 + 1))  # n . r < 0 where the surface is seen
+    facing = np.minimum(facing, -STEEPEST * np.sqrt(x**2 + y**2 + 1))  # n . r < 0 where the surface is seen
     return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
 
 

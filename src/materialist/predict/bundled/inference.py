@@ -39,19 +39,12 @@ SETTINGS = InferenceSettings()
 
 
 def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu") -> Prediction:
-    """Maps of a photo at its own size.
+    """Maps of a photo [H, W, 3] float32 linear, white about 1, at its own size, as a Prediction without a name.
 
-    The network sees the photo and its mirror image at two sizes; its answers are averaged and enlarged, geometry with
-    the photo's edges.
-
-    Args:
-        network: in evaluation mode, on `device`.
-        linear: [H, W, 3] float32 linear, white about 1; clipped to [0, 1] here, as photographs are.
-        rays: [H, W, 2] float32 x and y of the camera rays at z = -1.
-
-    Returns:
-        A Prediction without a name: albedo linear, depth with a fixed median, 0 where there is no surface; light where
-        the network knows it.
+    The network, in evaluation mode on `device`, sees the photo, clipped to [0, 1], and its mirror image at two sizes;
+    its answers are averaged and enlarged, geometry with the photo's edges. rays: [H, W, 2] float32 x and y of the
+    camera rays at z = -1. Albedo is linear, depth has a fixed median and is 0 where there is no surface; light where
+    the network knows it.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
@@ -82,8 +75,8 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     known = depth > 0
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
-    sharp = weighted_median(coarse, guide, known=known)
-    planes = [weighted_median(np.ascontiguousarray(c), guide, known=known, bins=16) for c in np.moveaxis(normal, -1, 0)]
+    sharp = weighted_median(coarse, guide, known)
+    planes = [weighted_median(np.ascontiguousarray(c), guide, known, bins=16) for c in np.moveaxis(normal, -1, 0)]
     normal = _unit(np.stack(planes, -1))
     logarithm = with_relief(np.where(known, sharp, np.nan), normal, seen)
     depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)

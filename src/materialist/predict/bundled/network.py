@@ -79,26 +79,22 @@ class BundledNetwork(StoredNetwork):
         _same_subpixels(self.head)
 
     def forward(self, image: Tensor, rays: Tensor) -> dict[str, Tensor]:
-        """All maps of a batch of photos.
+        """All maps of images [B, 3, H, W] linear radiance, >= 0, white about 1, whose sides are multiples of 32.
 
-        Args:
-            image: [B, 3, H, W] linear Rec.709 radiance, >= 0, exposed so that white is about 1; sides are multiples
-                of 32.
-            rays: [B, 2, H, W] x and y of the camera rays at z = -1 (see camera.pixel_rays).
+        rays: [B, 2, H, W] x and y of the camera rays at z = -1 (see camera.pixel_rays).
 
-        Returns:
-            albedo [B, 3, H, W] sRGB-encoded in [0, 1]; roughness and metallic [B, 1, H, W] in [0, 1]; normal
-            [B, 3, H, W] unit; depth [B, 1, H, W] natural logarithm of planar depth, up to a constant; mask
-            [B, 1, H, W] logit of there being a surface; metallic_logit, the metallic before its sigmoid; where the
-            architecture has it, light [B, 4, h, 2h], see `LightHead`.
+        albedo [B, 3, H, W] is sRGB-encoded in [0, 1]; roughness and metallic [B, 1, H, W] in [0, 1]; normal
+        [B, 3, H, W] unit; depth [B, 1, H, W] the natural logarithm of planar depth, up to a constant; mask
+        [B, 1, H, W] the logit of there being a surface; metallic_logit, the metallic before its sigmoid; where the
+        architecture has it, light [B, 4, h, 2h], see `LightHead`.
         """
         picture, more = encode(image), self._told(image)
-        x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), _shrink(rays, 4)], 1))
+        x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), F.avg_pool2d(rays, 4)], 1))
         x, skips, told = self.levels[0](x + more[0]), [], x
         for k in range(3):
             skips.append(x)
             x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + more[k + 1])
-        x = self._context(x, _shrink(rays, STRIDE))
+        x = self._context(x, F.avg_pool2d(rays, STRIDE))
         for k in (2, 1, 0):
             x = F.interpolate(self.ups[k](x), scale_factor=2, mode="nearest")
             x = self.decoders[k](x + self.skips[k](skips[k]))
@@ -150,25 +146,16 @@ def _maps(raw: Tensor, curve: Tensor) -> dict[str, Tensor]:
     The photo's own detail is then there from the start, and the network learns to take light out of it.
     """
     maps = dict(zip(CHANNELS, raw.split(list(CHANNELS.values()), 1), strict=True))
+    ahead = raw.new_tensor([0.0, 0.0, 1.0]).view(1, 3, 1, 1)
     return {
         "albedo": (maps["albedo"] + ALBEDO_SLOPE * curve).sigmoid(),
         "roughness": maps["roughness"].sigmoid(),
         "metallic": maps["metallic"].sigmoid(),
         "metallic_logit": maps["metallic"],
-        "normal": _facing(maps["normal"]),
+        "normal": F.normalize(maps["normal"] + ahead, dim=1, eps=1e-4),  # raw zero looks at the viewer
         "depth": maps["depth"],
         "mask": maps["mask"],
     }
-
-
-def _facing(raw: Tensor) -> Tensor:
-    """Unit vectors of raw [B, 3, H, W]; raw zero looks at the viewer."""
-    return F.normalize(raw + raw.new_tensor([0.0, 0.0, 1.0]).view(1, 3, 1, 1), dim=1, eps=1e-4)
-
-
-def _shrink(rays: Tensor, factor: int) -> Tensor:
-    """Mean ray of every factor x factor cell."""
-    return F.avg_pool2d(rays, factor)
 
 
 def _conv(inputs: int, outputs: int, *, bias: bool = False) -> nn.Conv2d:

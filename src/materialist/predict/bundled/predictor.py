@@ -21,15 +21,9 @@ WEIGHTS = Path(__file__).with_name("weights.safetensors")
 
 
 class BundledPredictor(Predictor):
-    """The bundled network, or one of its kind from `train matnet`.
+    """The network in the package, or one of its kind from `train matnet` in the .safetensors file `where`.
 
-    Args:
-        where: a .safetensors file, or "" for the weights in the package.
-        device: 'auto', 'cpu' or 'cuda'.
-
-    Raises:
-        WeightsError: the weights are missing, damaged, or for another network.
-        SetupError: there is no such device.
+    Raises WeightsError for weights that are missing, damaged, or for another network; SetupError as `on_gpu`.
     """
 
     def __init__(self, where: str | Path = "", *, device: str = "auto"):

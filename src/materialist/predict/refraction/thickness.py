@@ -48,14 +48,10 @@ def thickness(
 
     Both lengths are along the straight camera rays in the units of `depth`, normals are where those rays leave.
 
-    Args:
-        photo_linear: [H, W, 3] linear Rec.709. mask: [H, W] bool or weights: one object.
-        normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, 0 where there is no surface.
-        camera: its size must be that of the maps.
-        weights: a .safetensors file from `materialist train refraction`, or "" for those in the package.
-
-    Raises:
-        InputError: maps of different sizes, or a mask without any surface. WeightsError: no usable weights.
+    photo_linear: [H, W, 3] linear Rec.709. mask: [H, W] bool or weights: one object. normal: [H, W, 3] unit, camera
+    frame. depth: [H, W] planar, 0 where there is no surface. weights: a file of `materialist train refraction`, or ""
+    for those in the package. Raises InputError for maps of another size than the camera's, or a mask without any
+    surface; WeightsError for weights that cannot be used.
     """
     from materialist.predict.network import loaded
     from materialist.predict.refraction.network import RefractionNet
