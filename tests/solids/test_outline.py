@@ -5,7 +5,7 @@ import pytest
 from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, box, lines, turned, view
 
 from materialist.bench.glass_scenes import is_closed
-from materialist.solids.finder import surface_of_revolution
+from materialist.solids.outline import surface_of_revolution
 from materialist.types import Camera
 
 

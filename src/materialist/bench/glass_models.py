@@ -203,8 +203,8 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
 
 def _predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
     """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
+    from materialist.geometry.planes import upright
     from materialist.predict.refraction import best_thickness
-    from materialist.solids.finder import upright
 
     up, front = upright(normal, _planes(scene, depth, normal)), scene.front
     return best_thickness(photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth)

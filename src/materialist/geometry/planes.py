@@ -89,6 +89,19 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
     return _label(_Maps(rays, normal.astype(np.float64), depth), found)
 
 
+def upright(normal: Array, plane: Array) -> Array | None:
+    """[3] unit, camera frame: the mean normal of the largest plane that faces upwards, or None.
+
+    normal [H, W, 3] unit, plane [H, W] int: the plane of a pixel, -1 for none.
+    """
+    counts = np.bincount(plane[plane >= 0], minlength=1)
+    for k in np.argsort(-counts)[: np.count_nonzero(counts > 12)]:
+        mean = unit(normal[plane == k].mean(0, dtype=np.float64))
+        if mean[1] > 0.6:
+            return mean
+    return None
+
+
 @dataclass(frozen=True)
 class _Maps:
     """What the search looks at, at full or reduced resolution."""

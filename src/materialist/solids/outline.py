@@ -3,7 +3,7 @@
 The outline of a surface of revolution is its own image in the plane through the camera and the axis. The part of the
 half plane beside the axis that stays inside the outline at every turn is the largest body with that outline (its visual
 hull). For bodies that bulge and wave gently the hull is the body itself, but for the two ends that the camera sees from
-above and below.
+above and below. Predicted normals are rarely clean enough to tell an axis or a profile; an outline is.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import binary_fill_holes
 
 from materialist.camera import pixel_rays, project, unit
-from materialist.geometry.silhouette import silhouette_field
-from materialist.solids.profile import Profile, fitted
-from materialist.solids.revolution import DEFAULT as REVOLUTION
+from materialist.geometry.silhouette import silhouette_field, surface_in
+from materialist.solids.profile import Profile
 from materialist.solids.revolution import Axis, Revolution, ground_height
 from materialist.types import Array, Camera
 
@@ -25,6 +25,8 @@ from materialist.types import Array, Camera
 class OutlineSettings:
     """When an outline is taken for that of a surface of revolution, and how its hull is made."""
 
+    fewest: int = 64  # pixels below which an object is too small to tell
+    pierced: float = 1.02  # most of its filled outline, in its area: rings and handles have holes; tuned by eye
     alike: float = 0.964  # least share of the mask that lies in its image: boxes have edges where it is round
     covered: float = 0.955  # least share of the mask that the body covers
     leaning: float = 0.12  # least slope of the map's sideways normals over the body's: a face seen straight on has 0
@@ -32,27 +34,35 @@ class OutlineSettings:
     side: float = 0.5  # see `stepped`
     above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
     tilts: tuple[float, ...] = (0.05, 0.15, 0.28, 0.42)  # radians the camera may look down where no ground tells it
+    standing: float = 0.1  # distance from the ground, in its heights, up to which it is made to reach it where it is
     elsewhere: float = 0.3  # relative distance from the depth map's place up to which the ground is believed
     turns: int = 40  # turns at which a place beside the axis must stay inside the outline
     fine: int = 120  # cells of the hull along the object
+    air: float = 0.004  # part of its height that an object stays above the ground
     flat: float = 1.25  # slopes up to this multiple of the camera's are of the end caps, which the outline hides
 
 
 DEFAULT = OutlineSettings()
 
 
-def by_outline(
-    depth: Array, normal: Array, inside: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
-) -> Revolution | None:
-    """A surface of revolution with this outline, or None where the outline or the normals are of something else.
+def surface_of_revolution(
+    depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
+) -> tuple[Revolution, Array] | None:
+    """An object that is a surface of revolution and its thickness [H, W] float32 along the rays, scene units; or None.
 
-    Arguments as of `finder.surface_of_revolution`, inside [H, W] bool. Where nothing tells the upright direction, or it
-    does not fit, the camera looks down at the angle at which the body fills the outline best. An object that the frame
-    cuts is none.
+    depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object; one
+        that the frame cuts, or that has a hole, is none.
+    up: [3] unit, the axis' direction in the camera's frame, where a support tells it. Where it does not, or does not
+        fit, the camera looks down at the angle at which the body fills the outline best.
+    behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
+    Raises InputError for maps of different sizes, or a mask without any surface.
     """
-    if inside[[0, -1]].any() or inside[:, [0, -1]].any():
+    inside = surface_in(mask, depth, camera)
+    cut = inside[[0, -1]].any() or inside[:, [0, -1]].any()
+    if cut or inside.sum() < DEFAULT.fewest or binary_fill_holes(inside).sum() > DEFAULT.pierced * inside.sum():
         return None
     rays = pixel_rays(camera).astype(np.float64)
+    depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float64)
     told = [] if up is None else [(up, behind)]
     # A predicted ground may lean: then the outline says how far the camera looks down, and the ground says nothing.
     guessed = [(np.array([0, np.cos(tilt), np.sin(tilt)]), None) for tilt in DEFAULT.tilts]
@@ -60,7 +70,10 @@ def by_outline(
         standing = (_along(upright, _Seen(inside, depth, normal, rays, below, camera)) for upright, below in tries)
         share, best = max(standing, key=lambda one: one[0], default=(0.0, None))
         if best is not None and share > DEFAULT.covered:
-            return best if best.profile.lines() else None
+            if not best.profile.lines():
+                return None
+            front, _ = best.front(inside, rays)
+            return best, best.thickness(np.where(front > 0, front, depth), inside, rays)
     return None
 
 
@@ -138,25 +151,38 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
 
 
 def _placed(up: Array, ahead: Array, seen: _Seen) -> Revolution | None:
-    """The body as far away as the ground that the object stands on, or as the depth map has its front."""
+    """The body where the depth map has its front, or as far away as the ground that it stands on."""
     field = silhouette_field(seen.inside)
     first = Axis(up, ahead)  # at distance 1
-    trial = _profile(field, first, seen.camera, None)
-    if trial is None:
+    found = _profile_line(field, first, seen.camera)
+    if found is None:
         return None
-    front, _ = Revolution(first, trial).front(seen.inside, seen.rays)
+    line, cell = found
+    base, high = float(line[0, 1]), float(np.ptp(line[:, 1]))
+    front, _ = Revolution(first, Profile.of(line, cell, base)).front(seen.inside, seen.rays)
     both = seen.inside & (front > 0)
     away = float(np.median(seen.depth[both] / front[both])) if both.any() else 1.0
     ground = ground_height(Axis(up, np.zeros(3)), seen.behind, seen.inside, seen.rays)
-    if np.isfinite(ground) and trial.floor < 0 and abs(ground / trial.floor / away - 1) < DEFAULT.elsewhere:
-        away = ground / trial.floor
-    axis = Axis(up, away * ahead)
-    profile = _profile(field, axis, seen.camera, ground if np.isfinite(ground) else None)
-    return None if profile is None else Revolution(axis, profile)
+    floor = base * away
+    if np.isfinite(ground):
+        near = abs(ground - floor) < DEFAULT.standing * high * away
+        if not near and base < 0 and abs(ground / base / away - 1) < DEFAULT.elsewhere:
+            away = ground / base
+        lowest, highest = ((base + side * DEFAULT.standing * high) * away for side in (-1, 1))
+        floor = float(np.clip(ground + DEFAULT.air * high * away, lowest, highest))
+    line = line * away
+    # Down to the base it goes on straight.
+    down = unit(line[0] - line[3])
+    foot = line[0] + down * (max(line[0, 1] - floor, 0) + cell * away) / max(float(-down[1]), 1e-3)
+    line = np.concatenate([[np.maximum(foot, [0, -np.inf])], line])
+    return Revolution(Axis(up, away * ahead), Profile.of(line, cell * away, floor))
 
 
-def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> Profile | None:
-    """The profile of the visual hull, its caps rounded; None where nothing stays inside the outline."""
+def _profile_line(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | None:
+    """The border [K, 2] of the visual hull from its foot to the axis, its upper end rounded, and the size of a cell.
+
+    None where nothing stays inside the outline.
+    """
     from skimage.measure import find_contours
 
     far = float(np.linalg.norm(axis.foot))
@@ -177,9 +203,8 @@ def _profile(field: Array, axis: Axis, camera: Camera, ground: float | None) -> 
     if not lines or len(longest := max(lines, key=len)) < 12:
         return None
     line = longest[:, ::-1] * cell + [0, low]  # (distance, height)
-    if line[0, 1] > line[-1, 1]:
-        line = line[::-1]
-    return _capped(line, far, cell, ground)
+    capped = _capped(line if line[0, 1] < line[-1, 1] else line[::-1], far, cell)
+    return None if capped is None else (capped, cell)
 
 
 def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array:
@@ -204,8 +229,11 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     return (halves[0] + halves[1]) / 2
 
 
-def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profile | None:
-    """A profile through a line from the lower to the upper end, `far` from the camera, heights those above it."""
+def _capped(line: Array, far: float, cell: float) -> Array | None:
+    """A line from the lower to the upper end without what the camera does not see, and a round upper end.
+
+    line: [K, 2] (distance, height above the camera), `far` from the camera.
+    """
     from scipy.ndimage import gaussian_filter1d
 
     smooth = gaussian_filter1d(line, 3.0, axis=0, mode="nearest")
@@ -214,21 +242,12 @@ def _capped(line: Array, far: float, cell: float, ground: float | None) -> Profi
     lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
     limit = DEFAULT.flat * np.where(half, lower, upper)
-    steep = np.abs(step[:, 1]) > limit * np.abs(step[:, 0])
-    if steep.sum() < 4:
+    steep = np.flatnonzero(np.abs(step[:, 1]) > limit * np.abs(step[:, 0]))
+    if len(steep) < 4:
         return None
-    slope = float(upper[np.flatnonzero(steep)[-1]])
-    first, last = np.flatnonzero(steep)[[0, -1]]
-    side, along = smooth[first : last + 1], step[first : last + 1]
-    leaning = np.stack([along[:, 1], -along[:, 0]], -1)
+    side, slope = smooth[steep[0] : steep[-1] + 1], float(upper[steep[-1]])
     # A round end of the same slope where it begins, level at the axis.
     wide, top = side[-1]
-    r = np.arange(0, wide, cell)[::-1]
+    r = np.append(np.arange(cell, wide, cell)[::-1], 0)
     cap = np.stack([r, top + slope * (wide**2 - r**2) / (2 * max(wide, cell))], -1)
-    lean = unit(np.stack([slope * r / max(wide, cell), np.ones_like(r)], -1))
-    seen, leaning = np.concatenate([side, cap]), np.concatenate([leaning, lean])
-    high = float(np.ptp(seen[:, 1]))
-    floor = float(side[0, 1])
-    if ground is not None:
-        floor = float(np.clip(ground + REVOLUTION.air * high, floor - 0.1 * high, floor + 0.1 * high))
-    return fitted(seen, leaning, np.zeros((0, 2)), cell, floor)
+    return np.concatenate([side, cap])

@@ -1,9 +1,4 @@
-"""A surface of revolution: one profile swept around its axis, found from what is seen of it, and made a closed body.
-
-Every visible point says where the profile is and how it leans. Every ray that passes the object, or comes to its front,
-says where the profile is not, whatever turn brings it there. So the inner side of a ring and the underside of a
-shoulder are known; maps of front and back have no place for them.
-"""
+"""A surface of revolution: one profile swept around its axis, as a closed body or an open vessel."""
 
 from __future__ import annotations
 
@@ -13,28 +8,20 @@ import numpy as np
 
 from materialist.camera import project, unit
 from materialist.geometry.planes import axes
-from materialist.geometry.silhouette import grown
-from materialist.solids.profile import Profile, fitted
+from materialist.solids.profile import Profile
 from materialist.solids.shell import Shell, inside_out, joined
 from materialist.types import Array, Camera
 
 
 @dataclass(frozen=True)
 class RevolutionSettings:
-    """How a profile is read off the maps, and swept."""
+    """How a profile is swept."""
 
-    cells: int = 180  # of the profile's plane along the object
-    rays: int = 6000  # rays at most that tell where the object is not: a bound on memory
     block: int = 4096  # rays that are followed at once: a bound on memory
     around: int = 256  # corners of the swept circles
-    near: int = 6  # pixels around the object whose rays tell where it is not
-    before: float = 1.5  # cells before the front at which rays are free for certain
-    sunk: float = 0.3  # part of its height that an object reaches below what is seen of it, at most; tuned by eye
-    air: float = 0.004  # part of its height that an object stays above the ground
     side: float = 0.5  # least outward part of the normals of a side; above the last of it is the lid
     under: float = 3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
     lip: int = 12  # points of the rounded rim of an open vessel
-    base_facing: float = 0.35  # n.v of the lowest visible part above which it ends in an edge, at a flat base
 
 
 DEFAULT = RevolutionSettings()
@@ -111,16 +98,16 @@ class Revolution:
 
     def _chords(self, rays: Array) -> tuple[Array, Array]:
         """[N] planar depths of the first and of the last point of rays [N, 3] in the body, NaN where they pass it."""
-        seen, step = self.profile.seen, 0.5 * self.profile.cell
+        profile, step = self.profile, 0.5 * self.profile.cell
         length = np.linalg.norm(rays, axis=-1)
-        middle = self.axis.foot + seen[:, 1].mean() * self.axis.up
-        reach = 1.5 * float(np.hypot(seen[:, 0].max(), np.ptp(seen[:, 1])))
+        middle = self.axis.foot + (profile.floor + profile.high / 2) * self.axis.up
+        reach = float(np.hypot(profile.wide, profile.high / 2))
         steps = np.arange(-reach, reach, step)
         found = np.full((2, len(rays)), np.nan)
         for k in range(0, len(rays), DEFAULT.block):
             part = slice(k, k + DEFAULT.block)
             at = ((rays[part] @ middle) / length[part] ** 2)[:, None] + steps / length[part, None]  # [n, S]
-            values = self.profile.at(self.axis.of(rays[part, None] * at[..., None]))
+            values = profile.at(self.axis.of(rays[part, None] * at[..., None]))
             row, inner = np.arange(len(at)), values < 0
             for end, flipped in enumerate((inner, inner[:, ::-1])):
                 column = flipped.argmax(1)
@@ -133,51 +120,12 @@ class Revolution:
         return found[0], found[1]
 
 
-def profile_of(
-    depth: Array, normal: Array, inside: Array, rays: Array, axis: Axis, behind: Array | None = None
-) -> Profile:
-    """The profile of an object of revolution around an axis.
-
-    Args:
-        depth: [H, W] planar depth of the front, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both
-            are known. rays: [H, W, 3] through the pixels at z = -1.
-        behind: [H, W] planar depth of what stands behind, 0 = nothing: the body stays above the lowest of it.
-    """
-    points = (rays * depth[..., None])[inside]
-    seen = axis.of(points)
-    wide, high, low = float(seen[:, 0].max()), float(np.ptp(seen[:, 1])), float(seen[:, 1].min())
-    cell = max(2 * wide, high) / DEFAULT.cells
-    floor = ground_height(axis, behind, inside, rays) + DEFAULT.air * high
-    if not np.isfinite(floor):
-        facing = -(normal[inside] * rays[inside]).sum(-1) / np.linalg.norm(rays[inside], axis=-1)
-        floor = low if np.median(facing[seen[:, 1] <= low + 0.06 * high]) > DEFAULT.base_facing else -np.inf
-    passed = _passed(depth, inside, rays, axis, (wide, high), cell)
-    return fitted(seen, axis.leaning(points, normal[inside]), passed, cell, max(low - DEFAULT.sunk * high, floor))
-
-
 def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
     """Height above the foot of the lowest of what stands behind the object; -inf where there is nothing."""
     if behind is None or not (known := inside & (np.asarray(behind) > 0)).any():
         return -np.inf
     points = rays[known] * np.asarray(behind)[known][:, None]
     return float(np.percentile((points - axis.foot) @ axis.up, 2))
-
-
-def _passed(
-    depth: Array, inside: Array, rays: Array, axis: Axis, extent: tuple[float, float], cell: float
-) -> Array:  # fmt: skip
-    """[M, 2] places of the half plane that rays pass before they meet anything; extent: (width, height) of the body."""
-    near = grown(inside, DEFAULT.near)
-    stride = max(1, int(near.sum()) // DEFAULT.rays)
-    front = np.where(inside, depth - DEFAULT.before * cell, np.inf)[near][::stride]
-    ray = rays[near][::stride]
-    length = np.linalg.norm(ray, axis=-1)
-    # Along the rays, through the ball around the object.
-    reach = 1.2 * float(np.hypot(*extent))
-    middle = axis.foot + extent[1] / 2 * axis.up
-    nearest = (ray @ middle) / length**2
-    at = nearest[:, None] + np.arange(-reach, reach, 0.7 * cell) / length[:, None]  # [N, S] planar depth
-    return axis.of((ray[:, None] * at[..., None])[at < front[:, None]])
 
 
 def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:

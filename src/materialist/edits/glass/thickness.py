@@ -10,10 +10,10 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
+from materialist.geometry.planes import upright
 from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
 from materialist.predict.refraction import best_thickness, thickness
-from materialist.solids.finder import upright
 from materialist.solids.revolution import Revolution
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene

@@ -12,7 +12,7 @@ from materialist.camera import pixel_rays, unit
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.silhouette import surface_in
 from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
-from materialist.solids.finder import surface_of_revolution
+from materialist.solids.outline import surface_of_revolution
 from materialist.solids.revolution import Revolution
 from materialist.types import Array, Camera
 
