@@ -12,10 +12,12 @@ from materialist.edits.composite.composite import composite, developed, pictures
 from materialist.edits.composite.into_photo import DEFAULT, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.native_layer import NativeLayer
+from materialist.edits.composite.upsample import matte
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
+from materialist.types import Camera, Photo
 
 MASK = block_mask(36, 48)
 
@@ -67,6 +69,21 @@ def test_texture_beyond_the_fit_dims_with_the_surface():
     factor = (0.2 + DEFAULT.floor) / (0.5 + DEFAULT.floor)
     np.testing.assert_allclose(out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02)
     np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
+
+
+def test_the_rim_of_a_glaring_surface_is_mixed_with_white():
+    """A hundred times white in a tenth of a pixel would fill it, and the outline would be stairs."""
+    small, large = (np.full((n, n, 3), 0.2, np.float32) for n in (24, 96))
+    photo = Photo(small, Camera(24, 24, 45.0), large)
+    base, changed = np.full((24, 24, 3), 0.2, np.float32), np.zeros((24, 24), bool)
+    changed[6:18, 6:18] = True
+    edited = np.where(changed[..., None], np.float32(20), base)
+    share = matte(changed, photo.original)
+    mixed = (share > 0) & (share < 1)
+    out = into_photo(photo, layers_of(base, edited, changed))
+    assert mixed.any()
+    np.testing.assert_allclose(out[mixed], (0.2 + 0.8 * share[mixed])[:, None] * np.ones(3), atol=0.02)
+    assert out[48, 48] == pytest.approx(20, rel=1e-3)
 
 
 def test_hdr_stays_hdr():

@@ -11,7 +11,7 @@ import numpy as np
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
-from materialist.geometry.silhouette import window
+from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Photo
 
 WHITE = 0.995
@@ -24,6 +24,7 @@ class CompositeSettings:
 
     floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
     most_detail: float = 2.0  # largest factor on the photo's detail beyond working size under another light
+    edge: int = 2  # working pixels to either side of a changed surface's border; derived: the matte's reach
     rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
     threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
 
@@ -94,6 +95,10 @@ def _terms(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
         own = layers.covered[..., None]
         change = np.where(own, layers.edited - reference, change)
         excess = np.where(own, -1, excess)
+    if not (photo.hdr or layers.relit):
+        # As with the rim of bodies: where a surface ends, white is mixed in, not what outshines it.
+        edge = grown(layers.changed, DEFAULT.edge) & grown(~layers.changed, DEFAULT.edge)
+        change = np.where(edge[..., None], np.minimum(change, np.maximum(1 - reference, 0)), change)
     return change.astype(np.float32), excess.astype(np.float32), reference
 
 
