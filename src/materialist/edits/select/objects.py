@@ -1,5 +1,4 @@
-"""The object at clicks or in a box: ClickNet where it is certain, its outline redrawn by GrabCut (Rother et al. 2004);
-GrabCut alone elsewhere."""
+"""The object at clicks or in a box: ClickNet where it is certain, else GrabCut (Rother et al. 2004)."""
 
 from __future__ import annotations
 
@@ -9,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_levels
-from materialist.geometry.silhouette import disc, grown, window
+from materialist.geometry.silhouette import disc, window
+from materialist.predict.bundled.edges import GuidedFilter
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
@@ -32,12 +32,8 @@ class SelectSettings:
     probable: float = 0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
     possible: float = 0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
     gap: float = 0.015  # half of the gap across which two parts are one
-    inwards: float = 0.02  # how far ClickNet's outline may move inwards to an edge of the photo
-    outwards: float = 0.22  # how far it may move outwards: thin parts stick out
-    unlikely: float = 0.3  # likelihood below which a pixel is none of the object; larger keeps the outline closer
-    near_likely: float = 0.015  # distance from likelier pixels up to which an unlikely one may still be of the object
-    kept: float = 0.6  # overlap with ClickNet's mask below which GrabCut has lost the object in its surroundings
-    passes: int = 3  # times that the band follows the outline: a first pass stops at a shadow
+    reach: float = 0.02  # how far the outline may move to an edge of the photo; tuned on 206 clicks
+    grain: float = 0.01  # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
 
 
 DEFAULT = SelectSettings()
@@ -48,7 +44,7 @@ def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool 
     if network:
         likely = clicknet(scene, points)
         if certainty(likely) >= DEFAULT.certain:
-            return refined(scene, tidy(likely > 0.5, points), points, likely)
+            return outlined(scene, likely, points)
     return tidy(grabcut(scene, _around(scene, points), rounds=5), points)
 
 
@@ -58,7 +54,7 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
     """
     likely = _in_box(scene, box) if network else np.zeros(scene.depth.shape, np.float32)
-    known = tidy(likely > 0.5, ())
+    known = outlined(scene, likely, ())
     if box_overlap(known, box) >= DEFAULT.fills and certainty(likely) >= DEFAULT.certain:
         return known
     best = known
@@ -123,31 +119,12 @@ def _in_box(scene: Scene, box: Box) -> Array:
     return found
 
 
-def refined(scene: Scene, rough: Array, points: Sequence[tuple[int, int]], likely: Array) -> Array:
-    """[H, W] bool: the rough mask with its outline moved to the photo's edges, a band at a time.
-
-    `likely` [H, W] in [0, 1]: the outline stays out of what is clearly none of the object. `points` (column, row) lie
-    on the object.
-    """
-    near, inwards, outwards = (
-        max(2, round(share * max(rough.shape))) for share in (DEFAULT.near_likely, DEFAULT.inwards, DEFAULT.outwards)
-    )
-    possible = grown(likely > DEFAULT.unlikely, near)
-    mask = rough
-    for _ in range(DEFAULT.passes):
-        inner = ~grown(~mask, inwards)
-        inner = inner if inner.any() else ~grown(~mask, 1)
-        outer = grown(mask, outwards) & (possible | mask)
-        label = np.where(inner, CERTAIN, np.where(mask, PROBABLE, np.where(outer, POSSIBLE, 0))).astype(np.uint8)
-        for x, y in points:
-            label[y, x] = CERTAIN
-        found = tidy(grabcut(scene, label), points)
-        if overlap(found, mask) <= DEFAULT.kept:
-            return tidy(mask, points)
-        if np.array_equal(found, mask):
-            break
-        mask = found
-    return mask
+def outlined(scene: Scene, likely: Array, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] bool of the object at points (column, row), from likelihoods [H, W] in [0, 1] that end at the photo's
+    edges: a guided filter (He et al. 2013) puts them there."""
+    radius = max(2, round(DEFAULT.reach * max(likely.shape)))
+    guide = GuidedFilter(linear_to_srgb(scene.photo.linear), radius=radius, eps=DEFAULT.grain**2)
+    return tidy(guide.share(likely.astype(np.float32)) > 0.5, points)
 
 
 def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:

@@ -12,6 +12,7 @@ from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.camera import rays_at
 from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.geometry.membrane import nearest
 from materialist.predict import resample
 from materialist.predict.bundled.edges import GuidedFilter, weighted_median, with_relief
 from materialist.predict.bundled.network import BundledNetwork
@@ -32,6 +33,7 @@ class InferenceSettings:
     depth_span: float = 50.0  # largest ratio of a depth to the median, either way
     likely_sky: float = -1.0  # logit of a surface below which a pixel is sky where it is joined to sure sky; by eye
     sure_sky: float = -5.0  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
+    unsure_told: float = 0.03  # share of the picture that may be sky from which a note says so; by eye
     least_island: float = 0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
 
 
@@ -52,13 +54,18 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     surface = _without_specks(_surface(maps["mask"]))
     if not surface.any():
         surface[:] = True
+    unsure = _unsure_sky(maps["mask"], surface)
     depth = _scaled(maps["depth"], surface)
     albedo, roughness, metallic = (resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic"))
     depth, normal = with_edges(depth, maps["normal"], linear, rays)
     depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
-    return Prediction(materials, normal, depth, light=light)
+    sky = float((depth == 0).mean())
+    notes = (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
+    if unsure > SETTINGS.unsure_told:
+        notes += (f"{unsure:.0%} of the picture, at its top, may be sky and was taken for a far surface.",)
+    return Prediction(materials, normal, depth, warnings=notes, light=light)
 
 
 def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple[Array, Array]:
@@ -72,6 +79,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     reach = max(2, round(SETTINGS.edge_reach * max(middle)))
     guide = GuidedFilter(photo, radius=reach)
     depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
+    depth = with_sky(depth, guide)
     known = depth > 0
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
@@ -83,6 +91,15 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     if middle != size:
         depth, normal = resample.depth(depth, size), resample.normals(normal, size)
     return depth, normal
+
+
+def with_sky(depth: Array, guide: GuidedFilter) -> Array:
+    """Depth [h, w], 0 for sky, whose sky ends where the photo's does; surface beyond it is as deep as the nearest."""
+    known = depth > 0
+    if known.all():
+        return depth
+    surface = guide.share(known.astype(np.float32)) > 0.5
+    return np.where(surface, depth[nearest(known)], 0).astype(np.float32) if surface.any() else depth
 
 
 def _mean_answer(
@@ -148,6 +165,14 @@ def _surface(logit: Array) -> Array:
     White walls and windows look like sky, and a hole in a room costs more than a sky that is a far surface.
     """
     return ~binary_propagation(logit < SETTINGS.sure_sky, mask=logit < SETTINGS.likely_sky)
+
+
+def _unsure_sky(logit: Array, surface: Array) -> float:
+    """Share of the picture that is surface [h, w] bool, likely sky by the logit, and joined to the upper border."""
+    likely = surface & (logit < SETTINGS.likely_sky)
+    top = np.zeros_like(likely)
+    top[0] = likely[0]
+    return float(binary_propagation(top, mask=likely).mean())
 
 
 def _without_specks(surface: Array) -> Array:

@@ -44,11 +44,9 @@ class BundledPredictor(Predictor):
         maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
         if not all(np.isfinite(maps[name]).all() for name in MAPS):
             raise WeightsError(f"The network gave values that are not finite; check its weights ({self.name}).")
-        sky = found.depth == 0
-        warnings: tuple[str, ...] = ()
+        warnings = found.warnings
         if "depth" not in wanted:  # there may be a surface in the depth of another source
-            maps["normal"] = np.where(sky[..., None], 0, found.normal).astype(np.float32)
-        elif sky.any():
-            warnings = (f"{sky.mean():.0%} of the picture was taken for sky and has no surface.",)
+            maps["normal"] = np.where(found.depth[..., None] > 0, found.normal, 0).astype(np.float32)
+            warnings = ()
         light = found.light if "albedo" in wanted else None
         return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings, light)
