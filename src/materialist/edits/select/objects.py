@@ -27,6 +27,7 @@ class SelectSettings:
     """Places in a box, shares of its sides, at which ClickNet is asked for the object there."""
     within: float = 0.8  # share of an object that must lie in the box: a table's does not
     fills: float = 0.6  # overlap of an object's own box with the given one from which ClickNet's is taken
+    least: float = 0.25  # overlap below which nothing was found in the box: it is misplaced
     growth: tuple[float, ...] = (0.0, 0.04, 0.08, 0.16)  # margins tried until a box is filled, shorter sides of it
     core: float = 0.01  # radius around a click that is certainly of the object
     probable: float = 0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
@@ -51,7 +52,8 @@ def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool 
 def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     """[H, W] bool of the object in a box, by ClickNet where it is certain of one that fills the box, else by GrabCut.
 
-    GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
+    GrabCut takes for the object what is not seen outside of the box: a tight box suits it. Empty where nothing found
+    fills the box.
     """
     likely = _in_box(scene, box) if network else np.zeros(scene.depth.shape, np.float32)
     known = outlined(scene, likely, ())
@@ -65,7 +67,7 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
         best = max(tidy(grabcut(scene, label, rounds=5), ()), best, key=lambda mask: box_overlap(mask, box))
         if box_overlap(best, box) >= DEFAULT.fills:
             break
-    return best
+    return best if box_overlap(best, box) >= DEFAULT.least else np.zeros_like(best)
 
 
 def box_overlap(mask: Array, box: Box) -> float:
