@@ -1,4 +1,4 @@
-"""A part of a picture, path traced at another resolution than the camera's."""
+"""Some pixels of a picture, path traced, at the camera's resolution or another."""
 
 from __future__ import annotations
 
@@ -6,53 +6,64 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from materialist.geometry.silhouette import area
-from materialist.render.coverage import Box, directions
-from materialist.types import Array, Camera
+from materialist.buffers import integers
+from materialist.render.coverage import directions
+from materialist.types import Array
 
 _PATHS = 2**23
 """Paths traced together: bounds the memory."""
 
 
 def radiance(
-    target, size: tuple[int, ...], box: Box, *, spp: int, seed: int, max_depth: int, names: Sequence[str]
+    target, size: tuple[int, ...], pixels: Array, *, spp: int, seed: int, max_depth: int,
+    names: Sequence[str] | None = None,
 ) -> Array:  # fmt: skip
-    """[h, w, 3] float32 linear: a part of the picture of a `RenderScene` at another resolution, path traced.
+    """[..., 3] float32 linear radiance of pixels of a `RenderScene`, path traced, with at least `spp` paths each.
 
-    names: of shapes; the mean is over the rays that meet one of them first, and 0 where none does.
+    size: (H, W) of the whole picture. pixels: [...] int, row-major numbers in it.
+    names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
     """
-    mi, camera = target.mi, target.camera
-    h, w = (side.stop - side.start for side in box)
+    mi = target.mi
     # Bounded wavefronts, and whole squares of samples, which suit the sampler.
-    passes = max(1, -(-spp * h * w // _PATHS))
+    passes = max(1, -(-spp * pixels.size // _PATHS))
     each = int(np.ceil(np.sqrt(spp / passes))) ** 2
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
     sampler = mi.load_dict({"type": "multijitter", "sample_count": each})
-    total = np.zeros((h * w, 4))
+    sampler.set_samples_per_wavefront(each)
+    total = np.zeros((pixels.size, 4))
     for k in range(passes):
-        sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, h * w * each)
-        total += _sums(target.mi_scene, camera, size, box, integrator, sampler, each, names)
+        sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, pixels.size * each)
+        total += _sums(target, size, pixels.ravel(), integrator, sampler, each, names)
     mean = total[:, :3] / np.maximum(total[:, 3:], 1)
-    return np.ascontiguousarray(mean.reshape(h, w, 3), np.float32)
+    return np.ascontiguousarray(mean.reshape(*pixels.shape, 3), np.float32)
+
+
+def numbers_in(size: tuple[int, ...], box: tuple[slice, slice]) -> Array:
+    """[h, w] row-major numbers of the pixels of a box in a picture of `size`."""
+    return np.arange(size[0] * size[1]).reshape(size)[box]
 
 
 def _sums(
-    scene, camera: Camera, size: tuple[int, ...], box: Box, integrator, sampler, each: int, names: Sequence[str]
+    target, size: tuple[int, ...], pixels: Array, integrator, sampler, each: int, names: Sequence[str] | None
 ) -> Array:  # fmt: skip
-    """[h * w, 4]: of each pixel's rays that count, the sum of what they bring, and their number."""
+    """[n, 4]: of each pixel's rays that count, the sum of what they bring, and their number."""
     import drjit as dr
-    import mitsuba as mi
 
-    count = area(box)
-    pixel, inside = dr.arange(mi.UInt32, count * each) // each, sampler.next_2d()
-    ray = mi.RayDifferential3f(mi.Point3f(0), directions(camera, size, box, pixel, inside.x, inside.y))
-    counts, first = mi.Bool(False), scene.ray_intersect_preliminary(ray)
-    for one in scene.shapes():
-        if one.id() in names:
-            counts |= first.shape == mi.ShapePtr(one)
+    mi, scene = target.mi, target.mi_scene
+    # Numbers that differ from call to call are data, or every call would be compiled anew.
+    slot = dr.arange(mi.UInt32, len(pixels) * each) // dr.opaque(mi.UInt32, each)
+    inside = sampler.next_2d()
+    whole = (slice(0, size[0]), slice(0, size[1]))
+    way = directions(target.camera, size, whole, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y)
+    ray, counts = mi.RayDifferential3f(mi.Point3f(0), way), mi.Bool(True)
+    if names is not None:
+        first, counts = scene.ray_intersect_preliminary(ray), mi.Bool(False)
+        for one in scene.shapes():
+            if one.id() in names:
+                counts |= first.shape == mi.ShapePtr(one)
     light = integrator.sample(scene, sampler, ray, None, counts)[0]
-    sums = [dr.zeros(mi.Float, count) for _ in range(4)]
+    sums = [dr.zeros(mi.Float, len(pixels)) for _ in range(4)]
     for total, value in zip(sums, (light.x, light.y, light.z, mi.Float(1)), strict=True):
-        dr.scatter_reduce(dr.ReduceOp.Add, total, value, pixel, counts)
+        dr.scatter_reduce(dr.ReduceOp.Add, total, value, slot, counts)
     dr.eval(*sums)
     return np.stack([np.array(total) for total in sums], -1).astype(np.float64)

@@ -12,6 +12,7 @@ from materialist.errors import InputError
 from materialist.geometry.build import part
 from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
 from materialist.render.envmap import check_envmap, emitter, on_mitsuba_grid
+from materialist.render.native import radiance
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
 
@@ -85,14 +86,19 @@ class RenderScene:
         self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self.params.update()
 
-    def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH) -> Array:
+    def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, where: Array | None = None) -> Array:
         """[H, W, 3] float32 linear radiance, path-traced.
 
         spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
         max_depth: path length; 2 is direct light alone, 1 the sky alone.
+        where: [H, W] bool: the pixels that are traced, at a cost in proportion; the others are 0. None: all.
         """
         _check_options(spp, max_depth)
         mi = self.mi
+        if where is not None:
+            picture = np.zeros((*where.shape, 3), np.float32)
+            picture[where] = radiance(self, where.shape, np.flatnonzero(where), spp=spp, seed=seed, max_depth=max_depth)
+            return picture
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
         # Bounded wavefronts, all of one size: memory stays the same for any number of samples.
         passes = min(spp, -(-spp * self.camera.width * self.camera.height // _WAVEFRONT))

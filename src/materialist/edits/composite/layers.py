@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.color import luminance
+from materialist.color import linear_to_srgb, luminance
 from materialist.edits.composite.native_layer import NativeLayer, native_layer
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit
 from materialist.errors import InputError
+from materialist.geometry.silhouette import grown
 from materialist.types import Array, Scene
 
 
@@ -18,7 +20,9 @@ from materialist.types import Array, Scene
 class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
+    first: int = 16  # of the paths a pixel, one in so many goes to see where the edit reaches; twice, for two halves
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
+    visible: float = 1 / 255  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
     sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
     least_gain: float = 0.25  # gain below which a difference is none
     bright: float = 1.0  # radiance up to which nothing is a firefly: below white a sparkle does no harm; derived
@@ -94,8 +98,9 @@ def difference(
     """Layers of any two renderings of one view.
 
     Outside `changed` the edit arrives by way of a few paths only, and their noise would dust the whole photo. There
-    the difference counts where its mean over a neighbourhood stands out from what two half renderings disagree on
-    (a shrinkage by the estimated noise, as of Wiener), and is exactly zero where no path differs.
+    the difference counts where its mean over a neighbourhood can be seen and stands out from what two half renderings
+    disagree on (a shrinkage by the estimated noise, as of Wiener); elsewhere it is exactly zero. Few paths find out
+    where that is; the others are traced there.
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
@@ -106,26 +111,59 @@ def difference(
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     tick = progress or (lambda *_: None)
-    halves = []
-    for k in range(2):
-        pair = []
-        for j, render in enumerate((base, edited)):
-            tick("render", 2 * k + j, 4)
-            pair.append(render(-(-spp // 2), 2 * seed + k))
-        halves.append(pair)
-    tick("render", 4, 4)
-    (b0, e0), (b1, e1) = halves
-    b, e = (b0 + b1) / 2, (e0 + e1) / 2
+    first = max(1, spp // DEFAULT.first)  # paths a half: enough to see where the edit reaches
+    b0, e0, b1, e1 = _halves(base, edited, first, 2 * seed, None, tick)
+    near = changed | _large(_gain(b0, e0, b1, e1) > 0)
     differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
-    if not differs.any():
-        return Layers(b, b, differs, changed & differs)
-    gain = np.where(changed, 1, significance(e0 - b0, e1 - b1)).astype(np.float32)
+    if not (near & differs).any():
+        b = (b0 + b1) / 2
+        return Layers(b, b, differs & False, changed & False)
+    rest = -(-spp // 2) - first
+    if rest > 0:
+        near = grown(near, DEFAULT.window)
+        more = _halves(base, edited, rest, 2 * seed + 2, near, tick)
+        share = np.where(near, rest / (first + rest), 0)[..., None]
+        b0, e0, b1, e1 = ((1 - share) * old + share * new for old, new in zip((b0, e0, b1, e1), more, strict=True))
+        differs = ((e0 != b0) | (e1 != b1)).any(-1)
+    tick("render", 8, 8)
+    b, e = ((one + other) / 2 for one, other in ((b0, b1), (e0, e1)))
+    gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
     if clean:
         b = denoised(b, guides[0], guides[2])
         e = denoised(without_fireflies(e, changed), guides[1], guides[-1])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
+
+
+def _halves(
+    base: Render, edited: Render, spp: int, seed: int, where: Array | None, tick: Callable[..., object]
+) -> list[Array]:  # fmt: skip
+    """Base and edited picture with one seed, and again with the next."""
+    pictures: list[Array] = []
+    for k in range(2):
+        for render in (base, edited):
+            tick("render", len(pictures) + (0 if where is None else 4), 8)
+            pictures.append(render(spp, seed + k, where))
+    return pictures
+
+
+def _large(mask: Array) -> Array:
+    """The mask [H, W] bool without parts that chance makes: those of a window or two."""
+    from skimage.morphology import remove_small_objects
+
+    return remove_small_objects(mask, max_size=2 * DEFAULT.window**2)
+
+
+def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
+    """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
+    import cv2
+
+    mean = lambda v: cv2.blur(v, (DEFAULT.window,) * 2, borderType=cv2.BORDER_REFLECT)  # noqa: E731
+    base, edited = (np.maximum(mean(((one + other) / 2).astype(np.float32)), 0) for one, other in ((b0, b1), (e0, e1)))
+    white = np.maximum(np.maximum(base, edited), 1)
+    seen = np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1) >= DEFAULT.visible
+    return np.where(seen, significance(e0 - b0, e1 - b1), 0)
 
 
 def significance(d0: Array, d1: Array) -> Array:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,16 +14,24 @@ from materialist.geometry.silhouette import window
 from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
-Render = Callable[[int, int], Array]
-"""render(spp, seed) -> [H, W, 3] float32 linear; equal seeds give equal random numbers."""
+
+class Render(Protocol):
+    """A picture of one scene."""
+
+    def __call__(self, spp: int, seed: int, where: Array | None = None) -> Array:
+        """[H, W, 3] float32 linear, `spp` paths a pixel; equal seeds give equal random numbers.
+
+        where: [H, W] bool: pixels that are traced, the others are 0; None: all.
+        """
+        ...
 
 
 class EditRenderer:
     """Renderings of one fitted scene and of its edits, with common random numbers, so that their noise cancels.
 
     Under another light other directions are sampled, and less of the noise cancels. Scenes of one geometry, with the
-    same bodies and lamps, share a Mitsuba scene; a picture of the base is rendered once for each number of paths and
-    seed.
+    same bodies and lamps, share a Mitsuba scene; a whole picture of the base is rendered once for each number of paths
+    and seed.
     """
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
@@ -38,13 +45,15 @@ class EditRenderer:
         scene, edited = self.lit(self.scene, edited), self.lit(edited, edited)
         depth = max(path_depth(s) for s in (scene, edited))
 
-        def base(spp: int, seed: int) -> Array:
+        def base(spp: int, seed: int, where: Array | None = None) -> Array:
+            if where is not None:
+                return self._render(scene, depth, spp, seed, where)
             key = (scene is self.scene, depth, spp, seed)
             if key not in self._base:
                 self._base[key] = self._render(scene, depth, spp, seed)
             return self._base[key]
 
-        return base, lambda spp, seed: self._render(edited, depth, spp, seed)
+        return base, lambda spp, seed, where=None: self._render(edited, depth, spp, seed, where)
 
     def lit(self, shown: Scene, edited: Scene) -> Scene:
         """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
@@ -99,8 +108,8 @@ class EditRenderer:
         target.set_envmap(scene.envmap)
         return target
 
-    def _render(self, scene: Scene, depth: int, spp: int, seed: int) -> Array:
-        return self.render_scene(scene).render(spp=spp, seed=seed, max_depth=depth)
+    def _render(self, scene: Scene, depth: int, spp: int, seed: int, where: Array | None = None) -> Array:
+        return self.render_scene(scene).render(spp=spp, seed=seed, max_depth=depth, where=where)
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""

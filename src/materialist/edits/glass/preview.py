@@ -65,7 +65,7 @@ class GlassPreview:
         """
         from materialist.edits.composite.native_layer import spread
         from materialist.edits.core.renderer import denoised
-        from materialist.render.native import radiance
+        from materialist.render.native import numbers_in, radiance
         from materialist.render.scene import GLASS_DEPTH
 
         if spp < 1:
@@ -73,7 +73,15 @@ class GlassPreview:
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target, box = self._target(surface), self._box
         paths = max(FEWEST, min(spp, PATHS // area(box)))
-        seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
+        seen = radiance(
+            target,
+            self._size,
+            numbers_in(self._size, box),
+            spp=paths,
+            seed=seed,
+            max_depth=GLASS_DEPTH,
+            names=[self._name],
+        )
         traced = denoised(without_fireflies(spread(seen)), self._guide.albedo, self._guide.normal)
         out, share = self._edited.photo.linear.copy(), self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]
