@@ -97,10 +97,11 @@ def _along(up: Array, seen: _Seen) -> tuple[float, Revolution | None]:
     if alike < DEFAULT.alike:
         return 0.0, None
     ahead = np.cross(across, up)
-    body = _placed(up, ahead * np.sign(ahead @ middle), seen)
-    if body is None:
+    found = [_placed(up, ahead * np.sign(ahead @ middle), seen, round_top) for round_top in (True, False)]
+    seen_so = [(body, *body.front(seen.inside, seen.rays)) for body in found if body is not None]
+    if not seen_so:
         return 0.0, None
-    front, leaning = body.front(seen.inside, seen.rays)
+    body, front, leaning = max(seen_so, key=lambda one: float((one[2] * seen.normal).sum()))
     there = seen.inside & (front > 0)
     own, other = ((values @ across)[there] for values in (leaning, seen.normal))
     side = np.abs((leaning @ up)[there]) < DEFAULT.side
@@ -150,11 +151,11 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
     return plane(angle), 1 - unlike(angle)
 
 
-def _placed(up: Array, ahead: Array, seen: _Seen) -> Revolution | None:
-    """The body where the depth map has its front, or as far away as the ground that it stands on."""
+def _placed(up: Array, ahead: Array, seen: _Seen, round_top: bool) -> Revolution | None:
+    """The body, its upper end round or flat, where the depth map has its front, or as far away as the ground that it stands on."""
     field = silhouette_field(seen.inside)
     first = Axis(up, ahead)  # at distance 1
-    found = _profile_line(field, first, seen.camera)
+    found = _profile_line(field, first, seen.camera, round_top)
     if found is None:
         return None
     line, cell = found
@@ -178,7 +179,7 @@ def _placed(up: Array, ahead: Array, seen: _Seen) -> Revolution | None:
     return Revolution(Axis(up, away * ahead), Profile.of(line, cell * away, floor))
 
 
-def _profile_line(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | None:
+def _profile_line(field: Array, axis: Axis, camera: Camera, round_top: bool) -> tuple[Array, float] | None:
     """The border [K, 2] of the visual hull from its foot to the axis, its upper end rounded, and the size of a cell.
 
     None where nothing stays inside the outline.
@@ -203,7 +204,7 @@ def _profile_line(field: Array, axis: Axis, camera: Camera) -> tuple[Array, floa
     if not lines or len(longest := max(lines, key=len)) < 12:
         return None
     line = longest[:, ::-1] * cell + [0, low]  # (distance, height)
-    capped = _capped(line if line[0, 1] < line[-1, 1] else line[::-1], far, cell)
+    capped = _capped(line if line[0, 1] < line[-1, 1] else line[::-1], far, cell, round_top)
     return None if capped is None else (capped, cell)
 
 
@@ -229,14 +230,14 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     return (halves[0] + halves[1]) / 2
 
 
-def _capped(line: Array, far: float, cell: float) -> Array | None:
-    """A line from the lower to the upper end without what the camera does not see, and a round upper end.
+def _capped(line: Array, far: float, cell: float, round_top: bool) -> Array | None:
+    """A line from the lower to the upper end without what the camera does not see, and a round or flat upper end.
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
     from scipy.ndimage import gaussian_filter1d
 
-    smooth = gaussian_filter1d(line, 3.0, axis=0, mode="nearest")
+    smooth = gaussian_filter1d(line, 2.0, axis=0, mode="nearest")
     step = unit(np.gradient(smooth, axis=0))
     # The lower end is seen from above over its near rim, the upper one over its far rim.
     lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
@@ -245,8 +246,9 @@ def _capped(line: Array, far: float, cell: float) -> Array | None:
     steep = np.flatnonzero(np.abs(step[:, 1]) > limit * np.abs(step[:, 0]))
     if len(steep) < 4:
         return None
-    side, slope = smooth[steep[0] : steep[-1] + 1], float(upper[steep[-1]])
-    # A round end of the same slope where it begins, level at the axis.
+    side = smooth[steep[0] : steep[-1] + 1]
+    # A round end has the side's slope where it begins, and is level at the axis.
+    slope = float(upper[steep[-1]]) if round_top else 0.0
     wide, top = side[-1]
     r = np.append(np.arange(cell, wide, cell)[::-1], 0)
     cap = np.stack([r, top + slope * (wide**2 - r**2) / (2 * max(wide, cell))], -1)
