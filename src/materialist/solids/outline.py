@@ -152,7 +152,10 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
 
 
 def _placed(up: Array, ahead: Array, seen: _Seen, round_top: bool) -> Revolution | None:
-    """The body, its upper end round or flat, where the depth map has its front, or as far away as the ground that it stands on."""
+    """The body where the depth map has its front, or as far away as the ground that it stands on.
+
+    Its upper end is round, or flat.
+    """
     field = silhouette_field(seen.inside)
     first = Axis(up, ahead)  # at distance 1
     found = _profile_line(field, first, seen.camera, round_top)

@@ -62,7 +62,7 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
     sky = float((depth == 0).mean())
-    notes = (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
+    notes: tuple[str, ...] = (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
     if unsure > SETTINGS.unsure_told:
         notes += (f"{unsure:.0%} of the picture, at its top, may be sky and was taken for a far surface.",)
     return Prediction(materials, normal, depth, warnings=notes, light=light)
