@@ -1,7 +1,5 @@
 """Numpy arrays for Dr.Jit, safe to be read by whole vectors of the processor."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

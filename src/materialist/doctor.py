@@ -4,8 +4,6 @@ Nothing here loads Mitsuba or LLVM into this process: a wrong LLVM aborts the pr
 is tried in a child.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import re

@@ -1,7 +1,5 @@
 """The texels of an equirectangular environment map, in the project's convention (docs/conventions.md)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.types import Array

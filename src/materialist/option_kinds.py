@@ -3,8 +3,6 @@
 Values may be given as texts, as a YAML file or a command line has them: "0.3", "310,220", "#ff8800".
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping

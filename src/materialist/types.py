@@ -4,8 +4,6 @@ Conventions (see docs/conventions.md): linear Rec.709 RGB float32; camera at the
 +X right; pixel (0, 0) is top left with its centre at (0.5, 0.5); depth is planar along -Z, 0 where there is no surface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The list of edits of a batch, for one photo of it: masks, textures and light by name."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

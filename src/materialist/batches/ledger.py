@@ -4,8 +4,6 @@ A line is flushed to the disk before the next photo begins, so a batch that is k
 last line that was cut off is skipped. A lock that vanishes with its process keeps a second batch out of the folder.
 """
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """How a batch runs: options of `materialist batch`; nothing slow is imported here."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The outcome of a batch, its state while it runs, and its reports: summary.csv, summary.json and index.html."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

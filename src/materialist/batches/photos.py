@@ -1,7 +1,5 @@
 """Which photos a batch is about (a folder, a list file, one photo, or a URL), and what their results are called."""
 
-from __future__ import annotations
-
 import os
 import re
 import zlib

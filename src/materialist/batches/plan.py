@@ -1,7 +1,5 @@
 """The plan of a batch: which photos are finished, and which tasks are left."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Photos behind URLs (s3://, gs://, https://, ...), through fsspec."""
 
-from __future__ import annotations
-
 import re
 import tempfile
 from collections.abc import Iterator

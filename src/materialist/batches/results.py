@@ -1,7 +1,5 @@
 """Results of a batch: where they lie, whether they are whole, and whether two are the same."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterable

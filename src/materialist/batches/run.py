@@ -1,7 +1,5 @@
 """`materialist.batch`: the loop that hands photos to workers and records the results."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

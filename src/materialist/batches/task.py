@@ -1,7 +1,5 @@
 """One photo's worth of work: invert it, save the scene, edit it. The same on every kind of worker."""
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import resource

@@ -1,7 +1,5 @@
 """The command line. Each command is a thin call of the public functions; heavy modules load only when one runs."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """`materialist bench NAME`: dispatch to materialist.bench, with whatever options that benchmark takes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """`materialist edit`, `glass`, `remove`, `insert` and `apply`: an edited scene as a picture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

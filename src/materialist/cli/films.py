@@ -1,7 +1,5 @@
 """`materialist relight` and `drop`: other light, and things that fall, as a picture or a film."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """Commands whose flags come from options classes: a parameter of such a class becomes one flag for each field."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from enum import StrEnum

@@ -4,8 +4,6 @@
 that is terminated tidies up and dies by that signal.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

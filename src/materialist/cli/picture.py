@@ -1,7 +1,5 @@
 """What the editing commands share: the way from their flags to a region, and from an edited scene to a file."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A progress bar on stderr for each stage, driven by `progress(stage, done, total)` callbacks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """`materialist invert`, `render` and `export`: scene packages made, rendered, and written for other programs."""
 
-from __future__ import annotations
-
 import time
 from enum import StrEnum
 from pathlib import Path

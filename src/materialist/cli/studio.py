@@ -1,7 +1,5 @@
 """`materialist studio [PHOTO|SCENE]`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`materialist train ...`: the sub-commands that make training data and train networks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

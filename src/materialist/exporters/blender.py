@@ -1,7 +1,5 @@
 """Blender: a script and the files it builds the .blend from, and the running of it where Blender is at hand."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import shlex

@@ -1,7 +1,5 @@
 """What an export is on disk: files, or a folder that says that it is one."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ and perceptual roughness, alpha = r^2, F0 = 0.04) are ours; only the diffuse lob
 Light stays outside: the one extension for it, EXT_lights_image_based, wants prefiltered cube maps, and few read it.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -4,8 +4,6 @@
 paper's, after `materialist.render.variant.setup()`: its picture is this program's but for noise.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any

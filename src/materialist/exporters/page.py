@@ -1,7 +1,5 @@
 """One HTML page that holds everything and asks the network for nothing."""
 
-from __future__ import annotations
-
 import base64
 import html
 import json

@@ -1,7 +1,5 @@
 """The scene as the other programs want it: meshes with one material each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any

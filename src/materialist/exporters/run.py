@@ -1,7 +1,5 @@
 """`materialist.export`: which format, where to, and is it free."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """USD: UsdPreviewSurface materials, the photo's camera and a dome light; one .usdz file, or a folder."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

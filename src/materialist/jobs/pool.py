@@ -1,7 +1,5 @@
 """Pools of workers, each with one task at a time: processes of this machine, or tasks of a Ray cluster."""
 
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The starting side of a worker process: it sends tasks and receives messages, the last one about the process's end."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pickle

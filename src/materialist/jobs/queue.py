@@ -1,7 +1,5 @@
 """The studio's jobs: a queue with a limit, each job in a process of its own, and a stop that always works."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 import time

@@ -6,8 +6,6 @@ leaves none behind. `multiprocessing` and pools on top of it (pebble) would run 
 worker and import torch before the environment of a worker is set, so only its connections are used.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import queue

@@ -4,8 +4,6 @@ A page (`page`, `tab_*`) turns clicks into calls of a `session.Session`; what ta
 `jobs` runs in a process of its own, which can be stopped at any time. Scenes and edits lie in a `workspace.WorkFolder`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files

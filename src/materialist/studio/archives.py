@@ -1,7 +1,5 @@
 """Zip files: edits.yaml with its files, made here and loaded for the same photo or another; and scene packages."""
 
-from __future__ import annotations
-
 import filecmp
 import lzma
 import re

@@ -1,7 +1,5 @@
 """Controls of the page, each for one option of an operation: how a value goes to the list of edits, and back."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

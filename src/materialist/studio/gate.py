@@ -1,7 +1,5 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
-from __future__ import annotations
-
 import asyncio
 import hmac
 import secrets

@@ -3,8 +3,6 @@
 The worker keeps the last few bodies and makes one picture after the other; only the newest request counts.
 """
 
-from __future__ import annotations
-
 import json
 import threading
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Objects that are put into the photo: made, placed, changed, and let fall; steps `insert` and `drop` of the list."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

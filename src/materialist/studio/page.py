@@ -1,7 +1,5 @@
 """The page: the stage with its tools on one side, the tabs on the other; on a phone one below the other."""
 
-from __future__ import annotations
-
 import secrets
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Pictures of a scene while a slider moves: `edits.preview.Preview` on its thread, and sketches of what it lacks."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import json

@@ -1,7 +1,5 @@
 """Start and stop of the studio."""
 
-from __future__ import annotations
-
 import ipaddress
 import os
 import re

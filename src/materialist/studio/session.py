@@ -1,7 +1,5 @@
 """The state of one page: its scene, selection, list of edits and undo history."""
 
-from __future__ import annotations
-
 import re
 import secrets
 import threading

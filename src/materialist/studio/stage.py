@@ -1,7 +1,5 @@
 """The picture on the stage with its label, and what the page shows of a scene: maps, and a report in words."""
 
-from __future__ import annotations
-
 from time import time
 from typing import Any
 

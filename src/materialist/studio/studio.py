@@ -1,7 +1,5 @@
 """The running studio: its work folder, its queue of jobs, and the pages that are open."""
 
-from __future__ import annotations
-
 import re
 import secrets
 import shutil

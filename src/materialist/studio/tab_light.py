@@ -1,7 +1,5 @@
 """The tab that changes the light: another map, a turn, a sun, lamps, dimming."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The tab to look: before and after, every map, the light, the mesh, and the report in plain words."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gradio as gr

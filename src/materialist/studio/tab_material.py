@@ -1,7 +1,5 @@
 """The tab that changes materials: colour, roughness, metal, a texture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import gradio as gr

@@ -1,7 +1,5 @@
 """The tab for objects that are put into the photo, let fall, turned to glass, or taken away."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The tab that opens a photo, a scene, an example, or an earlier project."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

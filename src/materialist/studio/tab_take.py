@@ -1,7 +1,5 @@
 """The tab to take things away: pictures, the scene, other programs' formats, a video, the recipe, the commands."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The long tasks of the studio, each a call of the public API on files, run in a process of its own."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

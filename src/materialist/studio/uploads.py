@@ -1,7 +1,5 @@
 """Uploaded files: checked by size and header before anything is decoded, and stored under names of ours."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

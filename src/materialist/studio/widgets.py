@@ -1,7 +1,5 @@
 """Shared by the tabs of the page: components, events that change the session, and the values of the controls."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import time

@@ -3,8 +3,6 @@
 It survives reloads, restarts and closed browsers.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
