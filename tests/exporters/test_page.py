@@ -23,7 +23,7 @@ def test_nothing_comes_from_elsewhere(text):
 
 
 def test_foreign_text_is_escaped(text):
-    assert "<b>" not in text and "&lt;b&gt;ro&quot;om.png" in text
+    assert "<b>" not in text and "&lt;b&gt;ro&#34;om.png" in text
     assert "too &lt;/script&gt; dark" in text
     assert text.count("</script>") == 2 and "{{" not in text
     assert "31.25 dB" in text and "nan" not in text.split("<script")[0]

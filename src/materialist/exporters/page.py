@@ -1,7 +1,6 @@
 """One HTML page that holds everything and asks the network for nothing."""
 
 import base64
-import html
 import json
 import math
 import zlib
@@ -10,6 +9,7 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+from jinja2 import Template
 
 from materialist.color import srgb_levels
 from materialist.exporters.parts import Part, farthest
@@ -36,39 +36,31 @@ _NAMES = {
 def page(scene: Scene, parts: list[Part]) -> str:
     """A slider between photo and re-rendering, the mesh to turn, maps, light and report, as text.
 
-    Everything that came from outside is escaped, and a policy in the page forbids any request.
+    The template escapes whatever came from outside, and a policy in it forbids any request.
     """
     assets = files("materialist.exporters") / "assets"
-    camera, title, native = scene.camera, scene.photo.name, scene.photo.original.shape
-    subtitle = (
-        f"{native[1]} × {native[0]} photo, worked at {camera.width} × {camera.height}, "
-        f"{camera.fov:.1f}° wide ({scene.photo.fov_source}), predictor {scene.prior.predictor}"
+    camera, native = scene.camera, scene.photo.original.shape
+    template = Template((assets / "page.html").read_text("utf-8"), autoescape=True)
+    return template.render(
+        title=scene.photo.name,
+        subtitle=f"{native[1]} × {native[0]} photo, worked at {camera.width} × {camera.height}, "
+        f"{camera.fov:.1f}° wide ({scene.photo.fov_source}), predictor {scene.prior.predictor}",
+        warnings=scene.warnings,
+        width=camera.width,
+        height=camera.height,
+        photo=_image(srgb_levels(scene.photo.linear), quality=94),
+        rerender=_image(srgb_levels(scene.rerender), quality=94),
+        triangles=f"{sum(len(part.mesh.faces) for part in parts):,}",
+        maps=_maps(scene),
+        envmap=_image(display.light(scene.envmap)),
+        light_note=f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
+        metrics=[_figure(key, value) for key, value in scene.report.metrics.items()],
+        stages=[(s.get("name", ""), f"{s['seconds']:.1f} s" if "seconds" in s else "–") for s in scene.report.stages],
+        provenance=_options(scene),
+        scene=json.dumps(_packed(camera, scene.depth, parts)),
+        style=(assets / "page.css").read_text("utf-8"),
+        script=(assets / "page.js").read_text("utf-8"),
     )
-    values = {
-        "title": html.escape(title),
-        "subtitle": html.escape(subtitle),
-        "warnings": "".join(f'<p class="note">{html.escape(text)}</p>' for text in scene.warnings),
-        "width": str(camera.width),
-        "height": str(camera.height),
-        "photo": _image(srgb_levels(scene.photo.linear), quality=94),
-        "rerender": _image(srgb_levels(scene.rerender), quality=94),
-        "triangles": f"{sum(len(part.mesh.faces) for part in parts):,}",
-        "maps": _maps(scene),
-        "envmap": _image(display.light(scene.envmap)),
-        "light_note": f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
-        "metrics": _metrics(scene.report.metrics),
-        "stages": _table(
-            (s.get("name", ""), f"{s['seconds']:.1f} s" if "seconds" in s else "–") for s in scene.report.stages
-        ),
-        "provenance": _table(_options(scene)),
-        "scene": json.dumps(_packed(camera, scene.depth, parts)),
-        "style": (assets / "page.css").read_text("utf-8"),
-        "script": (assets / "page.js").read_text("utf-8"),
-    }
-    # Split, not replaced one after the other: what a value holds is never read as a place for another.
-    pieces = (assets / "page.html").read_text("utf-8").split("{{")
-    rest = (piece.split("}}", 1) for piece in pieces[1:])
-    return pieces[0] + "".join(values[name] + text for name, text in rest)
 
 
 def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
@@ -81,38 +73,27 @@ def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
             yield key, value
 
 
-def _maps(scene: Scene) -> str:
+def _maps(scene: Scene) -> list[tuple[str, str, str]]:
+    """(id, caption, data URL) of each map."""
     m = scene.materials
-    figures = (
-        ("albedo", "Albedo", srgb_levels(m.albedo)),
-        ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", display.grey(m.roughness)),
-        ("metallic", f"Metallic, mean {m.metallic.mean():.2f}", display.grey(m.metallic)),
-        ("normal", "Normal, camera frame", display.normals(scene.normal)),
-        ("depth", "Depth, near bright", display.depths(scene.depth)),
+    return [
+        ("albedo", "Albedo", _image(srgb_levels(m.albedo))),
+        ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", _image(display.grey(m.roughness))),
+        ("metallic", f"Metallic, mean {m.metallic.mean():.2f}", _image(display.grey(m.metallic))),
+        ("normal", "Normal, camera frame", _image(display.normals(scene.normal))),
+        ("depth", "Depth, near bright", _image(display.depths(scene.depth))),
         (
             "error",
             f"Error of the re-rendering × {display.ERROR_GAIN}",
-            display.error(scene.photo.linear, scene.rerender),
+            _image(display.error(scene.photo.linear, scene.rerender)),
         ),
-    )
-    return "".join(
-        f'<figure><img id="{name}" src="{_image(pixels)}" alt="{html.escape(caption)}">'
-        f"<figcaption>{html.escape(caption)}</figcaption></figure>"
-        for name, caption, pixels in figures
-    )
+    ]
 
 
-def _metrics(metrics: dict[str, float]) -> str:
-    def shown(key: str, value: Any) -> tuple[str, str]:
-        name, form = _NAMES.get(key, (key, "{:.4g}"))
-        finite = isinstance(value, int | float) and math.isfinite(value)
-        return name, form.format(value) if finite else "–"
-
-    return _table(shown(key, value) for key, value in metrics.items())
-
-
-def _table(rows: Iterable[tuple[Any, Any]]) -> str:
-    return "".join(f"<tr><th>{html.escape(str(a))}</th><td>{html.escape(str(b))}</td></tr>" for a, b in rows)
+def _figure(key: str, value: Any) -> tuple[str, str]:
+    name, form = _NAMES.get(key, (key, "{:.4g}"))
+    finite = isinstance(value, int | float) and math.isfinite(value)
+    return name, form.format(value) if finite else "–"
 
 
 def _image(pixels: Array, quality: int = 90) -> str:
