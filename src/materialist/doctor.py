@@ -89,7 +89,6 @@ def _pip(name: str) -> str:
 
 
 def _llvm() -> tuple[Finding, str | None]:
-    """The LLVM that the renderer will use."""
     try:
         from materialist.render.variant import find_llvm
 
@@ -100,7 +99,6 @@ def _llvm() -> tuple[Finding, str | None]:
 
 
 def _renderer(llvm: str | None) -> Finding:
-    """Mitsuba's CPU variant, tried in a child process."""
     command = [sys.executable, "-c", _PROBE, *([llvm] if llvm else [])]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)

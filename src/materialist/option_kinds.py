@@ -70,8 +70,6 @@ def option(default: Any, help: str, **told: Any) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class OperationOptions:
-    """What all sets of options can do."""
-
     operation: ClassVar[str]
     """Name of the function and command."""
 

@@ -33,7 +33,6 @@ def missing_files(path: str | Path, name: str) -> list[str]:
 
 
 def _files(step: Step) -> list[tuple[str, Path]]:
-    """(option, file) of the files that a step names."""
     named: list[tuple[str, str]] = []
     with_files(step, lambda option, name: named.append((option, name)))
     return [(option, step.folder / name) for option, name in named if isinstance(name, str)]

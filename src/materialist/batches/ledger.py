@@ -120,7 +120,6 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
 
 
 def _require_same(events: list[dict[str, Any]], options: dict[str, Any], folder: Path) -> None:
-    """Raise InputError where an option is not what it was at the last start."""
     starts = [entry["options"] for entry in events if entry["event"] == "start"]
     before = starts[-1] if starts else options
     for name in sorted({*before, *options}):

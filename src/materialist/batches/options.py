@@ -35,5 +35,4 @@ class BatchOptions(OperationOptions):
 
     @property
     def recipe(self) -> Path | None:
-        """The list of edits as a path."""
         return None if self.apply is None else Path(self.apply).resolve()

@@ -27,8 +27,6 @@ class Row(dict[str, Any]):
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a batch."""
-
     runs: Path
     rows: tuple[Row, ...]
     """In the order of the photos' names in the source."""
@@ -39,7 +37,6 @@ class Outcome:
     options: dict[str, Any] = field(default_factory=dict)
 
     def of(self, status: str) -> list[Row]:
-        """The photos that are `done`, `failed` or `open`."""
         return [row for row in self.rows if row["status"] == status]
 
     def count(self, status: str) -> int:
@@ -60,8 +57,6 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Status:
-    """The state of a running batch."""
-
     total: int
     done: int
     """Including photos that an earlier call finished."""

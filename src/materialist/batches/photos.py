@@ -26,8 +26,6 @@ LONGEST_NAME = 100
 
 @dataclass(frozen=True)
 class Listed:
-    """A photo of a batch."""
-
     id: str
     """Path below the folder, line of the list, or URL without secrets: the same wherever the folder lies."""
     location: str

@@ -13,12 +13,10 @@ RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.e
 
 
 def scene_path(runs: Path, name: str) -> Path:
-    """The scene package of a name."""
     return runs / f"{name}.scene"
 
 
 def picture_path(runs: Path, name: str) -> Path:
-    """The edited photo of a name."""
     return runs / f"{name}.png"
 
 

@@ -131,8 +131,6 @@ def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
 
 
 class _Run:
-    """The state of a batch at work."""
-
     def __init__(
         self, runs: Path, photos: list[Listed], ledger: Ledger, tasks: list[PhotoTask], kept: int,
         options: dict[str, Any], watch: Watch,

@@ -36,8 +36,6 @@ THUMBNAIL = (240, 150)
 
 @dataclass(frozen=True)
 class PhotoTask:
-    """A photo, and how to process it."""
-
     id: str
     """The key of the photo in the ledger: its path below the folder, its line in the list, or its URL."""
     name: str

@@ -46,5 +46,4 @@ def _root(
 
 
 def main() -> None:
-    """Entry point of the `materialist` command."""
     sys.exit(run_to_exit_code(app, sys.argv[1:]))

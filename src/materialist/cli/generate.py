@@ -107,7 +107,6 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
 
 
 def _shown(default: Any) -> str | bool:
-    """A default as the help shows it."""
     if isinstance(default, tuple):
         whole = bool(default) and all(isinstance(one, int) for one in default)
         return ("x" if whole else ",").join(f"{one:g}" for one in default) or False

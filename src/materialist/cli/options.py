@@ -56,13 +56,11 @@ class Place(OperationOptions):
 
     @property
     def named(self) -> list[str]:
-        """The flags that were given."""
         return [f"--{name}" for name in ("click", "box", "mask") if getattr(self, name)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Region(Place):
-    """A region of the photo, found as one likes."""
 
     method: str = option(
         "network", "network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights.", kind="word",

@@ -14,8 +14,6 @@ from materialist.options import InvertOptions
 
 
 class Format(StrEnum):
-    """What other programs read."""
-
     glb = "glb"
     blend = "blend"
     usd = "usd"

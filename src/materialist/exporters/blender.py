@@ -115,7 +115,6 @@ def _find_blender(named: str | None) -> list[str] | None:
 
 
 def _command(program: list[str], script: Path, output: Path, options: list[str]) -> list[str]:
-    """Run the script by `blender`, or by a Python."""
     start = list(program)
     if "python" not in Path(program[0]).name.lower():
         start += ["-b", "--factory-startup", "--python-exit-code", "1", "--python"]

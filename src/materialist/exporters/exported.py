@@ -14,8 +14,6 @@ MARKER = "materialist-export.json"
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written."""
-
     path: Path
     """The file or folder to open."""
     beside: tuple[Path, ...] = ()

@@ -89,7 +89,6 @@ class _Document:
         }  # fmt: skip
 
     def add_part(self, part: Part) -> int:
-        """Index of the mesh of a part."""
         mesh = part.mesh
         attributes = {
             "POSITION": self._accessor(mesh.vertices.astype("<f4"), "VEC3", bounds=True),

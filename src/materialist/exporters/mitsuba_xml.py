@@ -85,7 +85,6 @@ def _bsdf(part: Part, own: bool) -> dict:
 
 
 def _standard(bsdf: dict) -> dict:
-    """The material by Mitsuba's own plugins."""
     if bsdf["type"] == "blendbsdf":
         sides = {name: _standard(bsdf[name]) for name in ("opaque", "glass")}
         return {"type": "blendbsdf", "weight": bsdf["weight"]["value"], **sides}

@@ -42,7 +42,6 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
 
 
 def pack_usdz(folder: Path, file: Path) -> None:
-    """One file of what `write_usd` wrote."""
     from pxr import UsdUtils
 
     if not UsdUtils.CreateNewUsdzPackage(str(folder / "scene.usdc"), str(file)):

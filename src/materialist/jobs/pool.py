@@ -13,8 +13,6 @@ from materialist.jobs.worker import DONE, FAILED, Reporter, run
 
 @dataclass
 class _Place:
-    """A place for one worker."""
-
     environment: dict[str, str]
     worker: Worker | None = None
     key: Hashable | None = None
@@ -28,11 +26,9 @@ class LocalPool:
         self._places = [_Place(environment) for environment in environments]
 
     def free(self) -> int:
-        """How many tasks may be begun now."""
         return sum(place.key is None for place in self._places)
 
     def begin(self, key: Hashable, task: Callable[..., Any], arguments: dict[str, Any]) -> None:
-        """Hand a task to a free worker."""
         place = next(place for place in self._places if place.key is None)
         place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
         place.key = key

@@ -19,8 +19,6 @@ LOST = "lost"
 
 @dataclass(frozen=True)
 class Message:
-    """One message of a worker."""
-
     kind: str
     """A kind of `worker`, or LOST."""
     facts: Any
@@ -58,12 +56,10 @@ class Worker:
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
         return self._process.pid
 
     @property
     def running(self) -> bool:
-        """Whether the process has not ended yet."""
         return self._process.poll() is None
 
     def begin(self, task: Callable[..., Any], arguments: dict[str, Any]) -> int:

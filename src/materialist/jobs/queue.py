@@ -44,12 +44,10 @@ class Job:
 
     @property
     def over(self) -> bool:
-        """Whether it is done, failed or stopped."""
         return self.state in (DONE, FAILED, STOPPED)
 
     @property
     def seconds(self) -> float:
-        """How long it has run, or ran."""
         return (self.ended or time.monotonic()) - self.began
 
     def end(self, state: str, message: str = "") -> None:
@@ -67,7 +65,6 @@ class JobQueue:
         self._jobs: list[Job] = []
 
     def submit(self, job: Job) -> Job:
-        """Put a job in the queue."""
         with self._lock:
             self._jobs = [*(j for j in self._jobs if not j.over), job]
         self._threads.submit(self._run, job)
@@ -93,7 +90,6 @@ class JobQueue:
             worker.kill()
 
     def close(self) -> None:
-        """Stop everything."""
         with self._lock:
             unfinished = [j for j in self._jobs if not j.over]
         for job in unfinished:

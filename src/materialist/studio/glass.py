@@ -111,7 +111,6 @@ class GlassClient:
 
     @property
     def state(self) -> GlassState:
-        """The state of the last request."""
         with self.changed:
             return self._state
 

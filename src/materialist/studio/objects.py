@@ -74,7 +74,6 @@ def let_fall(session: Session, height: float) -> list[str]:
 
 
 def file_of(name: str) -> str:
-    """The file name of a computed mesh."""
     return f"thing-{name.lower()}.ply"
 
 

@@ -31,7 +31,6 @@ _HEAD = (
 
 
 def build(studio: Studio) -> Any:
-    """The Gradio page; `server` shows it."""
     context = PageContext(studio)
     parts = context.parts
     with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
@@ -60,7 +59,6 @@ def build(studio: Studio) -> Any:
 
 
 def _left(parts: dict[str, Any]) -> None:
-    """The stage, its tools, and the list of edits."""
     parts["stage"] = gr.HTML(
         {"picture": "", "width": 0, "height": 0, "badge": ""}, html_template=asset("stage.html"),
         js_on_load=asset("stage.js"), elem_id="stage",
@@ -97,7 +95,6 @@ def _left(parts: dict[str, Any]) -> None:
 
 
 def _wire(context: PageContext) -> None:
-    """Events of the left side."""
     for name in ("tool", "mode", "brush"):
         script = f"(v) => {{ document.body.dataset.{name} = v; }}"
         context[name].change(None, context[name], None, js=script, api_visibility="private")
@@ -134,7 +131,6 @@ def _wire(context: PageContext) -> None:
 
 
 def _turned_to(context: PageContext, session: Session) -> dict[Any, Any]:
-    """The tab with the controls of the current step."""
     tabs = {"edit": "material", "relight": "light", "insert": "object", "drop": "object", "glass": "object"}
     tab = tabs.get(session.current_kind or "")
     found = {context["tabs"]: gr.Tabs(selected=tab)} if tab else {}

@@ -108,7 +108,6 @@ class LivePreview:
         return picture
 
     def close(self) -> None:
-        """Give the memory back."""
         self._preview.cancel()
         self._preview = Future()
         self._preview.set_exception(InputError("This photo was closed; open it again."))  # for who waits

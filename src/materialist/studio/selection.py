@@ -61,7 +61,6 @@ class Selection:
         return self._with(select(scene, click=(x, y), method=method), mode)
 
     def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
-        """With the object in a box."""
         if mode == REMOVE:
             x0, y0, x1, y1 = (round(v) for v in box)
             gone = np.zeros(scene.depth.shape, bool)

@@ -29,8 +29,6 @@ _SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
 
 @dataclass(frozen=True)
 class FinalPicture:
-    """A path-traced picture."""
-
     steps: tuple[Step, ...]
     """The edits in it."""
     path: Path
@@ -39,7 +37,6 @@ class FinalPicture:
     """Paths a pixel."""
 
     def of(self, steps: tuple[Step, ...]) -> bool:
-        """Whether it shows these edits."""
         return bool(steps) and self.steps == steps
 
 
@@ -100,12 +97,10 @@ class Session:
 
     @property
     def current_kind(self) -> str | None:
-        """The kind of the step that sliders move, if there is one."""
         step = self.edits.current_step
         return step.kind if step else None
 
     def open(self, project: Project) -> None:
-        """Open a project where it was left."""
         from materialist.io.package import load_scene
 
         loaded = load_scene(project.scene)
@@ -312,7 +307,6 @@ def _slides(value: Any) -> bool:
 
 
 def _content(file: Path) -> bytes | None:
-    """The bytes of a file; None where there is none."""
     try:
         return file.read_bytes()
     except FileNotFoundError:

@@ -19,7 +19,6 @@ OWN = "The photo's own"
 
 
 def layout(context: PageContext) -> None:
-    """The components."""
     parts = context.parts
     with gr.Tab("Light", id="light"):
         parts["lights"] = gr.Gallery(
@@ -50,7 +49,6 @@ def layout(context: PageContext) -> None:
 
 
 def wire(context: PageContext) -> None:
-    """The events."""
     parts = context.parts
 
     @context.handler
@@ -106,7 +104,6 @@ def _written(session: Session, name: str) -> str:
 
 @cache
 def _gallery() -> list[tuple[Array, str]]:
-    """Small pictures of the lights, the photo's own first."""
     from materialist.io.display import light
 
     own = np.full((64, 128, 3), 225, np.uint8)

@@ -16,7 +16,6 @@ MESH = "mesh.glb"
 
 
 def layout(context: PageContext) -> None:
-    """The components."""
     parts = context.parts
     with gr.Tab("Look", id="look") as tab:
         parts["look"] = tab
@@ -37,7 +36,6 @@ def layout(context: PageContext) -> None:
 
 
 def wire(context: PageContext) -> None:
-    """The events."""
     parts, studio = context.parts, context.studio
 
     @context.handler

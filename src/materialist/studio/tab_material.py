@@ -12,7 +12,6 @@ from materialist.studio.workspace import store
 
 
 def layout(context: PageContext) -> None:
-    """The components."""
     parts = context.parts
     with gr.Tab("Material", id="material"):
         parts["hue"] = slider("hue", "Hue, degrees", 1, minimum=-180, maximum=180)
@@ -32,7 +31,6 @@ def layout(context: PageContext) -> None:
 
 
 def wire(context: PageContext) -> None:
-    """The events."""
     parts = context.parts
     context.bind("hue", "saturation", "value", "roughness", "metallic", "texture_scale")
     context.on(parts["colour"].input, _coloured, parts["colour"])

@@ -18,7 +18,6 @@ _GLASS = ("ior", "transmission", "roughness", "tint", "hollow")
 
 
 def layout(context: PageContext) -> None:
-    """The components."""
     parts = context.parts
     with gr.Tab("Objects", id="object"):
         gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
@@ -57,7 +56,6 @@ def _layout_glass(parts: dict[str, Any]) -> None:
 
 
 def wire(context: PageContext) -> None:
-    """The events."""
     parts = context.parts
 
     def choose(session: Session, name: str | None) -> dict[Any, Any]:
@@ -127,7 +125,6 @@ def _wire_following(context: PageContext) -> None:
 
 
 def _wire_fall(context: PageContext) -> None:
-    """An object that falls, and lies there."""
     parts = context.parts
 
     @context.handler

@@ -21,7 +21,6 @@ _READY = "Ready: click an object, then move a slider."
 
 
 def layout(context: PageContext) -> None:
-    """The components."""
     parts = context.parts
     with gr.Tab("Open", id="open"):
         parts["file"] = gr.File(
@@ -54,7 +53,6 @@ def layout(context: PageContext) -> None:
 
 
 def wire(context: PageContext, page: gr.Blocks) -> None:
-    """The events."""
     parts, studio = context.parts, context.studio
 
     @context.handler
@@ -217,7 +215,6 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
 
 
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:
-    """Titles and names of the projects that can be continued."""
     found = context.studio.projects(session.person)
     running = {j.folder for j in context.studio.jobs.unfinished(session.person, "invert")}
     return [

@@ -31,7 +31,6 @@ KINDS = {
 
 
 def layout(context: PageContext) -> None:
-    """The components."""
     parts = context.parts
     with gr.Tab("Take away", id="take"):
         choices = [(title, kind) for kind, (title, _) in KINDS.items()]
@@ -51,7 +50,6 @@ def layout(context: PageContext) -> None:
 
 
 def wire(context: PageContext) -> None:
-    """The events."""
     parts = context.parts
     outputs = [parts[name] for name in ("make_progress", "download", "make_stop", "stage")]
 
@@ -88,7 +86,6 @@ def wire(context: PageContext) -> None:
 
 
 def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job:
-    """The job that makes a file."""
     assert session.project is not None
     more = {"frames": SETTINGS.video_frames, "spp": SETTINGS.video_spp} if what == "turn" else {}
     return context.studio.submit(
@@ -98,7 +95,6 @@ def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job
 
 
 def _pack_edits(session: Session, file: Path) -> None:
-    """edits.yaml and every file it names."""
     session.save()
     if not session.edits.active:
         raise InputError("There is no edit to take away yet: change something first.")

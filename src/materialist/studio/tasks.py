@@ -49,7 +49,6 @@ def invert(
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
-    """Pictures of what `invert` has found so far."""
     if isinstance(value, Prediction):
         shown = {"depth": display.depths(value.depth), "normals": display.normals(value.normal)}
         value = value.materials
@@ -99,7 +98,6 @@ def take(report: Reporter, scene: str, steps: Steps, output: str, what: str, spp
 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
-    """The fitted scene, and the same after the list of edits (if there is one)."""
     from materialist.edits.recipe import apply
     from materialist.io.package import load_scene
 
@@ -168,6 +166,5 @@ def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
 
 
 def write_pixels(path: Path, pixels: Array) -> None:
-    """[H, W, 3] uint8 as a JPEG, whole."""
     with whole_file(path, force=True) as file:
         file.write_bytes(display.encoded(pixels, "JPEG", quality=SETTINGS.jpeg_quality))

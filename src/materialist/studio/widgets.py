@@ -52,7 +52,6 @@ class PageContext:
         return self.parts[name]
 
     def session(self, request: Any) -> Session:
-        """The session of the page that sent a request."""
         return self.studio.session(request.session_hash, self.studio.person(dict(request.cookies).get(PERSON)))
 
     def handler(self, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -111,12 +110,10 @@ class PageContext:
 
     @property
     def picture_parts(self) -> list[Any]:
-        """Components of `picture`."""
         return [self["stage"], self["steps"], self["commands"]]
 
     @property
     def all_parts(self) -> list[Any]:
-        """Components of `everything`."""
         return [*self.picture_parts, *(self[name] for name in CONTROLS)]
 
     def on(
@@ -202,7 +199,6 @@ def follow(jobs: JobQueue, job: Job) -> Iterator[State]:
 
 
 def shown(jobs: JobQueue, job: Job) -> State:
-    """One state."""
     if job.state == QUEUED:
         return f"Waiting: {jobs.ahead(job)} before yours.", 0.0, False
     if job.state == STOPPED:
@@ -227,14 +223,12 @@ def words(stage: str) -> str:
 
 
 def box(text: str, part: float | None = None, bad: bool = False) -> str:
-    """A line of text, with a bar where there is something to measure."""
     bar = "" if part is None else f'<div class="bar"><i style="width:{100 * part:.0f}%"></i></div>'
     kind, role = ("progress bad", "alert") if bad else ("progress", "status")
     return f'<div class="{kind}" role="{role}">{escape(text)}{bar}</div>'
 
 
 def steps(session: Session) -> list[dict[str, Any]]:
-    """The list of edits as the page shows it."""
     return [
         {"text": summary(step), "on": not step.skipped, "current": k == session.edits.current}
         for k, step in enumerate(session.edits.steps)

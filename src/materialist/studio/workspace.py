@@ -34,8 +34,6 @@ _PERSON = re.compile(r"[a-z0-9]{2,32}")
 
 @dataclass(frozen=True)
 class Project:
-    """A photo in work."""
-
     folder: Path
     title: str
     """For display; often the name of the uploaded file. Never part of a path."""
@@ -49,7 +47,6 @@ class Project:
 
     @property
     def ready(self) -> bool:
-        """Whether the inversion has finished."""
         return (self.scene / "scene.json").is_file()
 
     def workspace(self, person: str) -> Path:
@@ -62,8 +59,6 @@ class Project:
 
 
 class WorkFolder:
-    """The folder that the user named, and the projects in it."""
-
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         self._lock = threading.Lock()
