@@ -112,7 +112,17 @@ def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     parts = {name: getattr(wanted, name) for name in ("albedo", "roughness", "metallic", "normal", "depth")}
     source = get_predictor(wanted.predictor, device=wanted.device, **parts)
     picture = _seen_by(source, picture)
-    return picture, _predict(picture, source, wanted.seed)
+    prediction = source.predict(picture, seed=wanted.seed)
+    if not (prediction.depth > 0).any():
+        raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
+    middle = float(np.median(prediction.depth[prediction.depth > 0]))
+    if middle < SMALL:
+        note = (
+            f"Depth is {middle:.3g} in the median. Rays start about 0.0001 off a surface, which thins out its shadows; "
+            f"give depth in a smaller unit, so that the median is {SMALL:g} or more."
+        )
+        prediction = replace(prediction, warnings=(*prediction.warnings, note))
+    return picture, prediction
 
 
 def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:
@@ -185,20 +195,6 @@ def _seen_by(source, picture: Photo) -> Photo:
     return replace(picture, camera=replace(picture.camera, fov=angle), fov_source="predictor", warnings=notes)
 
 
-def _predict(picture: Photo, source, seed: int) -> Prediction:
-    prediction = source.predict(picture, seed=seed)
-    if not (prediction.depth > 0).any():
-        raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
-    middle = float(np.median(prediction.depth[prediction.depth > 0]))
-    if middle < SMALL:
-        note = (
-            f"Depth is {middle:.3g} in the median. Rays start about 0.0001 off a surface, which thins out its shadows; "
-            f"give depth in a smaller unit, so that the median is {SMALL:g} or more."
-        )
-        prediction = replace(prediction, warnings=(*prediction.warnings, note))
-    return prediction
-
-
 def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
     """[H, W] bool of an array or a file. Raises InputError for one of another size or type, or empty."""
     if given is None:
@@ -215,6 +211,3 @@ def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
     if not given.any():
         raise InputError("The mask is empty; mark at least one pixel.")
     return given
-
-
-__all__ = ["invert", "render_scene"]

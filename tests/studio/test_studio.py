@@ -111,13 +111,12 @@ def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
 
 
 def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path):
-    queue, job = JobQueue(1), Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
+    job = Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
     assert "Done in" in list(named(shared).follow(job))[-1]
     job.state, job.message = FAILED, "<script>alert(1)</script>"
-    shown = widgets.box(*widgets.shown(queue, job))
+    shown = named(shared).state(job)
     assert "<script>" not in shown and 'role="alert"' in shown
     assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
-    queue.close()
 
 
 def test_one_person_cannot_fill_the_queue(shared, tmp_path):

@@ -1,6 +1,7 @@
 """The outcome of a batch, its state while it runs, and its reports: summary.csv, summary.json and index.html."""
 
 import csv
+import hashlib
 import io
 import json
 from dataclasses import dataclass, field
@@ -8,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from materialist.batches.results import picture_path, replace_file, scene_path, thumbnail_path, together
+from materialist.batches.results import replace_file
 
 COLUMNS = (
     "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
@@ -45,7 +46,8 @@ class Outcome:
     @property
     def hash(self) -> str:
         """Of all results: equal for equal photos and options, however many workers and interruptions there were."""
-        return together((row["name"], f"{row['scene_hash']} {row['picture_hash'] or ''}") for row in self.of("done"))
+        results = sorted((row["name"], f"{row['scene_hash']} {row['picture_hash'] or ''}") for row in self.of("done"))
+        return hashlib.sha256("\n".join(f"{name} {value}" for name, value in results).encode()).hexdigest()
 
     @property
     def exit_code(self) -> int:
@@ -109,7 +111,7 @@ def write_page(outcome: Outcome) -> None:
     rows = sorted(outcome.rows, key=lambda row: order[row["status"]])  # what needs a look comes first
     page = template.render(
         title=outcome.runs.resolve().name, style=(assets / "page.css").read_text("utf-8"), facts=_facts(outcome),
-        edited=any(row["picture_hash"] for row in outcome.rows), cards=[_card(outcome.runs, row) for row in rows],
+        edited=any(row["picture_hash"] for row in outcome.rows), cards=[_card(row) for row in rows],
     )  # fmt: skip
     replace_file(outcome.runs / "index.html", page.encode("utf-8"))
 
@@ -127,7 +129,7 @@ def _facts(outcome: Outcome) -> list[tuple[str, str]]:
     return facts
 
 
-def _card(runs: Path, row: Row) -> dict[str, Any]:
+def _card(row: Row) -> dict[str, Any]:
     """Values of the template for one photo; links are relative to the page."""
     if row["status"] != "done":
         return {"row": row}
@@ -137,9 +139,8 @@ def _card(runs: Path, row: Row) -> dict[str, Any]:
     shown = [form.format(value) for value, form in figures if value is not None]
     shown += [f"{row['width']} × {row['height']}"] if row["width"] else []
     shown += [f"{row['attempts']} attempts"] if (row["attempts"] or 1) > 1 else []
-    scene = scene_path(runs, row["name"]).name
-    links = [("all maps", f"{scene}/overview.png"), ("scene", f"{scene}/")]
+    name = row["name"]
+    links = [("all maps", f"{name}.scene/overview.png"), ("scene", f"{name}.scene/")]
     if row["picture_hash"]:
-        links.insert(0, ("edited photo", picture_path(runs, row["name"]).name))
-    thumbnail = thumbnail_path(runs, row["name"]).relative_to(runs).as_posix()
-    return {"row": row, "figures": " · ".join(shown), "links": links, "thumbnail": thumbnail}
+        links.insert(0, ("edited photo", f"{name}.png"))
+    return {"row": row, "figures": " · ".join(shown), "links": links, "thumbnail": f"thumbs/{name}.jpg"}

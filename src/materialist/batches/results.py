@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from collections.abc import Iterable
 from pathlib import Path
 
 from materialist.errors import SceneError
@@ -10,19 +9,6 @@ from materialist.io.atomic import MARKER, whole_file
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
 """Files that the hash covers beside the camera. Times, memory, paths and pictures with figures are left out."""
-
-
-def scene_path(runs: Path, name: str) -> Path:
-    return runs / f"{name}.scene"
-
-
-def picture_path(runs: Path, name: str) -> Path:
-    return runs / f"{name}.png"
-
-
-def thumbnail_path(runs: Path, name: str) -> Path:
-    """Small pictures of the photo, its re-rendering and its edit, side by side."""
-    return runs / "thumbs" / f"{name}.jpg"
 
 
 def replace_file(path: Path, content: bytes) -> None:
@@ -59,8 +45,3 @@ def file_hash(path: str | Path) -> str:
 def package_size(path: str | Path) -> int:
     """Bytes of all files of a scene package; 0 where there is none. Another size than at first: it is not whole."""
     return sum(file.stat().st_size for file in Path(path).rglob("*") if file.is_file())
-
-
-def together(hashes: Iterable[tuple[str, str]]) -> str:
-    """SHA-256 (hex) of a whole batch from (name, hash) of each result, whatever their order."""
-    return hashlib.sha256("\n".join(f"{name} {value}" for name, value in sorted(hashes)).encode()).hexdigest()

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from materialist.batches import results
 from materialist.batches.edits import edits_for, edits_key
 from materialist.batches.options import INVERSION
 from materialist.batches.remote import fingerprint, is_url, local_copy
-from materialist.batches.results import file_hash, package_hash, package_size
+from materialist.batches.results import file_hash, package_hash, package_size, replace_file
 from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable
@@ -56,11 +55,11 @@ class PhotoTask:
 
     @property
     def scene(self) -> Path:
-        return results.scene_path(self.runs, self.name)
+        return self.runs / f"{self.name}.scene"
 
     @property
     def picture(self) -> Path:
-        return results.picture_path(self.runs, self.name)
+        return self.runs / f"{self.name}.png"
 
     def named_options(self) -> dict[str, Any]:
         return {k: v.replace("{name}", self.name) if isinstance(v, str) else v for k, v in self.options.items()}
@@ -84,7 +83,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
         warnings += notes
         facts |= {"edit_seconds": time.perf_counter() - begun, "picture_hash": file_hash(task.picture)}
         facts["edits"] = edits_key(task.edits, task.name, task.spp)
-    _write_strip(results.thumbnail_path(task.runs, task.name), pictures)
+    _write_strip(task.runs / "thumbs" / f"{task.name}.jpg", pictures)
     metrics = scene.report.metrics
     facts |= {
         "scene_hash": package_hash(task.scene), "scene_bytes": package_size(task.scene),
@@ -156,4 +155,4 @@ def _write_strip(path: Path, pictures: list[Array]) -> None:
     for one in small:
         strip.paste(one, (left, 0))
         left += one.width + 4
-    results.replace_file(path, encoded(np.asarray(strip), "JPEG", quality=85))
+    replace_file(path, encoded(np.asarray(strip), "JPEG", quality=85))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from materialist.jobs.process import LOST, Message, Worker, sentence
+from materialist.jobs.process import LOST, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
 QUEUED, RUNNING, STOPPED = "queued", "running", "stopped"
@@ -72,8 +72,7 @@ class JobQueue:
 
     def ahead(self, job: Job) -> int:
         """How many jobs are before this one in the queue; 0 when it runs."""
-        with self._lock:
-            waiting = [j for j in self._jobs if not j.over]
+        waiting = self.unfinished()
         return waiting.index(job) if job.state == QUEUED and job in waiting else 0
 
     def unfinished(self, owner: str | None = None, kind: str | None = None) -> list[Job]:
@@ -90,9 +89,7 @@ class JobQueue:
             worker.kill()
 
     def close(self) -> None:
-        with self._lock:
-            unfinished = [j for j in self._jobs if not j.over]
-        for job in unfinished:
+        for job in self.unfinished():
             self.stop(job)
         self._threads.shutdown(wait=False, cancel_futures=True)
 
@@ -112,7 +109,10 @@ class JobQueue:
                 if message.kind in (DONE, FAILED, LOST):
                     worker.kill()
                     break
-                _note(job, message)
+                if message.kind == PROGRESS:
+                    job.stage, job.done, job.total = (message.facts[name] for name in ("stage", "done", "total"))
+                elif message.kind == FOUND:
+                    job.found = [*job.found, message.facts]
         finally:
             worker.close()
             _sweep(job.folder, worker.pid)
@@ -121,13 +121,6 @@ class JobQueue:
                 job.end(DONE)
             else:
                 job.end(FAILED, sentence(message.facts))
-
-
-def _note(job: Job, message: Message) -> None:
-    if message.kind == PROGRESS:
-        job.stage, job.done, job.total = (message.facts[name] for name in ("stage", "done", "total"))
-    elif message.kind == FOUND:
-        job.found = [*job.found, message.facts]
 
 
 def _sweep(folder: Path, pid: int) -> None:

@@ -1,13 +1,11 @@
 """The tab to take things away: pictures, the scene, other programs' formats, a video, the recipe, the commands."""
 
 import shutil
-from pathlib import Path
 from typing import Any
 
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.jobs.queue import Job
 from materialist.jobs.worker import DONE
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.archives import pack
@@ -59,17 +57,24 @@ def wire(context: PageContext) -> None:
         if what not in KINDS:
             raise InputError("Choose one of the listed things.")
         _ = session.scene
+        assert session.project is not None
         yield {parts["download"]: gr.update(visible=False)}
         file = session.workspace / f"take-{what}{KINDS[what][1]}"
         if what == "edits":
-            _pack_edits(session, file)
+            session.save()
+            if not session.edits.active:
+                raise InputError("There is no edit to take away yet: change something first.")
+            pack(session.edits.steps, session.workspace / EDITS, file)
         elif what in ("png", "exr"):
             final = yield from context.traced(session, SETTINGS.final_spp, "make_progress", "make_stop")
             if final is None:
                 return
             shutil.copyfile(final.path.with_suffix(file.suffix), file)
         else:
-            job = _asked(context, session, what, file)
+            job = context.studio.submit(
+                session, tasks.take, session.workspace, scene=str(session.project.scene), steps=session.edits.active,
+                output=str(file), what=what,
+            )  # fmt: skip
             yield from context.following(job, "make_progress", "make_stop")
             if job.state != DONE:
                 return
@@ -83,19 +88,3 @@ def wire(context: PageContext) -> None:
     parts["make"].click(make, parts["what"], outputs, **LONG)
     context.stops("make_stop", "take", "final")
     context.on_upload("recipe", Session.read_edits, everything=True, **{**LONG, "queue": True, "trigger_mode": "once"})
-
-
-def _asked(context: PageContext, session: Session, what: str, file: Path) -> Job:
-    assert session.project is not None
-    more = {"frames": SETTINGS.video_frames, "spp": SETTINGS.video_spp} if what == "turn" else {}
-    return context.studio.submit(
-        session, tasks.take, session.workspace, scene=str(session.project.scene), steps=session.edits.active,
-        output=str(file), what=what, **more,
-    )  # fmt: skip
-
-
-def _pack_edits(session: Session, file: Path) -> None:
-    session.save()
-    if not session.edits.active:
-        raise InputError("There is no edit to take away yet: change something first.")
-    pack(session.edits.steps, session.workspace / EDITS, file)

@@ -65,36 +65,41 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
         report.found(name=title, file=file.name)
 
 
-def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int = 256, seed: int = 0) -> None:
+def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
     from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
 
     loaded, edited = _edited(report, scene, steps)
-    picture = composite(loaded, edited, spp=spp, seed=seed, progress=report)
+    picture = composite(loaded, edited, spp=spp, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
     write_jpeg(out.with_suffix(".jpg"), picture, longest=2048)
 
 
-def mesh(report: Reporter, scene: str, output: str, triangles: int = 60_000) -> None:
+def mesh(report: Reporter, scene: str, output: str) -> None:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
     from materialist.exporters.glb import glb_bytes
     from materialist.exporters.parts import scene_parts
+    from materialist.exporters.run import PAGE_TRIANGLES
     from materialist.io.package import load_scene
 
     report("export", 0, 1)
     loaded = load_scene(scene)
     with whole_file(output, force=True) as file:
-        file.write_bytes(glb_bytes(loaded, scene_parts(loaded, triangles)[:1]))
+        file.write_bytes(glb_bytes(loaded, scene_parts(loaded, PAGE_TRIANGLES)[:1]))
 
 
-def take(report: Reporter, scene: str, steps: Steps, output: str, what: str, spp: int = 256, frames: int = 36) -> None:
+def take(report: Reporter, scene: str, steps: Steps, output: str, what: str) -> None:
     """One thing to take away, as a single file at `output` (its suffix included)."""
-    maker: dict[str, Callable[..., None]] = {"scene": _package, "turn": _turntable}
     loaded, edited = _edited(report, scene, steps)
-    maker.get(what, _exported)(report, loaded, edited, Path(output), what=what, spp=spp, frames=frames)
+    if what == "scene":
+        _package(report, loaded, edited, Path(output))
+    elif what == "turn":
+        _turntable(report, loaded, edited, Path(output))
+    else:
+        _exported(report, edited, Path(output), what)
 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
@@ -106,14 +111,14 @@ def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     return loaded, apply(loaded, list(steps)) if steps else loaded
 
 
-def _package(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, spp: int, **_: Any) -> None:
+def _package(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> None:
     """The edited scene as a zipped package, its photo the composite."""
     from materialist.edits.composite.composite import composite, developed
     from materialist.io.package import save_scene
 
     result = loaded
     if edited is not loaded:
-        result = developed(loaded, edited, composite(loaded, edited, spp=spp, progress=report))
+        result = developed(loaded, edited, composite(loaded, edited, spp=SETTINGS.final_spp, progress=report))
     folder = partial(output, "") / output.with_suffix("").name
     folder.parent.mkdir()
     report("save", 0, 1)
@@ -121,7 +126,7 @@ def _package(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, sp
     _zip(folder, output)
 
 
-def _exported(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, what: str, **_: Any) -> None:
+def _exported(report: Reporter, edited: Scene, output: Path, what: str) -> None:
     """Another program's format; several files come as a zip."""
     from materialist.exporters.run import FOLDERS, export
 
@@ -135,15 +140,16 @@ def _exported(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, w
     _zip(folder, output)
 
 
-def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path, *, spp: int, frames: int, **_: Any):
+def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> None:
     """`materialist relight --rotate 360`: the light once round, over the edits."""
     from materialist.edits.composite.composite import pictures
     from materialist.edits.light.relight import moving_light
     from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
-    scenes = list(moving_light(edited, frames, rotate=360.0))
-    write_frames(output, pictures(loaded, scenes, spp=spp, progress=report), fps=12, force=True)
+    scenes = list(moving_light(edited, SETTINGS.video_frames, rotate=360.0))
+    film = pictures(loaded, scenes, spp=SETTINGS.video_spp, progress=report)
+    write_frames(output, film, fps=12, force=True)
 
 
 def _zip(folder: Path, output: Path) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 import gradio as gr
 
 from materialist.errors import MaterialistError
-from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
+from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.controls import CONTROLS, control_values, set_option
@@ -154,7 +154,25 @@ class PageContext:
 
     def follow(self, job: Job) -> Iterator[str]:
         """The state of a job as HTML whenever it changed, until it is over; the last one says how it ended."""
-        return (box(self.studio.shown(text), part, bad) for text, part, bad in follow(self.studio.jobs, job))
+        last = None
+        while not job.over:
+            if (state := self.state(job)) != last:
+                yield (last := state)
+            time.sleep(SETTINGS.poll_seconds)
+        yield self.state(job)
+
+    def state(self, job: Job) -> str:
+        """The state of a job as HTML."""
+        if job.state == QUEUED:
+            return box(f"Waiting: {self.studio.jobs.ahead(job)} before yours.", 0.0)
+        if job.state == STOPPED:
+            return box("Stopped; nothing was changed.")
+        if job.state == FAILED:
+            return box(self.studio.shown(failure(job)), bad=True)
+        if job.over:
+            return box(f"Done in {job.seconds:.0f} s.")
+        part = min(1.0, job.done / job.total) if job.total else 0.0
+        return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
     def traced(self, session: Session, spp: int, words: str, stop: str) -> Generator[Any, Any, FinalPicture | None]:
         """Path-trace the edits of a page, if that is not done yet, with the updates of `following`.
@@ -182,33 +200,6 @@ class PageContext:
             self.session(request).stop(self.studio.jobs, *kinds)
 
         self[button].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
-
-
-State = tuple[str, float | None, bool]
-"""What a job does in words, how much of it is done, and whether it failed; arguments of `box`."""
-
-
-def follow(jobs: JobQueue, job: Job) -> Iterator[State]:
-    """The state of a job whenever it changed, until it is over; the last one says how it ended."""
-    last = None
-    while not job.over:
-        if (state := shown(jobs, job)) != last:
-            yield (last := state)
-        time.sleep(SETTINGS.poll_seconds)
-    yield shown(jobs, job)
-
-
-def shown(jobs: JobQueue, job: Job) -> State:
-    if job.state == QUEUED:
-        return f"Waiting: {jobs.ahead(job)} before yours.", 0.0, False
-    if job.state == STOPPED:
-        return "Stopped; nothing was changed.", None, False
-    if job.state == FAILED:
-        return failure(job), None, True
-    if job.over:
-        return f"Done in {job.seconds:.0f} s.", None, False
-    part = min(1.0, job.done / job.total) if job.total else 0.0
-    return f"{words(job.stage)} … {job.seconds:.0f} s", part, False
 
 
 def failure(job: Job) -> str:
