@@ -8,8 +8,9 @@ import pytest
 from materialist import Drop, Glass, Insertion, InvertOptions, MaterialEdit, Relight, Removal
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
+from materialist.options import ExportOptions
 
-ALL = (MaterialEdit, Removal, Glass, Relight, Insertion, Drop, InvertOptions)
+ALL = (MaterialEdit, Removal, Glass, Relight, Insertion, Drop, InvertOptions, ExportOptions)
 
 
 @pytest.mark.parametrize("kind", ALL)
@@ -59,6 +60,7 @@ def test_texts_mean_what_the_values_do(tmp_path):
         (Insertion, {"material": "wood"}, "The material is 'wood'; give as-is, glass, mirror, R,G,B"),
         (InvertOptions, {"envmap_size": (64, 64)}, "The envmap size is 64x64; it must be twice as wide"),
         (InvertOptions, {"envmap_size": "512"}, "must look like 512x256, not '512'"),
+        (ExportOptions, {"max_triangles": 99}, "The number of triangles is 99; it must lie in [100, "),
         (InvertOptions, {"tau": 90}, "The tau is 90; it must lie in (0, 90) degrees."),
     ],
 )

@@ -20,6 +20,7 @@ from .io.package import load_scene as load_scene
 from .io.package import save_scene as save_scene
 from .io.photo import read_photo as read_photo
 from .options import Drop as Drop
+from .options import ExportOptions as ExportOptions
 from .options import Glass as Glass
 from .options import Insertion as Insertion
 from .options import InvertOptions as InvertOptions

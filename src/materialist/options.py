@@ -198,3 +198,23 @@ class InvertOptions(OperationOptions):
     settings: Any = option(None, "FitSettings in place of the preset.", kind="any", flag=None)
     prior: Prediction | None = option(None, "A Prediction in place of the predictor.", kind="any", flag=None)
     spp: int | None = option(None, "Paths a pixel of the final re-rendering.", kind="whole", low=1, flag=None)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions(OperationOptions):
+    """How a scene is written for another program."""
+
+    operation = "export"
+    to: str | None = option(
+        None, "Format; else that of the suffix.", kind="word", choices=("glb", "blend", "usd", "mitsuba", "html"),
+        called="format")
+    max_triangles: int | None = option(
+        None, "Coarser mesh of at most N triangles; html: 60000 unless given.", kind="whole", low=100,
+        called="number of triangles", metavar="N")
+    blender: str | None = option(
+        None, "blend: the blender program, or a Python that has bpy; else it is looked for.", kind="name",
+        metavar="PROGRAM")
+    shadow_catcher: bool = option(
+        False, "blend: show the photo, with the scene to catch shadows on it.", kind="switch")
+    fitted_material: bool = option(
+        False, "blend: the material model of the fit, not Blender's Principled.", kind="switch")

@@ -18,7 +18,7 @@ from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.exr import read_exr
 from materialist.io.package import load_scene
 from materialist.option_kinds import declarations
-from materialist.options import Drop, Glass, InvertOptions, Relight
+from materialist.options import Drop, ExportOptions, Glass, InvertOptions, Relight
 
 
 @pytest.fixture
@@ -129,7 +129,8 @@ def test_bench_dispatches_with_extra_options(run, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("command", "kind"), [("invert", InvertOptions), ("glass", Glass), ("relight", Relight), ("drop", Drop)]
+    ("command", "kind"),
+    [("invert", InvertOptions), ("glass", Glass), ("relight", Relight), ("drop", Drop), ("export", ExportOptions)],
 )
 def test_help_names_a_flag_for_every_option(run, command, kind):
     code, out, _ = run(command, "--help")

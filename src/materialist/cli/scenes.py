@@ -1,7 +1,6 @@
 """`materialist invert`, `render` and `export`: scene packages made, rendered, and written for other programs."""
 
 import time
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,15 +9,7 @@ import typer
 from materialist.cli.options import Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
-from materialist.options import InvertOptions
-
-
-class Format(StrEnum):
-    glb = "glb"
-    blend = "blend"
-    usd = "usd"
-    mitsuba = "mitsuba"
-    html = "html"
+from materialist.options import ExportOptions, InvertOptions
 
 
 def invert(
@@ -89,20 +80,8 @@ def export(
     output: Annotated[
         Path, output_option("OUT", "NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba).")
     ],
-    to: Annotated[Format, typer.Option("--to", help="Format.")],
+    options: ExportOptions,
     run: Run,
-    max_triangles: Annotated[
-        int | None, typer.Option(metavar="N", help="Coarser mesh of at most N triangles; html: 60000 unless given.")
-    ] = None,
-    blender: Annotated[
-        str | None, typer.Option(metavar="PROGRAM", help="blend: the blender program, or a Python that has bpy.")
-    ] = None,
-    shadow_catcher: Annotated[
-        bool, typer.Option("--shadow-catcher", help="blend: show the photo, with the scene to catch shadows on it.")
-    ] = False,
-    fitted_material: Annotated[
-        bool, typer.Option("--fitted-material", help="blend: the material model of the fit, not Blender's Principled.")
-    ] = False,
 ) -> None:
     """Write a scene for another program: glTF, Blender, USD, Mitsuba, or one self-contained page of HTML.
 
@@ -114,12 +93,9 @@ def export(
     from materialist.exporters.run import export as write
     from materialist.io.package import load_scene
 
-    check_format(output, to)
+    check_format(output, options.to)
     with Console(stderr=True).status(f"Writing {output}"):
-        done = write(
-            load_scene(scene), output, to=to, force=run.force, max_triangles=max_triangles, blender=blender,
-            shadow_catcher=shadow_catcher, fitted_material=fitted_material,
-        )  # fmt: skip
+        done = write(load_scene(scene), output, options, force=run.force)
     files = [str(done.path), *map(str, done.beside)]
     report_success(
         "export", run.as_json, [f"Wrote {', '.join(files)}", *done.notes], output=str(done.path), beside=files[1:],

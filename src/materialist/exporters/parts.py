@@ -10,8 +10,6 @@ from materialist.errors import InputError
 from materialist.geometry.build import part
 from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene, Surface
 
-FEWEST = 100
-"""Triangles below which a reduced mesh would no longer show the scene."""
 _NEUTRAL = ((0.5, 0.5, 0.5), 0.5, 0.0)
 """Albedo, roughness and metallic of a plane that no pixel lies on, as the renderer has it."""
 
@@ -45,13 +43,11 @@ def scene_parts(scene: Scene, max_triangles: int | None = None) -> list[Part]:
 
     max_triangles: rebuild the mesh from a coarser depth map where the scene's has more triangles than this; the
         texture keeps its size. None: the scene's own mesh.
-    Raises InputError for a mesh without a depth surface, or too small a number of triangles.
+    Raises InputError for a mesh without a depth surface, and where so few triangles do not show the scene.
     """
     geometry = scene.geometry
     if not (geometry.mesh.face_plane == -1).any():
         raise InputError("The mesh has no depth surface to export; give a depth map with some values above 0.")
-    if max_triangles is not None and max_triangles < FEWEST:
-        raise InputError(f"The most triangles are {max_triangles}; give at least {FEWEST}.")
     materials = scene.materials
     if max_triangles is not None and len(geometry.mesh.faces) > max_triangles:
         geometry, materials = _reduced(scene, max_triangles)

@@ -4,15 +4,16 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part, body_parts, scene_parts
 from materialist.io.atomic import whole_file, whole_files
+from materialist.options import ExportOptions
 from materialist.types import Scene
 
-FORMATS = ("glb", "blend", "usd", "mitsuba", "html")
 SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
 """Format -> suffix of its single file."""
 FOLDERS = ("blend", "usd", "mitsuba")
@@ -22,38 +23,33 @@ PAGE_TRIANGLES = 60_000
 
 
 def export(
-    scene: Scene, path: str | Path, *, to: str | None = None, force: bool = False, max_triangles: int | None = None,
-    blender: str | None = None, shadow_catcher: bool = False, fitted_material: bool = False,
-) -> Exported:  # fmt: skip
+    scene: Scene, path: str | Path, options: ExportOptions | None = None, *, force: bool = False, **values: Any
+) -> Exported:
     """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
 
     Args:
         path: a file with the suffix of the format; for blend, usd and mitsuba a folder (a name without suffix).
-        to: `glb`, `blend`, `usd`, `mitsuba` or `html`; None: by the suffix of PATH.
+        options, values: see `options.ExportOptions`; `values` are fields of it, as in `export(scene, path, to="usd")`.
         force: replace PATH where it is an earlier export.
-        max_triangles: rebuild the mesh from a coarser depth map where it has more than these.
-        blender: for blend, the `blender` program or a Python that has `bpy`; None: look for one.
-        shadow_catcher: for blend, start with the reconstruction as a shadow catcher over the photo.
-        fitted_material: for blend, the material model of the fit instead of Blender's Principled.
 
     Raises:
         InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
         SetupError: the extra for the format is missing, or `blender` does not work.
     """
-    path = Path(path)
-    to = check_format(path, to)
-    if to != "blend" and (blender is not None or shadow_catcher or fitted_material):
+    wanted, path = ExportOptions.given(options, **values), Path(path)
+    to, most = check_format(path, wanted.to), wanted.max_triangles
+    chosen = {"--shadow-catcher": wanted.shadow_catcher, "--fitted-material": wanted.fitted_material}
+    flags = [flag for flag, on in chosen.items() if on]
+    if to != "blend" and (wanted.blender is not None or flags):
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
-    if to == "html" and max_triangles is None:
-        max_triangles = PAGE_TRIANGLES
+    if to == "html" and most is None:
+        most = PAGE_TRIANGLES
     bodies = body_parts(scene)
-    parts = [*scene_parts(scene, max_triangles), *bodies]
+    parts = [*scene_parts(scene, most), *bodies]
     if to == "blend":
         from materialist.exporters.blender import export_blend
 
-        chosen = {"--shadow-catcher": shadow_catcher, "--fitted-material": fitted_material}
-        options = [option for option, wanted in chosen.items() if wanted]
-        made = export_blend(path, scene, parts, force, blender=blender, options=options)
+        made = export_blend(path, scene, parts, force, blender=wanted.blender, options=flags)
     else:
         writers: dict[str, Callable[..., Exported]] = {"glb": _glb, "usd": _usd, "mitsuba": _mitsuba, "html": _html}
         made = writers[to](path, scene, parts, force)
@@ -85,15 +81,13 @@ def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:
 
 
 def check_format(path: Path, to: str | None) -> str:
-    """The format of an export to PATH. Raises InputError where it is unknown or PATH's suffix is another's."""
+    """The format of an export to PATH. Raises InputError where PATH does not say it, or its suffix is another's."""
     suffix = path.suffix.lower()
     if to is None:
         named = [name for name, end in SUFFIX.items() if end == suffix]
         if not named:
-            raise InputError(f"{path} does not say its format; give to= one of {', '.join(FORMATS)}.")
+            raise InputError(f"{path} does not say its format; give it as --to (in Python to=).")
         to = named[0]
-    if to not in FORMATS:
-        raise InputError(f"The format is '{to}'; choose one of {', '.join(FORMATS)}.")
     folder = to in FOLDERS and suffix not in (".usda", ".usdc", ".usd", ".xml", *SUFFIX.values())
     if not folder and suffix != SUFFIX.get(to):
         expected = [f"NAME{SUFFIX[to]}"] if to in SUFFIX else []
