@@ -9,15 +9,8 @@ SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
 NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "option_kinds", "options", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
-OPERATIONS = {
-    "edits.select",
-    "edits.material",
-    "edits.light",
-    "edits.remove",
-    "edits.glass",
-    "edits.insert",
-    "edits.drop",
-}
+KINDS = ("select", "material", "light", "remove", "glass", "insert", "drop", "core", "composite")
+EDITING = {"edits", *(f"edits.{kind}" for kind in KINDS)}
 MAY_IMPORT: dict[str, set[str]] = {
     "io": set(),
     "bsdf": set(),
@@ -36,47 +29,27 @@ MAY_IMPORT: dict[str, set[str]] = {
     "edits.glass": SCENE | {"edits.core", "edits.composite", "edits.remove", "predict", "solids"},
     "edits.insert": SCENE | {"edits.core", "edits.composite"},
     "edits.drop": SCENE | {"edits.core", "edits.insert"},
-    "edits": SCENE | OPERATIONS | {"edits.core", "edits.composite", "fit"},
+    "edits": SCENE | EDITING | {"fit"},
     "exporters": SCENE | {"edits.core"},
     "pipeline": SCENE | {"predict", "fit", "edits.core"},
     "jobs": set(),
-    "batches": SCENE | OPERATIONS | {"edits", "edits.core", "edits.composite", "jobs", "pipeline", "predict"},
-    "studio": SCENE | OPERATIONS | {"edits", "edits.core", "edits.composite", "exporters", "jobs", "pipeline"},
+    "batches": SCENE | EDITING | {"jobs", "pipeline", "predict"},
+    "studio": SCENE | EDITING | {"exporters", "jobs", "pipeline"},
     "procedural": SCENE | {"predict"},
     "train": {"io", "render", "predict", "procedural"},
-    "bench": SCENE
-    | OPERATIONS
-    | {"edits", "edits.core", "edits.composite", "batches", "fit", "pipeline", "predict", "procedural", "solids"},
+    "bench": SCENE | EDITING | {"batches", "fit", "pipeline", "predict", "procedural", "solids"},
     "doctor": {"predict", "render"},
     "cli": SCENE
-    | OPERATIONS
-    | {
-        "edits",
-        "edits.core",
-        "edits.composite",
-        "batches",
-        "bench",
-        "doctor",
-        "exporters",
-        "pipeline",
-        "predict",
-        "procedural",
-        "studio",
-        "train",
-    },
+    | EDITING
+    | {"batches", "bench", "doctor", "exporters", "pipeline", "predict", "procedural", "studio", "train"},
     "__main__": {"cli"},
 }
 """Package -> the packages it may import beside the nouns; docs/architecture.md draws this table."""
 
 HEAVY = {"torch", "mitsuba", "drjit"}
 MAY_BE_HEAVY = ("bsdf", "render", "transport", "fit", "train", "procedural")
-NETWORKS = (
-    "predict.bundled.",
-    "predict.matnet.",
-    "predict.refraction.",
-    "predict.clicks.",
-    "predict.efficientnet",
-    "predict.network",
+NETWORKS = tuple(
+    f"predict.{name}" for name in ("bundled.", "matnet.", "refraction.", "clicks.", "efficientnet", "network")
 )
 """Networks need torch at their top; whoever calls them imports them late."""
 LIGHT_START = ("", "types", "errors", "color", "camera", "option_kinds", "options", "plain", "cli")

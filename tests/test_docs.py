@@ -84,24 +84,6 @@ def test_every_command_line_parses(page):
         _parsed(words, whole)
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("materialist invent PHOTO -o SCENE", "no command"),
-        ("materialist invert PHOTO -o SCENE --seeds 3", "--seeds"),
-        ("materialist invert PHOTO -o SCENE --engine fast", "fast"),
-        ("materialist models fetch NAME", "no command"),
-        ("materialist export SCENE --to glb|obj -o OUT", "obj"),
-        ("materialist bench light -o REPORT --scene 3", "does not take {'scene'}"),
-        ("materialist render SCENE", "output"),
-    ],
-)
-def test_what_does_not_parse_is_found(line, words):
-    ((given, whole),) = _commands(f"```\n{line}  # a comment --with-dashes\n```")
-    with pytest.raises(AssertionError, match=words):
-        _parsed(given, whole)
-
-
 @cache
 def _options():
     """Every option of every command, and of every benchmark."""

@@ -59,23 +59,14 @@ def options(folder, **changes) -> dict:
     }  # fmt: skip
 
 
-def short():
-    """The default preset with a few steps."""
-    from materialist.fit.settings import DEFAULT
+def short(preset="default", steps=4, light_steps=10):
+    """A preset with a few steps."""
+    from materialist.fit.settings import preset as named
 
-    stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=4)) for s in DEFAULT.materials.stages)
-    light = replace(DEFAULT.light, schedule=replace(DEFAULT.light.schedule, max_steps=10))
-    materials = replace(DEFAULT.materials, stages=stages)
-    return replace(DEFAULT, light=light, materials=materials)
-
-
-def short_paper():
-    """The paper's preset with three steps a stage."""
-    from materialist.fit.settings import PAPER
-
-    stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=3)) for s in PAPER.materials.stages)
-    light = replace(PAPER.light, schedule=replace(PAPER.light.schedule, max_steps=3))
-    return replace(PAPER, light=light, materials=replace(PAPER.materials, stages=stages))
+    settings = named(preset)
+    stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=steps)) for s in settings.materials.stages)
+    light = replace(settings.light, schedule=replace(settings.light.schedule, max_steps=light_steps))
+    return replace(settings, light=light, materials=replace(settings.materials, stages=stages))
 
 
 @pytest.fixture(scope="module")
@@ -143,13 +134,14 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
 
     monkeypatch.setitem(engine.PathEngine.__init__.__kwdefaults__, "spp", 2)
     told = []
-    scene = invert(**options(folder, engine="path", settings=short_paper(), progress=lambda *a: told.append(a[0])))
+    scene = invert(
+        **options(folder, engine="path", settings=short("paper", 3, 3), progress=lambda *a: told.append(a[0]))
+    )
     assert scene.provenance["engine"] == "path"
     assert scene.provenance["preset"] == "paper"
     names = [stage["name"] for stage in scene.report.stages]
-    assert [n for n in names if n in ("light", "roughness+metallic", "materials")] == [
-        "light", "roughness+metallic", "materials",
-    ]  # fmt: skip
+    wanted = ["light", "roughness+metallic", "materials"]
+    assert [n for n in names if n in wanted] == wanted
     assert scene.envmap.shape == (16, 32, 3)
     assert {"read", "predict", "geometry", "light", "rerender"} <= set(told)
 

@@ -15,23 +15,17 @@ def test_numbers_of_any_kind_become_pythons():
     assert lamp == Lamp((0.0, 1.0, -2.0), (3.0, 3.0, 3.0), 0.5) and type(lamp.radius) is float
 
 
-@pytest.mark.parametrize("values", [(0, 6, 40), (8.5, 6, 40), (8, None, 40), ([8, 6], 6, 40), (np.inf, 6, 40)])
-def test_a_camera_without_pixels(values):
-    with pytest.raises(InputError, match="whole numbers"):
-        Camera(*values)
-
-
-@pytest.mark.parametrize("fov", [0, 180, -3, np.nan, "wide"])
-def test_a_camera_that_sees_nothing_or_all(fov):
-    with pytest.raises(InputError, match="degrees between 0 and 180"):
-        Camera(8, 6, fov)
-
-
 @pytest.mark.parametrize(
-    "position, power, radius",
-    [((0, 0), (1, 1, 1), 1), (None, (1, 1, 1), 1), ((0, 0, 0), 5, 1), ((0, 0, 0), (1, -1, 1), 1),
-     ((0, 0, 0), (1, 1, 1), 0), ((0, 0, np.nan), (1, 1, 1), 1), ((0, 0, 0), (1, 1, 1), "small")],
+    ("kind", "values", "words"),
+    [
+        *((Camera, values, "whole numbers") for values in
+          ((0, 6, 40), (8.5, 6, 40), (8, None, 40), ([8, 6], 6, 40), (np.inf, 6, 40))),
+        *((Camera, (8, 6, fov), "degrees between 0 and 180") for fov in (0, 180, -3, np.nan, "wide")),
+        *((Lamp, values, "A lamp at") for values in (
+            ((0, 0), (1, 1, 1), 1), (None, (1, 1, 1), 1), ((0, 0, 0), 5, 1), ((0, 0, 0), (1, -1, 1), 1),
+            ((0, 0, 0), (1, 1, 1), 0), ((0, 0, np.nan), (1, 1, 1), 1), ((0, 0, 0), (1, 1, 1), "small"))),
+    ],
 )  # fmt: skip
-def test_a_lamp_that_is_none(position, power, radius):
-    with pytest.raises(InputError, match="A lamp at"):
-        Lamp(position, power, radius)
+def test_values_that_are_none(kind, values, words):
+    with pytest.raises(InputError, match=words):
+        kind(*values)

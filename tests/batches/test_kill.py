@@ -5,11 +5,11 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import psutil
 import pytest
 from made_batch import driver, environment, photos
+from made_tasks import until
 
 from materialist.batches.ledger import LEDGER, read_events
 from materialist.batches.run import batch
@@ -32,16 +32,6 @@ def done(runs):
     return [e for e in read_events(path) if e["event"] == "done"] if path.exists() else []
 
 
-def wait_for(condition, seconds=60):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        found = condition()
-        if found:
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it did not happen in time")
-
-
 def workers_of(process):
     return [c for c in psutil.Process(process.pid).children() if "materialist.jobs.worker" in c.cmdline()]
 
@@ -62,8 +52,8 @@ def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_res
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
     monkeypatch.setenv("MADE_SLOW", "30")  # the second batch of photos is at work when it is killed
     process = driver(source, runs, workers=2)
-    wait_for(lambda: len(done(runs)) >= 1)
-    workers = wait_for(lambda: workers_of(process))
+    until(lambda: len(done(runs)) >= 1, 60)
+    workers = until(lambda: workers_of(process), 60)
     process.kill()
     process.wait()
     gone, alive = psutil.wait_procs(workers, timeout=20)
@@ -81,8 +71,8 @@ def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
     monkeypatch.setenv("MADE_SLOW", "1")
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
     process = driver(source, runs, workers=2)
-    wait_for(lambda: len(done(runs)) >= 1)
-    wait_for(lambda: workers_of(process))[0].kill()
+    until(lambda: len(done(runs)) >= 1, 60)
+    until(lambda: workers_of(process), 60)[0].kill()
     assert process.wait(60) == 0, process.stderr.read().decode()
     attempts = [entry["attempts"] for entry in done(runs)]
     assert sorted(attempts) in ([1, 1, 1, 1, 2], [1] * 5)  # killed between two photos, it costs nothing
@@ -95,8 +85,8 @@ def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(tmp_path, monkeypatch, wh
     monkeypatch.setenv("MADE_SLOW", "30")
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
     process = command("batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json")
-    wait_for(lambda: len(done(runs)) >= 1)
-    workers = wait_for(lambda: workers_of(process))
+    until(lambda: len(done(runs)) >= 1, 60)
+    workers = until(lambda: workers_of(process), 60)
     (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 130 and "Traceback" not in err and "--resume" in err

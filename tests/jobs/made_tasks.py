@@ -30,7 +30,9 @@ def answer(report, how="fine", out=None, wait=0.0):
 
 
 def until(done, seconds=15.0):
+    """What `done` returns, once that is true."""
     end = time.monotonic() + seconds
-    while not done():
+    while not (found := done()):
         assert time.monotonic() < end, "took too long"
         time.sleep(0.02)
+    return found

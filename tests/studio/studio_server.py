@@ -4,11 +4,12 @@ import os
 import socket
 import subprocess
 import sys
-import time
 import urllib.error
 import urllib.request
 from contextlib import contextmanager
 from pathlib import Path
+
+from made_tasks import until
 
 
 def free_port() -> int:
@@ -17,33 +18,25 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
-def start(folder: Path, *arguments: str) -> tuple[subprocess.Popen, str]:
-    """`materialist studio` in a process of its own, and its address once it answers."""
-    port = free_port()
-    command = [sys.executable, "-m", "materialist", "studio", *arguments, "--port", str(port), "--work", str(folder)]
-    log = (folder.parent / "studio.log").open("w")
-    process = subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, "OMP_NUM_THREADS": "1"})
-    address = f"http://127.0.0.1:{port}"
-    end = time.monotonic() + 120  # as `bench studio` waits
-    while True:
-        try:
-            urllib.request.urlopen(address, timeout=5).close()
-            return process, address
-        except urllib.error.HTTPError:
-            return process, address
-        except OSError:
-            assert process.poll() is None, (folder.parent / "studio.log").read_text()
-            if time.monotonic() > end:
-                process.kill()
-                raise AssertionError("the studio did not start") from None
-            time.sleep(0.2)
-
-
 @contextmanager
 def studio(folder: Path, *arguments: str):
-    """(process, address) of a studio that runs as long."""
-    process, address = start(folder / "work", *arguments)
+    """(process, address) of a studio that runs as long, once it answers."""
+    port, work, log = free_port(), str(folder / "work"), folder / "studio.log"
+    command = [sys.executable, "-m", "materialist", "studio", *arguments, "--port", str(port), "--work", work]
+    with log.open("w") as out:
+        process = subprocess.Popen(command, stdout=out, stderr=out, env={**os.environ, "OMP_NUM_THREADS": "1"})
+    address = f"http://127.0.0.1:{port}"
+
+    def answers():
+        assert process.poll() is None, log.read_text()
+        try:
+            urllib.request.urlopen(address, timeout=5).close()
+        except OSError as error:
+            return isinstance(error, urllib.error.HTTPError)  # asks for a password
+        return True
+
     try:
+        until(answers, 120)  # as `bench studio` waits
         yield process, address
     finally:
         process.terminate()

@@ -132,6 +132,9 @@ def test_uploaded_recipes_stay_on_the_desk(session, tmp_path):
         ("- edit: {mask: nothere.png}", "not here"), ("- edit: {colour: red}", "says 'colour'"),
         ("- explode: {}", "must be one of"), ("!!python/object/apply:os.system ['true']", "must be one of"),
         ("- relight: {envmap: /etc/hostname}", "plain file name"),
+        ("- drop: {mesh: [../a.ply], at: [3, 4]}", "plain file name"),
+        ("- drop: {mesh: [[a.ply]], at: [3, 4]}", "plain file name"),
+        ("- drop: {mesh: [a.ply], at: [3, 4]}", "not here"),
     ):  # fmt: skip
         file = tmp_path / "edits.yaml"
         file.write_text(text)

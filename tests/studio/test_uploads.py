@@ -16,28 +16,18 @@ from materialist.studio.session import Session
 
 
 @pytest.mark.parametrize(
-    ("size", "message"),
-    [((30_000, 30_000), "megapixels"), ((30_000, 2_500), "75 megapixels"), ((30_000, 100), "longer than"),
-     ((4, 4), "at least")],
-)  # fmt: skip
-def test_bombs_are_refused_by_their_header(tmp_path, size, message):
-    file = tmp_path / "bomb.png"
-    file.write_bytes(png_header(*size))
-    assert file.stat().st_size < 200
-    with pytest.raises(InputError, match=message):
-        uploads.checked_picture(file, "bomb.png")
-
-
-@pytest.mark.parametrize(
     ("name", "content", "message"),
     [
         ("a.exe", b"MZ", "not a photo"), ("a.svg", b"<svg/>", "not a photo"), ("a.png", b"hello", "not an image"),
         ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "not a readable EXR"),
         ("a.hdr", b"#?RADIANCE\n\n", "no size"), ("noending", b"x", "not a photo"),
+        ("a.png", png_header(30_000, 30_000), "megapixels"), ("a.png", png_header(30_000, 2_500), "75 megapixels"),
+        ("a.png", png_header(30_000, 100), "longer than"), ("a.png", png_header(4, 4), "at least"),
+        ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 40000 +X 50000\n", "2000 megapixels"),
     ],
 )  # fmt: skip
-def test_no_picture(tmp_path, name, content, message):
-    file = tmp_path / "upload"
+def test_pictures_are_refused_by_their_header(tmp_path, name, content, message):
+    file = tmp_path / name
     file.write_bytes(content)
     with pytest.raises(InputError, match=message):
         uploads.checked_picture(file, name)
@@ -46,9 +36,6 @@ def test_no_picture(tmp_path, name, content, message):
 def test_sizes_of_other_headers(tmp_path):
     write_exr(tmp_path / "a.exr", np.zeros((12, 40, 3), np.float32))
     assert image_size(tmp_path / "a.exr") == (40, 12)
-    (tmp_path / "a.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 40000 +X 50000\n")
-    with pytest.raises(InputError, match="2000 megapixels"):
-        uploads.checked_picture(tmp_path / "a.hdr", "a.hdr")
 
     import cv2  # Pillow does not know the pixels of a float TIFF, and `invert` reads it
 

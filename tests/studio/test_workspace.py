@@ -2,9 +2,7 @@
 
 import pytest
 
-from materialist.edits.recipe import Step
-from materialist.errors import InputError
-from materialist.studio.workspace import CARD, WorkFolder, confined
+from materialist.studio.workspace import CARD, WorkFolder
 
 
 def test_a_project_survives_a_restart(tmp_path):
@@ -33,12 +31,3 @@ def test_a_damaged_card_hides_its_project_alone(tmp_path):
     broken, good = work.new("a", "me"), work.new("b", "me")
     (broken.folder / CARD).write_text("{")
     assert [p.name for p in work.projects()] == [good.name]
-
-
-def test_every_file_of_a_list_is_looked_at(tmp_path):
-    (tmp_path / "mesh-1.ply").write_text("ply")
-    step = Step("drop", {"mesh": ["mesh-1.ply", "mesh-1.ply"], "at": ["3", "4"]})
-    assert confined(step, tmp_path).folder == tmp_path
-    for other, words in [("../secret.ply", "plain file name"), ("mesh-2.ply", "is not here"), ([["x.ply"]], "plain")]:
-        with pytest.raises(InputError, match=words):
-            confined(Step("drop", {"mesh": ["mesh-1.ply", other], "at": ["3", "4"]}), tmp_path)

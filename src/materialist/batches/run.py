@@ -85,14 +85,13 @@ def _pool(how: BatchOptions, tasks: int, device: str, size: int) -> LocalPool | 
 
 def environments(workers: int, device: str) -> list[dict[str, str]]:
     """Environment variables of each worker: one thread, and its GPU where there are any."""
-    gpus = visible_gpus() if device != "cpu" else []
+    gpus = visible_gpus(device)
     return [SINGLE_THREAD | ({"CUDA_VISIBLE_DEVICES": gpus[k % len(gpus)]} if gpus else {}) for k in range(workers)]
 
 
 def default_workers(device: str = "auto", size: int = 512) -> int:
     """One for each GPU that may be used, else one for each processor as far as memory reaches."""
-    gpus = visible_gpus() if device != "cpu" else []
-    if gpus:
+    if gpus := visible_gpus(device):
         return len(gpus)
     import psutil
 
@@ -101,11 +100,11 @@ def default_workers(device: str = "auto", size: int = 512) -> int:
     return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker)))
 
 
-def visible_gpus() -> list[str]:
-    """Names by which CUDA can be told to use one GPU; none where no driver answers."""
+def visible_gpus(device: str = "auto") -> list[str]:
+    """Names by which CUDA can be told to use one GPU; none for the device "cpu", or where no driver answers."""
     from materialist.render.variant import cuda_usable
 
-    if not cuda_usable():
+    if device == "cpu" or not cuda_usable():
         return []
     chosen = os.environ.get("CUDA_VISIBLE_DEVICES")
     if chosen is not None:

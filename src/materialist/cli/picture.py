@@ -24,14 +24,9 @@ def chosen_region(scene: Any, region: Place, run: Run) -> Any:
     """[H, W] bool from the flags of the command line."""
     from materialist.edits.select.select import select
 
-    return select(
-        scene,
-        click=list(region.click) or None,
-        box=region.box,
-        mask=region.mask,
-        method=region.method if isinstance(region, Region) else "network",
-        device=run.device,
-    )
+    method = region.method if isinstance(region, Region) else "network"
+    click = list(region.click) or None
+    return select(scene, click=click, box=region.box, mask=region.mask, method=method, device=run.device)
 
 
 def opened(scene: Path, output: Path, region: Place, rendering: Rendering, run: Run) -> tuple[Any, Any]:

@@ -20,6 +20,8 @@ from materialist.studio.workspace import store, with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, NotImplementedError, RuntimeError, EOFError, OSError)
+"""What `zipfile` raises for damaged archives."""
 
 
 def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
@@ -90,15 +92,7 @@ def _members(
                 raise InputError(f"{shown} holds {missing}.")
             root = found[: found.rfind("/") + 1]
             yield given, {one.filename[len(root) :]: one for one in infos if one.filename.startswith(root)}
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        lzma.LZMAError,
-        NotImplementedError,
-        RuntimeError,
-        EOFError,
-        OSError,
-    ) as error:
+    except _UNREADABLE as error:
         raise InputError(f"{shown} is not a readable zip file ({error}); zip it again.") from error
 
 

@@ -24,7 +24,7 @@ from materialist.studio.stage import stage
 from materialist.studio.studio import Studio
 from materialist.studio.widgets import LIVE, LONG, PageContext, steps
 
-TITLE = "Materialist studio"
+TABS = (tab_material, tab_light, tab_object, tab_look, tab_take)
 _HEAD = (
     "<h1>Materialist</h1><p>One photo, taken apart into shape, material and light. Click something and change it.</p>"
 )
@@ -33,7 +33,7 @@ _HEAD = (
 def build(studio: Studio) -> Any:
     context = PageContext(studio)
     parts = context.parts
-    with gr.Blocks(title=TITLE, analytics_enabled=False, fill_width=True) as page:
+    with gr.Blocks(title="Materialist studio", analytics_enabled=False, fill_width=True) as page:
         # A new studio has another key, so what it was started on is shown first.
         key = f"materialist-last-{secrets.token_hex(4)}"
         parts["last"] = gr.BrowserState("", storage_key=key, secret="page")
@@ -43,14 +43,10 @@ def build(studio: Studio) -> Any:
                 _left(parts)
             with gr.Column(scale=4, min_width=320), gr.Tabs(selected="open") as tabs:
                 parts["tabs"] = tabs
-                tab_open.layout(context)
-                tab_material.layout(context)
-                tab_light.layout(context)
-                tab_object.layout(context)
-                tab_look.layout(context)
-                tab_take.layout(context)
+                for tab in (tab_open, *TABS):
+                    tab.layout(context)
         _wire(context)
-        for tab in (tab_material, tab_light, tab_object, tab_look, tab_take):
+        for tab in TABS:
             tab.wire(context)
         tab_open.wire(context, page)
         # For an event of its end alone a page shows, by a request that it holds (`Gate`), that it is open.
@@ -64,13 +60,8 @@ def _left(parts: dict[str, Any]) -> None:
         js_on_load=asset("stage.js"), elem_id="stage",
     )  # fmt: skip
     with gr.Row(elem_id="tools"):
-        tools = [
-            ("Click", "click"),
-            ("Box", "box"),
-            ("Brush", "brush"),
-            ("Place a lamp", "lamp"),
-            ("Place an object", "place"),
-        ]
+        tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
+        tools.append(("Place an object", "place"))
         parts["tool"] = gr.Radio(tools, value="click", label="Tool", scale=3, min_width=220)
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)

@@ -55,12 +55,6 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
     return {**shown, "picture": jpeg_url(linear), "badge": badge, "waiting": waiting}
 
 
-def picture(session: Session) -> Array:
-    """[H, W, 3] float32 linear: what the stage shows where nothing is path traced."""
-    assert session.live is not None
-    return session.live.picture(session.edits.active, session.glass)
-
-
 def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
     return tuple(one for one in steps if one is not step)
 

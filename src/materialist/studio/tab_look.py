@@ -8,7 +8,7 @@ import numpy as np
 from materialist.color import srgb_levels
 from materialist.studio import tasks
 from materialist.studio.session import Session
-from materialist.studio.stage import maps, picture, report
+from materialist.studio.stage import maps, report
 from materialist.studio.widgets import LONG, PageContext
 from materialist.types import Array
 
@@ -84,4 +84,4 @@ def compared(session: Session) -> tuple[Array, Array]:
         native = srgb_levels(live.scene.photo.original)
         before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
         return np.asarray(before), np.ascontiguousarray(after)
-    return before, srgb_levels(picture(session))
+    return before, srgb_levels(live.picture(steps, session.glass))

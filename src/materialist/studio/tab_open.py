@@ -30,12 +30,9 @@ def layout(context: PageContext) -> None:
         parts["facts"] = gr.HTML("", elem_id="facts", js_on_load=None)
         with gr.Row():
             parts["predictor"] = gr.Dropdown(
-                list(PREDICTORS),
-                value="auto",
-                label="First guess by",
-                min_width=150,
+                list(PREDICTORS), value="auto", label="First guess by", min_width=150,
                 info="MatNet and Marigold need their weights",
-            )
+            )  # fmt: skip
             parts["size"] = gr.Dropdown(list(SIZES), value=512, label="Working size", min_width=130)
             parts["fov"] = gr.Textbox("auto", label="Field of view, degrees", max_lines=1, min_width=130)
         with gr.Row():
