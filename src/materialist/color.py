@@ -7,7 +7,6 @@ from materialist.types import Array
 ROWS = 256
 """Rows of a picture encoded at a time: bounds the memory."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
-"""Rec.709 luminance weights of linear RGB."""
 
 
 def srgb_to_linear(srgb: Array) -> Array:

@@ -24,7 +24,6 @@ class Option:
 
     help: str
     kind: str = "number"
-    """A key of `_CHECKS`."""
     low: float = -math.inf
     high: float = math.inf
     ends: str = "[]"
@@ -35,7 +34,6 @@ class Option:
     count: int = 1
     """Of `numbers`: how many."""
     many: bool = False
-    """Several values of this kind, as a tuple."""
     called: str = ""
     """Name in messages, where the field's own is not a good one."""
     hint: str = ""
@@ -71,7 +69,6 @@ def option(default: Any, help: str, **told: Any) -> Any:
 @dataclass(frozen=True, kw_only=True)
 class OperationOptions:
     operation: ClassVar[str]
-    """Name of the function and command."""
 
     def __post_init__(self) -> None:
         for name, (declared, default) in declarations(type(self)).items():
@@ -261,4 +258,3 @@ _CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
     "any": lambda declared, called, value: value,
     "name": lambda declared, called, value: value if callable(value) else str(value),
 }
-"""Kind of an option -> (option, its name in messages, value) -> checked value."""

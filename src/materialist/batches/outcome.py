@@ -32,7 +32,6 @@ class Outcome:
     rows: tuple[Row, ...]
     """In the order of the photos' names in the source."""
     kept: int
-    """How many were finished before this call."""
     seconds: float
     """Wall clock of this call."""
     options: dict[str, Any] = field(default_factory=dict)

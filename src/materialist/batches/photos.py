@@ -29,7 +29,6 @@ class Listed:
     id: str
     """Path below the folder, line of the list, or URL without secrets: the same wherever the folder lies."""
     location: str
-    """Where it is read from."""
 
 
 def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:

@@ -30,23 +30,19 @@ SINGLE_THREAD = {
 thread a photo's result does not depend on how many workers there are, and several workers use a processor better."""
 
 THUMBNAIL = (240, 150)
-"""Largest width and height of a small picture, pixels."""
 
 
 @dataclass(frozen=True)
 class PhotoTask:
     id: str
-    """The key of the photo in the ledger: its path below the folder, its line in the list, or its URL."""
     name: str
     """Its results are NAME.scene, NAME.png and thumbs/NAME.jpg."""
     location: str
     """Where the photo is read from: an absolute path, `example:NAME` or a URL."""
     runs: Path
-    """Folder of the results."""
     options: dict[str, Any] = field(default_factory=dict)
     """Keywords of the inversion; `{name}` in a text stands for the name."""
     edits: Path | None = None
-    """A list of edits to apply."""
     spp: int | None = None
     """Paths per pixel of each rendering of the edit; None: those of `composite`."""
     inverted: bool = False

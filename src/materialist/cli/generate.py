@@ -12,7 +12,6 @@ import typer
 from materialist.option_kinds import OperationOptions, Option, declarations
 
 TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": Path}
-"""Kind of an option -> type of its flag; texts for the others."""
 
 
 def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:

@@ -15,11 +15,9 @@ MARKER = "materialist-export.json"
 @dataclass(frozen=True)
 class Exported:
     path: Path
-    """The file or folder to open."""
     beside: tuple[Path, ...] = ()
     """Further files that belong to it."""
     notes: tuple[str, ...] = ()
-    """What the reader should know or do next."""
 
 
 def _is_listed(folder: Path, name: str) -> bool:

@@ -30,7 +30,6 @@ _NAMES = {
     "total_seconds": ("Time", "{:.0f} s"),
     "peak_rss_mb": ("Peak memory", "{:.0f} MB"),
 }
-"""Figure of the report -> what a person reads."""
 
 
 def page(scene: Scene, parts: list[Part]) -> str:

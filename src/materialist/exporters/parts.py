@@ -19,7 +19,6 @@ class Part:
     """A mesh and its material: the depth surface with the maps, a continued plane with their mean, or a body."""
 
     name: str
-    """`surface`, `plane0`, `plane1`, ..."""
     mesh: Mesh
     """Faces of this part alone; uv as everywhere: u right, v DOWN."""
     materials: Materials

@@ -26,7 +26,6 @@ class Job:
     owner: str
     """The person who asked for it (not the page), so that a reloaded page finds it."""
     folder: Path
-    """The folder that it writes to."""
     task: Callable[..., Any] = field(repr=False)
     """Importable function task(report, **arguments)."""
     arguments: dict[str, Any] = field(default_factory=dict)
@@ -37,7 +36,6 @@ class Job:
     message: str = ""
     """One sentence where it failed."""
     found: list[dict[str, Any]] = field(default_factory=list)
-    """Intermediate results."""
     began: float = field(default_factory=time.monotonic)
     ended: float | None = None
     worker: Worker | None = field(default=None, repr=False)

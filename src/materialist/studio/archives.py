@@ -21,7 +21,6 @@ from materialist.studio.workspace import store, with_plain_files
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
 _UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, NotImplementedError, RuntimeError, EOFError, OSError)
-"""What `zipfile` raises for damaged archives."""
 
 
 def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:

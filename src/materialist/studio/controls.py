@@ -93,7 +93,6 @@ CONTROLS = {
     "thing_colour": Control(Insertion, "material", value=picked_colour),
     "height": Control(Drop, "height"),
 }
-"""Name of a component -> what it stands for."""
 
 
 def slider(name: str, label: str, step: float, **narrower: Any) -> Any:

@@ -19,7 +19,6 @@ from materialist.studio.studio import PERSON, Studio
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
 LOCAL = ("localhost", "127.0.0.1", "::1")
-"""Names of this machine."""
 _BEAT = "/gradio_api/heartbeat/"
 """A page holds a request to this place, and its name, as long as it is open."""
 _UPLOAD = "/gradio_api/upload"

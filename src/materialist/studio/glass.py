@@ -47,9 +47,7 @@ class GlassState:
     waiting: bool = False
     """Whether it is not answered yet."""
     words: str = ""
-    """A sentence about it."""
     bad: bool = False
-    """Whether that is an error."""
 
 
 def is_traced(step: Step) -> bool:

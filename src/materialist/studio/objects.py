@@ -17,7 +17,6 @@ _SHAPES: dict[str, tuple[str, dict[str, Any]]] = {
     "Ring": ("torus", {"major_radius": 0.35, "minor_radius": 0.15, "major_sections": 96, "minor_sections": 48}),
     "Slab": ("box", {"extents": (1, 1, 0.12)}),
 }
-"""Name -> function of trimesh.creation, and its arguments."""
 LIBRARY = tuple(_SHAPES)
 MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
 

@@ -30,11 +30,9 @@ _SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
 @dataclass(frozen=True)
 class FinalPicture:
     steps: tuple[Step, ...]
-    """The edits in it."""
     path: Path
     """Its files (.png, .exr, .jpg), without the ending."""
     spp: int
-    """Paths a pixel."""
 
     def of(self, steps: tuple[Step, ...]) -> bool:
         return bool(steps) and self.steps == steps
@@ -56,15 +54,12 @@ class Session:
         self.glass: GlassClient | None = None
         self.selection = Selection()
         self.next_object: dict[str, str] = {}
-        """Options of the next object that is placed."""
         self.falls = 0
         """How many falls were begun here: each tumbles in its own way."""
         self.edits = EditList()
         self._past: list[tuple[str, EditList, Selection]] = []
         self._future: list[tuple[str, EditList, Selection]] = []
-        """What was taken back."""
         self.running: list[Job] = []
-        """The jobs that this page asked for."""
         self.mark = secrets.token_hex(4)
         """Tells this page's path-traced pictures from those of other pages."""
         self._kept: bytes | None = None

@@ -23,7 +23,6 @@ LOCAL_PERSON = "me"
 PERSON = "materialist_person"
 """The cookie that tells whose photos a browser may see."""
 _FOLDERS = re.compile(r"(?<![\w/:.<])/(?:[^/\s<>'\"]+/)*(?=[^/\s<>])")
-"""The folders of an absolute path."""
 LOST = "The page has lost its session; reload it."
 
 
@@ -38,15 +37,12 @@ class Studio:
     start: Project | Path | None = None
     """The scene to open first, or the photo to show on the opening tab."""
     seed: int = 0
-    """Of inversions."""
     device: str = "auto"
-    """Of jobs, as `invert` takes it."""
     _sessions: dict[str, Session] = field(default_factory=dict)
     _uploads: dict[str, deque[tuple[float, int]]] = field(default_factory=dict)
     """Person -> when, and how many bytes."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _swept: float = float("-inf")
-    """When the work folder was swept last."""
 
     def person(self, token: Any) -> str:
         """The person of a page, from the cookie that its browser keeps. Raises InputError for an invalid one."""

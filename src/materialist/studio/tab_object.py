@@ -14,7 +14,6 @@ from materialist.studio.workspace import store
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
 _GLASS = ("ior", "transmission", "roughness", "tint", "hollow")
-"""Options of glass that have a control."""
 
 
 def layout(context: PageContext) -> None:

@@ -46,7 +46,6 @@ class PageContext:
 
     studio: Studio
     parts: dict[str, Any] = field(default_factory=dict)
-    """Name -> Gradio component."""
 
     def __getitem__(self, name: str) -> Any:
         return self.parts[name]
