@@ -71,17 +71,21 @@ def test_a_blender_that_fails(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["python-with-bpy"]
 
 
-@pytest.mark.slow
-def test_cycles_sees_what_we_see(tmp_path):
+def by_cycles(scene, tmp_path, *options):
+    """[H, W, 3] the scene as Blender renders it."""
     if not shutil.which(BPY):
         pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
-    from materialist.metrics import psnr
-
-    scene = room()
     folder = mt.export(scene, tmp_path / "out", to="blend").path
     command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
-    subprocess.run(command, check=True, capture_output=True)
-    ours, theirs = renderer(scene).render(spp=256), read_exr(tmp_path / "r.exr")[..., :3]
+    subprocess.run([*command, *options], check=True, capture_output=True)
+    return read_exr(tmp_path / "r.exr")[..., :3]
+
+
+@pytest.mark.slow
+def test_cycles_sees_what_we_see(tmp_path):
+    from materialist.metrics import psnr
+
+    ours, theirs = renderer(room()).render(spp=256), by_cycles(room(), tmp_path)
     assert psnr(ours, theirs) > 32
     assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
     assert max(psnr(ours, np.roll(theirs, 1, axis)) for axis in (0, 1)) < 30
@@ -90,8 +94,6 @@ def test_cycles_sees_what_we_see(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["texture", "glass", "rough glass", "coat"])
 def test_cycles_has_our_bodies(tmp_path, kind):
-    if not shutil.which(BPY):
-        pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
     from dataclasses import replace
 
     import trimesh
@@ -112,10 +114,7 @@ def test_cycles_has_our_bodies(tmp_path, kind):
     vertices = (ways * 0.5 + [0.1, 0, -2.2]).astype(np.float32)
     body = Body(vertices, np.asarray(ball.faces, np.int32), ways, uv, surface, "ball")
     scene = replace(room(), bodies=(body,))
-    folder = mt.export(scene, tmp_path / "out", to="blend").path
-    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
-    subprocess.run([*command, "--samples", "512"], check=True, capture_output=True)
-    ours, theirs = rendered(scene, spp=512, seed=0), read_exr(tmp_path / "r.exr")[..., :3]
+    ours, theirs = rendered(scene, spp=512, seed=0), by_cycles(scene, tmp_path, "--samples", "512")
     y, x = np.indices(ours.shape[:2])
     inside = (x - 34.9) ** 2 + (y - 19.5) ** 2 < 14**2
     np.testing.assert_allclose(theirs[inside].mean(0), ours[inside].mean(0), rtol=0.04)

@@ -64,6 +64,7 @@ def test_the_centre_of_the_light_lies_ahead(written):
 
 def test_without_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
     with pytest.raises(mt.SetupError, match=r"pip install 'materialist\[usd\]'"):
         mt.export(room(), tmp_path / "a.usdz")
     assert list(tmp_path.iterdir()) == []

@@ -1,7 +1,6 @@
 """`materialist.batch`: the loop that hands photos to workers and records the results."""
 
 import os
-import sys
 import time
 from collections import deque
 from collections.abc import Callable
@@ -112,7 +111,7 @@ def visible_gpus(device: str = "auto") -> list[str]:
     import ctypes
 
     count = ctypes.c_int()
-    ctypes.CDLL("nvcuda.dll" if sys.platform == "win32" else "libcuda.so.1").cuDeviceGetCount(ctypes.byref(count))
+    ctypes.CDLL("libcuda.so.1").cuDeviceGetCount(ctypes.byref(count))
     return [str(k) for k in range(count.value)]
 
 

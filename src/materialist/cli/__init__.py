@@ -6,7 +6,7 @@ from typing import Any
 
 import typer
 
-from materialist.cli import batch, bench, edits, films, scenes, setup, studio, train
+from materialist.cli import batch, bench, edits, scenes, setup, studio, train
 from materialist.cli.generate import add_command, group
 from materialist.cli.outcome import run_to_exit_code
 
@@ -15,7 +15,7 @@ MODELS = "List, download and verify networks from a model hub; no other command 
 FREE = {"allow_extra_args": True, "ignore_unknown_options": True}
 COMMANDS: tuple[Callable[..., Any], ...] = (
     scenes.invert, scenes.render, scenes.export, setup.doctor, edits.select, edits.edit, edits.glass, edits.remove,
-    edits.insert, edits.apply, films.relight, films.drop, batch.batch, studio.studio,
+    edits.insert, edits.apply, edits.relight, edits.drop, batch.batch, studio.studio,
 )  # fmt: skip
 TRAINING: tuple[Callable[..., Any], ...] = (train.data, train.matnet, train.refraction, train.clicks)
 app = group("materialist", ABOUT)

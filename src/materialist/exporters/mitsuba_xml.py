@@ -17,11 +17,9 @@ from materialist.exporters.parts import Part
 from materialist.io.exr import write_exr
 from materialist.render.bodies import OUTSIDE, at_least_2x2, body_bsdf, body_emitter
 from materialist.render.envmap import on_mitsuba_grid
-from materialist.render.scene import MAX_DEPTH, beside_u, sensor, sphere
+from materialist.render.scene import beside_u, sensor, sphere
 from materialist.types import Mesh, Scene
 
-DEFAULTS = {"spp": 64, "max_depth": MAX_DEPTH}
-"""Parameters of the files and their values: `mi.load_file(path, spp=256)` sets another."""
 FILES = {"scene.xml": False, "scene_materialist.xml": True}
 """The files, and whether their materials are this program's own plugins."""
 MAPS = {"base_color": "albedo", "roughness": "roughness", "metallic": "metallic"}
@@ -44,7 +42,7 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
                 write_exr(folder / f"{part.name}_{key}.exr", at_least_2x2(getattr(part.materials, key)))
     for name, own in FILES.items():
         root = ET.Element("scene", version="3.0.0")
-        for key, value in {**DEFAULTS, "max_depth": path_depth(scene)}.items():
+        for key, value in {"spp": 64, "max_depth": path_depth(scene)}.items():  # as in mi.load_file(path, spp=256)
             ET.SubElement(root, "default", name=key, value=str(value))
         for key, described in _description(scene, parts, own).items():
             _add(root, key, described)

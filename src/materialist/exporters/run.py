@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.edits.core.notes import PICTURED, is_pictured
-from materialist.errors import InputError
+from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part, body_parts, scene_parts
 from materialist.io.atomic import whole_file, whole_files
@@ -116,7 +116,10 @@ def _mitsuba(path: Path, scene: Scene, parts: list[Part], force: bool) -> Export
 
 
 def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
-    from materialist.exporters.usd import pack_usdz, write_usd
+    try:
+        from materialist.exporters.usd import pack_usdz, write_usd
+    except ImportError as error:
+        raise SetupError("USD needs usd-core; install it with: pip install 'materialist[usd]'") from error
 
     if path.suffix.lower() == ".usdz":
         with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as file:

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils, Vt
 
 from materialist.color import srgb_levels
-from materialist.errors import SetupError
 from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import encoded, to_bytes
 from materialist.io.exr import write_exr
@@ -19,21 +19,14 @@ _APERTURE = 36.0
 
 
 def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
-    """Fill an empty folder with `scene.usdc` and the textures beside it; our frame is USD's with the Y axis up.
-
-    Raises SetupError without usd-core.
-    """
-    try:
-        from pxr import Sdf, Usd, UsdGeom
-    except ImportError as error:
-        raise SetupError("USD needs usd-core; install it with: pip install 'materialist[usd]'") from error
+    """Fill an empty folder with `scene.usdc` and the textures beside it; our frame is USD's with the Y axis up."""
     stage = Usd.Stage.CreateNew(str(folder / "scene.usdc"))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Scene").GetPrim())
     UsdGeom.Scope.Define(stage, "/Scene/Materials")
     for part in parts:
-        _mesh(stage, part, _material(stage, folder, part, Sdf))
+        _mesh(stage, part, _material(stage, folder, part))
     _camera(stage, scene.camera, parts)
     _light(stage, folder, scene)
     for number, lamp in enumerate(scene.lamps):
@@ -42,16 +35,12 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
 
 
 def pack_usdz(folder: Path, file: Path) -> None:
-    from pxr import UsdUtils
-
     if not UsdUtils.CreateNewUsdzPackage(str(folder / "scene.usdc"), str(file)):
         raise OSError(f"usd-core could not pack {file}")
 
 
 def _mesh(stage: Any, part: Part, material: Any) -> None:
     """A mesh with normals and texture coordinates; USD's v runs up."""
-    from pxr import Sdf, UsdGeom, UsdShade, Vt
-
     source = part.mesh
     mesh = UsdGeom.Mesh.Define(stage, f"/Scene/{part.name}")
     points = np.ascontiguousarray(source.vertices, np.float32)
@@ -71,10 +60,8 @@ def _mesh(stage: Any, part: Part, material: Any) -> None:
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
+def _material(stage: Any, folder: Path, part: Part) -> Any:
     """Preview surface of the maps as 8-bit PNG."""
-    from pxr import UsdShade
-
     path = f"/Scene/Materials/{part.name}"
     material = UsdShade.Material.Define(stage, path)
     kinds = Sdf.ValueTypeNames
@@ -113,8 +100,6 @@ def _material(stage: Any, folder: Path, part: Part, Sdf: Any) -> Any:
 
 def _camera(stage: Any, photo: Camera, parts: list[Part]) -> None:
     """The photo's pinhole at the origin, which looks down -Z in USD too."""
-    from pxr import Gf, UsdGeom
-
     reach = farthest(parts)
     camera = UsdGeom.Camera.Define(stage, "/Scene/Photo")
     camera.CreateHorizontalApertureAttr(_APERTURE)
@@ -125,8 +110,6 @@ def _camera(stage: Any, photo: Camera, parts: list[Part]) -> None:
 
 def _light(stage: Any, folder: Path, scene: Scene) -> None:
     """The environment map. The centre of USD's (OpenEXR's) lies along +Z, the centre of ours along -Z."""
-    from pxr import Sdf, UsdGeom, UsdLux
-
     write_exr(folder / "envmap.exr", scene.envmap)
     light = UsdLux.DomeLight.Define(stage, "/Scene/Light")
     light.CreateTextureFileAttr(Sdf.AssetPath("./envmap.exr"))
@@ -136,8 +119,6 @@ def _light(stage: Any, folder: Path, scene: Scene) -> None:
 
 def _lamp(stage: Any, path: str, lamp: Lamp) -> None:
     """A glowing sphere: intensity times colour is the radiance of its surface."""
-    from pxr import Gf, UsdGeom, UsdLux
-
     most = max(lamp.radiance)
     light = UsdLux.SphereLight.Define(stage, path)
     light.CreateRadiusAttr(float(lamp.radius))
