@@ -7,15 +7,15 @@ import re
 import pytest
 from made_batch import photos
 
-import materialist.batches.run as batch_run
+import materialist as mt
 from materialist.batches.outcome import Outcome, Row
 
 
 @pytest.fixture(autouse=True)
 def stand_in(monkeypatch):
     """The stand-in for the inversion."""
-    real = batch_run.batch
-    monkeypatch.setattr(batch_run, "batch", lambda *a, **how: real(*a, **how | {"function": "made_batch:moody"}))
+    real = mt.batch
+    monkeypatch.setattr(mt, "batch", lambda *a, **how: real(*a, **how | {"function": "made_batch:moody"}))
 
 
 def test_all_done_is_0_and_a_photo_that_failed_is_2(run, tmp_path):

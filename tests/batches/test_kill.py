@@ -19,9 +19,9 @@ NAMES = ("slow1", "slow2", "slow3", "slow4", "quick")
 COMMAND = """
 import functools, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored
-import materialist.batches.run as run
+import materialist as mt
 from materialist.cli import main
-run.batch = functools.partial(run.batch, function="made_batch:moody")
+mt.batch = functools.partial(mt.batch, function="made_batch:moody")
 sys.argv = ["materialist", *{arguments!r}]
 main()
 """

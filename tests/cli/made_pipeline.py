@@ -1,13 +1,12 @@
 """A stand-in for the pipeline, so that the command line is tested without minutes of fitting."""
 
-import sys
-import types
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from made_scene import make_mesh, make_scene
 
+import materialist
 from materialist.types import Geometry, Photo, Scene
 
 
@@ -41,10 +40,6 @@ def install(monkeypatch: Any, failure: BaseException | None = None) -> list[dict
         calls.append({"scene": scene, **options})
         return scene.rerender
 
-    module = types.ModuleType("materialist.pipeline")
-    module.invert, module.render_scene = invert, render_scene  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "materialist.pipeline", module)
-    import materialist
-
-    monkeypatch.setattr(materialist, "pipeline", module, raising=False)
+    monkeypatch.setattr(materialist, "invert", invert)
+    monkeypatch.setattr(materialist, "render_scene", render_scene)
     return calls

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import materialist as mt
 from materialist.batches.options import BatchOptions
 from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
@@ -30,11 +31,9 @@ def batch(
     size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
 ) -> None:
     """Invert many photos, and apply a list of edits to each. Exit code 0: all done; 2: some failed, with reasons."""
-    from materialist.batches.run import batch as run
-
     try:
         with stage_progress(quiet=computing.as_json) as bars:
-            outcome = run(
+            outcome = mt.batch(
                 source, output, **vars(how), predictor=predictor, size=size, fov=fov, seed=computing.seed,
                 device=computing.device, progress=lambda status: _told(bars, status, computing.as_json),
             )  # fmt: skip

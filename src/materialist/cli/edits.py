@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+import materialist as mt
 from materialist.cli.options import (
     FramesPerSecond,
     PictureOutput,
@@ -37,12 +38,11 @@ def select(
     from materialist.color import srgb_to_linear
     from materialist.edits.composite.upsample import matte
     from materialist.io.image import ensure_image_writable, write_image
-    from materialist.io.package import load_scene
 
     if output.suffix.lower() != ".png":
         raise InputError(f"The mask {output} must end in .png.")
     ensure_image_writable(output, force=run.force)
-    loaded = load_scene(scene)
+    loaded = mt.load_scene(scene)
     found = chosen_region(loaded, region, run)
     shown = matte(found, loaded.photo.original) if native else found.astype(np.float32)
     # Written as display values: half a pixel inside must be half of white, whatever the curve.
@@ -58,13 +58,11 @@ def edit(
     scene: SceneArgument, output: PictureOutput, region: Region, options: MaterialEdit, rendering: Rendering, run: Run
 ) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
-    from materialist.edits.material.material import edit as change
-
     if options == MaterialEdit():
         raise InputError("Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like.")
     loaded, found = opened(scene, output, region, rendering, run)
     lines = [f"{int(found.sum())} pixels edited, {float(found.mean()):.0%} of the photo."]
-    write_result("edit", loaded, change(loaded, found, options), output, rendering, run, lines=lines)
+    write_result("edit", loaded, mt.edit(loaded, found, options), output, rendering, run, lines=lines)
 
 
 def glass(
@@ -72,12 +70,11 @@ def glass(
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
-    from materialist.edits.glass.glass import glass as change
 
     if options.model == "two-interface" and rendering.full_render:
         raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")
     loaded, found = opened(scene, output, region, rendering, run)
-    edited = change(loaded, found, options)
+    edited = mt.glass(loaded, found, options)
     source = edited.provenance["edits"][-1]["thickness"]
     lines = [f"{int(found.sum())} pixels are glass; thickness: {source}."]
     write_result("glass", loaded, edited, output, rendering, run, lines=lines)
@@ -87,11 +84,9 @@ def remove(
     scene: SceneArgument, output: PictureOutput, region: Region, options: Removal, rendering: Rendering, run: Run
 ) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
-    from materialist.edits.remove.remove import remove as change
-
     loaded, found = opened(scene, output, region, rendering, run)
     lines = [f"{int(found.sum())} pixels taken away."]
-    write_result("remove", loaded, change(loaded, found, options), output, rendering, run, lines=lines)
+    write_result("remove", loaded, mt.remove(loaded, found, options), output, rendering, run, lines=lines)
 
 
 def insert(
@@ -106,16 +101,14 @@ def insert(
     run: Run,
 ) -> None:
     """Put a mesh into the photo: it stands on what is there, casts its shadow and is reflected."""
-    from materialist.edits.insert.insert import insert as put
     from materialist.edits.insert.meshes import read_model
-    from materialist.io.package import load_scene
 
     check_before(output, rendering, run)
     places = [flag_numbers(text, 2, "--at") for text in at]
     model = read_model(mesh, up=options.up)
-    loaded = edited = load_scene(scene)
+    loaded = edited = mt.load_scene(scene)
     for x, y in places:
-        edited = put(edited, model, (x, y), options)
+        edited = mt.insert(edited, model, (x, y), options)
     longest = edited.provenance["edits"][-1]["size"]
     lines = [f"{model.name}: longest side {longest:.3g} scene units."]
     write_result("insert", loaded, edited, output, rendering, run, lines=lines)
@@ -131,11 +124,10 @@ def apply(
     """Replay a list of edits on a scene: materials and light, in one picture."""
     from materialist.edits.recipe import apply as replay
     from materialist.edits.recipe import read_recipe
-    from materialist.io.package import load_scene
 
     check_before(output, rendering, run)
     steps = read_recipe(edits)
-    loaded = load_scene(scene)
+    loaded = mt.load_scene(scene)
     edited = replay(loaded, steps, seed=run.seed, device=run.device)
     skipped = sum(step.skipped for step in steps)
     done = len(steps) - skipped
@@ -161,8 +153,6 @@ def relight(
     fps: FramesPerSecond = FPS,
 ) -> None:
     """Show the photo under other light."""
-    from materialist.io.package import load_scene
-
     suns = [(azimuth, elevation) for azimuth, elevation in (flag_numbers(text, 2, "--sun") for text in sun or ())]
     if options == Relight() and not suns and frames is None:
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
@@ -182,7 +172,7 @@ def relight(
         if rendering.save is not None:
             raise InputError("--save writes one scene; leave out --frames.")
         check_before(output, rendering, run, video=True)
-    loaded = load_scene(scene)
+    loaded = mt.load_scene(scene)
     marked = chosen_region(loaded, lights, run) if lights.named else None
     wanted = Relight.given(options, sun_power=sun_power, lights=marked)
     if frames is not None:
@@ -191,9 +181,7 @@ def relight(
         film = moving_light(loaded, frames, wanted, suns=tuple(suns))
         write_film("relight", loaded, film, output, rendering, run, frames=frames, fps=fps)
         return
-    from materialist.edits.light.relight import relight as change
-
-    edited = change(loaded, wanted, sun=suns[0] if suns else None)
+    edited = mt.relight(loaded, wanted, sun=suns[0] if suns else None)
     write_result("relight", loaded, edited, output, rendering, run)
 
 
@@ -211,13 +199,11 @@ def drop(
     rendering: Rendering = Rendering(spp=32),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
-    from materialist.edits.drop.drop import drop as simulate
     from materialist.edits.insert.meshes import read_model
-    from materialist.io.package import load_scene
 
     check_before(output, rendering, run, video=True)
     places: Any = [flag_numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
-    loaded = load_scene(scene)
-    film = simulate(loaded, models, places, options, frames=frames, fps=fps)
+    loaded = mt.load_scene(scene)
+    film = mt.drop(loaded, models, places, options, frames=frames, fps=fps)
     write_film("drop", loaded, film, output, rendering, run, frames=frames, fps=fps)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import materialist as mt
 from materialist.cli.options import Place, Region, Rendering, Run
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
@@ -22,19 +23,15 @@ def flag_numbers(text: str, count: int, flag: str) -> tuple[float, ...]:
 
 def chosen_region(scene: Any, region: Place, run: Run) -> Any:
     """[H, W] bool from the flags of the command line."""
-    from materialist.edits.select.select import select
-
     method = region.method if isinstance(region, Region) else "network"
     click = list(region.click) or None
-    return select(scene, click=click, box=region.box, mask=region.mask, method=method, device=run.device)
+    return mt.select(scene, click=click, box=region.box, mask=region.mask, method=method, device=run.device)
 
 
 def opened(scene: Path, output: Path, region: Place, rendering: Rendering, run: Run) -> tuple[Any, Any]:
     """(the scene, [H, W] bool region that is edited), once the output is known to be writable."""
-    from materialist.io.package import load_scene
-
     check_before(output, rendering, run)
-    loaded = load_scene(scene)
+    loaded = mt.load_scene(scene)
     return loaded, chosen_region(loaded, region, run)
 
 
@@ -67,13 +64,12 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: bool = 
 def write_result(
     command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
-    from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.renderer import paths_for
 
     start, spp = time.monotonic(), rendering.spp or paths_for(scene, edited)
     with stage_progress(quiet=run.as_json) as progress:
-        picture = composite(
+        picture = mt.composite(
             scene, edited, spp=spp, seed=run.seed, full_render=rendering.full_render,
             denoise=rendering.denoise, device=run.device, progress=progress,
         )  # fmt: skip
@@ -114,14 +110,13 @@ def finish(
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
     from materialist.edits.core.notes import effect_notes, warnings_since
-    from materialist.io.package import save_scene
 
     save, warnings = rendering.save, warnings_since(scene, edited)
     if not rendering.full_render:
         warnings += effect_notes(scene, edited, picture)
     lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
-        save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)
+        mt.save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)
         lines.append(f"The edited scene is {save}")
     told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
     report_success(command, run.as_json, lines, **told)

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+import materialist as mt
 from materialist.cli.options import Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
@@ -20,18 +21,14 @@ def invert(
 ) -> None:
     """Decompose a photo into geometry, materials and light, and write it as a scene package."""
     from materialist.io.atomic import ensure_writable
-    from materialist.io.package import save_scene
-    from materialist.io.photo import read_photo
 
     # Everything that can be wrong is found before the work starts.
     ensure_writable(output, run.force)
-    picture = read_photo(photo, size=options.size, fov=options.fov)
-    from materialist import pipeline
-
+    picture = mt.read_photo(photo, size=options.size, fov=options.fov)
     start = time.monotonic()
     with stage_progress(quiet=run.as_json) as progress:
-        scene = pipeline.invert(picture, options, progress=progress)
-    save_scene(scene, output, force=run.force)
+        scene = mt.invert(picture, options, progress=progress)
+    mt.save_scene(scene, output, force=run.force)
     warnings = scene.warnings
     seconds = time.monotonic() - start
     quality = scene.report.metrics.get("rerender_psnr_path")
@@ -61,14 +58,11 @@ def render(
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.notes import PICTURED, is_pictured
     from materialist.io.image import ensure_image_writable
-    from materialist.io.package import load_scene
 
     ensure_image_writable(output, force=run.force)
-    loaded = load_scene(scene)
-    from materialist import pipeline
-
+    loaded = mt.load_scene(scene)
     with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
-        image = pipeline.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
+        image = mt.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
     write_composite(output, image, loaded.photo, force=run.force)
     notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) else []
     shown = [*(f"Note: {note}" for note in notes), f"Look at {output}"]
@@ -90,12 +84,10 @@ def export(
     from rich.console import Console
 
     from materialist.exporters.run import check_format
-    from materialist.exporters.run import export as write
-    from materialist.io.package import load_scene
 
     check_format(output, options.to)
     with Console(stderr=True).status(f"Writing {output}"):
-        done = write(load_scene(scene), output, options, force=run.force)
+        done = mt.export(mt.load_scene(scene), output, options, force=run.force)
     files = [str(done.path), *map(str, done.beside)]
     report_success(
         "export", run.as_json, [f"Wrote {', '.join(files)}", *done.notes], output=str(done.path), beside=files[1:],
