@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+import materialist as mt
 from materialist.batches.edits import edits_for, edits_key
 from materialist.batches.options import INVERSION
 from materialist.batches.remote import fingerprint, is_url, local_copy
@@ -96,18 +97,15 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
 
 def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     """The inverted photo, and facts for the ledger where it was inverted now."""
-    from materialist.io.package import load_scene, save_scene
-    from materialist.io.photo import read_photo
-
     if task.inverted:
-        return load_scene(task.scene), {}
+        return mt.load_scene(task.scene), {}
     ensure_writable(task.scene, force=True)
     options = task.named_options()
     size, fov = options.pop("size", 512), options.pop("fov", "auto")
     report("read", 0, 1)
     photo_version = fingerprint(task.location)
     with local_copy(task.location) as file:
-        photo = read_photo(file if str(file) != task.location else task.location, size=size, fov=fov)
+        photo = mt.read_photo(file if str(file) != task.location else task.location, size=size, fov=fov)
     place = task.id if is_url(task.location) else task.location
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     report("start", 0, 1)
@@ -115,7 +113,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     module, _, attribute = task.function.partition(":")
     scene = getattr(import_module(module), attribute)(photo, size=size, fov=fov, progress=report, **options)
     report("save", 0, 1)
-    save_scene(scene, task.scene, force=True)
+    mt.save_scene(scene, task.scene, force=True)
     photo_hash = hashlib.sha256(photo.source or b"").hexdigest()
     seconds = time.perf_counter() - begun
     return scene, {"photo_hash": photo_hash, "photo_version": photo_version, "invert_seconds": seconds}
@@ -123,7 +121,6 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
 
 def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
-    from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
     from materialist.edits.core.notes import effect_notes, warnings_since
     from materialist.edits.recipe import apply
@@ -134,7 +131,7 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
         edited = apply(scene, edits_for(edits, task.name), seed=seed, device=device)
     except InputError as error:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
-    picture = composite(scene, edited, spp=task.spp, seed=seed, device=device, progress=report)
+    picture = mt.composite(scene, edited, spp=task.spp, seed=seed, device=device, progress=report)
     write_composite(task.picture, picture, scene.photo, force=True)
     return picture, [*warnings_since(scene, edited), *effect_notes(scene, edited, picture)]
 

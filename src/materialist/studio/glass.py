@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+import materialist as mt
 from materialist.edits.recipe import REGION, Step, apply, glass_arguments
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
@@ -191,9 +192,7 @@ def _place(step: Step) -> str:
 
 @lru_cache(1)
 def _loaded(path: str) -> Scene:
-    from materialist.io.package import load_scene
-
-    return load_scene(path)
+    return mt.load_scene(path)
 
 
 @lru_cache(SETTINGS.glass_bodies)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import materialist as mt
 from materialist.edits.recipe import REGION, Step, region_of, write_recipe
 from materialist.errors import InputError
 from materialist.jobs.queue import Job, JobQueue
@@ -96,9 +97,7 @@ class Session:
         return step.kind if step else None
 
     def open(self, project: Project) -> None:
-        from materialist.io.package import load_scene
-
-        loaded = load_scene(project.scene)
+        loaded = mt.load_scene(project.scene)
         workspace = project.workspace(self.person)
         kept = _content(workspace / EDITS)
         try:

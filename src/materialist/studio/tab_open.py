@@ -7,6 +7,7 @@ from typing import Any
 
 import gradio as gr
 
+import materialist as mt
 from materialist.errors import InputError
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
@@ -134,12 +135,10 @@ def _start_inversion(
 
 
 def _unpack(context: PageContext, session: Session, file: Path) -> Project:
-    from materialist.io.package import load_scene
-
     project = context.studio.work.new(file.stem, session.person)
     try:
         archives.unpack_scene(file, project.scene, file.name)
-        load_scene(project.scene, most=SETTINGS.decoded_bytes)
+        mt.load_scene(project.scene, most=SETTINGS.decoded_bytes)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise

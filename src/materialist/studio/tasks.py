@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+import materialist as mt
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.io import display
@@ -36,16 +37,12 @@ def invert(
     """`materialist invert`; maps and light go to `found` as soon as they are there."""
     from dataclasses import replace
 
-    from materialist import pipeline
-    from materialist.io.package import save_scene
-    from materialist.io.photo import read_photo
-
-    picture = replace(read_photo(photo, size=size, fov=fov), path=title)
+    picture = replace(mt.read_photo(photo, size=size, fov=fov), path=title)
     folder = Path(scene).parent
     show = lambda name, value: _show(report, folder, name, value)  # noqa: E731
-    done = pipeline.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show)
+    done = mt.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show)
     report("save", 0, 1)
-    save_scene(done, scene, force=True)
+    mt.save_scene(done, scene, force=True)
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
@@ -67,11 +64,10 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
 
 def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
-    from materialist.edits.composite.composite import composite
     from materialist.edits.composite.output import write_composite
 
     loaded, edited = _edited(report, scene, steps)
-    picture = composite(loaded, edited, spp=spp, progress=report)
+    picture = mt.composite(loaded, edited, spp=spp, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
@@ -83,10 +79,9 @@ def mesh(report: Reporter, scene: str, output: str) -> None:
     from materialist.exporters.glb import glb_bytes
     from materialist.exporters.parts import scene_parts
     from materialist.exporters.run import PAGE_TRIANGLES
-    from materialist.io.package import load_scene
 
     report("export", 0, 1)
-    loaded = load_scene(scene)
+    loaded = mt.load_scene(scene)
     with whole_file(output, force=True) as file:
         file.write_bytes(glb_bytes(loaded, scene_parts(loaded, PAGE_TRIANGLES)[:1]))
 
@@ -104,39 +99,37 @@ def take(report: Reporter, scene: str, steps: Steps, output: str, what: str) -> 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     from materialist.edits.recipe import apply
-    from materialist.io.package import load_scene
 
     report("load", 0, 1)
-    loaded = load_scene(scene)
+    loaded = mt.load_scene(scene)
     return loaded, apply(loaded, list(steps)) if steps else loaded
 
 
 def _package(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> None:
     """The edited scene as a zipped package, its photo the composite."""
-    from materialist.edits.composite.composite import composite, developed
-    from materialist.io.package import save_scene
+    from materialist.edits.composite.composite import developed
 
     result = loaded
     if edited is not loaded:
-        result = developed(loaded, edited, composite(loaded, edited, spp=SETTINGS.final_spp, progress=report))
+        result = developed(loaded, edited, mt.composite(loaded, edited, spp=SETTINGS.final_spp, progress=report))
     folder = partial(output, "") / output.with_suffix("").name
     folder.parent.mkdir()
     report("save", 0, 1)
-    save_scene(result, folder)
+    mt.save_scene(result, folder)
     _zip(folder, output)
 
 
 def _exported(report: Reporter, edited: Scene, output: Path, what: str) -> None:
     """Another program's format; several files come as a zip."""
-    from materialist.exporters.run import FOLDERS, export
+    from materialist.exporters.run import FOLDERS
 
     report("export", 0, 1)
     if output.suffix != ".zip":
-        export(edited, output, to=what, force=True)
+        mt.export(edited, output, to=what, force=True)
         return
     folder = partial(output, "") / output.with_suffix("").name
     folder.mkdir(parents=True)
-    export(edited, folder / "scene" if what in FOLDERS else folder / f"scene.{what}", to=what)
+    mt.export(edited, folder / "scene" if what in FOLDERS else folder / f"scene.{what}", to=what)
     _zip(folder, output)
 
 
