@@ -133,7 +133,7 @@ def numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
     except (TypeError, ValueError):
         found = ()
     if len(found) != count:
-        raise InputError(f"The {called} must be {count} numbers, not {value!r}.")
+        raise InputError(f"The {called} must be {count} numbers, with commas between them, not {value!r}.")
     return found
 
 

@@ -17,8 +17,9 @@ from materialist.cli.options import (
     output_option,
 )  # fmt: skip
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import check_before, chosen_region, flag_numbers, opened, write_film, write_result
+from materialist.cli.picture import check_before, chosen_region, opened, write_film, write_result
 from materialist.errors import InputError
+from materialist.option_kinds import numbers
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
@@ -104,7 +105,7 @@ def insert(
     from materialist.edits.insert.meshes import read_model
 
     check_before(output, rendering, run)
-    places = [flag_numbers(text, 2, "--at") for text in at]
+    places = [numbers(text, 2, "--at") for text in at]
     model = read_model(mesh, up=options.up)
     loaded = edited = mt.load_scene(scene)
     for x, y in places:
@@ -153,7 +154,7 @@ def relight(
     fps: FramesPerSecond = FPS,
 ) -> None:
     """Show the photo under other light."""
-    suns = [(azimuth, elevation) for azimuth, elevation in (flag_numbers(text, 2, "--sun") for text in sun or ())]
+    suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
     if options == Relight() and not suns and frames is None:
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
     alone = [("--sun-power", "--sun")] if sun_power != 1.0 and not suns else []
@@ -202,7 +203,7 @@ def drop(
     from materialist.edits.insert.meshes import read_model
 
     check_before(output, rendering, run, video=True)
-    places: Any = [flag_numbers(text, 2, "--at") for text in at]
+    places: Any = [numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = mt.load_scene(scene)
     film = mt.drop(loaded, models, places, options, frames=frames, fps=fps)

@@ -10,15 +10,6 @@ from materialist.cli.options import Place, Region, Rendering, Run
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
 from materialist.errors import InputError
-from materialist.option_kinds import numbers
-
-
-def flag_numbers(text: str, count: int, flag: str) -> tuple[float, ...]:
-    """`count` numbers from a text such as 310,220. Raises InputError."""
-    try:
-        return numbers(text, count, flag)
-    except InputError as error:
-        raise InputError(f"{flag} takes {count} numbers with commas between them, not {text!r}.") from error
 
 
 def chosen_region(scene: Any, region: Place, run: Run) -> Any:
