@@ -13,7 +13,7 @@ from materialist.errors import InputError
 from materialist.predict.clicks.features import CHANNELS
 from materialist.procedural.dataset import produce as produce_set
 from materialist.procedural.options import DataSetOptions
-from materialist.train.clicks import ClickView, click_losses, draw_click, load_views, produce_views
+from materialist.train.clicks import click_losses, draw_click, load_views, produce_views
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def folder(tmp_path_factory):
 
 def test_clicks_lie_on_what_they_ask_for():
     rng = np.random.default_rng(0)
-    view = ClickView(**made_runs.click_view(0))
+    view = made_runs.click_view(0)
     seen = set()
     for _ in range(60):
         maps, mask = draw_click(view, 64, rng)
@@ -51,10 +51,10 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     views = tmp_path / "run" / "views"
     produce_views(sets[0], views)
     (made,) = load_views(views)
-    assert made.rgb.shape == (64, 64, 3) and made.rgb.dtype == np.uint8
-    length = np.linalg.norm(made.normal.astype(float) / 127, axis=-1)
-    assert np.abs(length[made.depth > 0] - 1).max() < 0.03
-    assert 1 in np.sign(made.thing)
+    assert made["rgb"].shape == (64, 64, 3) and made["rgb"].dtype == np.uint8
+    length = np.linalg.norm(made["normal"].astype(float) / 127, axis=-1)
+    assert np.abs(length[made["depth"] > 0] - 1).max() < 0.03
+    assert 1 in np.sign(made["thing"])
     before = (views / "0000000.npz").stat().st_mtime_ns
     shutil.move(sets[0], tmp_path / "elsewhere")
     produce_views(tmp_path / "elsewhere", views)  # a set may move

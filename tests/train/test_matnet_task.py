@@ -1,6 +1,7 @@
 """The paper's recipe on a MatNet of a few thousand parameters."""
 
 import json
+from dataclasses import replace
 
 import made_samples
 import numpy as np
@@ -12,7 +13,7 @@ from materialist.errors import WeightsError
 from materialist.io.samples import SampleFolder
 from materialist.predict.matnet.network import MatNet
 from materialist.predict.weights import metadata
-from materialist.train.matnet import PaperTask, freeze, load_start
+from materialist.train.matnet import PaperTask, freeze, load_start, resized
 from materialist.train.stream import epoch
 
 
@@ -48,14 +49,34 @@ def test_a_step_moves_what_learns_and_nothing_else(network, task):
 
 
 def test_only_flips_upside_down_and_crops(task, source):
+    """The samples show the plane n . p = -1.2, or its mirror image; each pixel keeps its ray."""
     seen = set()
     for seed in range(8):
         sample = task.prepare(source.read(0), 32, np.random.default_rng(seed))
         assert sample.image.shape == (32, 32, 3) and sample.image.max() <= 1
         surface = sample.mask > 0
-        seen.add(bool(sample.normal[surface][0, 1] < 0))
-        assert (sample.normal[surface][:, 0] == 0).all()
+        upright = sample.normal[surface][0, 1] > 0
+        seen.add(bool(upright))
+        normal = made_samples.NORMAL * [1, 1 if upright else -1, 1]
+        points = np.dstack([sample.rays, -np.ones(surface.shape)]) * sample.depth[..., None]
+        np.testing.assert_allclose((points @ normal)[surface], -1.2, rtol=2e-3)
+        np.testing.assert_allclose(sample.normal[surface] @ normal, 1, atol=1e-3)
     assert seen == {True, False}
+
+
+@pytest.mark.parametrize("size", [22, 96])
+def test_colours_at_the_sky_are_those_of_the_surface(source, size):
+    """Next to the sky, which has no albedo, a surface of one paint keeps it; the picture itself is mixed."""
+    sample = source.read(0)
+    surface = sample.mask[..., None] > 0
+    painted = replace(sample, albedo=np.where(surface, np.float32([0.6, 0.4, 0.2]), 0),
+                      metallic=sample.mask * np.float32(0.8))  # fmt: skip
+    scaled = resized(painted, size, size)
+    here = scaled.mask > 0
+    assert 0.2 < here.mean() < 0.95
+    np.testing.assert_allclose(scaled.albedo[here], np.broadcast_to([0.6, 0.4, 0.2], (here.sum(), 3)), atol=1e-5)
+    np.testing.assert_allclose(scaled.roughness[here], 0.4, atol=1e-5)
+    np.testing.assert_allclose(scaled.metallic[here], 0.8, atol=1e-5)
 
 
 def test_starting_from_other_checkpoints(network, tmp_path):

@@ -107,7 +107,7 @@ def _albedo(
 
 def lit(
     scene: GlassScene, behind: Background, envmap: Array, things: dict[str, Any] | None = None, *, length: int,
-    spp: int, seed: int = 0, cropped: bool = False,
+    spp: int, cropped: bool = False,
 ) -> Array:  # fmt: skip
     """[H, W, 3] linear: Mitsuba objects before a background, whose planes go on with their mean albedo, path-traced.
 
@@ -127,12 +127,7 @@ def lit(
             texture = {"type": "bitmap", "data": tensor(mi, paint), "raw": True, "wrap_mode": "clamp"}
             surface = {"type": "diffuse", "reflectance": texture}
             shapes[f"backdrop{int(k) + 1}"] = mesh(part(geometry.mesh, int(k)), surface)
-    return scene.trace({**shapes, **(things or {})}, envmap, length=length, spp=spp, seed=seed, cropped=cropped)
-
-
-def plain(case: Case, behind: Background) -> Array:
-    """[H, W, 3] linear: no refraction at all, the background as it is."""
-    return np.where(case.scene.mask[..., None], behind.picture, 0).astype(np.float32)
+    return scene.trace({**shapes, **(things or {})}, envmap, length=length, spp=spp, cropped=cropped)
 
 
 def two_interface(case: Case, found: Thickness, behind: Background, *, papers_back: bool = False) -> Array:

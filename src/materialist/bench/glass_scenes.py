@@ -145,33 +145,23 @@ class GlassScene:
         """[H, W] bool: where the object is."""
         return self.front.depth > 0
 
-    @cached_property
-    def albedo(self) -> Array:
-        """[H, W, 3] linear: of what the camera sees first, the object grey."""
-        things = {**self._room(), "object": mesh(self.item.solid, painted(self.item.albedo))}
-        return self.trace(things, None, spp=64, integrator={"type": "aov", "aovs": "albedo:albedo"})
-
     def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
         """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it).
 
         Of 'glass' only the rectangle around the object is rendered, the rest is 0.
         """
-        things = self._room()
+        things = {f"room{k}": mesh(i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
         glass = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0}
         if what != "room":
             things["object"] = mesh(self.item.solid, glass if what == "glass" else painted(self.item.albedo))
         length = PROTOCOL.glass_length if what == "glass" else PROTOCOL.diffuse_length
         return self.trace(things, envmap, length=length, spp=spp, seed=seed, cropped=what == "glass")
 
-    def _room(self) -> dict[str, Any]:
-        return {f"room{k}": mesh(i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
-
     def trace(
-        self, things: dict[str, Any], envmap: Array | None, *, spp: int, length: int = 0, seed: int = 0,
-        cropped: bool = False, integrator: dict[str, Any] | None = None,
-    ) -> Array:  # fmt: skip
+        self, things: dict[str, Any], envmap: Array, *, spp: int, length: int, seed: int = 0, cropped: bool = False
+    ) -> Array:
         """[H, W, 3] float32 linear picture of Mitsuba objects under a light [h, 2h, 3]; 0 outside a `cropped` one,
-        which is the rectangle around the object. By paths of `length` segments at most, or another `integrator`."""
+        which is the rectangle around the object. By paths of `length` segments at most."""
         import mitsuba as mi
 
         from materialist.render.envmap import half_turn, on_mitsuba_grid
@@ -182,12 +172,10 @@ class GlassScene:
         if cropped:
             for side, axis, part in zip(("width", "height"), "xy", reversed(box), strict=True):
                 camera["film"] |= {f"crop_offset_{axis}": part.start, f"crop_{side}": part.stop - part.start}
-        light = {}
-        if envmap is not None:
-            grid = np.ascontiguousarray(on_mitsuba_grid(np.asarray(envmap, np.float32), np)[:, :-1])
-            light["light"] = {"type": "envmap", "bitmap": mi.Bitmap(grid), "to_world": half_turn(mi)}
-        scene = mi.load_dict({"type": "scene", **light, **things, "sensor": camera})
-        how = mi.load_dict(integrator or {"type": "path", "max_depth": length, "rr_depth": 64})
+        grid = np.ascontiguousarray(on_mitsuba_grid(np.asarray(envmap, np.float32), np)[:, :-1])
+        light = {"type": "envmap", "bitmap": mi.Bitmap(grid), "to_world": half_turn(mi)}
+        scene = mi.load_dict({"type": "scene", "light": light, **things, "sensor": camera})
+        how = mi.load_dict({"type": "path", "max_depth": length, "rr_depth": 64})
         edge = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
         render: Any = mi.render  # whose types know no plain seeds
         picture = np.array(render(scene, integrator=how, spp=edge * edge, seed=seed & 0x7FFFFFFF))[..., :3]

@@ -76,8 +76,9 @@ class PhotoAloneBench(Benchmark):
                 scenes[name] = fitted
                 if name == "fitted":
                     yield {"method": "maps: prior", "sample": sample.name, **map_figures(fitted.prior, sample)}
+                maps = replace(fitted.prior, materials=fitted.materials, normal=fitted.normal, depth=fitted.depth)
                 yield {
-                    "method": f"maps: {name}", "sample": sample.name, **map_figures(maps_of(fitted), sample),
+                    "method": f"maps: {name}", "sample": sample.name, **map_figures(maps, sample),
                     "light": light_error(fitted.envmap, sample.envmap), **cost,
                 }  # fmt: skip
             before = sample.render(sample.envmap, spp=self.truth_spp, seed=5)
@@ -154,11 +155,6 @@ def with_truth(prior: Prediction, truth: Prediction, given: str) -> Prediction:
     if "geometry" in given:
         prior = replace(prior, depth=truth.depth, normal=truth.normal)
     return prior
-
-
-def maps_of(scene: Scene) -> Prediction:
-    """The fitted maps of a scene."""
-    return replace(scene.prior, materials=scene.materials, normal=scene.normal, depth=scene.depth)
 
 
 def map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:

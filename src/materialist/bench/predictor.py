@@ -58,16 +58,12 @@ class PredictorBench(Benchmark):
                 weights["parameters_m"] = sum(p.numel() for p in network.parameters()) / 1e6
                 work = {"network": forward(network, self.size), **work}
             for name, call in work.items():
-                spent = milliseconds(call, self.warmups, self.runs)
-                yield {"method": f"{spec} {name}", "sample": 0, **weights, **spent}
-
-
-def milliseconds(call: Callable[[], Any], warmups: int, runs: int) -> dict[str, float]:
-    """Milliseconds of `call` after warm-ups: mean_ms, median_ms, fastest_ms."""
-    for _ in range(warmups):
-        call()
-    taken = 1e3 * np.array([timed(call)[1]["seconds"] for _ in range(runs)])
-    return {"mean_ms": float(taken.mean()), "median_ms": float(np.median(taken)), "fastest_ms": float(taken.min())}
+                seconds = [timed(call)[1]["seconds"] for _ in range(self.warmups + self.runs)]
+                taken = 1e3 * np.array(seconds[self.warmups :])
+                yield {
+                    "method": f"{spec} {name}", "sample": 0, **weights, "mean_ms": float(taken.mean()),
+                    "median_ms": float(np.median(taken)), "fastest_ms": float(taken.min()),
+                }  # fmt: skip
 
 
 def forward(network: Any, size: int) -> Callable[[], Any]:

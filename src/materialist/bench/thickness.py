@@ -44,8 +44,11 @@ class ThicknessBench(Benchmark):
             raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
         from materialist.predict.refraction import WEIGHTS
         from materialist.predict.refraction.network import RefractionNet
-        from materialist.procedural.thickness.dataset import ViewPlan, make_views
-        from materialist.procedural.thickness.errors import of_meshes
+        from materialist.procedural.objects.glassware import Shape, centred
+        from materialist.procedural.objects.things import mesh
+        from materialist.procedural.options import captures
+        from materialist.procedural.thickness.dataset import ViewPlan, draw_views, make_views
+        from materialist.procedural.thickness.ray_paths import ShapeTracer
         from materialist.render.variant import setup
 
         setup("cpu")
@@ -54,8 +57,11 @@ class ThicknessBench(Benchmark):
         for k in range(self.shapes):
             yield from _rows("held-out", f"shape {k}", network, make_views(k, plan))
         for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
-            for name, found in of_meshes(group, self.mesh_views, self.seed).items():
-                yield from _rows(f"{group.name} meshes", name, network, found)
+            for k, file in enumerate(captures(group, "**/*.ply")):
+                shape = Shape(centred(mesh(file)), hollow=False, upright=True)
+                rng = np.random.default_rng([self.seed, k])
+                views = draw_views(shape, ShapeTracer(shape.solid), rng, self.mesh_views, exact=True)
+                yield from _rows(f"{group.name} meshes", file.stem, network, views)
 
 
 def _rows(group: str, name: str, network: Any, views: dict[str, Array]) -> Iterator[Row]:

@@ -52,7 +52,7 @@ def make_sample(
     light_index: int,
     *,
     size: int | tuple[int, int] = 128,
-    data: str | Path | None = None,
+    data: Path | None = None,
     seed: int = 0,
     spp: int = PHOTO_SPP,
     unseen: bool = False,
@@ -65,9 +65,8 @@ def make_sample(
     variant to be set (render.variant.setup).
     """
     height, width = (size, size) if isinstance(size, int) else size
-    folder = None if data is None else Path(data)
-    truth_scene = _true_scene(scene_index, view_index, height, width, folder, seed, unseen)
-    radiance = lights.environment(light_index, seed=seed, data=folder, unseen=unseen)
+    truth_scene = _true_scene(scene_index, view_index, height, width, data, seed, unseen)
+    radiance = lights.environment(light_index, seed=seed, data=data, unseen=unseen)
     envmap = lights.envmap(radiance, truth_scene.view.to_scene)
     photo_seed = int(np.random.default_rng((scene_index, view_index, light_index)).integers(1, 2**31))
     picture = truth_scene.render(envmap, spp=spp, seed=photo_seed)

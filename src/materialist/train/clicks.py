@@ -54,18 +54,9 @@ class ClickDraw:
 DRAW = ClickDraw()
 
 
-@dataclass(frozen=True)
-class ClickView:
-    """One photograph as the package would see it, and its things."""
-
-    rgb: Array
-    """[H, W, 3] uint8 sRGB."""
-    normal: Array
-    """[H, W, 3] int8, 127 for 1: predicted."""
-    depth: Array
-    """[H, W] float16: predicted."""
-    thing: Array
-    """[H, W] int16: number of what is seen, negative for walls and the like, 0 for nothing."""
+View = dict[str, Array]
+"""One photograph as the package would see it: rgb [H, W, 3] uint8 sRGB; predicted normal [H, W, 3] int8, 127 for 1, and
+depth [H, W] float16; thing [H, W] int16, number of what is seen, negative for walls and the like, 0 for nothing."""
 
 
 def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None) -> None:
@@ -79,7 +70,7 @@ def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None
     claim(folder, DESCRIPTION, said, tuple(said))
     predictor = BundledPredictor()
 
-    def view(number: int) -> dict[str, Array]:
+    def view(number: int) -> View:
         path = source.paths[number]
         arrays, rng = read_arrays(path), np.random.default_rng([int(path.stem), 4])
         if "thing" not in arrays:
@@ -95,30 +86,28 @@ def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None
     complete(folder, [path.name for path in source.paths], view, "views", progress)
 
 
-def load_views(folder: Path) -> list[ClickView]:
+def load_views(folder: Path) -> list[View]:
     """All views of a folder, in the order of their names. Raises InputError for one that is damaged."""
-    names = ("rgb", "normal", "depth", "thing")
-    return [ClickView(**read_arrays(path, *names)) for path in sorted(folder.glob("[0-9]*.npz"))]
+    return [read_arrays(path, "rgb", "normal", "depth", "thing") for path in sorted(folder.glob("[0-9]*.npz"))]
 
 
-def draw_click(view: ClickView, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:
+def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:
     """([C, side, side] features, [side, side] bool) of a random part of a view and a click in it; None without things.
 
     The part is mirrored or not and recoloured, its maps are made worse at times; some examples have several clicks.
     """
-    height, width = view.thing.shape
+    height, width = view["thing"].shape
     size = round(min(height, width) * rng.uniform(DRAW.smallest_crop, 1.0))
     top, left = rng.integers(height - size + 1), rng.integers(width - size + 1)
     part = np.s_[top : top + size, left : left + size]
     smooth = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
 
-    def scaled(values: Array, method: int) -> Array:
+    def scaled(name: str, method: int) -> Array:
+        values = view[name] if name == "thing" else view[name].astype(np.float32)
         return np.asarray(cv2.resize(np.ascontiguousarray(values[part]), (side, side), interpolation=method))
 
-    thing = scaled(view.thing, cv2.INTER_NEAREST)
-    depth = scaled(view.depth.astype(np.float32), cv2.INTER_NEAREST)
-    rgb = scaled(view.rgb.astype(np.float32), smooth) / 255
-    normal = unit(scaled(view.normal.astype(np.float32), smooth))
+    thing, depth = scaled("thing", cv2.INTER_NEAREST), scaled("depth", cv2.INTER_NEAREST)
+    rgb, normal = scaled("rgb", smooth) / 255, unit(scaled("normal", smooth))
     if rng.random() < 0.5:
         thing, depth, rgb = thing[:, ::-1], depth[:, ::-1], rgb[:, ::-1]
         normal = normal[:, ::-1] * [-1, 1, 1]
@@ -182,7 +171,7 @@ def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
 class ClickExamples(Examples):
     """Random parts of views with a click in them."""
 
-    def __init__(self, views: list[ClickView]):
+    def __init__(self, views: list[View]):
         self.views = views
 
     def __len__(self) -> int:
@@ -218,7 +207,6 @@ class ClickTask(Task):
         return ClickNet(self.architecture)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        """Cross-entropy, and one minus the soft overlap (Dice), of logits with masks [B, S, S]."""
         return click_losses(network(batch["maps"]).float(), batch["mask"])
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
@@ -234,7 +222,7 @@ class ClickTask(Task):
 
 
 def click_losses(found: Tensor, mask: Tensor) -> dict[str, Tensor]:
-    """Cross-entropy, and one minus the soft overlap, of logits [B, S, S] with masks [B, S, S]."""
+    """Cross-entropy, and one minus the soft overlap (Dice), of logits [B, S, S] with masks [B, S, S]."""
     share = found.sigmoid()
     both = 2 * (share * mask).sum((1, 2)) + 1
     return {

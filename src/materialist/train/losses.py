@@ -52,7 +52,8 @@ def silog(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
 def centred_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     """L1 of logarithmic depths after each picture's mean difference is removed: blind to scale, robust to outliers."""
     difference = predicted - true
-    return mean((difference - per_picture(difference, mask)).abs().clamp(max=2), mask)
+    centre = (difference * mask).flatten(1).sum(1) / mask.flatten(1).sum(1).clamp(min=1)
+    return mean((difference - centre.view(-1, 1, 1, 1)).abs().clamp(max=2), mask)
 
 
 def scaled_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
@@ -78,12 +79,6 @@ def gradient(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> 
         down = mean((difference[..., 1:, :] - difference[..., :-1, :]).abs(), m[..., 1:, :] * m[..., :-1, :])
         total = total + across + down
     return total / scales
-
-
-def per_picture(values: Tensor, mask: Tensor) -> Tensor:
-    """[B, 1, 1, 1] mean of values [B, C, H, W] over the kept pixels of each picture."""
-    over = (values * mask).flatten(1).sum(1)
-    return (over / (mask.flatten(1).sum(1) * values.shape[1]).clamp(min=1)).view(-1, 1, 1, 1)
 
 
 def slopes(log_depth: Tensor, rays: Tensor, true_normal: Tensor, mask: Tensor, step: int = 4) -> Tensor:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.camera import unit
+from materialist.camera import rays_at, unit
 from materialist.errors import WeightsError
 from materialist.io.samples import Sample, Source
 from materialist.metrics.lpips import backbone
@@ -18,10 +20,10 @@ from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.network import PATCH, MatNet, Size
 from materialist.predict.matnet.predictor import infer
 from materialist.predict.weights import read_state
-from materialist.train import augment, losses
+from materialist.train import losses
 from materialist.train.maps import MapsTask, Pictures
 from materialist.train.task import Batch, Recipe
-from materialist.types import Materials, Prediction
+from materialist.types import Array, Materials, Prediction
 
 RECIPE = Recipe(
     side=512, batch=8, rate=1e-5, weight_decay=0.01, betas=(0.9, 0.999), warm_up=0, last_rate=1.0, ema=0.0, clip=1e9
@@ -70,12 +72,13 @@ class PaperTask(MapsTask):
         height, width = sample.depth.shape
         if min(height, width) < side:
             factor = side / min(height, width)
-            sample = augment.resized(sample, max(side, round(height * factor)), max(side, round(width * factor)))
+            sample = resized(sample, max(side, round(height * factor)), max(side, round(width * factor)))
             height, width = sample.depth.shape
         top, left = int(rng.integers(0, height - side + 1)), int(rng.integers(0, width - side + 1))
-        sample = augment.window(sample, top, left, side, side)
+        part = np.s_[top : top + side, left : left + side]
+        sample = each_map(sample, lambda array, _: np.ascontiguousarray(array[part]))
         if rng.random() < 0.5:
-            sample = augment.flip(sample, axis=0)
+            sample = upside_down(sample)
         return replace(sample, image=np.clip(sample.image, 0, 1), shading=None)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
@@ -107,6 +110,40 @@ class PaperTask(MapsTask):
         maps = infer(network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape)))
         materials = Materials(**{name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")})
         return Prediction(materials, unit(maps["normal"]), np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
+
+
+def each_map(sample: Sample, work: Callable[[Array, str], Array]) -> Sample:
+    """The sample with `work(array, name)` applied to every map it has, without its light."""
+    arrays = {name: array for name, array in vars(sample).items() if name != "light" and array is not None}
+    return replace(sample, light=None, **{name: work(array, name) for name, array in arrays.items()})
+
+
+def resized(sample: Sample, height: int, width: int) -> Sample:
+    """The sample at height x width pixels: colours are averaged, geometry is taken from the nearest pixel.
+
+    Albedo, roughness and metallic are averaged over what has a surface: the sky has none to mix in.
+    """
+    smooth = cv2.INTER_AREA if height < sample.depth.shape[0] else cv2.INTER_LINEAR
+    scaled = lambda array, method: np.asarray(cv2.resize(array, (width, height), interpolation=method))  # noqa: E731
+    share = scaled(sample.mask, smooth)
+
+    def work(array: Array, name: str) -> Array:
+        if name == "rays":
+            return rays_at(array, height, width)
+        if name in ("normal", "depth", "mask"):
+            return scaled(array, cv2.INTER_NEAREST_EXACT)
+        if name in ("albedo", "roughness", "metallic"):
+            deep = (..., None) if array.ndim == 3 else ...
+            return scaled(array * sample.mask[deep], smooth) / np.maximum(share, 1e-6)[deep]
+        return scaled(array, smooth)
+
+    return each_map(sample, work)
+
+
+def upside_down(sample: Sample) -> Sample:
+    """The mirror image in a level plane: rows reversed, y of normals and rays negated."""
+    turned = each_map(sample, lambda array, _: np.ascontiguousarray(array[::-1]))
+    return replace(turned, normal=turned.normal * np.float32([1, -1, 1]), rays=turned.rays * np.float32([1, -1]))
 
 
 def freeze(network: MatNet) -> None:

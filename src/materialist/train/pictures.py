@@ -9,18 +9,19 @@ import logging
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import DataLoader
 
 from materialist.errors import InputError
 from materialist.io.samples import LIGHT_ROWS, Source
 from materialist.procedural.photographic import developed
 from materialist.train.maps import Pictures
-from materialist.train.stream import ATTEMPTS
+from materialist.train.stream import readable
 from materialist.train.task import Batch
 
 _PLANES = ("image", "shading", "albedo", "roughness", "metallic", "normal", "depth", "mask")
@@ -71,7 +72,8 @@ class DevicePictures(Pictures):
         """Put samples into the pool, while there is room."""
         room = self.settings.capacity - self._kept
         workers = min(self.settings.readers, os.cpu_count() or 1)
-        for row in DataLoader(_Rows(self, places[:room]), batch_size=None, num_workers=workers):
+        chosen: Any = places[:room]
+        for row in DataLoader(chosen, batch_size=None, collate_fn=self._read_or_message, num_workers=workers):
             if isinstance(row, str):
                 logging.getLogger(__name__).warning("%s It is left out.", row)
                 continue
@@ -95,7 +97,8 @@ class DevicePictures(Pictures):
         if self._pool:
             found = {name: plane[chosen] for name, plane in self._pool.items()}
         else:
-            rows = [self._readable(k, random) for k in chosen.tolist()]
+            another = lambda: int(torch.randint(count, (), generator=random, device=self.device))  # noqa: E731
+            rows = [readable(lambda k: self._read(self._places[k]), k, another) for k in chosen.tolist()]
             found = {name: torch.stack([row[name] for row in rows]) for name in rows[0]}
         maps = {name: plane.float() for name, plane in found.items()}
         reach, light = maps.pop("reach"), maps.pop("light")
@@ -109,17 +112,12 @@ class DevicePictures(Pictures):
         del maps["shading"]
         return maps
 
-    def _readable(self, index: int, random: torch.Generator) -> dict[str, Tensor]:
-        """Example `index`, or a random one in place of one that cannot be read. Raises InputError after ATTEMPTS."""
-        for attempt in range(ATTEMPTS):
-            try:
-                return self._read(self._places[index])
-            except InputError as error:
-                if attempt == ATTEMPTS - 1:
-                    raise
-                logging.getLogger(__name__).warning("%s Another sample is used.", error)
-                index = int(torch.randint(len(self), (), generator=random, device=self.device))
-        raise AssertionError
+    def _read_or_message(self, place: int) -> dict[str, Tensor] | str:
+        """A sample as `_read` has it, or the message why it cannot be read."""
+        try:
+            return self._read(place)
+        except InputError as error:
+            return str(error)
 
     def _read(self, place: int) -> dict[str, Tensor]:
         """A sample as float16: [C, H, W], light [4, h, 2h], and reach [], the largest x of the camera rays at z = -1.
@@ -184,22 +182,6 @@ class DevicePictures(Pictures):
         out["rays"] = torch.stack([x, y], 1)
         light = torch.where(mirror.view(-1, 1, 1, 1) < 0, light.flip(-1), light)
         return out, light
-
-
-class _Rows(Dataset):
-    """Samples for the pool, or the message why one cannot be read."""
-
-    def __init__(self, pictures: DevicePictures, places: Sequence[int]):
-        self.pictures, self.places = pictures, places
-
-    def __len__(self) -> int:
-        return len(self.places)
-
-    def __getitem__(self, index: int) -> dict[str, Tensor] | str:
-        try:
-            return self.pictures._read(self.places[index])
-        except InputError as error:
-            return str(error)
 
 
 def recolour(maps: dict[str, Tensor], s: AugmentSettings, random: torch.Generator) -> dict[str, Tensor]:

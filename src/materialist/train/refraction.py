@@ -81,7 +81,25 @@ class RefractionTask(Task):
         return RefractionNet()
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        return thickness_losses(network(batch["maps"]).float(), batch, ThicknessLoss())
+        """Errors of lengths and of their logarithms, and of the normals of the back; see `ThicknessLoss`."""
+        found, target, weight = network(batch["maps"]).float(), batch["target"], ThicknessLoss()
+        inside = batch["maps"][:, MASK] * (target[:, 0] > 0)
+        count = inside.sum((1, 2)).clamp(min=1)
+        terms = {}
+        for k, (name, share) in enumerate((("solid", 1.0), ("hollow", weight.hollow))):
+            a, b, soft = found[:, k], target[:, k], weight.soft[k]
+            mean = (b * inside).sum((1, 2)) / count
+            length = ((a - b).abs() * inside).sum((1, 2)) / count / (mean + 2 * soft)
+            ratio = ((a + soft).log() - (b + soft).log()).abs()
+            each = length + weight.logarithm * (ratio * inside).sum((1, 2)) / count
+            if k == 1:  # only hollow shapes have walls to learn from
+                each = each * batch["hollow"] / batch["hollow"].mean().clamp(min=0.1)
+            terms[name] = share * each.mean()
+        # Means over the pixels of smaller views are shorter than 1 where the back is bent: they say less there.
+        cosine = (found[:, BACK_X:] * target[:, BACK_X:]).sum(1)
+        length = target[:, BACK_X:].square().sum(1).clamp(min=1e-8).sqrt()
+        terms["back"] = weight.back * (((length - cosine) * inside).sum((1, 2)) / count).mean()
+        return terms
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Errors on the views kept aside; see `procedural.thickness.errors`."""
@@ -102,25 +120,3 @@ def smaller(views: dict[str, Array], side: int, at_a_time: int = 256) -> dict[st
             share = shrink(np.ascontiguousarray(weight))
             result[name][part] = np.where(share > 0.5, shrink(values) / np.maximum(share, 1e-6), 0)
     return {**result, "hollow": views["hollow"]}
-
-
-def thickness_losses(found: Tensor, batch: Batch, weight: ThicknessLoss) -> dict[str, Tensor]:
-    """The terms of the loss of predictions [B, 5, S, S] against batch["target"] [B, 5, S, S]."""
-    target, maps = batch["target"], batch["maps"]
-    inside = maps[:, MASK] * (target[:, 0] > 0)
-    count = inside.sum((1, 2)).clamp(min=1)
-    terms = {}
-    for k, (name, share) in enumerate((("solid", 1.0), ("hollow", weight.hollow))):
-        a, b, soft = found[:, k], target[:, k], weight.soft[k]
-        mean = (b * inside).sum((1, 2)) / count
-        length = ((a - b).abs() * inside).sum((1, 2)) / count / (mean + 2 * soft)
-        ratio = ((a + soft).log() - (b + soft).log()).abs()
-        each = length + weight.logarithm * (ratio * inside).sum((1, 2)) / count
-        if k == 1:  # only hollow shapes have walls to learn from
-            each = each * batch["hollow"] / batch["hollow"].mean().clamp(min=0.1)
-        terms[name] = share * each.mean()
-    # Means over the pixels of smaller views are shorter than 1 where the back is bent: they say less there.
-    cosine = (found[:, BACK_X:] * target[:, BACK_X:]).sum(1)
-    length = target[:, BACK_X:].square().sum(1).clamp(min=1e-8).sqrt()
-    terms["back"] = weight.back * (((length - cosine) * inside).sum((1, 2)) / count).mean()
-    return terms

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import logging
 import signal
-from collections.abc import Generator
-from typing import Any
+from collections.abc import Callable, Generator
+from functools import partial
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 import torch
-from torch.utils.data import DataLoader, Dataset, default_collate
+from torch.utils.data import DataLoader, default_collate
 
 from materialist.errors import InputError
 from materialist.train.task import Batch, Examples
-from materialist.types import Array
 
 ATTEMPTS = 4
 """Examples tried in place of one that cannot be read, before the run ends with its error."""
@@ -22,25 +22,23 @@ GRACE = 20
 """Seconds for which a loading process goes on after SIGTERM: the trainer may be waiting for its batch."""
 
 
-class _Drawn(Dataset):
-    """Variants of examples; an item is asked for by (example, seed of its randomness)."""
+T = TypeVar("T")
+Key = tuple[int, tuple[int, ...]]
+"""Number of an example, and the seed of its variant."""
 
-    def __init__(self, examples: Examples, side: int):
-        self.examples, self.side = examples, side
 
-    def __getitem__(self, key: tuple[int, tuple[int, ...]]) -> dict[str, Array] | str:
-        """A variant, or the message why there is none: an exception of a worker would arrive as its traceback."""
-        index, seed = key
-        rng = np.random.default_rng(seed)
-        message = ""
-        for _ in range(ATTEMPTS):
-            try:
-                return self.examples.draw(index, self.side, rng)
-            except InputError as error:
-                message = str(error)
-                logging.getLogger(__name__).warning("%s Another sample is used.", message)
-                index = int(rng.integers(len(self.examples)))
-        return message
+def readable(read: Callable[[int], T], index: int, another: Callable[[], int]) -> T:
+    """What `read` makes of a number, or of `another()` in place of one that cannot be read.
+
+    Raises InputError after ATTEMPTS.
+    """
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return read(index)
+        except InputError as error:
+            logging.getLogger(__name__).warning("%s Another sample is used.", error)
+            index = another()
+    return read(index)
 
 
 def epoch(
@@ -60,13 +58,13 @@ def epoch(
     order = np.tile(order, -(-batch // len(order)))
     order = order[: len(order) // batch * batch]
     keys = [(int(index), (seed, number, k)) for k, index in enumerate(order)]
-    loader = DataLoader(
-        _Drawn(examples, side),
-        batch_sampler=[keys[k : k + batch] for k in range(skip * batch, len(keys), batch)],  # type: ignore[arg-type]
+    loader: DataLoader[Any] = DataLoader(
+        keys[skip * batch :],  # type: ignore[arg-type]
+        batch_size=batch,
         num_workers=workers,
         worker_init_fn=_init_worker,
         prefetch_factor=4 if workers else None,
-        collate_fn=_collated,
+        collate_fn=partial(_drawn, examples, side),
         pin_memory=torch.cuda.is_available(),
     )
     batches = iter(loader)
@@ -79,9 +77,17 @@ def epoch(
         del batches  # ends the workers
 
 
-def _collated(items: list[Any]) -> Any:
-    """The items as a batch; the message of one of them where there is one."""
-    return next((item for item in items if isinstance(item, str)), None) or default_collate(items)
+def _drawn(examples: Examples, side: int, keys: list[Key]) -> Any:
+    """A batch, or the message why there is none: an exception of a worker would arrive as its traceback."""
+    items = []
+    for index, seed in keys:
+        rng = np.random.default_rng(seed)
+        draw, another = partial(examples.draw, side=side, rng=rng), partial(rng.integers, len(examples))
+        try:
+            items.append(readable(draw, index, another))
+        except InputError as error:
+            return str(error)
+    return default_collate(items)
 
 
 def _init_worker(_: int) -> None:

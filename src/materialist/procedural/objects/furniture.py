@@ -5,6 +5,8 @@ The first part of what one can look down on is its top.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from materialist.procedural import materials as m
@@ -41,10 +43,6 @@ def table(rng, meshes=(), fewest: int = 0) -> Parts:
         cloth = s.sheet((-width * 0.3, height + 0.003, depth / 2), (width * 0.6, 0, 0), (0, 0, -depth))
         parts.append(ScenePart(cloth, m.fabric(rng)))
     return parts + _cluttered(rng, width, depth, height, int(rng.integers(fewest, fewest + 7)), meshes)
-
-
-def set_table(rng, meshes=()) -> Parts:
-    return table(rng, meshes, 3)
 
 
 def chair(rng, meshes=()) -> Parts:
@@ -92,17 +90,9 @@ def _fronts(width, height, at, columns, rows, front, knob) -> Parts:
     return parts
 
 
-def cupboard(rng, meshes=()) -> Parts:
-    """Chest, sideboard or wardrobe, with doors or drawers."""
-    height = rng.uniform(0.45, 1.0) if rng.random() < 0.7 else rng.uniform(1.7, 2.2)
-    return _closed(rng, height, meshes)
-
-
-def sideboard(rng, meshes=()) -> Parts:
-    return _closed(rng, rng.uniform(0.45, 1.0), meshes)
-
-
-def _closed(rng, height, meshes) -> Parts:
+def cupboard(rng, meshes=(), wardrobes: bool = True) -> Parts:
+    """Chest, sideboard or, where `wardrobes` may be, wardrobe, with doors or drawers."""
+    height = rng.uniform(1.7, 2.2) if wardrobes and rng.random() >= 0.7 else rng.uniform(0.45, 1.0)
     width, depth, foot = rng.uniform(0.5, 2.2), rng.uniform(0.35, 0.6), float(rng.choice([0.0, 0.08, 0.15]))
     body, low = _board_look(rng), height < 1.3
     front = body if rng.random() < 0.6 else _board_look(rng)
@@ -178,4 +168,5 @@ ALONG_WALLS = (
     (0.24, cupboard), (0.2, shelf), (0.2, sofa), (0.08, bed), (0.12, table), (0.08, kitchen), (0.08, floor_thing)
 )  # fmt: skip
 IN_THE_MIDDLE = ((0.45, table), (0.25, chair), (0.12, sofa), (0.18, floor_thing))
-TO_LOOK_ON = ((0.6, set_table), (0.2, kitchen), (0.2, sideboard))
+set_table = partial(table, fewest=3)
+TO_LOOK_ON = ((0.6, set_table), (0.2, kitchen), (0.2, partial(cupboard, wardrobes=False)))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from materialist.camera import unit
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
@@ -144,8 +145,7 @@ def _frustum(rng: np.random.Generator) -> Solid:
     profile = np.array([(1e-3, 0), (low, 0), (high, 1), (1e-3, 1)])
     solid = shapes.lathe(profile, int(rng.choice([3, 4, 4, 5, 6, 48])))
     corners = (solid.vertices * [1, 1, deep])[solid.faces]
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat = flat / np.maximum(np.linalg.norm(flat, axis=-1, keepdims=True), 1e-12)
+    flat = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     own = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
     return Solid(corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2)))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from materialist.camera import unit
 from materialist.types import Array
 
 
@@ -280,11 +281,8 @@ def metric(solid: Solid, width: float, height: float) -> Solid:
 def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     """Round tube along points [P, 3] with one radius or [P] radii; open ends."""
     line = np.asarray(points, float)
-    along = np.gradient(line, axis=0)
-    along /= np.maximum(np.linalg.norm(along, axis=-1, keepdims=True), 1e-9)
-    helper = np.where(np.abs(along[:, 1:2]) > 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])
-    side = np.cross(along, helper)
-    side /= np.linalg.norm(side, axis=-1, keepdims=True)
+    along = unit(np.gradient(line, axis=0))
+    side = unit(np.cross(along, np.where(np.abs(along[:, 1:2]) > 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])))
     other = np.cross(along, side)
     phi = np.linspace(0, 2 * np.pi, n + 1)[None, :, None]
     normal = np.cos(phi) * side[:, None] + np.sin(phi) * other[:, None]
@@ -306,9 +304,8 @@ def turn_upright(back: Array) -> Array:
 def leaves(rng: np.random.Generator, roots: Array, directions: Array, length: float, width: float) -> Solid:
     """Bent leaves of six triangles each, from roots [N, 3] along unit directions [N, 3]."""
     n = len(roots)
-    directions = directions / np.maximum(np.linalg.norm(directions, axis=-1, keepdims=True), 1e-9)
-    side = np.cross(directions, np.array([0, 1, 0]) + rng.normal(scale=0.3, size=(n, 3)))
-    side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
+    directions = unit(directions)
+    side = unit(np.cross(directions, np.array([0, 1, 0]) + rng.normal(scale=0.3, size=(n, 3))))
     size = (length * rng.uniform(0.6, 1.2, n))[:, None]
     rows = []
     for t, w in ((0.0, 0.1), (0.35, 1.0), (0.7, 0.8), (1.0, 0.05)):

@@ -81,7 +81,7 @@ def bush(rng, size: float) -> Parts:
     return [ScenePart(core, leaf), ScenePart(leaves, leaf)]
 
 
-def person(rng, meshes=()) -> Parts:
+def person(rng) -> Parts:
     """Somebody standing, of capsules and a head."""
     tall, skin, shirt, trousers, parts = rng.uniform(1.5, 1.9), m.skin(rng), m.fabric(rng), m.fabric(rng), []
     hip, neck = 0.5 * tall, 0.84 * tall

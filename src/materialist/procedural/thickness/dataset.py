@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from materialist.camera import unit
 from materialist.errors import InputError
 from materialist.io.samples import Progress, claim, complete, read_arrays
 from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
@@ -182,15 +183,12 @@ def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -
         albedo = albedo * np.clip(1 + wave * rng.uniform(0.1, 1.5), 0.3, 1.6)
     up = rng.normal(size=3) * [0.4, 0.2, 0.4] + [0, 1, 0.3]
     light = rng.uniform(0.15, 0.6) * (1 + 0.6 * (normal @ (up / np.linalg.norm(up))))[..., None]
-    view = -rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+    view = unit(-rays)
     gloss = rng.uniform(0.1, 1.5) if rng.random() < 0.4 else 0.0
     for _ in range(int(rng.integers(1, 3))):
-        towards = rng.normal(size=3) + np.array([0, 0.7, 0.7])
-        towards /= np.linalg.norm(towards)
+        towards = unit(rng.normal(size=3) + np.array([0, 0.7, 0.7]))
         colour = rng.uniform(0.7, 1.0, 3) * rng.uniform(0.2, 0.9)
-        half = towards + view
-        half = half / np.maximum(np.linalg.norm(half, axis=-1, keepdims=True), 1e-9)
-        highlight = gloss * np.clip(np.sum(normal * half, -1), 0, 1) ** rng.uniform(20, 200)
+        highlight = gloss * np.clip(np.sum(normal * unit(towards + view), -1), 0, 1) ** rng.uniform(20, 200)
         light = light + colour * (np.clip(normal @ towards, 0, None) + highlight)[..., None]
     noise = rng.normal(0, rng.uniform(0, 0.02), normal.shape)
     return np.clip(albedo * light + noise, 0, 1).astype(np.float32)
@@ -217,8 +215,7 @@ def _imperfect(rng: np.random.Generator, view: View) -> View:
         kernel = np.ones((2 * int(rng.integers(1, max(2, round(2 * side / SIDE)) + 1)) + 1,) * 2, np.uint8)
         smaller = cv2.erode(inside.astype(np.uint8), kernel, borderValue=0) > 0
         inside = smaller if smaller.sum() > 0.5 * inside.sum() else inside
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    return View(view.photo, inside, normal.astype(np.float32), depth.astype(np.float32), view.rays)
+    return View(view.photo, inside, unit(normal).astype(np.float32), depth.astype(np.float32), view.rays)
 
 
 def _smooth_noise(rng: np.random.Generator, channels: int, side: int) -> Array:

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
-from materialist.procedural.objects.glassware import Shape, centred
-from materialist.procedural.objects.things import mesh
-from materialist.procedural.options import captures
-from materialist.procedural.thickness.dataset import draw_views
-from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.types import Array
 
 
@@ -58,13 +51,3 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     if hollow.any():
         figures["hollow"] = np.where(hollow, relative_error(found[:, 1], target[:, 1], inside), np.nan)
     return figures
-
-
-def of_meshes(folder: Path, views: int = 8, seed: int = 0) -> dict[str, dict[str, Array]]:
-    """Views of every .ply mesh below a folder, by the mesh's name: upright, exact maps. Raises InputError."""
-    found: dict[str, dict[str, Array]] = {}
-    for file in captures(folder, "**/*.ply"):
-        shape = Shape(centred(mesh(file)), hollow=False, upright=True)
-        rng = np.random.default_rng([seed, len(found)])
-        found[file.stem] = draw_views(shape, ShapeTracer(shape.solid), rng, views, exact=True)
-    return found

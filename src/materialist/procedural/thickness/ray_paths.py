@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.buffers import floats
+from materialist.camera import unit
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
@@ -42,7 +43,7 @@ def towards(normal: Array, direction: Array, sign: int) -> Array:
 
     What is seen faces the viewer, also where the shading normals of coarse triangles do not.
     """
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    normal = unit(normal)
     return np.where(sign * np.sum(normal * direction, -1, keepdims=True) < 0, -normal, normal)
 
 
