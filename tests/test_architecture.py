@@ -48,7 +48,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 """Package -> the packages it may import beside the nouns; docs/architecture.md draws this table."""
 
 HEAVY = {"torch", "mitsuba", "drjit"}
-MAY_BE_HEAVY = ("bsdf", "render", "transport", "fit", "train", "procedural")
+MAY_BE_HEAVY = ("bsdf", "render", "transport", "fit", "train", "procedural", "bench")
 NETWORKS = tuple(
     f"predict.{name}" for name in ("bundled.", "matnet.", "refraction.", "clicks.", "efficientnet", "network")
 )

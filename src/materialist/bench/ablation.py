@@ -16,9 +16,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
+import torch
 
 from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
@@ -29,13 +30,12 @@ from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
+from materialist.geometry.build import build_geometry
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.render.scene import RenderScene
 from materialist.types import Array, Materials, Prediction
-
-if TYPE_CHECKING:
-    import torch
 
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
@@ -84,8 +84,6 @@ class _Photo:
 
     def __init__(self, bench: AblationBench, sample: SyntheticSample, other: Array):
         """`other` [h, 2h, 3] is the light of the relit pictures."""
-        import torch
-
         self.bench, self.sample, self.other = bench, sample, other
         self.camera = sample.photo.camera
         self.photo = torch.from_numpy(sample.photo.linear.reshape(-1, 3))
@@ -110,8 +108,6 @@ class _Photo:
 
     def materials(self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False) -> Row:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
-        import torch
-
         prepared, envmap = self.fitted
         engine: Any = prepared.fit.engine
         prior = _maps(self.prior.materials)
@@ -150,8 +146,6 @@ class _Photo:
 
 def _maps(materials: Materials) -> torch.Tensor:
     """[H W, 5] albedo, roughness, metallic."""
-    import torch
-
     maps = np.dstack(tuple(vars(materials).values()))
     return torch.from_numpy(maps.reshape(-1, 5).astype(np.float32))
 
@@ -195,9 +189,6 @@ def _field(photo: _Photo) -> Iterator[Row]:
 
 def _fov(photo: _Photo) -> Iterator[Row]:
     """Table fov_syn_ab."""
-    from materialist.geometry.build import build_geometry
-    from materialist.render.scene import RenderScene
-
     bench, sample, truth = photo.bench, photo.sample, photo.sample.truth
     relit = sample.render(photo.other, spp=bench.spp, seed=bench.seed + 3)
     for factor in bench.fovs:

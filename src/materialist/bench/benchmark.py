@@ -13,9 +13,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from rich.console import Console
+from rich.progress import track
+
 from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError, MaterialistError
 from materialist.option_kinds import OperationOptions, option
+from materialist.render.variant import setup
 
 Row = dict[str, Any]
 """'method', 'sample' and the keys of columns; a figure that does not apply is absent."""
@@ -50,11 +54,6 @@ class Benchmark(OperationOptions, ABC):
 
         Raises InputError where there are no rows.
         """
-        from rich.console import Console
-        from rich.progress import track
-
-        from materialist.render.variant import setup
-
         setup(self.device)
         title, _, note = inspect.cleandoc(sys.modules[type(self).__module__].__doc__ or "").partition("\n\n")
         settings = {name: None if value == "" else value for name, value in asdict(self).items()}

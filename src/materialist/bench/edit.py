@@ -15,12 +15,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
-from materialist import metrics
+from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist.bench.edits import KINDS, Edit, awaited, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
+from materialist.edits.composite.composite import composite
+from materialist.edits.composite.into_photo import into_photo
+from materialist.edits.composite.layers import render_layers
+from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.light.relight import relight
+from materialist.edits.material import material
+from materialist.edits.preview import Preview
 from materialist.option_kinds import option
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.types import Array, Scene
@@ -49,8 +57,6 @@ class EditBench(Benchmark):
     large: int = option(4900, "Side of the large photo that an edit is brought into.", **SIZE)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist import pipeline
-
         kinds = names("kinds", self.kinds, KINDS)
         for scene in range(self.scenes):
             sample, other = (
@@ -68,8 +74,6 @@ class EditBench(Benchmark):
         self, edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: tuple[Scene, float], report: Report
     ) -> Iterator[Row]:
         """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet."""
-        from materialist.edits.composite.composite import composite
-
         before = sample.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)
@@ -86,21 +90,11 @@ class EditBench(Benchmark):
         report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
-        import cv2
-
-        from materialist.edits.composite.composite import composite
-        from materialist.edits.composite.into_photo import into_photo
-        from materialist.edits.composite.layers import render_layers
-        from materialist.edits.core.renderer import EditRenderer
-        from materialist.edits.light.relight import relight
-        from materialist.edits.material.material import edit
-        from materialist.edits.preview import Preview
-
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
         scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(Preview, scene)
         yield {"method": "preview: built once", "sample": sample, **cost}
-        changes = [edit(scene, mask, hue=30.0 * k, roughness=0.1 * k) for k in range(1, 6)]
+        changes = [material.edit(scene, mask, hue=30.0 * k, roughness=0.1 * k) for k in range(1, 6)]
         turns = [relight(scene, rotate=40.0 * k) for k in range(1, 4)]
         for name, edited in (("preview: material", changes), ("preview: light", turns)):
             preview.render(edited[0])  # the first one compiles

@@ -8,9 +8,18 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.edits.core.surfaces import uniform_surface
+from materialist.edits.glass.glass import glass
+from materialist.edits.insert.insert import insert
+from materialist.edits.insert.meshes import MeshModel
+from materialist.edits.light.relight import relight
+from materialist.edits.material.material import edit, shifted_hsv
+from materialist.edits.remove.remove import remove
+from materialist.geometry.build import build_geometry
 from materialist.procedural.arrangements import Item
 from materialist.procedural.objects import shapes
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
@@ -52,11 +61,6 @@ class Edit:
 
 def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[Edit]:
     """The edits of these KINDS that the scene has room for; `light` [h, 2h, 3] is that of the relit picture."""
-    from materialist.edits.glass.glass import glass
-    from materialist.edits.light.relight import relight
-    from materialist.edits.material.material import edit
-    from materialist.edits.remove.remove import remove
-
     stage = sample.scene
     things = stage.things
     for kind in kinds:
@@ -85,8 +89,6 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
 
 def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
     """The values of an edit, and the true object after it."""
-    from materialist.edits.material.material import shifted_hsv
-
     if kind == "hue":
         return {"hue": 120.0}, replace(item, albedo=shifted_hsv(item.albedo.astype(np.float32), 120.0, 0.0, 0.0))
     if kind in SHIFTS:
@@ -118,12 +120,6 @@ def staged(stage: TrueScene, items: list[Item]) -> TrueScene:
 
 def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator[Edit]:
     """A cup, blue or of glass, in a free place of the floor, if any; the true one has the vertices of the other one."""
-    import cv2
-
-    from materialist.edits.core.surfaces import uniform_surface
-    from materialist.edits.insert.insert import insert
-    from materialist.edits.insert.meshes import MeshModel
-
     floor = np.pad((stage.seen == 0).astype(np.uint8), 1)
     free = cv2.distanceTransform(floor, cv2.DIST_L2, 5)[1:-1, 1:-1]
     row, column = np.unravel_index(int(np.argmax(free)), free.shape)
@@ -154,8 +150,6 @@ def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]
 
 def true_scene(sample: SyntheticSample, maps: Prediction | None = None) -> Scene:
     """The sample as a fit without any error: true maps on the mesh of the true depth, true light; or other `maps`."""
-    from materialist.geometry.build import build_geometry
-
     maps, photo = maps or sample.truth, sample.photo
     geometry = build_geometry(maps.depth, maps.normal, photo.camera)
     return Scene(

@@ -29,6 +29,8 @@ from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row,
 from materialist.bench.edits import awaited
 from materialist.bench.glass_models import Background, Case
 from materialist.bench.report import CEILING, Column, Report, strip
+from materialist.edits.glass.preview import GlassPreview
+from materialist.metrics.lpips import lpips
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness
 from materialist.types import Array
@@ -135,8 +137,6 @@ class GlassBench(Benchmark):
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
         """Rows of the preview: built, its first picture, and one picture after another, as a person changes sliders."""
-        from materialist.edits.glass.preview import GlassPreview
-
         scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(lambda: GlassPreview(scene, mask, device=self.device, seed=self.seed))
         yield {"method": "preview: built once", "sample": sample, **cost}
@@ -164,8 +164,6 @@ def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, see
 
 def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str, float]:
     """The figures of a picture [H, W, 3] inside the mask, named by the object's group."""
-    from materialist.metrics.lpips import lpips
-
     mask, group = case.scene.mask, case.scene.thing.group
     truth = case.truth * case.gain
     # Outside the mask both are the truth, so that windows that reach over its border compare equals.

@@ -10,12 +10,26 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from materialist.bench.glass_scenes import PROTOCOL, GlassScene, mesh, painted
+from materialist.buffers import tensor
+from materialist.edits.glass import two_interface as interfaces
+from materialist.edits.remove.behind import behind as continued_behind
+from materialist.edits.remove.patches import patched
+from materialist.edits.remove.remove import carried
 from materialist.errors import SetupError, WeightsError
+from materialist.geometry.build import build_geometry, part
+from materialist.geometry.planes import find_planes, upright
 from materialist.geometry.silhouette import window
+from materialist.options import Glass
+from materialist.predict.refraction import best_thickness, thickness
 from materialist.predict.refraction.thickness import Thickness
+from materialist.render.denoise import denoise
+from materialist.solids.closed import closed_proxy
+from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array
 
 
@@ -63,19 +77,13 @@ def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: f
     Surfaces go on as planes, the picture by patches, the albedo with it; `gain` is the photo's exposure. The albedo
     is found with the object there, closed as the photo tells, so that its shadow is not part of it.
     """
-    from scipy.ndimage import binary_dilation
-
-    from materialist.edits.remove.behind import behind
-    from materialist.edits.remove.patches import patched
-    from materialist.edits.remove.remove import carried
-
     hole = binary_dilation(scene.mask, np.ones((3, 3), bool))  # with the rim of mixed pixels
     depth = np.where(hole, 0, scene.behind.depth)
     normal = np.where(hole[..., None], [0, 0, 1], scene.behind.normal).astype(np.float32)
     label, things = np.zeros(hole.shape, int), None
     if depth.any():
         plane = _planes(scene, depth, normal)
-        continued = behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
+        continued = continued_behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
         found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
         things = {"object": mesh(_body(scene, found, depth), painted(scene.item.albedo))}
@@ -93,8 +101,6 @@ def _albedo(
 
     `things` are Mitsuba objects that stand before them, in the picture, too.
     """
-    from materialist.render.denoise import denoise
-
     albedo = np.full(picture.shape, 0.5, np.float32)
     for _ in range(PROTOCOL.albedo_rounds if depth.any() else 0):
         surfaces = Background(picture, depth, normal, albedo)
@@ -113,11 +119,6 @@ def lit(
 
     Paths have `length` segments at most; `cropped` as in `GlassScene.trace`.
     """
-    import mitsuba as mi
-
-    from materialist.buffers import tensor
-    from materialist.geometry.build import build_geometry, part
-
     shapes: dict[str, Any] = {}
     if behind.depth.any():
         geometry = build_geometry(behind.depth, behind.normal, scene.camera)
@@ -135,14 +136,10 @@ def two_interface(case: Case, found: Thickness, behind: Background, *, papers_ba
 
     The normals of the back are the known ones, or with `papers_back` the opposite of the front's.
     """
-    from materialist.edits.glass.two_interface import Backdrop, back_of
-    from materialist.edits.glass.two_interface import two_interface as model
-    from materialist.options import Glass
-
-    scene, front = case.scene, case.scene.front
-    beyond = Backdrop(behind.picture, behind.depth, case.envmap)
-    back = None if papers_back else back_of(front.depth, scene.mask, found.solid, found.back, scene.camera)
-    return model(scene.camera, front.normal, front.depth, scene.mask, found.solid, beyond, Glass(ior=case.ior), back)
+    camera, front, mask = case.scene.camera, case.scene.front, case.scene.mask
+    beyond, material = interfaces.Backdrop(behind.picture, behind.depth, case.envmap), Glass(ior=case.ior)
+    back = None if papers_back else interfaces.back_of(front.depth, mask, found.solid, found.back, camera)
+    return interfaces.two_interface(camera, front.normal, front.depth, mask, found.solid, beyond, material, back)
 
 
 def closed(case: Case, found: Thickness, behind: Background) -> Array:
@@ -155,8 +152,6 @@ def before(case: Case, body: Any, behind: Background) -> Array:
 
     Denoised as `materialist glass` does, where the denoiser is installed.
     """
-    from materialist.render.denoise import denoise
-
     scene = case.scene
     things = {"object": mesh(body, {"type": "dielectric", "int_ior": case.ior, "ext_ior": 1.0})}
     length = PROTOCOL.glass_length
@@ -170,8 +165,6 @@ def before(case: Case, body: Any, behind: Background) -> Array:
 
 def _body(scene: GlassScene, found: Thickness, depth: Array) -> Any:
     """The closed object of a thickness, before what stands behind it at planar `depth` [H, W]."""
-    from materialist.solids.closed import closed_proxy
-
     if found.revolution is not None:
         return found.revolution.body(scene.camera)
     front, mask = scene.front, scene.mask
@@ -184,9 +177,6 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
     'true', 'predicted' (what `materialist glass` takes by itself), 'network' (RefractionNet alone, where its weights
     are), 'symmetry'. Where the normals are None they are those of the thickness: 'true' leaves out what true ones add.
     """
-    from materialist.predict.refraction import thickness
-    from materialist.solids.symmetry import symmetric_thickness
-
     front = scene.front
     best = _predicted(scene, photo, behind.depth, behind.normal)
     found = {"true": Thickness(front.thickness, front.thickness), "predicted": best}
@@ -198,17 +188,12 @@ def thicknesses(scene: GlassScene, photo: Array, behind: Background) -> dict[str
 
 def _predicted(scene: GlassScene, photo: Array, depth: Array, normal: Array) -> Thickness:
     """What `materialist glass` takes for the thickness of the object in an exposed photo, before maps of the rest."""
-    from materialist.geometry.planes import upright
-    from materialist.predict.refraction import best_thickness
-
     up, front = upright(normal, _planes(scene, depth, normal)), scene.front
     return best_thickness(photo, scene.mask, front.normal, front.depth, scene.camera, up=up, behind=depth)
 
 
 def _planes(scene: GlassScene, depth: Array, normal: Array) -> Array:
     """[H, W] int8: the plane of each pixel of what is around the object, -1 for none."""
-    from materialist.geometry.planes import find_planes
-
     plane = np.full(depth.shape, -1, np.int8)
     for k, found in enumerate(find_planes(depth, normal, scene.camera) if depth.any() else ()):
         plane[found.mask] = k

@@ -8,7 +8,10 @@ from itertools import islice, zip_longest
 from pathlib import Path
 from typing import Any
 
+import cv2
+import mitsuba as mi
 import numpy as np
+import trimesh
 
 from materialist.camera import pixel_rays
 from materialist.color import luminance
@@ -19,7 +22,10 @@ from materialist.procedural import lights, patterns
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.glassware import KINDS, make_shape
 from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.thickness.ray_paths import ShapeTracer, towards
 from materialist.procedural.world import Viewpoint, orbit
+from materialist.render.envmap import half_turn, on_mitsuba_grid
+from materialist.render.scene import look_along, sensor, shape
 from materialist.types import Array, Camera
 
 GROUPS = ("symmetric", "asymmetric")
@@ -100,8 +106,6 @@ def _made(group: str, k: int, seed: int) -> GlassObject:
 
 def is_closed(solid: Solid) -> bool:
     """Whether every edge of the mesh has two faces that run through it in opposite directions."""
-    import trimesh
-
     mesh = trimesh.Trimesh(np.round(solid.vertices, 7), solid.faces)  # merges vertices
     corners = np.sort(mesh.faces, 1)
     mesh.update_faces((np.diff(corners) > 0).all(1))
@@ -162,11 +166,6 @@ class GlassScene:
     ) -> Array:
         """[H, W, 3] float32 linear picture of Mitsuba objects under a light [h, 2h, 3]; 0 outside a `cropped` one,
         which is the rectangle around the object. By paths of `length` segments at most."""
-        import mitsuba as mi
-
-        from materialist.render.envmap import half_turn, on_mitsuba_grid
-        from materialist.render.scene import look_along, sensor
-
         camera = sensor(self.camera, look_along(mi))
         box = window(self.mask) if cropped else np.s_[:, :]
         if cropped:
@@ -186,25 +185,17 @@ class GlassScene:
 
 def mesh(solid: Any, bsdf: dict[str, Any]) -> Any:
     """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
-    import mitsuba as mi
-
-    from materialist.render.scene import shape
-
     return shape(mi, solid, bsdf)
 
 
 def painted(albedo: Array) -> dict[str, Any]:
     """Mitsuba's diffuse surface with a texture [h, w, 3]."""
-    import mitsuba as mi
-
     bitmap = mi.Bitmap(np.ascontiguousarray(albedo, np.float32))
     return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
 
 
 def seen(solid: Solid, camera: Camera) -> SeenSide:
     """What the camera sees of a mesh in its frame."""
-    from materialist.procedural.thickness.ray_paths import ShapeTracer, towards
-
     rays = pixel_rays(camera)
     shape = rays.shape[:2]
     # Off the centres of pixels by a little: rays through the edges of meshes may slip between faces.
@@ -223,8 +214,6 @@ def seen(solid: Solid, camera: Camera) -> SeenSide:
 
 def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int = 0) -> Array:
     """[h, 2h, 3] light of that number in the frame of the scene's camera, its peaks clipped; h is ENVMAP_ROWS."""
-    import cv2
-
     full = lights.envmap(lights.environment(index, seed=seed, data=data), scene.to_scene)
     rows = ENVMAP_ROWS[scene.background]
     small = full if rows == len(full) else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)

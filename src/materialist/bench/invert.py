@@ -20,12 +20,23 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+import torch
 
 from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, materialist, numbers, timed
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
+from materialist.fit.engine import PathEngine, TransportEngine
+from materialist.geometry.build import build_geometry
+from materialist.io.exr import write_exr
+from materialist.io.image import write_png
+from materialist.io.photo import read_photo
 from materialist.option_kinds import option
+from materialist.predict import get_predictor
+from materialist.procedural.synthetic import make_sample
+from materialist.render.scene import RenderScene
+from materialist.render.variant import setup
 from materialist.types import Photo
 
 NATIVE = 512
@@ -108,11 +119,6 @@ def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, si
             f"{data} holds neither official_indoor/ nor photo.png with maps/ beside it; give such a folder, a --photo, "
             "or leave out --data for a synthetic photo."
         )
-    from materialist.io.exr import write_exr
-    from materialist.io.image import write_png
-    from materialist.procedural.synthetic import make_sample
-    from materialist.render.variant import setup
-
     setup(bench.device)
     sample = make_sample(0, 0, 0, size=size, seed=bench.seed)
     write_png(folder / "photo.png", sample.photo.linear)
@@ -147,10 +153,6 @@ def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *o
 
 def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
     """The photo, or a copy enlarged to `size` when it is smaller: `invert` itself never enlarges."""
-    import cv2
-
-    from materialist.io.image import write_png
-
     linear = _photo(case, size).linear
     height, width = linear.shape[:2]
     scale = size / max(height, width)
@@ -163,8 +165,6 @@ def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
 
 
 def _photo(case: InvertedPhoto, size: int) -> Photo:
-    from materialist.io.photo import read_photo
-
     return read_photo(case.photo, size=size, fov=case.fov)
 
 
@@ -185,14 +185,6 @@ def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     allocate memory, and the first one of PRB compiles kernels; they do not count. The light is grey, which changes no
     cost.
     """
-    import torch
-
-    from materialist.fit.engine import PathEngine, TransportEngine
-    from materialist.geometry.build import build_geometry
-    from materialist.predict import get_predictor
-    from materialist.render.scene import RenderScene
-    from materialist.render.variant import setup
-
     setup(bench.device)
     size, seed = bench.step_size, bench.seed
     photo = _photo(replace(case, photo=_at_least(case, size, folder)), size)

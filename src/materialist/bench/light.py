@@ -21,14 +21,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
-from materialist import metrics
+from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
 from materialist.bench.edits import staged
 from materialist.bench.report import CEILING, Column, Report
+from materialist.fit.engine import PathEngine, prepared_envmap
+from materialist.fit.invert import FitSetup, prepare
+from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
+from materialist.fit.settings import preset
+from materialist.geometry.build import build_geometry
 from materialist.option_kinds import option
-from materialist.predict import NEUTRAL_METALLIC
+from materialist.predict import NEUTRAL_METALLIC, get_predictor
 from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.render.scene import RenderScene
 from materialist.types import Array, Materials, Prediction
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
@@ -139,18 +146,12 @@ class _Stage:
 
     def mesh(self, completion: str) -> Any:
         """The RenderScene of the true depth; `auto` continues floors."""
-        from materialist.geometry.build import build_geometry
-        from materialist.render.scene import RenderScene
-
         camera, truth = self.sample.photo.camera, self.sample.truth
         geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion, seed=self.bench.seed)
         return RenderScene(geometry, camera, device=self.bench.device)
 
     def relit(self) -> Iterator[Row]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
-        from materialist import pipeline
-        from materialist.render.scene import RenderScene
-
         truth, device = self.sample.truth, self.bench.device
         for completion, suffix in COMPLETIONS.items():
             figures = self._on(self.mesh(completion), truth.materials, self.sample.envmap)
@@ -197,13 +198,6 @@ def fit(
 ) -> tuple[Array, int, Any]:
     """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of the depth that is given, in
     how many steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
-    import torch
-
-    from materialist.fit.engine import PathEngine, prepared_envmap
-    from materialist.fit.invert import FitSetup, prepare
-    from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
-    from materialist.fit.settings import preset
-
     photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
     given = given_maps(sample, method, seed=seed, device=device)
     engine: Any
@@ -230,8 +224,6 @@ def fit(
 
 def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:
     """The maps that a method is given: true, predicted, or with the paper's neutral materials."""
-    from materialist.predict import get_predictor
-
     source: dict[str, Prediction] = {"true": sample.truth}
     if "predicted" in (method.maps, method.shape):
         source["predicted"] = get_predictor("bundled", device=device).predict(sample.photo, seed=seed)
@@ -243,8 +235,6 @@ def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: st
 
 def constant_light(problem: Any, photo: Any) -> Any:
     """[h, 2h, 3] tensor of the colour that explains the photo [H W, 3] with the least square error."""
-    import torch
-
     dark, lit = (problem.render(torch.full((problem.height, 2 * problem.height, 3), v)) for v in (0.0, 1.0))
     gain, missing = lit - dark, photo[problem.pixels] - dark
     colour = ((missing * gain).sum(0) / (gain**2).sum(0)).clamp(min=0)

@@ -23,8 +23,16 @@ import numpy as np
 from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, timed
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
+from materialist.io.datasets import InteriorVerse, open_sources
+from materialist.io.display import strip
+from materialist.io.photo import read_photo
+from materialist.io.samples import SampleFolder
+from materialist.metrics.maps import ordinal_accuracy, score, summary
 from materialist.option_kinds import option
+from materialist.predict import get_predictor
+from materialist.predict.maps import MapsPredictor
 from materialist.predict.protocol import MAPS
+from materialist.procedural.photographic import as_photo
 from materialist.types import Camera, Photo, Prediction
 
 
@@ -62,9 +70,6 @@ class MaterialsBench(Benchmark):
     pictures: int = option(8, "Samples in sheet.png.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.io.display import strip
-        from materialist.predict import get_predictor
-
         if data is None:
             raise InputError(
                 "There is nothing to score; give --data DIR: materialist train data --split heldout -o DIR."
@@ -89,10 +94,6 @@ class MaterialsBench(Benchmark):
             for folder in _spread(folders, self.limit):
                 yield folder.name, *_read_folder(folder)
             return
-        from materialist.io.datasets import InteriorVerse, open_sources
-        from materialist.io.samples import SampleFolder
-        from materialist.procedural.photographic import as_photo
-
         source = open_sources([data], split=self.split)
         if isinstance(source, InteriorVerse):
             report.settings["left out"] = " ".join(source.notes()) or None
@@ -116,9 +117,6 @@ def photo_folders(data: Path) -> list[Path]:
 
 def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
     """The photo at its own size (at most 1024) and its true maps at that size."""
-    from materialist.io.photo import read_photo
-    from materialist.predict.maps import MapsPredictor
-
     maps = folder / "maps"
     photo = read_photo(str(min(folder.glob("photo.*"))), size=1024)
     truth = MapsPredictor(maps).predict(photo)
@@ -135,8 +133,6 @@ def _spread(things: list, limit: int) -> list:
 
 def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:
     """The figures of a prediction; none of the maps that the truth lacks, in whose place something else stands."""
-    from materialist.metrics.maps import ordinal_accuracy, score
-
     figures = score(found, truth)
     if (truth.depth > 0).any():
         figures["depth_order"] = ordinal_accuracy(found.depth, truth.depth)
@@ -145,8 +141,6 @@ def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str
 
 def _pool(rows: list[Row]) -> None:
     """Give all rows the pooled PSNRs of their method, so that the table of means shows them."""
-    from materialist.metrics.maps import summary
-
     for method in {row["method"] for row in rows}:
         own = [row for row in rows if row["method"] == method]
         means = summary([{key: value for key, value in row.items() if key.endswith("_mse")} for row in own])

@@ -18,6 +18,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import cv2
+import yaml
+from jinja2 import Environment
+
 from materialist import __version__
 from materialist.bench import benchmark_class
 from materialist.bench.benchmark import names, timed
@@ -82,8 +86,6 @@ class Table:
 @cache
 def published() -> tuple[dict[str, Measure], list[Table]]:
     """What is measured, and the paper's tables in its order."""
-    import yaml
-
     content = yaml.safe_load((files("materialist.bench") / "assets" / "paper.yaml").read_text("utf-8"))
     measures = {name: Measure(**told) for name, told in content["measures"].items()}
     return measures, [Table(**told) for told in content["tables"]]
@@ -150,8 +152,6 @@ def write_page(
     output: Path, tables: list[Table], measures: dict[str, Measure], rows: dict[str, dict[str, Any]], *, quick: bool
 ) -> None:
     """Write report.html, which opens without a server or other files, and report.md. Raises OutputError."""
-    from jinja2 import Environment
-
     parts: list[dict[str, Any]] = []
     for table in tables:
         row: dict[str, Any] = rows.get(table.measure, {"absent": table.absent or "Not run yet."})
@@ -172,8 +172,6 @@ def write_page(
 
 def _picture(path: Path, widest: int = 1400) -> str:
     """A picture as a JPEG in a data URI, at most `widest` pixels across; empty where there is none."""
-    import cv2
-
     picture = cv2.imread(str(path)) if path.is_file() else None
     if picture is None:
         return ""

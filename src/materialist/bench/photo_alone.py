@@ -23,10 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from materialist import metrics
+from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
 from materialist.bench.edits import KINDS, Edit, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
+from materialist.edits.composite.composite import composite
 from materialist.errors import InputError
 from materialist.metrics.maps import best_scale, score
 from materialist.option_kinds import option
@@ -88,8 +89,6 @@ class PhotoAloneBench(Benchmark):
 
     def _fitted(self, sample: SyntheticSample) -> Iterator[tuple[str, Scene, dict[str, float]]]:
         """Names of rows, their scenes, and figures of those that are inversions."""
-        from materialist import pipeline
-
         shared: dict[str, Any] = {"completion": self.completion, "seed": self.seed, "device": self.device}
 
         def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
@@ -112,8 +111,6 @@ class PhotoAloneBench(Benchmark):
         self, edit: Edit, sample: SyntheticSample, before: Array, scenes: dict[str, Scene], report: Report
     ) -> Iterator[Row]:
         """Rows of one edit, and its strip of the sheet; `before` is the true picture of the photo."""
-        from materialist.edits.composite.composite import composite
-
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
         inside = edit.region(before, after)
         shown = [sample.photo.linear, after]

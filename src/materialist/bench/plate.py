@@ -14,13 +14,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+from scipy.ndimage import binary_dilation
 
-from materialist import metrics
+from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, timed
 from materialist.bench.report import Column, Report, strip
 from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edits.composite.composite import composite
+from materialist.edits.remove.remove import remove
 from materialist.errors import InputError
+from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.types import Array
 
@@ -47,10 +52,6 @@ class PlateBench(Benchmark):
     spp: int = option(128, "Paths a pixel of the composite.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        import cv2
-
-        from materialist.io.photo import read_photo
-
         if data is None or not ((data / PLATE).is_file() and (data / PHOTO).is_file()):
             raise InputError(f"This benchmark needs a pair of photos: --data DIR with {PLATE} and {PHOTO}.")
         photo, plate = read_photo(data / PHOTO, size=self.size), read_photo(data / PLATE).original
@@ -80,10 +81,6 @@ class PlateBench(Benchmark):
         report.sheet.append(strip(*pictures[:2], *pictures[3:]))
 
     def _removed(self, photo: Any, predictor: str, mask: Array) -> Array:
-        from materialist import pipeline
-        from materialist.edits.composite.composite import composite
-        from materialist.edits.remove.remove import remove
-
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
         scene = pipeline.invert(photo, predictor=predictor, **shared)
         return composite(scene, remove(scene, mask), spp=self.spp, **shared)
@@ -91,15 +88,11 @@ class PlateBench(Benchmark):
 
 def grown(mask: Array, pixels: int) -> Array:
     """The mask [H, W] bool and what is so near to it."""
-    from scipy.ndimage import binary_dilation
-
     return binary_dilation(mask, np.ones((3, 3)), iterations=pixels)
 
 
 def orange(linear: Array) -> Array:
     """[H, W] bool: the largest connected thing of a photo [H, W, 3] in saturated orange."""
-    import cv2
-
     hue, saturation, _ = cv2.split(cv2.cvtColor(linear_to_srgb(linear), cv2.COLOR_RGB2HSV))
     found = ((hue < 30) & (saturation > 0.75)).astype(np.uint8)
     _, label, stats, _ = cv2.connectedComponentsWithStats(found)

@@ -14,10 +14,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist.bench.report import Column, Report
 from materialist.option_kinds import option
+from materialist.predict import get_predictor
+from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.types import Camera, Photo
 
 
@@ -40,10 +43,6 @@ class PredictorBench(Benchmark):
     threads: int = option(0, "Of torch; 0 leaves their number.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        import torch
-
-        from materialist.predict import get_predictor
-
         if self.threads:
             torch.set_num_threads(self.threads)
         report.settings.update(threads=torch.get_num_threads(), cores=os.cpu_count())
@@ -68,10 +67,6 @@ class PredictorBench(Benchmark):
 
 def forward(network: Any, size: int) -> Callable[[], Any]:
     """The forward pass of the bundled network or MatNet on noise; it waits for the device."""
-    import torch
-
-    from materialist.predict.bundled.network import STRIDE, BundledNetwork
-
     device = next(network.parameters()).device
     step = STRIDE if isinstance(network, BundledNetwork) else 14
     side = max(step, round(size / step) * step)

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
@@ -124,9 +126,6 @@ def markdown(report: Report) -> str:
 
 def _plot(report: Report, path: Path) -> None:
     """One panel a plotted column: a dot for every sample, a bar for the mean of each method."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     table = means(report)
     titles = {c.key: c.title for c in report.columns}
     figure = Figure(figsize=(3.6 * len(report.plotted), 0.45 * len(table) + 1.6), layout="constrained")

@@ -15,14 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
 from materialist.bench.edits import true_scene
 from materialist.bench.report import Column, Report
 from materialist.edits.select.objects import Box
+from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.geometry.silhouette import window
 from materialist.option_kinds import option
+from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.procedural.arrangements import arrangement
 from materialist.procedural.synthetic import make_sample
 from materialist.types import Array, Scene
@@ -49,8 +52,6 @@ class SelectBench(Benchmark):
     spp: int = option(100, "Samples a pixel of the pictures.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.predict.bundled.predictor import BundledPredictor
-
         if data is not None:
             arrangement(0, seed=self.seed, data=data)  # that there are meshes
         predictor = BundledPredictor()
@@ -78,8 +79,6 @@ class SelectBench(Benchmark):
 def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float = 2.5) -> list[tuple[int, int]]:
     """Two (column, row) in a mask [H, W] bool: its middle, and any place `inside` pixels from its border or more; both
     `usable` [H, W] bool."""
-    from scipy.ndimage import distance_transform_edt
-
     away = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
     places = [np.argwhere(away == away.max()), np.argwhere((away > inside) & usable)]
     chosen = [places[0][0], *([places[1][rng.integers(len(places[1]))]] if len(places[1]) else [])]
@@ -87,8 +86,6 @@ def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float =
 
 
 def _scores(scene: Scene, mask: Array, **how: Any) -> dict[str, float]:
-    from materialist.edits.select.select import select
-
     try:
         found = select(scene, **how)
     except InputError:  # nothing was found there

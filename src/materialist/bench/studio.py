@@ -31,6 +31,7 @@ import psutil
 from materialist.bench.benchmark import SIZE, Benchmark, Row
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.io.photo import PREFIX, example_path
 from materialist.option_kinds import option
 
 _MOVE = """([name, value, waits]) => new Promise((done, fail) => {
@@ -89,8 +90,6 @@ class StudioBench(Benchmark):
     scene: str = option("", "A scene package that is opened in place of the photo.", kind="name")
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.io.photo import PREFIX, example_path
-
         photo = example_path(self.photo) if self.photo.startswith(PREFIX) else Path(self.photo)
         if not photo.is_file():
             raise InputError(f"There is no photo at {self.photo}.")

@@ -20,6 +20,15 @@ from materialist.bench.benchmark import COUNT, Benchmark, Row
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.option_kinds import option
+from materialist.predict.refraction import WEIGHTS
+from materialist.predict.refraction.network import RefractionNet
+from materialist.procedural.objects.glassware import Shape, centred
+from materialist.procedural.objects.things import mesh
+from materialist.procedural.options import captures
+from materialist.procedural.thickness.dataset import ViewPlan, draw_views, make_views
+from materialist.procedural.thickness.errors import errors
+from materialist.procedural.thickness.ray_paths import ShapeTracer
+from materialist.render.variant import setup
 from materialist.types import Array
 
 
@@ -42,15 +51,6 @@ class ThicknessBench(Benchmark):
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         if data is not None and not (data / "meshes").is_dir():
             raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
-        from materialist.predict.refraction import WEIGHTS
-        from materialist.predict.refraction.network import RefractionNet
-        from materialist.procedural.objects.glassware import Shape, centred
-        from materialist.procedural.objects.things import mesh
-        from materialist.procedural.options import captures
-        from materialist.procedural.thickness.dataset import ViewPlan, draw_views, make_views
-        from materialist.procedural.thickness.ray_paths import ShapeTracer
-        from materialist.render.variant import setup
-
         setup("cpu")
         network, _ = RefractionNet.load(Path(self.weights) if self.weights else WEIGHTS)
         plan = ViewPlan(self.shapes, self.views, "heldout", self.seed)
@@ -66,8 +66,6 @@ class ThicknessBench(Benchmark):
 
 def _rows(group: str, name: str, network: Any, views: dict[str, Array]) -> Iterator[Row]:
     """A row a view for the network and for the prior."""
-    from materialist.procedural.thickness.errors import errors
-
     each = errors(network, views)
     own = {"solid": "solid", "hollow": "hollow", "back": "back"}
     prior = {"solid": "symmetry", "back": "back_symmetry"}

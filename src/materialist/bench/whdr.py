@@ -20,7 +20,9 @@ import numpy as np
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
+from materialist.io.photo import read_photo
 from materialist.option_kinds import option
+from materialist.predict import get_predictor
 from materialist.types import Array
 
 BASELINES = ("constant", "photo")
@@ -45,9 +47,6 @@ class WhdrBench(Benchmark):
     delta: float = option(0.1, "Relative difference from which albedos differ.", low=0, high=10)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        from materialist.io.photo import read_photo
-        from materialist.predict import get_predictor
-
         if data is None:
             raise InputError("This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json.")
         pairs = find(data)[:: self.every]

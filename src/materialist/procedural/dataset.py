@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import time
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
 from materialist.io.samples import Progress, SampleFolder, claim, described, write_arrays
@@ -77,8 +79,6 @@ def _rendered(folder: Path, options: DataSetOptions, missing: list[int], workers
     if workers == 1 or len(missing) < 2:
         yield from (_write(folder, options, k) for k in missing)
         return
-    import multiprocessing
-
     # Fresh processes: a renderer that has started does not survive a fork.
     context = multiprocessing.get_context("spawn")
     with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
@@ -104,8 +104,6 @@ def _write(folder: Path, options: DataSetOptions, index: int) -> int:
 
 
 def _description(options: DataSetOptions) -> dict[str, Any]:
-    from materialist import __version__
-
     files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}
     drawn = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
     told = {"format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT}

@@ -11,9 +11,11 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from materialist.color import luminance
+from materialist.io.exr import read_exr
 from materialist.procedural.objects.shapes import turn_upright
 from materialist.procedural.options import captures
 from materialist.types import Array
@@ -57,10 +59,6 @@ def envmap(radiance: Radiance, to_scene: Array) -> Array:
 
 def _capture(path: Path, turn: float) -> Radiance:
     """Bilinear lookup in a captured envmap, turned about +Y by `turn` radians."""
-    import cv2
-
-    from materialist.io.exr import read_exr
-
     source = np.nan_to_num(np.maximum(read_exr(path), 0))[..., :3]
     h, w = source.shape[:2]
     wrapped = cv2.copyMakeBorder(source, 0, 0, 1, 1, cv2.BORDER_WRAP)
@@ -214,8 +212,6 @@ def captured(rng: np.random.Generator, captures: tuple[Path, ...]) -> Array:
 
 @lru_cache(maxsize=64)
 def _load(path: Path) -> Array:
-    from materialist.io.exr import read_exr
-
     return np.minimum(np.nan_to_num(np.maximum(read_exr(path)[..., :3], 0)), 6e4)
 
 

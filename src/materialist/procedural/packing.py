@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from materialist.color import luminance
@@ -104,8 +105,6 @@ def _resample(weight: Array, entries: int) -> tuple[Array, Array]:
 
 def _directions(world: World) -> tuple[Array, Array, bool]:
     """(table of texels, density per solid angle, whether a small part of the sky gives much of the light)."""
-    import cv2
-
     size = (2 * ENV_ROWS, ENV_ROWS)
     glow = cv2.resize(luminance(world.envmap), size, interpolation=cv2.INTER_AREA).astype(np.float64)
     angle = np.repeat(row_solid_angle(ENV_ROWS), 2 * ENV_ROWS)

@@ -10,8 +10,10 @@ from materialist.color import linear_to_srgb, luminance
 from materialist.io.samples import LIGHT_ROWS
 from materialist.procedural import outdoors, packing, rooms
 from materialist.procedural.options import SPLITS, DataSetOptions
+from materialist.procedural.tracer import SampleTracer
 from materialist.procedural.world import World
 from materialist.render.denoise import denoise
+from materialist.render.variant import setup
 from materialist.types import Array, Camera
 
 PROBE = 4
@@ -36,11 +38,7 @@ def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
 
     Raises SetupError where Mitsuba or the denoiser is missing.
     """
-    from materialist.render.variant import setup
-
     setup(options.device)  # before a mesh is read, which would choose for itself
-    from materialist.procedural.tracer import SampleTracer
-
     for attempt in range(ATTEMPTS):
         rng = np.random.default_rng([options.seed, index, attempt, *SPLITS[options.split]])
         world = make_world(rng, options)

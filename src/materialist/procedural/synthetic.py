@@ -11,12 +11,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from materialist.buffers import floats, tensor
+from materialist.color import luminance
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights
 from materialist.procedural.world import Viewpoint
+from materialist.render.envmap import emitter, on_mitsuba_grid
+from materialist.render.scene import look_along, sensor, shape
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
@@ -79,8 +84,6 @@ def make_sample(
 
 def _exposure(picture: Array, surface: Array) -> float:
     """Factor that brings the 98th percentile of the surfaces' luminance to EXPOSED, as a camera would."""
-    from materialist.color import luminance
-
     bright = float(np.percentile(luminance(picture)[surface], 98)) if surface.any() else float(picture.max())
     return EXPOSED / max(bright, 1e-6)
 
@@ -89,11 +92,6 @@ class TrueScene:
     """The true geometry and materials of one view in Mitsuba, to be rendered under any envmap."""
 
     def __init__(self, items: list[scenes.Item], view: Viewpoint, height: int, width: int):
-        import mitsuba as mi
-
-        from materialist.render.envmap import emitter
-        from materialist.render.scene import look_along, sensor
-
         self.view = view
         self.camera = Camera(width, height, view.fov)
         self.items = items
@@ -115,10 +113,6 @@ class TrueScene:
 
     def render(self, envmap: Array, spp: int = PHOTO_SPP, seed: int = 0) -> Array:
         """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
-        import mitsuba as mi
-
-        from materialist.render.envmap import on_mitsuba_grid
-
         self._params["light.data"] = tensor(mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self._params.update()
         depth = GLASS_DEPTH if any(item.transparent for item in self.items) else MAX_DEPTH
@@ -165,9 +159,6 @@ class TrueScene:
 
     def _probe(self, offset: tuple[float, float]) -> dict[str, Array]:
         """What rays through that (x, y) place in each pixel see: item (-1 = sky), depth, normal [., 3], uv [., 2]."""
-        import drjit as dr
-        import mitsuba as mi
-
         height, width = self.camera.height, self.camera.width
         columns, rows = np.meshgrid(np.arange(width) + offset[0], np.arange(height) + offset[1])
         x = floats(mi, (columns - width / 2) / self.camera.focal)
@@ -203,9 +194,6 @@ def _true_scene(
 
 def _registry(meshes: list[Any]) -> Array:
     """[n] item number by Mitsuba's number of a shape; -1 for number 0 (nothing was hit)."""
-    import drjit as dr
-    import mitsuba as mi
-
     numbers = [int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh)))[0]) for mesh in meshes]
     table = np.full(max(numbers) + 1, -1)
     table[numbers] = np.arange(len(meshes))
@@ -214,9 +202,6 @@ def _registry(meshes: list[Any]) -> Array:
 
 def _mesh(item: scenes.Item) -> Any:
     """A Mitsuba mesh with the item's material."""
-    import mitsuba as mi
-
-    from materialist.render.scene import shape
 
     def texture(values: Array) -> dict[str, Any]:
         bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))

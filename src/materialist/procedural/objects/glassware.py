@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from skimage.measure import marching_cubes
 
 from materialist.camera import unit
 from materialist.procedural.objects import shapes
@@ -46,8 +48,6 @@ def centred(solid: Solid) -> Solid:
 
 def _profile(rng: np.random.Generator, points: int, low: float = 0.25) -> Array:
     """[40, 2] smooth outline (radius, height) through random radii at even heights, height 0 to 1."""
-    from scipy.interpolate import PchipInterpolator
-
     y = np.linspace(0, 1, 40)
     radius = PchipInterpolator(np.linspace(0, 1, points + 2), rng.uniform(low, 1, points + 2))(y)
     return np.stack([radius * rng.uniform(0.18, 0.55), y], -1)
@@ -177,8 +177,6 @@ def _twisted(rng: np.random.Generator) -> Solid:
 
 def _stick(rng: np.random.Generator) -> Solid:
     """Bars, tubes, cones, hooks: round along a bent line."""
-    from scipy.interpolate import CubicSpline
-
     t, knots = np.linspace(0, 1, 28), np.linspace(0, 1, 4)
     line = CubicSpline(knots, np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0))(t)
     radius = np.interp(t, [0, rng.uniform(0.2, 0.8), 1], rng.uniform(0.06, 0.3, 3))
@@ -226,8 +224,6 @@ def _limb(p: Array, start: Array, end: Array, first: float, last: float) -> Arra
 
 def level_set(field: Callable[[Array], Array], reach: float, points: int = 72) -> Solid:
     """The zero of a function of points [..., 3], negative inside, within a box of that half side about the origin."""
-    from skimage.measure import marching_cubes
-
     axis = np.linspace(-reach, reach, points)
     values = field(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1))
     closed = np.pad(values[1:-1, 1:-1, 1:-1], 1, constant_values=1e-3)

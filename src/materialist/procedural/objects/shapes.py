@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import PchipInterpolator
 
 from materialist.camera import unit
 from materialist.types import Array
@@ -71,8 +73,6 @@ def capsule(radius: float, length: float) -> Solid:
 
 def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Solid:
     """Open vase, cup or bowl: a smooth wall through `control` [K, 2] (radius, height), with an inside and a rim."""
-    from scipy.interpolate import PchipInterpolator
-
     height = np.linspace(control[0, 1], control[-1, 1], rows)
     radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
     inner = np.maximum(radius - thickness, np.minimum(0.02, radius / 2))
@@ -94,8 +94,6 @@ def panel(origin: ArrayLike, right: Array, up: Array, repeat: tuple[float, float
 
 def load(path: Path) -> Solid:
     """A PLY mesh, stood on y = 0 with longest side 1, smooth normals, and a texture wrapped around its Y axis."""
-    import mitsuba as mi
-
     params = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
     vertices = np.array(params["vertex_positions"], np.float64).reshape(-1, 3)
     faces = np.array(params["faces"], np.int32).reshape(-1, 3)

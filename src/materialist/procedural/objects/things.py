@@ -13,6 +13,7 @@ from materialist.procedural import materials as m
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects.shapes import Solid
 from materialist.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
+from materialist.render.variant import setup
 
 Meshes = tuple[Path, ...]
 
@@ -35,8 +36,6 @@ def captured(rng: np.random.Generator, size: float, meshes: Meshes) -> Parts:
 @lru_cache(maxsize=40)
 def mesh(path: Path) -> Solid:
     """The mesh in a .ply file; see `shapes.load`. Raises InputError when it is damaged or has no faces."""
-    from materialist.render.variant import setup
-
     setup()
     try:
         solid = s.load(path)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -196,8 +197,6 @@ def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -
 
 def _imperfect(rng: np.random.Generator, view: View) -> View:
     """The view with maps as a predictor gives them: bent, flattened or exaggerated, smoothed, a mask that is off."""
-    import cv2
-
     normal, depth, inside = view.normal, view.depth.copy(), view.inside
     if not inside.any():
         return view
@@ -220,7 +219,5 @@ def _imperfect(rng: np.random.Generator, view: View) -> View:
 
 def _smooth_noise(rng: np.random.Generator, channels: int, side: int) -> Array:
     """[S, S, channels] float32 with waves about a third of the window long, of amplitude about 1."""
-    import cv2
-
     coarse = rng.normal(size=(5, 5, channels)).astype(np.float32)
     return cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC).reshape(side, side, channels)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import torch
 
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.types import Array
@@ -31,8 +32,6 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     of the mirrored thickness as the solid one; `back`, `back_symmetry`: degrees by which the back's normals are off,
     those predicted and those of the front mirrored.
     """
-    import torch
-
     maps, target = views["maps"].astype(np.float32), views["target"].astype(np.float32)
     with torch.inference_mode():
         parts = [network(torch.from_numpy(maps[k : k + batch])).numpy() for k in range(0, len(maps), batch)]

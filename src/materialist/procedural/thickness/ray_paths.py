@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
 from materialist.buffers import floats
 from materialist.camera import unit
 from materialist.procedural.objects.shapes import Solid
+from materialist.render.scene import shape
+from materialist.render.variant import setup
 from materialist.types import Array
 
 MOST = 24
@@ -51,12 +55,9 @@ class ShapeTracer:
     """One mesh to be shot at."""
 
     def __init__(self, solid: Solid):
-        from materialist.render.scene import shape
-        from materialist.render.variant import setup
-
-        self._mi = mi = setup()
-        mesh = shape(mi, solid)
-        self._scene = mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, "shape": mesh})
+        setup()
+        scene = {"type": "scene", "embree_use_robust_intersections": True, "shape": shape(mi, solid)}
+        self._scene = mi.load_dict(scene)
         self._faces, self._normals = solid.faces, solid.normals
         corners = solid.vertices[solid.faces]
         self._flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -94,9 +95,6 @@ class ShapeTracer:
 
     def _nearest(self, origin: Array, direction: Array) -> tuple[Array, Array, Array]:
         """Distance [n] (inf for none), face [n] and place in it [n, 2] (0 for none) of every ray's nearest surface."""
-        import drjit as dr
-
-        mi = self._mi
         start, way = (mi.Vector3f(*(floats(mi, c) for c in x.T)) for x in (origin, direction))
         ray = mi.Ray3f(mi.Point3f(start), way)
         found = self._scene.ray_intersect_preliminary(ray, coherent=False)
