@@ -20,30 +20,20 @@ def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
     assert better > 3 + metrics.psnr(sample.render(grey, spp=64), photo)
 
 
-def test_without_materials_the_paper_s_neutral_ones_are_given(sample, monkeypatch):
-    """ "w/o mat": A = R = 0.5 and M = 0.1 everywhere, whatever the true ones are."""
-    from materialist.fit.engine import PathEngine
-
-    seen = []
-    monkeypatch.setattr(
-        PathEngine, "light_problem", lambda self, materials, height=None: seen.append(materials) or 1 / 0
+def test_maps_are_given_as_the_method_says(sample):
+    """The paper's "w/ mat" is MatNet's maps, held fixed; "w/o mat": A = R = 0.5 and M = 0.1, whatever the true ones."""
+    names = ("paper", "paper w/o mat", "paper predicted", "paper predicted w/o mat")
+    true, neutral, predicted, shape = (
+        light.given_maps(sample, light.METHODS[name], seed=0, device="cpu") for name in names
     )
-    for name in ("paper path 128x64", "paper path w/o mat"):
-        with pytest.raises(ZeroDivisionError):
-            light.fit(sample, light.METHODS[name], "auto", device="cpu")
-    true, neutral = seen
-    assert np.array_equal(true.albedo, sample.truth.materials.albedo)
-    assert neutral.albedo.shape == true.albedo.shape and (neutral.albedo == 0.5).all()
-    assert (neutral.roughness == 0.5).all() and np.allclose(neutral.metallic, 0.1)
+    assert true.depth is neutral.depth is sample.truth.depth and true.materials is sample.truth.materials
+    assert not np.array_equal(predicted.depth, true.depth) and np.array_equal(shape.depth, predicted.depth)
+    for given in (neutral.materials, shape.materials):
+        assert given.albedo.shape == true.materials.albedo.shape and (given.albedo == 0.5).all()
+        assert (given.roughness == 0.5).all() and np.allclose(given.metallic, 0.1)
 
 
-def test_predicted_maps_on_predicted_geometry_and_one_colour_of_light(sample):
-    """The paper's "w/ mat" is MatNet's maps, held fixed; a constant light is what a fit must beat."""
-    how = {"seed": 0, "device": "cpu"}
-    truth, predicted = (light.given_maps(sample, light.METHODS[f"paper{name}"], **how) for name in ("", " predicted"))
-    neutral = light.given_maps(sample, light.METHODS["paper predicted w/o mat"], **how)
-    assert truth is not predicted and not np.array_equal(predicted.depth, truth.depth)
-    assert np.array_equal(neutral.depth, predicted.depth) and (neutral.materials.roughness == 0.5).all()
+def test_one_colour_of_light_and_the_predicted_one_are_not_fitted(sample):
     found, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
     colours = np.unique(found.reshape(-1, 3), axis=0, return_counts=True)[1]
     prior, none, _ = light.fit(sample, light.METHODS["prior predicted"], "auto", device="cpu")

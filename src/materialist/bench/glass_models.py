@@ -14,7 +14,7 @@ import mitsuba as mi
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from materialist.bench.glass_scenes import PROTOCOL, GlassScene, mesh, painted
+from materialist.bench.glass_scenes import PROTOCOL, GlassScene, painted
 from materialist.buffers import tensor
 from materialist.edits.glass import two_interface as interfaces
 from materialist.edits.remove.behind import behind as continued_behind
@@ -28,6 +28,7 @@ from materialist.options import Glass
 from materialist.predict.refraction import best_thickness, thickness
 from materialist.predict.refraction.thickness import Thickness
 from materialist.render.denoise import denoise
+from materialist.render.scene import shape
 from materialist.solids.closed import closed_proxy
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array
@@ -86,7 +87,7 @@ def inpainted_background(scene: GlassScene, photo: Array, envmap: Array, gain: f
         continued = continued_behind(depth, normal, plane, hole, scene.front.depth, scene.camera)
         depth, normal, label = continued.depth, continued.normal, continued.label
         found = _predicted(scene, np.clip(photo * gain, 0, 1), depth, normal)
-        things = {"object": mesh(_body(scene, found, depth), painted(scene.item.albedo))}
+        things = {"object": shape(mi, _body(scene, found, depth), painted(scene.item.albedo))}
     albedo = _albedo(scene, depth, normal, photo, envmap, things)
     filled = patched(np.clip(photo * gain, 0, 1), hole, ~hole, depth, label)
     shown = np.where(hole[..., None], filled / gain, photo).astype(np.float32)
@@ -127,7 +128,7 @@ def lit(
             paint = behind.albedo if mean is None else np.broadcast_to(mean, (2, 2, 3))
             texture = {"type": "bitmap", "data": tensor(mi, paint), "raw": True, "wrap_mode": "clamp"}
             surface = {"type": "diffuse", "reflectance": texture}
-            shapes[f"backdrop{int(k) + 1}"] = mesh(part(geometry.mesh, int(k)), surface)
+            shapes[f"backdrop{int(k) + 1}"] = shape(mi, part(geometry.mesh, int(k)), surface)
     return scene.trace({**shapes, **(things or {})}, envmap, length=length, spp=spp, cropped=cropped)
 
 
@@ -153,7 +154,7 @@ def before(case: Case, body: Any, behind: Background) -> Array:
     Denoised as `materialist glass` does, where the denoiser is installed.
     """
     scene = case.scene
-    things = {"object": mesh(body, {"type": "dielectric", "int_ior": case.ior, "ext_ior": 1.0})}
+    things = {"object": shape(mi, body, {"type": "dielectric", "int_ior": case.ior, "ext_ior": 1.0})}
     length = PROTOCOL.glass_length
     picture = lit(scene, behind, case.envmap, things, length=length, spp=case.spp, cropped=True)
     box = window(scene.mask)

@@ -154,10 +154,10 @@ class GlassScene:
 
         Of 'glass' only the rectangle around the object is rendered, the rest is 0.
         """
-        things = {f"room{k}": mesh(i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
+        things = {f"room{k}": shape(mi, i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
         glass = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0}
         if what != "room":
-            things["object"] = mesh(self.item.solid, glass if what == "glass" else painted(self.item.albedo))
+            things["object"] = shape(mi, self.item.solid, glass if what == "glass" else painted(self.item.albedo))
         length = PROTOCOL.glass_length if what == "glass" else PROTOCOL.diffuse_length
         return self.trace(things, envmap, length=length, spp=spp, seed=seed, cropped=what == "glass")
 
@@ -183,11 +183,6 @@ class GlassScene:
         return whole
 
 
-def mesh(solid: Any, bsdf: dict[str, Any]) -> Any:
-    """A Mitsuba mesh of anything with vertices, faces, normals and uv."""
-    return shape(mi, solid, bsdf)
-
-
 def painted(albedo: Array) -> dict[str, Any]:
     """Mitsuba's diffuse surface with a texture [h, w, 3]."""
     bitmap = mi.Bitmap(np.ascontiguousarray(albedo, np.float32))
@@ -197,7 +192,7 @@ def painted(albedo: Array) -> dict[str, Any]:
 def seen(solid: Solid, camera: Camera) -> SeenSide:
     """What the camera sees of a mesh in its frame."""
     rays = pixel_rays(camera)
-    shape = rays.shape[:2]
+    size = rays.shape[:2]
     # Off the centres of pixels by a little: rays through the edges of meshes may slip between faces.
     direction = rays.reshape(-1, 3).astype(np.float64) + np.array([3e-5, 2e-5, 0])
     found = ShapeTracer(solid).trace(np.zeros_like(direction), direction)
@@ -207,8 +202,8 @@ def seen(solid: Solid, camera: Camera) -> SeenSide:
     thickness = found.solid * np.linalg.norm(direction, axis=-1)
     depth = np.where(hit, found.first, 0)
     return SeenSide(
-        depth.reshape(shape).astype(np.float32), normal.reshape(*shape, 3).astype(np.float32),
-        thickness.reshape(shape).astype(np.float32), back.reshape(*shape, 3).astype(np.float32),
+        depth.reshape(size).astype(np.float32), normal.reshape(*size, 3).astype(np.float32),
+        thickness.reshape(size).astype(np.float32), back.reshape(*size, 3).astype(np.float32),
     )  # fmt: skip
 
 

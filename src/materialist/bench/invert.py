@@ -16,7 +16,7 @@ import json
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,6 @@ from materialist.predict import get_predictor
 from materialist.procedural.synthetic import make_sample
 from materialist.render.scene import RenderScene
 from materialist.render.variant import setup
-from materialist.types import Photo
 
 NATIVE = 512
 """Longer side of the synthetic photo; larger working sizes enlarge it."""
@@ -153,7 +152,7 @@ def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *o
 
 def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
     """The photo, or a copy enlarged to `size` when it is smaller: `invert` itself never enlarges."""
-    linear = _photo(case, size).linear
+    linear = read_photo(case.photo, size=size).linear
     height, width = linear.shape[:2]
     scale = size / max(height, width)
     if scale <= 1:
@@ -162,10 +161,6 @@ def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
     path = folder / f"photo{size}.png"
     write_png(path, np.clip(cv2.resize(linear, target, interpolation=cv2.INTER_CUBIC), 0, 1))
     return path
-
-
-def _photo(case: InvertedPhoto, size: int) -> Photo:
-    return read_photo(case.photo, size=size, fov=case.fov)
 
 
 def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
@@ -187,7 +182,7 @@ def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     """
     setup(bench.device)
     size, seed = bench.step_size, bench.seed
-    photo = _photo(replace(case, photo=_at_least(case, size, folder)), size)
+    photo = read_photo(_at_least(case, size, folder), size=size, fov=case.fov)
     prior = get_predictor(case.predictor).predict(photo, seed=seed)
     camera, light = photo.camera, np.full((256, 512, 3), 0.6, np.float32)
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)

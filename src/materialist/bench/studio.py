@@ -200,7 +200,10 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
     address = f"http://127.0.0.1:{port}"
     try:
         end = time.monotonic() + 120
-        while not _answers(address):
+        while True:
+            with contextlib.suppress(OSError):
+                urllib.request.urlopen(address, timeout=10).close()
+                break
             if process.poll() is not None or time.monotonic() > end:
                 raise MaterialistError("The studio did not start; try: materialist studio")
             time.sleep(0.2)
@@ -208,13 +211,6 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
     finally:
         process.terminate()
         process.wait(30)
-
-
-def _answers(address: str) -> bool:
-    with contextlib.suppress(OSError):
-        urllib.request.urlopen(address, timeout=10).close()
-        return True
-    return False
 
 
 @contextlib.contextmanager
