@@ -142,8 +142,9 @@ def resized(sample: Sample, height: int, width: int) -> Sample:
 
 def upside_down(sample: Sample) -> Sample:
     """The mirror image in a level plane: rows reversed, y of normals and rays negated."""
+    mirror = np.array([1, -1, 1], np.float32)
     turned = each_map(sample, lambda array, _: np.ascontiguousarray(array[::-1]))
-    return replace(turned, normal=turned.normal * np.float32([1, -1, 1]), rays=turned.rays * np.float32([1, -1]))
+    return replace(turned, normal=turned.normal * mirror, rays=turned.rays * mirror[:2])
 
 
 def freeze(network: MatNet) -> None:

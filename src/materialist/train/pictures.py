@@ -73,7 +73,8 @@ class DevicePictures(Pictures):
         room = self.settings.capacity - self._kept
         workers = min(self.settings.readers, os.cpu_count() or 1)
         chosen: Any = places[:room]
-        for row in DataLoader(chosen, batch_size=None, collate_fn=self._read_or_message, num_workers=workers):
+        read: Any = self._read_or_message
+        for row in DataLoader(chosen, batch_size=None, collate_fn=read, num_workers=workers):
             if isinstance(row, str):
                 logging.getLogger(__name__).warning("%s It is left out.", row)
                 continue

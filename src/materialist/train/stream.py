@@ -27,7 +27,7 @@ Key = tuple[int, tuple[int, ...]]
 """Number of an example, and the seed of its variant."""
 
 
-def readable(read: Callable[[int], T], index: int, another: Callable[[], int]) -> T:
+def readable(read: Callable[[int], T], index: int, another: Callable[[], Any]) -> T:
     """What `read` makes of a number, or of `another()` in place of one that cannot be read.
 
     Raises InputError after ATTEMPTS.

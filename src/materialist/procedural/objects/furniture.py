@@ -5,6 +5,7 @@ The first part of what one can look down on is its top.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -168,5 +169,6 @@ ALONG_WALLS = (
     (0.24, cupboard), (0.2, shelf), (0.2, sofa), (0.08, bed), (0.12, table), (0.08, kitchen), (0.08, floor_thing)
 )  # fmt: skip
 IN_THE_MIDDLE = ((0.45, table), (0.25, chair), (0.12, sofa), (0.18, floor_thing))
-set_table = partial(table, fewest=3)
-TO_LOOK_ON = ((0.6, set_table), (0.2, kitchen), (0.2, partial(cupboard, wardrobes=False)))
+set_table: Callable[..., Parts] = partial(table, fewest=3)
+sideboard: Callable[..., Parts] = partial(cupboard, wardrobes=False)
+TO_LOOK_ON = ((0.6, set_table), (0.2, kitchen), (0.2, sideboard))
