@@ -21,15 +21,9 @@ MIN_ALPHA = 1e-3
 
 
 def evaluate(albedo: Array, roughness: Array, metallic: Array, n: Array, wi: Array, wo: Array) -> Array:
-    """f_r = f_s + (1 - M) f_d, without the cosine of the rendering equation.
+    """[..., 3] float64 f_r = f_s + (1 - M) f_d in 1 / sr; 0 where wi and wo lie on different sides of the surface.
 
-    Args:
-        albedo: [..., 3] A in [0, 1].
-        roughness: [...] R in [0, 1]; metallic: [...] M in [0, 1].
-        n: [..., 3] unit shading normal; wi, wo: [..., 3] unit directions away from the surface. All broadcast.
-
-    Returns:
-        [..., 3] float64, 1 / sr; 0 where wi and wo lie on different sides of the surface.
+    albedo: [..., 3]. roughness, metallic: [...]. n, wi, wo: [..., 3] unit, directions away from the surface.
     """
     albedo, roughness, metallic = (np.asarray(x, np.float64) for x in (albedo, roughness, metallic))
     c0, c1, c2 = np.moveaxis(diffuse_coefficients(n, wi, wo), -1, 0)
@@ -58,11 +52,7 @@ def diffuse_coefficients(n: Array, wi: Array, wo: Array) -> Array:
 
 
 def specular_split(roughness: Array, n: Array, wi: Array, wo: Array) -> tuple[Array, Array]:
-    """(s0, s1), each [...], with f_s = C_0 s0(R) + s1(R): the modified Schlick F_s split by its C_0.
-
-    Args:
-        roughness: [...] R in [0, 1]; n, wi, wo: [..., 3] unit.
-    """
+    """(s0, s1), each [...], with f_s = C_0 s0(R) + s1(R): the modified Schlick F_s split by its C_0."""
     cos_i, cos_o, sin2_h, cos_d = _cosines(n, wi, wo)
     alpha = np.maximum(np.asarray(roughness, np.float64) ** 2, MIN_ALPHA)
     # D = a^2 / (pi (cos^2 (a^2 - 1) + 1)^2), with 1 - cos^2 = sin^2 written out so that nothing cancels.

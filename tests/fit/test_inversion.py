@@ -10,7 +10,7 @@ from transport_scenes import furnished_room, windowed_sky
 from materialist import metrics
 from materialist.envmap import texel_directions
 from materialist.fit.engine import PathEngine, TransportEngine
-from materialist.fit.invert import Fit, FitSetup
+from materialist.fit.invert import Fit, FitSetup, invert
 from materialist.fit.light import paste_visible_sky
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
 from materialist.render.scene import RenderScene
@@ -199,3 +199,14 @@ def test_visible_sky_is_pasted_where_it_is_seen():
     # An HDR photo measures up to its own white.
     measured = paste_visible_sky(envmap, 1.5 * photo, surface, camera, white=10.0)
     np.testing.assert_allclose(measured[ahead & (d[..., 0] > 0.03)], 1.5)
+
+
+def test_a_result_has_two_independent_halves(room):
+    told = {}
+    setup = replace(room.setup(short(PAPER, 3), room.truth), completion="none", spp=4, device="cpu")
+    result = invert(setup, found=told.__setitem__)
+    assert result.spp == 4 and not np.array_equal(*result.halves)
+    np.testing.assert_allclose(result.rerender, np.mean(result.halves, 0), rtol=1e-6)
+    assert told["light"] is result.envmap and told["materials"] is result.materials
+    names = [stage["name"] for stage in result.stages]
+    assert names[:4] == ["geometry", "scene", "engine", "trace"] and names[-1] == "rerender"

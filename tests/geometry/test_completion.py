@@ -1,11 +1,12 @@
-"""Continued planes: found where light looks for them, never seen by the camera."""
+"""Continued planes: found where light looks for them, never seen by the camera. Creases."""
 
 import numpy as np
 import pytest
 from geometry_scenes import box_depth, plane_depth, room, screen_rays, trace
 
 from materialist.errors import InputError
-from materialist.geometry.build import build_geometry
+from materialist.geometry.boundary import depth_to_mesh
+from materialist.geometry.build import build_geometry, split_creases
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 60.0)
@@ -111,3 +112,18 @@ def test_walls_can_end_at_the_frame(furnished):
     assert faces(bare, floor) == faces(geometry, floor)
     assert 0 < faces(bare, wall) < faces(geometry, wall)  # it still goes on behind the box
     np.testing.assert_array_equal(bare.plane_label, geometry.plane_label)
+
+
+def test_the_last_row_of_a_wall_has_the_walls_normal():
+    """Normals are not shared across creases, points are."""
+    floor, wall = plane_depth(CAMERA, (0, 1, 0), -1.0), plane_depth(CAMERA, (0, 0, 1), -4.0)
+    is_wall = wall < np.where(floor > 0, floor, np.inf)
+    depth = np.where(is_wall, wall, floor)
+    normal = np.where(is_wall[..., None], [0.0, 0, 1], [0.0, 1, 0]).astype(np.float32)
+    mesh = depth_to_mesh(depth, normal, CAMERA)
+    blended = np.abs(mesh.normals).max(-1) < 0.9
+    assert blended.sum() > 40  # the mean of wall and floor
+    split = split_creases(mesh, depth, normal)
+    np.testing.assert_array_equal(build_geometry(depth, normal, CAMERA, completion="none").mesh.normals, split.normals)
+    own = normal.reshape(-1, 3)[split.face_pixel]  # [F, 3]
+    np.testing.assert_allclose(split.normals[split.faces], np.repeat(own[:, None], 3, 1), atol=1e-6)

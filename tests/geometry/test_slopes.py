@@ -1,9 +1,10 @@
-"""Normals of backs: exact on planes, up to where they end."""
+"""Normals of backs, and membranes: exact on planes, up to where they end and across holes."""
 
 import numpy as np
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import pixel_rays
+from materialist.geometry.membrane import membrane
 from materialist.geometry.slopes import back_normals
 from materialist.types import Camera
 
@@ -23,3 +24,12 @@ def test_a_flat_slanting_back_has_one_normal_even_next_to_an_edge():
         inner = binary_erosion(own, np.ones((5, 5))) & DISC
         assert inner.sum() > 100 and ((found[inner] @ normal) > 1 - 1e-6).all()
     assert (found[~DISC] == 0).all()
+
+
+def test_linear_functions_are_carried_through_a_hole():
+    y, x = np.mgrid[:60, :81].astype(float)
+    truth = np.stack([2 * x - y, 0.3 * y + 5], -1)
+    known = np.hypot(y - 30, x - 44) > 17
+    found = membrane(np.where(known[..., None], truth, np.nan), known)
+    np.testing.assert_array_equal(found[known], truth[known].astype(np.float32))
+    assert np.abs(found - truth)[~known].max() < 0.04 * np.ptp(truth)

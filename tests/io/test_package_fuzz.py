@@ -97,6 +97,7 @@ def linked(root, name):
     (root / name).symlink_to(outside)
 
 
+FILES = ("scene.json", "report.json", "maps/depth.exr", "mesh.ply", "plane_label.png")
 CASES = {
     "a huge map": lambda root: window(root / "maps/albedo.exr", 0, 0, 11_999, 11_999),
     "a huge envmap": lambda root: window(root / "envmap.exr", 0, 0, 2**30, 2**30),
@@ -114,6 +115,8 @@ CASES = {
     "many vertices": lambda root: counted(root / "bodies/0.ply", 4_000_000_000, 2),
     "text for a count": lambda root: counted(root / "mesh.ply", "many", 2),
     "deep JSON": lambda root: (root / "scene.json").write_text('{"a":' * 100_000),
+    **{f"no {name}": lambda root, name=name: (root / name).unlink() for name in FILES},
+    **{f"cut {name}": lambda root, name=name: (root / name).write_bytes(b"{") for name in FILES},
     "many bodies": lambda root: said(root, '"bodies": [', '"bodies": [' + "{}," * 100_000),
     "a list for a photo": lambda root: said(root, '"photo": {', '"photo": [], "x": {'),
     "another original": lambda root: said(root, '"original": "original.png"', '"original": ".."'),

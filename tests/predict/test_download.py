@@ -8,15 +8,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from materialist.errors import WeightsError
-from materialist.predict.models import (
-    chosen,
-    download,
-    folder_of,
-    hub_model,
-    is_complete,
-    require,
-    weights_file,
-)
+from materialist.predict.models import chosen, download, folder_of, hub_model, is_complete, require, weights_file
 from materialist.predict.weights import verify_folder
 
 MODEL = hub_model("matnet")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from render_scenes import empty, random_maps, uniform, wall, with_floor
 
+from materialist.buffers import floats
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
@@ -13,6 +14,7 @@ from materialist.types import Camera
 
 CAMERA = Camera(13, 7, 50.0)
 SIZE = (7, 13)
+HILLS = Camera(96, 64, 50.0)
 WHITE = np.ones((4, 8, 3), np.float32)
 
 
@@ -161,3 +163,50 @@ def test_normals_along_the_picture_s_x_are_normals_like_others():
     normal[..., 0] = 1
     scene = scene_of(build_geometry(np.full(SIZE, 2, np.float32), normal, CAMERA, completion="none"))
     assert np.isfinite(scene.render(spp=4)).all()
+
+
+def test_two_planes_keep_their_own_materials():
+    """Planes start alike; assigning one must not reach the other."""
+    camera = Camera(6, 4, 50.0)
+    label = np.full((4, 6), -1)
+    label[3], label[0] = 0, 1
+    geometry = with_floor(wall(camera), label)
+    geometry.mesh.face_plane[-1] = 1  # the second triangle of the floor becomes the other plane
+    scene = RenderScene(geometry, camera, device="cpu")
+    maps = uniform(camera)
+    maps.albedo[3], maps.albedo[0] = 0.9, 0.1
+    scene.set_materials(maps)
+    for plane, value in ((0, 0.9), (1, 0.1)):
+        assert np.array(scene.params[f"plane{plane}.bsdf.base_color.data"]) == pytest.approx(value, rel=1e-5)
+
+
+def hills():
+    """Depth [H, W] of smooth relief with one step, and normals [H, W, 3] towards the viewer."""
+    row, col = np.indices((64, 96))
+    depth = 4 + 0.3 * np.sin(row / 5.0) * np.cos(col / 7.0) + 0.01 * row
+    depth[20:40, 30:60] -= 1.2
+    return depth.astype(np.float32), np.broadcast_to(np.float32([0, 0, 1]), (64, 96, 3))
+
+
+def misses(scene):
+    """Rays through the middles of all horizontal and vertical mesh edges inside the picture that hit nothing."""
+    mi = scene.mi
+    row, col = np.indices((63, 95)).reshape(2, -1) + 1.0
+    x, y = np.concatenate([col + 0.5, col]) / 96, np.concatenate([row, row + 0.5]) / 64
+    film = mi.Point2f(x.astype(np.float32), y.astype(np.float32))
+    ray = scene.mi_scene.sensors()[0].sample_ray(0, 0, film, mi.Point2f(0.5, 0.5))[0]
+    return int((~np.array(scene.mi_scene.ray_intersect_preliminary(ray).is_valid())).sum())
+
+
+def test_no_ray_passes_along_an_edge():
+    """Embree's robust mode is on, and it is what closes the mesh."""
+    scene = RenderScene(build_geometry(*hills(), HILLS, completion="none"), HILLS, device="cpu")
+    assert misses(scene) == 0
+
+
+def test_a_change_of_the_original_does_not_reach_dr_jit():
+    mi = RenderScene(wall(CAMERA), CAMERA, device="cpu").mi
+    given = np.ones(40, np.float32)
+    copy = floats(mi, given)
+    given[:] = 2
+    np.testing.assert_array_equal(np.array(copy), 1)

@@ -1,11 +1,13 @@
 """The transport tables against numerical integrals of the paper's BRDF, with and without occluders."""
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 from disney_reference import diffuse_coefficients, specular_split
 
 from materialist.envmap import texel_directions
-from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, CacheSettings, TransportCache
+from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, CacheSettings, TransportCache, point
 from materialist.types import Camera, Geometry, Mesh
 
 CAMERA = Camera(12, 9, 60.0)
@@ -48,11 +50,8 @@ def open_floor():
 
 @pytest.fixture(scope="module")
 def walled_floor():
-    return TransportCache(
-        quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, -1]),
-        CAMERA,
-        CacheSettings(4096, 16),
-    )
+    geometry = quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, -1])
+    return TransportCache(geometry, CAMERA, CacheSettings(4096, 16))
 
 
 def hemisphere(rows: int = 400):
@@ -178,3 +177,12 @@ def test_equal_seeds_give_equal_tables():
     first, again, other = (TransportCache(geometry, CAMERA, seed=s).gather(envmap, radiance) for s in (4, 4, 5))
     assert first.diffuse.equal(again.diffuse) and first.specular.equal(again.specular)
     assert not first.diffuse.equal(other.diffuse)
+
+
+def test_points_fill_the_square():
+    """Every cell of a 64 x 64 grid holds 4 points, give or take one a side: far more even than random."""
+    count = 1 << 14
+    x, y = np.array(point(dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, count), mi.Point2f(0.2, 0.7)))
+    assert x.min() >= 0 and y.min() >= 0 and x.max() < 1 and y.max() < 1
+    counts, _, _ = np.histogram2d(x, y, bins=64, range=[[0, 1], [0, 1]])
+    assert counts.min() >= 2 and counts.max() <= 6

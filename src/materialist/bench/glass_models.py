@@ -25,8 +25,7 @@ from materialist.geometry.build import build_geometry, part
 from materialist.geometry.planes import find_planes, upright
 from materialist.geometry.silhouette import window
 from materialist.options import Glass
-from materialist.predict.refraction import best_thickness, thickness
-from materialist.predict.refraction.thickness import Thickness
+from materialist.predict.refraction.thickness import Thickness, best_thickness, thickness
 from materialist.render.denoise import denoise
 from materialist.render.scene import shape
 from materialist.solids.closed import closed_proxy

@@ -20,8 +20,8 @@ from materialist.bench.benchmark import COUNT, Benchmark, Row
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.option_kinds import option
-from materialist.predict.refraction import WEIGHTS
 from materialist.predict.refraction.network import RefractionNet
+from materialist.predict.refraction.thickness import WEIGHTS
 from materialist.procedural.objects.glassware import Shape, centred
 from materialist.procedural.objects.things import mesh
 from materialist.procedural.options import captures

@@ -62,9 +62,7 @@ class MaterialSettings:
     field: str = "mlp"  # `mlp`, `maps` or `unet`
     remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
-    loss: Loss = (
-        "l1+l2"  # paper; of the rendering. With `l2`, leaving the prior is penalised by its encoded square, too
-    )
+    loss: Loss = "l1+l2"  # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
     clipped: bool = False
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons

@@ -8,6 +8,7 @@ Google trained them on the photographs of ImageNet (Apache 2.0; docs/training.md
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import torch
@@ -102,6 +103,14 @@ def shipped(name: str) -> EfficientNetLite:
     encoder = EfficientNetLite()
     load_weights(encoder, read_state(WEIGHTS), WEIGHTS)
     return encoder.eval().requires_grad_(False).to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+
+
+def zero_convolutions(channels: Iterable[int], widths: Iterable[int]) -> nn.ModuleList:
+    """Convolutions 1 x 1 from features to the levels of a network, which begin by telling nothing."""
+    layers = nn.ModuleList(nn.Conv2d(c, w, 1) for c, w in zip(channels, widths, strict=True))
+    for parameter in layers.parameters():
+        nn.init.zeros_(parameter)
+    return layers
 
 
 def unit_power(features: Tensor) -> Tensor:

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
+from materialist.camera import unit
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import SetupError, WeightsError
 from materialist.predict.models import locate
@@ -102,7 +103,8 @@ class Marigold(HubPredictor):
         if kind == "MarigoldIntrinsicsPipeline":
             maps = appearance(output, made.target_properties or {})
         elif kind == "MarigoldNormalsPipeline":
-            maps = {"normal": unit_normals(output[0])}
+            normal = unit(output[0])  # in our frame already; interpolation shortens
+            maps = {"normal": np.where(normal.any(-1, keepdims=True), normal, [0, 0, 1]).astype(np.float32)}
         else:
             inverse = made.config.prediction_type == "disparity"
             depth, note, notes = planar(output[0, ..., 0], photo.camera, normal, inverse=inverse, name=self.name)
@@ -129,13 +131,6 @@ def appearance(output: Array, properties: dict) -> dict[str, Array]:
         elif name == "albedo":
             maps[name] = picture if about.get("prediction_space") == "linear" else srgb_to_linear(picture)
     return {name: np.ascontiguousarray(np.clip(values, 0, 1), np.float32) for name, values in maps.items()}
-
-
-def unit_normals(output: Array) -> Array:
-    """[H, W, 3] unit normals. Marigold's frame is ours: +X right, +Y up, +Z to the viewer; interpolation shortens."""
-    length = np.linalg.norm(output, axis=-1, keepdims=True)
-    ahead = np.array([0, 0, 1], np.float32)
-    return np.where(length > 1e-3, output / np.maximum(length, 1e-3), ahead).astype(np.float32)
 
 
 def _pipeline_class(folder: Path) -> str:

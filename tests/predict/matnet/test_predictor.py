@@ -6,13 +6,13 @@ import pickle
 import numpy as np
 import pytest
 import torch
-from made_matnet import install, made_network, made_photo
+from made_matnet import TINY, install, made_network, made_photo
 from safetensors.torch import save_file
 
 from materialist.errors import WeightsError
 from materialist.predict import get_predictor
-from materialist.predict.matnet.network import MatNet
-from materialist.predict.matnet.predictor import MatNetPredictor, infer, planar_depth
+from materialist.predict.matnet.network import PATCH, MatNet
+from materialist.predict.matnet.predictor import MatNetPredictor, infer, network_size, planar_depth
 from materialist.predict.weights import write_weights
 
 
@@ -159,3 +159,25 @@ def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
     own = MatNetPredictor(tmp_path / "own.safetensors", device="cpu", input_size=28).predict(photo).depth
     np.testing.assert_allclose(own, np.maximum(output, 1e-3), rtol=1e-2, atol=1e-2 * output.max())
+
+
+def test_attention_is_the_textbook_one():
+    attention = made_network().pretrained.blocks[0].attn
+    tokens = torch.randn(2, 7, TINY.width)
+    query, key, value = attention.qkv(tokens).chunk(3, -1)
+    mixed = []
+    for head in range(TINY.heads):
+        part = slice(head * 16, head * 16 + 16)
+        weights = torch.softmax(query[..., part] @ key[..., part].transpose(1, 2) / 4, -1)
+        mixed.append(weights @ value[..., part])
+    assert torch.allclose(attention(tokens), attention.proj(torch.cat(mixed, -1)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("height", "width", "wanted"),
+    [(512, 512, (518, 518)), (384, 512, (518, 686)), (98, 126, (518, 672)), (1000, 300, (1722, 518))],
+)
+def test_network_size_keeps_the_aspect_and_the_shorter_side(height, width, wanted):
+    found = network_size(height, width)
+    assert found == wanted
+    assert min(found) >= 518 and all(side % PATCH == 0 for side in found)

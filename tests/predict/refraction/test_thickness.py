@@ -7,8 +7,8 @@ from geometry_scenes import ball
 
 from materialist.camera import pixel_rays
 from materialist.predict.network import UNetArchitecture
-from materialist.predict.refraction import WEIGHTS, best_thickness, thickness
 from materialist.predict.refraction.network import LEAST, RefractionNet
+from materialist.predict.refraction.thickness import WEIGHTS, best_thickness, thickness
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
 

@@ -13,7 +13,7 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.planes import upright
 from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
-from materialist.predict.refraction import best_thickness, thickness
+from materialist.predict.refraction.thickness import best_thickness, thickness
 from materialist.solids.revolution import Revolution
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene

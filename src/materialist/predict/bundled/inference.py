@@ -10,7 +10,7 @@ import torch
 from scipy.ndimage import binary_propagation
 from skimage.morphology import remove_small_holes, remove_small_objects
 
-from materialist.camera import rays_at
+from materialist.camera import rays_at, unit
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
@@ -59,7 +59,7 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     albedo, roughness, metallic = (resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic"))
     depth, normal = with_edges(depth, maps["normal"], linear, rays)
     depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
-    normal = np.where((depth > 0)[..., None], _unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
+    normal = np.where((depth > 0)[..., None], unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
     materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
     sky = float((depth == 0).mean())
     notes: tuple[str, ...] = (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
@@ -85,7 +85,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     seen = resample.values(np.ascontiguousarray(rays), middle)
     sharp = weighted_median(coarse, guide, known)
     planes = [weighted_median(np.ascontiguousarray(c), guide, known, bins=16) for c in np.moveaxis(normal, -1, 0)]
-    normal = _unit(np.stack(planes, -1))
+    normal = unit(np.stack(planes, -1))
     logarithm = with_relief(np.where(known, sharp, np.nan), normal, seen)
     depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
     if middle != size:
@@ -179,7 +179,3 @@ def _without_specks(surface: Array) -> Array:
     """The surface [h, w] bool without tiny islands of either kind."""
     most = max(4, int(SETTINGS.least_island * surface.size)) - 1
     return remove_small_holes(remove_small_objects(surface, max_size=most), max_size=most)
-
-
-def _unit(normal: Array) -> Array:
-    return normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)

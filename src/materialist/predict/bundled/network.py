@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from materialist.envmap import texel_directions
-from materialist.predict.efficientnet import shipped, unit_power
+from materialist.predict.efficientnet import shipped, unit_power, zero_convolutions
 from materialist.predict.network import STRIDE, Architecture, ResidualBlock, StoredNetwork, group_norm
 
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
@@ -70,9 +70,7 @@ class BundledNetwork(StoredNetwork):
         self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
         if a.encoder:
             self.encoder = shipped(a.encoder)
-            self.told = nn.ModuleList(nn.Conv2d(c, w[k], 1) for k, c in enumerate(self.encoder.channels))
-            for parameter in self.told.parameters():
-                nn.init.zeros_(parameter)
+            self.told = zero_convolutions(self.encoder.channels, w)
         if a.light:
             self.light = LightHead(a.light, w[2])
         _same_subpixels(self.fine)

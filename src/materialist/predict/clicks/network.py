@@ -7,11 +7,11 @@ colour, in geometry, and in the features of an image classifier, which know part
 from __future__ import annotations
 
 import torch
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional as F
 
 from materialist.predict.clicks.features import CHANNELS, SPOT
-from materialist.predict.efficientnet import shipped, unit_power
+from materialist.predict.efficientnet import shipped, unit_power, zero_convolutions
 from materialist.predict.network import UNet, UNetArchitecture
 
 DEFAULT = UNetArchitecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
@@ -27,10 +27,7 @@ class ClickNet(UNet):
         super().__init__(CHANNELS, 1, a)
         if a.encoder:
             self.encoder = shipped(a.encoder)
-            channels = self.encoder.channels
-            self.told = nn.ModuleList(nn.Conv2d(2 * c + 1, a.widths[k + 1], 1) for k, c in enumerate(channels))
-            for parameter in self.told.parameters():
-                nn.init.zeros_(parameter)
+            self.told = zero_convolutions([2 * c + 1 for c in self.encoder.channels], a.widths[1:])
 
     def forward(self, maps: Tensor) -> Tensor:
         """[B, S, S] float32 logits of belonging to the object, of maps [B, CHANNELS, S, S]; S a multiple of 32."""
