@@ -58,9 +58,6 @@ def face_towards(face, normal):
 
 
 def lifted(direction, face):
-    """The direction, mirrored at the plane with the normal `face` where it lies below it.
-
-    A shading normal sees below the face it belongs to, and a ray from there would come through an opaque surface.
-    Mirrored, nothing passes and nothing is lost.
-    """
+    """The direction, mirrored at the plane with the normal `face` where it lies below it: nothing comes through an
+    opaque surface, and nothing is lost."""
     return direction - 2 * dr.minimum(dr.dot(direction, face), 0) * face

@@ -99,11 +99,7 @@ def fit_light(
 
 
 def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator) -> torch.Tensor:
-    """[height, 2 height, 3] of a field whose map has `settings.height` rows.
-
-    A coarser map is what is optimised, enlarged. A finer one is costly to evaluate: a coarser light matrix is served by
-    random points of its texels.
-    """
+    """[height, 2 height, 3] of a field of `settings.height` rows: enlarged, or at random points of finer texels."""
     if settings.height <= height:
         return resize_envmap(field(settings.height), height)
     return field(height, None if settings.field == "texels" else jitter)
@@ -112,8 +108,7 @@ def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: t
 def hidden_weights(matrix: LightMatrix, settings: LightSettings) -> torch.Tensor:
     """[h, 2h] weight of each texel in the smoothness of the light: 1 where it is seen, more where it is hidden.
 
-    A light that reaches the scene through slits of the geometry alone can be made to explain anything by making it
-    bright enough, and a path tracer finds it by luck.
+    Light through slits of the geometry explains anything where it is bright enough; path tracers rarely meet it.
     """
     return (settings.free_from / matrix.open.clamp_min(1e-6)).clamp(1, settings.hidden_weight).view(matrix.shape)
 

@@ -60,9 +60,7 @@ def check_maps(depth: Array, normal: Array, camera: Camera) -> tuple[Array, Arra
     depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float32)
     size = (camera.height, camera.width)
     if depth.shape != size:
-        raise InputError(
-            f"The depth map is {depth.shape} but the camera is {size} (rows, columns); make them the same."
-        )
+        raise InputError(f"The depth map is {depth.shape} but the camera is {size} (H, W); make them the same.")
     if normal.shape != (*size, 3):
         raise InputError(f"The normal map is {normal.shape} but the camera needs {(*size, 3)}; make them the same.")
     if not np.isfinite(depth).all():
@@ -207,10 +205,9 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
 
 
 def _parted_pairs(surface: Array, cuts: Cuts, inverse: Array) -> tuple[Array, Array, Array]:
-    """Nearer and farther pixel [T] (row-major) of pairs whose surfaces may part, and the step between them [T, 2].
+    """Nearer and farther pixel [T] of pairs whose surfaces may part, and the step (x, y) to the nearer one [T, 2].
 
-    All cut pairs, and the diagonal pairs next to a cut: without these, round-off opens a pinhole where the foreground's
-    rim turns a corner. Steps are (x, y) from the farther to the nearer pixel.
+    All cut pairs, and the diagonal ones next to a cut: else round-off opens a pinhole where the rim turns a corner.
     """
     height, width = surface.shape
     index = np.arange(height * width).reshape(height, width)

@@ -59,10 +59,9 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
 def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     """The mesh with a vertex for each normal where pixels of different normals meet; its points stay where they are.
 
-    A normal that is the mean of a wall's and of the floor's below it belongs to neither, and lights the last row of the
-    wall from above: a bright line along every crease, and around the foot of everything that stands on something.
-    The corner of a pixel gets the mean normal of those pixels that have the vertex in common and whose normals are
-    within `CREASE` degrees of the pixel's own. Faces keep their order, everything but the visible pixels its normals.
+    The mean of a wall's and a floor's normal belongs to neither, and is a bright line along every crease. The corner of
+    a pixel gets the mean normal of those pixels that have the vertex in common and whose normals are within `CREASE`
+    degrees of the pixel's own. Faces keep their order.
 
     mesh: whose first faces are two for each pixel with a surface, as of `depth_to_mesh`. depth: [H, W], 0 = none.
     normal: [H, W, 3] unit, camera frame.

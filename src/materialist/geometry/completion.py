@@ -145,7 +145,7 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     cell = max(1, max(height, width) // DEFAULT.cells)
     xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
     rays = rays_through(np.stack(np.meshgrid(xs, ys), -1), camera)  # [h+1, w+1, 3] through the cell corners
-    reach = sheet.plane.inverse_depth(rays)  # [h+1, w+1]
+    reach = rays @ (sheet.plane.normal / sheet.plane.offset)  # [h+1, w+1] inverse depth of the plane; <= 0: never
     points = rays / np.maximum(reach, 1e-9)[..., None]
     allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)
     close = (reach > 0) & (np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.behind)

@@ -39,17 +39,13 @@ class Cuts:
 
 
 def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = None) -> Cuts:
-    """Cut the pixel grid at occlusion boundaries.
+    """Cut the pixel grid at occlusion boundaries: pairs of 4-neighbours for which all of these hold.
 
-    A pair of 4-neighbours is cut when all of these hold:
-
-    1. it is a leg of a triangle of the pixel-centre grid with arcsin(n . v) < tau (the paper's criterion);
-    2. the leg itself is grazing: it makes an angle below sqrt(2) tau with the view ray. A triangle's plane is at least
-       as grazing as any of its edges, and its steeper leg is at most about sqrt(2) times less so: every grazing
-       triangle is cut, and only across its slope, not along the boundary;
-    3. its step in inverse depth exceeds what the slope on either side, over `support` pixels, lets expect.
-       Inverse depth is linear in screen space on a plane, so a floor seen at any angle is never cut. This exception
-       holds only where the predicted normals, if given, agree that the surface is slanted (`CutSettings.slanted`).
+    1. The pair is a leg of a triangle of the pixel-centre grid with arcsin(n . v) < tau (the paper's criterion).
+    2. It makes an angle below sqrt(2) tau with the view ray itself, as the steeper leg of every such triangle does: it
+       is cut across its slope, not along the boundary.
+    3. Its step in inverse depth, linear on the screen for a plane, exceeds what the slope on either side lets expect,
+       or the predicted normals, if given, deny that the surface is slanted (`CutSettings`).
 
     depth: [H, W] planar scene units, 0 = no surface. tau: degrees. normal: [H, W, 3] predicted unit normals or None.
     """
@@ -57,18 +53,15 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     points = unproject(depth, camera).astype(np.float64)  # [H, W, 3] scene units
     inverse = np.where(surface, 1.0 / np.where(surface, depth, 1.0), 0.0)  # [H, W] 1 / scene unit
     grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
-    slanted = np.ones(depth.shape, bool) if normal is None else _slanted(normal, points)  # [H, W]
+    slanted = np.ones(depth.shape, bool)  # [H, W] whether the normals are near enough to grazing for a slope
+    if normal is not None:
+        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(np.radians(DEFAULT.slanted))
     steep_x = _exceeds_slope(inverse, surface) | ~(slanted[:, :-1] | slanted[:, 1:])
     steep_y = _exceeds_slope(inverse.T, surface.T).T | ~(slanted[:-1] | slanted[1:])
     pair_x = surface[:, :-1] & surface[:, 1:]
     pair_y = surface[:-1] & surface[1:]
     cut_x, cut_y = pair_x & grazing_x & steep_x, pair_y & grazing_y & steep_y
     return Cuts(pair_x & ~cut_x, pair_y & ~cut_y, cut_x, cut_y)
-
-
-def _slanted(normal: Array, points: Array) -> Array:
-    """[H, W] bool: predicted normal [H, W, 3] within `slanted` of grazing, seen from the camera at points [H, W, 3]."""
-    return np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(np.radians(DEFAULT.slanted))
 
 
 def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:

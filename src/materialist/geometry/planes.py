@@ -45,10 +45,6 @@ class Plane:
     mask: Array
     """[H, W] bool: pixels whose surface lies on the plane."""
 
-    def inverse_depth(self, rays: Array) -> Array:
-        """Inverse planar depth [...] (1 / scene unit) where rays [..., 3] with z = -1 meet the plane; <= 0: never."""
-        return rays @ (self.normal / self.offset)
-
 
 def axes(normal: Array) -> Array:
     """[2, 3] unit: to the right and up for one who faces a plane with this normal [3]; of a ceiling, any such pair."""

@@ -50,12 +50,10 @@ def continued(values: Array, known: Array) -> Array:
 def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -> Array:
     """[H, W, 3] unit normals, away from the camera, of a surface that is seen from within; 0 where it is not known.
 
-    Planes are planes in 1/z, too, whatever the perspective, so slopes of 1/z are exact on flat backs.
-
     back: [H, W] planar depth, scene units. known: [H, W] bool. sigma: of the window of `depth_slopes`, pixels.
     rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
     """
-    depth = np.where(known, back, 1).astype(np.float64)
+    depth = np.where(known, back, 1).astype(np.float64)  # 1/z of a plane is linear: its slopes are exact
     right, down = depth_slopes(1 / depth, known, sigma)
     step = spacing(rays)
     # d log z = -z d(1/z); the tangents of z r are z (r d log z + dr).

@@ -62,9 +62,7 @@ def check_size(width: int, height: int, name: object) -> None:
     if min(width, height) < MIN_SIDE:
         raise InputError(f"{name} is {width} x {height} pixels; at least {MIN_SIDE} on each side are needed.")
     if max(width, height) > MAX_ASPECT * min(width, height):
-        raise InputError(
-            f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to the part of interest."
-        )
+        raise InputError(f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to what matters.")
 
 
 def light_and_alpha(light: Array, alpha: Array, warnings: list[str]) -> Decoded:

@@ -51,9 +51,7 @@ def _opened(path: Path, **how: bool) -> Iterator[Any]:
         with OpenEXR.File(str(path), **how) as file:
             yield file
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
-        raise InputError(
-            f"{path} is not a readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
-        ) from error
+        raise InputError(f"{path} is no readable EXR file (truncated or damaged): {str(error).rstrip('.')}.") from error
 
 
 def exr_headers(path: Path) -> list[dict[str, Any]]:

@@ -53,9 +53,8 @@ def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
 
 
 def read_map(path: str | Path) -> Array:
-    """A data map, [H, W] or [H, W, C] float32: EXR as stored; PNG and friends scaled to [0, 1], never colour-decoded.
+    """A data map, [H, W] or [H, W, 3] float32: EXR as stored; PNG and friends scaled to [0, 1], never colour-decoded.
 
-    An 8-bit albedo that another tool saved sRGB-encoded is for the caller to decode: the file does not say.
     Alpha is dropped. Raises InputError when the file is missing or unreadable.
     """
     return _with_alpha(path)[0]

@@ -102,17 +102,16 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
 
 def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, ...]:
     """The bodies of the package `folder`. Raises SceneError where a file is missing or damaged."""
-    return tuple(_read_body(folder / "bodies", k, entry) for k, entry in enumerate(entries))
-
-
-def _read_body(folder: Path, number: int, entry: dict[str, Any]) -> Body:
-    mesh = read_ply(folder / f"{number}.ply")
-    albedo, roughness, metallic = (read_map(folder / f"{number}.{name}.exr") for name in MAPS[:3])
-    if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
-        raise SceneError(f"The maps of body {number} have other channels than they need; the package is damaged.")
-    told: dict[str, Any] = {key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None}
-    surface = Surface(albedo, roughness, metallic, **told)
-    return Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))
+    bodies = []
+    for k, entry in enumerate(entries):
+        mesh = read_ply(folder / f"bodies/{k}.ply")
+        albedo, roughness, metallic = (read_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3])
+        if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
+            raise SceneError(f"The maps of body {k} have other channels than they need; the package is damaged.")
+        told: dict[str, Any] = {key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None}
+        surface = Surface(albedo, roughness, metallic, **told)
+        bodies.append(Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"])))
+    return tuple(bodies)
 
 
 def _told(value: Any) -> float | tuple[float, float, float]:

@@ -177,9 +177,7 @@ def _read_meta(folder: Path) -> dict[str, Any]:
     except OSError as error:  # a folder one may not enter, a name that is too long
         raise SceneError(f"{folder} cannot be read: {(error.strerror or str(error)).lower()}.") from error
     if aside is not None:
-        raise SceneError(
-            f"An interrupted save left {folder} without its scene; get the old one back: mv {aside} {folder}"
-        )
+        raise SceneError(f"An interrupted save left {folder} without its scene; get it back: mv {aside} {folder}")
     if not there:
         raise SceneError(f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}")
     meta = _read_json(folder / MARKER)

@@ -54,9 +54,7 @@ class Sample:
     camera frame, in the units of `image`; last the share of the surfaces that each direction reaches."""
 
     def truth(self) -> Prediction:
-        return Prediction(
-            Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, predictor="truth"
-        )
+        return Prediction(Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, "truth")
 
 
 _DECODED = srgb_to_linear(np.arange(256, dtype=np.float32) / 255)
@@ -193,10 +191,9 @@ def complete(
 
 
 def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:
-    """Make FOLDER, and write the description of its set to FOLDER/name.
+    """Make FOLDER, and write the description of its set to FOLDER/name, or raise OutputError.
 
-    Raises InputError when FOLDER holds a set whose description differs in one of `keys`, or other things, OutputError
-    when it cannot be written.
+    Raises InputError when FOLDER holds a set whose description differs in one of `keys`, or other things.
     """
     with writing(folder):
         if folder.is_dir() and any(folder.iterdir()):

@@ -96,9 +96,8 @@ def sh_error_relative(estimate: Array, truth: Array) -> float:
 def envmap_metrics(estimate: Array, truth: Array) -> dict[str, float]:
     """The paper's envmap figures (table "Quantitative evaluation of envmap optimization").
 
-    SSIM and PSNR are on the sRGB-encoded, [0, 1]-clipped maps as they are: no exposure is fitted, because the photo
-    fixes the absolute scale of the light. MSE is on linear radiance without clipping (small suns dominate it), SH
-    error as in `sh_error`. An estimate of another size is first resampled to the size of the truth.
+    SSIM and PSNR are on the maps as they are: the photo fixes the scale of the light. MSE is on linear radiance without
+    clipping. An estimate of another size is first resampled to the size of the truth.
     """
     estimate = resample_envmap(estimate, truth.shape[0])
     return {

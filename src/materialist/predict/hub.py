@@ -70,10 +70,7 @@ class HubPredictor(Predictor):
 
 
 def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
-    """The Marigold model in a folder or of a hub id; all maps from the three published ones where `where` is "".
-
-    Raises WeightsError where `where` is no Marigold model on this machine.
-    """
+    """The Marigold model in a folder or of a hub id, else WeightsError; "": all maps from the three published ones."""
     if where:
         return Marigold(where, GIVES[_pipeline_class(locate(where, ""))], device=device)
     parts = {model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())}
@@ -235,8 +232,6 @@ def pipeline(name: str, folder: Path, gpu: bool, what: str = "", **options: Any)
     try:
         made = getattr(diffusers, name).from_pretrained(folder, local_files_only=True, **components, **options)
     except Exception as error:  # whatever its readers raise on a damaged configuration
-        raise WeightsError(
-            f"{folder} does not hold a whole {what or name} ({reason(error)}); fetch it again."
-        ) from error
+        raise WeightsError(f"{folder} holds no whole {what or name} ({reason(error)}); fetch it again.") from error
     made.set_progress_bar_config(disable=True)
     return made.to("cuda" if gpu else "cpu")

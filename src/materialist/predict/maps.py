@@ -149,9 +149,7 @@ def _check_finite(values: Array, path: Path) -> None:
     """Raises InputError when there are NaN or infinite values."""
     bad = ~np.isfinite(values)
     if bad.any():
-        raise InputError(
-            f"{path} has {int(bad.sum())} NaN or infinite values; replace them (depth 0 means no surface)."
-        )
+        raise InputError(f"{path} has {int(bad.sum())} NaN or infinite values; replace them (depth 0: no surface).")
 
 
 def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
@@ -176,9 +174,7 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
     _check_finite(values, path)
     negative = values < 0
     if negative.mean() > SETTINGS.wild:
-        raise InputError(
-            f"{path} has negative depths (down to {values.min():.4g}); depth is a positive distance along -Z."
-        )
+        raise InputError(f"{path} has negative depths (to {values.min():.4g}); depth is a positive distance along -Z.")
     if negative.any():
         warnings.append(f"{path.name} has {int(negative.sum())} negative depths: taken as no surface.")
     values = np.maximum(values, 0)

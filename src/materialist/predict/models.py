@@ -214,6 +214,4 @@ def _write_checksums(folder: Path, names: Iterable[str]) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> OutputError:
-    return OutputError(
-        f"{folder} cannot be written ({error.strerror or error}); free space, or set MATERIALIST_MODELS."
-    )
+    return OutputError(f"{folder} cannot be written ({error.strerror or error}); free space or set MATERIALIST_MODELS.")

@@ -73,9 +73,7 @@ class StoredNetwork(nn.Module):
             network = cls(cls.ARCHITECTURE.from_dict(json.loads(header["architecture"])))
             facts = json.loads(header.get("facts", "{}"))
         except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
-            raise WeightsError(
-                f"{path} describes no usable network ({error}); make it again with: {cls.COMMAND}."
-            ) from error
+            raise WeightsError(f"{path} describes no usable network ({error}); make it with: {cls.COMMAND}.") from error
         load_weights(network, tensors | shared_tensors(network), path)
         return network.eval().requires_grad_(False), facts
 

@@ -11,11 +11,10 @@ from materialist.types import Array, Camera
 def normals_from_depth(depth: Array, camera: Camera, *, radius: int = 0) -> Array:
     """Unit normals [H, W, 3] float32 (camera frame, facing the viewer) of planar depth [H, W] (scene units, 0 = none).
 
-    A plane has an inverse depth that is linear on the screen: with q = 1 / depth and the ray (X, Y, -1),
-    q = a X + b Y + c, and the normal is along (-a, -b, c). The gradient (a, b) is taken from the side of each pixel
-    that continues its neighbours best, so that it does not reach across depth edges; planes come out exactly.
-    `radius` > 0 averages the gradient over a (2 radius + 1)^2 window of pixels on the same surface, which calms noisy
-    or quantised depth (and keeps planes exact). Pixels without depth get (0, 0, 1).
+    On a plane q = 1 / depth = a X + b Y + c for the ray (X, Y, -1), and the normal is along (-a, -b, c): planes are
+    exact. The gradient (a, b) is taken from the side of each pixel that continues its neighbours best, not across depth
+    edges; `radius` > 0 averages it over (2 radius + 1)^2 pixels on the same surface, which calms noisy or quantised
+    depth. Pixels without depth get (0, 0, 1).
     """
     known = depth > 0
     q = np.where(known, 1.0 / np.where(known, depth, 1), np.nan)  # [H, W] 1 / scene units, float64

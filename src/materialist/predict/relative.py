@@ -40,9 +40,8 @@ def from_relative(
 ) -> tuple[Array, float, bool]:
     """Planar depth of an affine-invariant depth d = s values + t, or inverse depth 1 / d, with s > 0 and t unknown.
 
-    Scale is a convention: the nearest surface is at 1. The shift follows from the ratio of the farthest surface to the
-    nearest: the ratio whose surface has the least mean angle to the given normals. (The mean and not the median: a wall
-    that faces the camera has its normals at every ratio and may be most of the picture.)
+    The nearest surface is put at 1. The shift follows from the ratio of the farthest surface to the nearest: the one
+    with the least mean angle to the given normals. (Not median: a wall that faces the camera fits every ratio.)
 
     Returns depth [H, W] float32 > 0 of values [H, W], the ratio, and whether it was fitted to the normals [H, W, 3]
     (unit; zero where unknown).

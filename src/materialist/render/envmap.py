@@ -44,9 +44,7 @@ def check_envmap(envmap: Array) -> None:
         raise InputError(f"The environment map is {shape}; it must be twice as wide as high, RGB, and 4 rows or more.")
     low, high = float(np.min(envmap)), float(np.max(envmap))
     if not (low >= 0 and np.isfinite(high)):
-        raise InputError(
-            f"The environment map has values from {low:g} to {high:g}; none may be negative, NaN or infinite."
-        )
+        raise InputError(f"The environment map has values from {low:g} to {high:g}; it must be finite and >= 0.")
 
 
 def is_peaked(envmap: Array) -> bool:

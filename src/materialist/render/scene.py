@@ -68,7 +68,8 @@ class RenderScene:
             description[f"lamp{k}"] = sphere(lamp)
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
-        self.params.keep([k for k in list(self.params.keys()) if _exchanged(k)])
+        names = list(self.params.keys())
+        self.params.keep([k for k in names if k == "light.data" or (".bsdf." in k and k.endswith(".data"))])
 
     def set_materials(self, materials: Materials) -> None:
         """Take other maps; their size must be the camera's, else InputError."""
@@ -165,10 +166,6 @@ def _stratified(spp: int) -> int:
     """The least number of samples >= `spp` that the multijitter sampler can lay out in a grid, as it would round."""
     rows = int(np.sqrt(spp))
     return rows * -(-spp // rows)
-
-
-def _exchanged(name: str) -> bool:
-    return name == "light.data" or (".bsdf." in name and name.endswith(".data"))
 
 
 def look_along(mi) -> Any:

@@ -41,10 +41,8 @@ class LLVM:
 
 
 def find_llvm() -> LLVM:
-    """The LLVM library to use: DRJIT_LIBLLVM_PATH if set, else the best of the usual places.
-
-    The best is the newest up to `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded into this process. Raises
-    SetupError where none of version 17 or later is found; the message names the package to install.
+    """The LLVM library to use: DRJIT_LIBLLVM_PATH if set, else the best of the usual places, which is the newest up to
+    `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded. Raises SetupError that names the package to install.
     """
     chosen = os.environ.get("DRJIT_LIBLLVM_PATH")
     paths = [chosen] if chosen else {os.path.realpath(path) for place in _PLACES for path in glob(place)}

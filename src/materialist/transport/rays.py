@@ -102,7 +102,8 @@ class _Lobes:
         texel, part = number // self.per_texel, number % self.per_texel
         height, width = self.shape
         shift = self._take(self.cache.shift, row)
-        u, v = (_fraction(number * step) + s for step, s in zip(STEPS, (shift.x, shift.y), strict=True))
+        # UInt32 as a fraction of 2^32, and its place in the point set
+        u, v = (mi.Float(number * step >> 8) * 2.0**-24 + s for step, s in zip(STEPS, (shift.x, shift.y), strict=True))
         u, v = u - dr.floor(u), (mi.Float(part) + v - dr.floor(v)) / self.per_texel
         above, below = (dr.cos(mi.Float(texel // width + k) * (dr.pi / height)) for k in (0, 1))
         y = dr.lerp(above, below, u)
@@ -142,8 +143,3 @@ class _Lobes:
 
     def _take(self, values: Any, row: Any) -> Any:
         return dr.gather(type(values), values, dr.gather(mi.UInt32, self._rows, row))
-
-
-def _fraction(value: Any) -> Any:
-    """UInt32 as a fraction of 2^32."""
-    return mi.Float(value >> 8) * 2.0**-24

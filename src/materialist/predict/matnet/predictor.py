@@ -24,8 +24,7 @@ INPUT_SIZE = 518
 class MatNetPredictor(Predictor):
     """MatNet with weights from a file, a folder, or a model that was downloaded from a hub; "": the published ones.
 
-    `input_size`: shorter side that the network sees, pixels. Raises WeightsError for weights that are missing, damaged,
-    or for another network.
+    `input_size`: shorter side that it sees, pixels. Raises WeightsError for missing, damaged or other weights.
     """
 
     def __init__(self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE):
@@ -44,11 +43,10 @@ class MatNetPredictor(Predictor):
         self.name = f"matnet {size} {path.name} sha256:{digest[:16]}"
 
     def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
-        """The wanted of the network's maps; `seed` changes nothing.
+        """The wanted of the network's maps, as docs/predictors.md has them; `seed` changes nothing.
 
-        It sees linear values, as in training (InteriorVerse). Albedo is linear, normals are in our camera frame, as the
-        published renderer uses them, roughness is perceptual; materials are clipped to [0, 1]. For depth see
-        `planar_depth`; weights of `train matnet --config paper` answer with depth itself, as their loss asks.
+        It sees linear values, as in training. For depth see `planar_depth`; weights of `train matnet --config paper`
+        answer with depth itself, as their loss asks.
         """
         maps = infer(self.network, photo.linear, input_size=self.input_size)
         if not all(np.isfinite(values).all() for values in maps.values()):
@@ -93,11 +91,9 @@ def network_size(height: int, width: int, input_size: int = INPUT_SIZE) -> tuple
 
 
 def planar_depth(output: Array) -> Array:
-    """Planar depth [H, W] > 0 from the published network's depth output [H, W]: 2 max - output, as its pipeline does
-    it.
+    """Planar depth [H, W] > 0 from the published network's output [H, W]: 2 max - output, as its pipeline does it.
 
-    The decoder starts from Depth Anything, and the output still falls with distance, in no fixed unit. The far side is
-    then at most twice as far as the near one: a relief with the right order, not a measurement.
+    The output falls with distance, in no fixed unit: this is a relief with the right order, not a measurement.
     """
     top = float(output.max())
     if top <= 0:  # nothing was seen: a flat wall
