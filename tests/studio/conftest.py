@@ -44,6 +44,14 @@ def studio(tmp_path_factory):
     made.jobs.close()
 
 
+@pytest.fixture
+def shared(tmp_path):
+    """A studio that several people reach."""
+    made = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
+    yield made
+    made.jobs.close()
+
+
 @pytest.fixture(scope="module")
 def opened(studio):
     session = studio.session("page", "me")

@@ -10,21 +10,17 @@ from starlette.responses import PlainTextResponse
 from starlette.testclient import TestClient
 
 from materialist.errors import InputError
-from materialist.jobs.queue import JobQueue
 from materialist.studio import StudioSettings, gate
 from materialist.studio.gate import Gate, names_of
 from materialist.studio.server import password_of
-from materialist.studio.studio import PERSON, Studio
-from materialist.studio.workspace import WorkFolder
+from materialist.studio.studio import PERSON
 
 ALONE = names_of("127.0.0.1")
 
 
 @pytest.fixture
-def studio(tmp_path):
-    made = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
-    yield made
-    made.jobs.close()
+def studio(shared):
+    return shared
 
 
 async def echo(scope, receive, send):

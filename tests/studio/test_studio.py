@@ -13,19 +13,11 @@ from studio_scenes import named
 from studio_server import free_port
 
 from materialist.errors import InputError
-from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
+from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, widgets
 from materialist.studio.server import check_host, new_studio
-from materialist.studio.studio import LOCAL_PERSON, Studio
-from materialist.studio.workspace import WorkFolder
-
-
-@pytest.fixture
-def shared(tmp_path):
-    studio = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
-    yield studio
-    studio.jobs.close()
+from materialist.studio.studio import LOCAL_PERSON
 
 
 def test_people_are_kept_apart(shared):

@@ -19,7 +19,6 @@ from materialist.procedural.options import DataSetOptions
 
 @dataclass(frozen=True, kw_only=True)
 class MapsLearning(Learning):
-
     config: str = option(
         "bundled", "The network that ships, or the paper's.", kind="word", choices=("bundled", "paper"))
 
