@@ -34,8 +34,9 @@ class OutlineSettings:
     side: float = 0.5  # see `stepped`
     above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
     tilts: tuple[float, ...] = (0.05, 0.15, 0.28, 0.42)  # radians the camera may look down where no ground tells it
-    standing: float = 0.1  # distance from the ground, in its heights, up to which it is made to reach it where it is
+    standing: float = 0.15  # distance from the ground, in its heights, up to which it is made to reach it where it is
     elsewhere: float = 0.3  # relative distance from the depth map's place up to which the ground is believed
+    stairs: float = 0.1  # root mean square by which pixels move an outline, pixels: it is smoothed by so much; 4 meshes
     turns: int = 40  # turns at which a place beside the axis must stay inside the outline
     fine: int = 120  # cells of the hull along the object
     air: float = 0.004  # part of its height that an object stays above the ground
@@ -207,7 +208,7 @@ def _profile_line(field: Array, axis: Axis, camera: Camera, round_top: bool) -> 
     if not lines or len(longest := max(lines, key=len)) < 12:
         return None
     line = longest[:, ::-1] * cell + [0, low]  # (distance, height)
-    capped = _capped(line if line[0, 1] < line[-1, 1] else line[::-1], far, cell, round_top)
+    capped = _capped(line if line[0, 1] < line[-1, 1] else line[::-1], far, pixel, cell, round_top)
     return None if capped is None else (capped, cell)
 
 
@@ -233,15 +234,16 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     return (halves[0] + halves[1]) / 2
 
 
-def _capped(line: Array, far: float, cell: float, round_top: bool) -> Array | None:
+def _capped(line: Array, far: float, pixel: float, cell: float, round_top: bool) -> Array | None:
     """A line from the lower to the upper end without what the camera does not see, and a round or flat upper end.
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
-    from scipy.ndimage import gaussian_filter1d
+    from scipy.interpolate import splev, splprep
 
-    smooth = gaussian_filter1d(line, 2.0, axis=0, mode="nearest")
-    step = unit(np.gradient(smooth, axis=0))
+    spline, along = splprep(line.T, s=len(line) * (DEFAULT.stairs * pixel) ** 2)
+    smooth = np.stack(splev(along, spline), -1)
+    step = unit(np.stack(splev(along, spline, der=1), -1))
     # The lower end is seen from above over its near rim, the upper one over its far rim.
     lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
