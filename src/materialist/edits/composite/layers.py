@@ -20,7 +20,8 @@ from materialist.types import Array, Scene
 class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
-    first: int = 16  # of the paths a pixel, one in so many goes to see where the edit reaches; twice, for two halves
+    first: int = 16  # of the paths a pixel, one in so many of each half finds out where the edit reaches
+    least_first: int = 8  # and no fewer than so many
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
     visible: float = 1 / 255  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
     sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
@@ -111,14 +112,15 @@ def difference(
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     tick = progress or (lambda *_: None)
-    first = max(1, spp // DEFAULT.first)  # paths a half: enough to see where the edit reaches
+    half = -(-spp // 2)
+    first = min(half, max(DEFAULT.least_first, spp // DEFAULT.first))
     b0, e0, b1, e1 = _halves(base, edited, first, 2 * seed, None, tick)
     near = changed | _large(_gain(b0, e0, b1, e1) > 0)
     differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
     if not (near & differs).any():
         b = (b0 + b1) / 2
         return Layers(b, b, differs & False, changed & False)
-    rest = -(-spp // 2) - first
+    rest = half - first
     if rest > 0:
         near = grown(near, DEFAULT.window)
         more = _halves(base, edited, rest, 2 * seed + 2, near, tick)
