@@ -116,7 +116,8 @@ def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeyp
     depth, up = theirs["depth"].copy(), np.zeros((H, W, 3), np.float32)
     depth[:8], up[..., 1] = 0, 1
     up[:8] = [0, 0, 1]
-    seen = Prediction(Materials(theirs["albedo"], theirs["roughness"], theirs["metallic"]), up, depth)
+    materials = Materials(theirs["albedo"], theirs["roughness"], theirs["metallic"])
+    seen = Prediction(materials, up, depth, warnings=("40% of the picture was taken for sky.",))
     monkeypatch.setattr(predictor, "infer", lambda *_, **__: seen)
     mixed = get_predictor("bundled", depth=spec).predict(photo)
     assert np.allclose(mixed.normal[8:], [0, 1, 0]) and mixed.warnings == ()

@@ -84,9 +84,9 @@ class Fit:
         light = envmap_field(settings, seed=setup.seed, start=begin.radiance)
         result = fit_light(problem, photo, light, settings, start=begin, seed=setup.seed, progress=self.progress)
         envmap = prepared_envmap(light(max(settings.height, 16)), setup.envmap_height)
-        surface = np.zeros(len(photo), bool)
-        surface[self.engine.pixels.numpy()] = True
-        surface, white = surface.reshape(setup.photo.linear.shape[:2]), HDR_CLIP if setup.photo.hdr else CLIPPED
+        surface = np.zeros(setup.photo.linear.shape[:2], bool)
+        surface.reshape(-1)[self.engine.pixels.numpy()] = True
+        white = HDR_CLIP if setup.photo.hdr else CLIPPED
         state.envmap = paste_visible_sky(envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 

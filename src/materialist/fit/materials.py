@@ -59,6 +59,6 @@ def fit_materials(
                 base.maps.clamp_(0, 1)
 
         name = "+".join(stage.targets) if held else "materials"
-        stepped = {"after_step": into_range, "progress": progress}
-        results.append(optimise(name, field.parameters(), loss, stage.schedule, **stepped))
+        run = optimise(name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress)
+        results.append(run)
     return results

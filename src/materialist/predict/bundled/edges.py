@@ -10,6 +10,8 @@ Medians also print the photo's texture onto every slope, and a mesh with such st
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 
@@ -90,8 +92,8 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
     if known.sum() < 9:
         return sharp
     index = np.cumsum(known.ravel()).reshape(known.shape) - 1
-    pairs, across, down = [], np.s_[:, :-1], np.s_[:-1]
-    neighbours = (across, np.s_[:, 1:]), (down, np.s_[1:])
+    pairs = []
+    neighbours: list[tuple[Any, Any]] = [(np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])]  # in rows, in columns
     for demanded, (near, far) in zip(slopes(normal, rays), neighbours, strict=True):
         both = known[near] & known[far]
         change = (sharp[far] - sharp[near])[both].astype(np.float64)
