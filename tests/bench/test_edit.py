@@ -78,7 +78,7 @@ def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(mitsuba,
     out = bench.run("edit", output=tmp_path / "out", device="cpu", **options)
     rows = json.loads((out / "report.json").read_text())["rows"]
     edited = ["hue: untouched", "ceiling hue", "ceiling hue, composite", "hue: edit"]
-    waited = ["preview: built once", "preview: material", "preview: light", "final: material, 256 paths",
+    waited = ["preview: built once", "preview: material", "preview: light", "final: material",
               "final: into a large photo"]  # fmt: skip
     assert list(dict.fromkeys(row["method"] for row in rows)) == edited + waited
     assert all(row["seconds"] > 0 for row in rows[4:]) and rows[-1]["sample"] == "300 x 300"

@@ -19,7 +19,7 @@ class BatchOptions(OperationOptions):
         None, "Edits for every photo; {name} in a mask's file name is the photo's.", kind="file", metavar="EDITS"
     )
     spp: int | None = option(
-        None, "Paths per pixel of the edits; else 256 for glass and other light, 128.", kind="whole", low=2,
+        None, "Paths per pixel of the edits; else 128 for new glass, 64.", kind="whole", low=2,
         high=1_000_000, called="number of paths (spp)",
     )  # fmt: skip
     workers: int | None = option(

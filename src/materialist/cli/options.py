@@ -71,7 +71,7 @@ class Rendering(OperationOptions):
     """How an edited scene becomes a picture."""
 
     spp: int | None = option(
-        None, "Paths per pixel, of both renderings; else 256 for glass and other light, 128 for the rest.",
+        None, "Paths per pixel, of both renderings; else 128 for new glass, 64 for the rest.",
         kind="whole", low=2, high=1_000_000, called="--spp")
     denoise: bool = option(
         True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")

@@ -33,7 +33,7 @@ def composite(
 
     Args:
         scene: the fitted scene; its photo is what stays. edited: the same scene after `edit`, `relight`, ...
-        spp: paths per pixel, of each of the two renderings; None: 256 for new glass and another light, else 128.
+        spp: paths per pixel, of each of the two renderings; None: 128 for new glass, else 64.
         full_render: the plain rendering of the edited scene [H, W, 3], as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
         upscale: with `full_render`, a super-resolution of yours that brings the rendering to the photo's native size
