@@ -15,7 +15,7 @@ from materialist.camera import pixel_rays
 from materialist.fit.fields import resize_envmap
 from materialist.transport.cache import CacheSettings, Tables, TransportCache
 from materialist.transport.filter import Guide, filter_tables
-from materialist.transport.light import LightMatrix, bilinear, light_matrix
+from materialist.transport.light import bilinear, light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
 
@@ -34,8 +34,6 @@ class LightProblem:
     """Rows of the environment map that `render` takes."""
     render: Callable[[torch.Tensor], torch.Tensor]
     """render(envmap [height, 2 height, 3]) -> radiance [Q, 3], differentiable."""
-    matrix: LightMatrix | None = None
-    """The transport behind `render`, where the engine has one."""
 
 
 MaterialProblem = Callable[[torch.Tensor], torch.Tensor]
@@ -78,7 +76,7 @@ class TransportEngine:
             return torch.cat([matrix.combine(matrix.direct(flat) + indirect), seen])
 
         pixels = torch.cat([matrix.pixels, torch.from_numpy(sky.astype(np.int64))])
-        return LightProblem(pixels, self.light_height, render, matrix)
+        return LightProblem(pixels, self.light_height, render)
 
     def tables(self, envmap: Array) -> Tables:
         """Filtered transport tables under `envmap` [h, 2h, 3]."""

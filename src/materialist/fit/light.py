@@ -16,7 +16,6 @@ from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_env
 from materialist.fit.losses import CLIPPED, log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import LightSettings
-from materialist.transport.light import LightMatrix
 from materialist.types import Array, Camera
 
 
@@ -80,7 +79,6 @@ def fit_light(
     if start is not None and start.scale is not None:
         angle = torch.from_numpy(row_solid_angle(problem.height)).float().view(-1, 1, 1)
         trust = angle / angle.mean() / resize_envmap(start.scale.expand(-1, -1, 3), problem.height)
-    weight = None if problem.matrix is None else hidden_weights(problem.matrix, settings)
     jitter = torch.Generator().manual_seed(seed)
 
     def loss(_: int) -> torch.Tensor:
@@ -89,7 +87,7 @@ def fit_light(
         value = rendering_loss(error)
         if settings.smooth or settings.chroma:
             change = envmap.clamp_min(1e-6).log() - before
-            value = value + settings.smooth * log_total_variation(change, weight)
+            value = value + settings.smooth * log_total_variation(change)
             value = value + settings.chroma * log_chroma(change, settings.warm_cool)
             if trust is not None:
                 value = value + settings.prior * (trust * change.abs()).mean()
@@ -103,14 +101,6 @@ def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: t
     if settings.height <= height:
         return resize_envmap(field(settings.height), height)
     return field(height, None if settings.field == "texels" else jitter)
-
-
-def hidden_weights(matrix: LightMatrix, settings: LightSettings) -> torch.Tensor:
-    """[h, 2h] weight of each texel in the smoothness of the light: 1 where it is seen, more where it is hidden.
-
-    Light through slits of the geometry explains anything where it is bright enough; path tracers rarely meet it.
-    """
-    return (settings.free_from / matrix.open.clamp_min(1e-6)).clamp(1, settings.hidden_weight).view(matrix.shape)
 
 
 def paste_visible_sky(

@@ -48,16 +48,9 @@ def consistency(maps: torch.Tensor, prior: torch.Tensor, settings: MaterialSetti
     return settings.delta * (change * weights).sum(1).mean()
 
 
-def log_total_variation(log_map: torch.Tensor, weight: torch.Tensor | None = None) -> torch.Tensor:
-    """Mean absolute difference of neighbouring texels of a log-radiance map [h, w, 3], wrapped in azimuth.
-
-    weight: [h, w]; a difference counts as much as the heavier of its two texels.
-    """
-    down, right = (log_map[1:] - log_map[:-1]).abs(), (log_map - log_map.roll(1, 1)).abs()
-    if weight is not None:
-        down = down * torch.maximum(weight[1:], weight[:-1])[..., None]
-        right = right * torch.maximum(weight, weight.roll(1, 1))[..., None]
-    return down.mean() + right.mean()
+def log_total_variation(log_map: torch.Tensor) -> torch.Tensor:
+    """Mean absolute difference of neighbouring texels of a log-radiance map [h, w, 3], wrapped in azimuth."""
+    return (log_map[1:] - log_map[:-1]).abs().mean() + (log_map - log_map.roll(1, 1)).abs().mean()
 
 
 def log_chroma(log_map: torch.Tensor, warm_cool: float) -> torch.Tensor:

@@ -38,8 +38,6 @@ class LightSettings:
     clipped: bool = False  # a rendering brighter than a clipped photo channel is no error
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
-    free_from: float = 0.5  # share of a texel's light that must arrive for it to be as free as others; tuned by eye
-    hidden_weight: float = 3.0  # largest factor on the smoothness of hidden texels; tuned on 5 synthetic scenes
     chroma: float = 0.0  # weight of the colourfulness of log radiance; larger: whiter; tuned on 5 scenes
     prior: float = 0.0  # weight of the distance from a predicted light, over its scale of error; tuned on 14 scenes
     warm_cool: float = 0.3  # part of that for a warm or cool light, not a red or green one; by eye, and on 5 scenes

@@ -37,9 +37,6 @@ class LightMatrix:
     """[K, 2] weight of each such ray in both."""
     albedo: torch.Tensor
     """[Q, 3]."""
-    open: torch.Tensor
-    """[h * 2h] in [0, 1]: share of the light that each texel would send to the pixels that nothing holds back; 1 for
-    texels that no pixel faces."""
 
     def direct(self, envmap: torch.Tensor) -> torch.Tensor:
         """[2, Q, 3] light of each part straight from `envmap` [h * 2h, 3]; differentiable in it."""
@@ -91,7 +88,6 @@ def light_matrix(
     shape, per_texel = (height, 2 * height), max(1, round(sphere_samples / (2 * height * height)))
     scene: Any = cache.scene
     parts = torch.zeros(2, len(rows), height * 2 * height)
-    free, faced = torch.zeros(2, height * 2 * height)  # diffuse light that leaves the scene, and all that there is
     hits = []
     for some in rays(cache, rows, rough, metallic, shape, per_texel, specular_samples):
         pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
@@ -101,14 +97,11 @@ def light_matrix(
         leaves = slot == MISS
         for part, weight in zip(parts, some.weights, strict=True):
             add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
-        if some.diffuse is not None:
-            for out, kept in ((faced, np.ones_like(leaves)), (free, leaves)):
-                add_footprints(out, index[kept], share[kept], some.diffuse[kept], 0 * some.row[kept])
         hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
     row, slots, hit_weight = (torch.from_numpy(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
         torch.from_numpy(pixels.astype(np.int64)), shape, parts, torch.stack([row, slots.long()]), hit_weight,
-        torch.from_numpy(albedo.astype(np.float32)), torch.where(faced > 0, free / faced.clamp_min(1e-12), 1.0),
+        torch.from_numpy(albedo.astype(np.float32)),
     )  # fmt: skip
 
 

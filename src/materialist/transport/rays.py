@@ -37,8 +37,6 @@ class Rays:
     """[N] int64."""
     weights: tuple[Array, Array]
     """Each [N]: what the albedo multiplies, and the rest."""
-    diffuse: Array | None
-    """[N] weight in the diffuse lobe, without A (1 - M); None: not part of it."""
 
 
 def rays(
@@ -94,7 +92,7 @@ class _Lobes:
         wi = mi.reflect(wo, visible_normal(wo, dr.gather(mi.Float, self._alpha, row), sample))
         world = mi.Frame3f(self._take(self.cache.normal, row)).to_world(wi)
         base, grazing = (dr.select(wi.z > 0, w, 0) for w in self._reflected(world, wi, wo, row))
-        return self._rays(world, row, first, None, (base, grazing))
+        return self._rays(world, row, first, 0, (base, grazing))
 
     def _texel(self, lane: Any) -> Any:
         """The direction of each lane: texel after texel, and in each all rows."""
@@ -128,18 +126,15 @@ class _Lobes:
         fresnel = schlick(cos_d)
         return (1 - fresnel) * value, fresnel * value
 
-    def _rays(self, world: Any, row: Any, first: int, diffuse: Any | None, specular: tuple[Any, Any]) -> Rays:
+    def _rays(self, world: Any, row: Any, first: int, diffuse: Any, specular: tuple[Any, Any]) -> Rays:
         """A (1 - M) diffuse + C_0 base + grazing, with C_0 = R_0 (1 - M) + M A, as A times something and the rest."""
         cache, m = self.cache, dr.gather(mi.Float, self._metallic, row)
         base, grazing = specular
-        weights = m * base + (1 - m) * (0 if diffuse is None else diffuse), base_reflectance(0, m) * base + grazing
+        weights = m * base + (1 - m) * diffuse, base_reflectance(0, m) * base + grazing
         origin = self._take(cache.position, row), self._take(cache.geometric_normal, row)
         ray = spawn(*origin, lifted(world, self._take(cache.face, row)))
         dr.eval(ray, row, *weights)
-        return Rays(
-            ray, np.array(row).astype(np.int64) + first, (np.array(weights[0]), np.array(weights[1])),
-            None if diffuse is None else np.array(diffuse),
-        )  # fmt: skip
+        return Rays(ray, np.array(row).astype(np.int64) + first, (np.array(weights[0]), np.array(weights[1])))
 
     def _take(self, values: Any, row: Any) -> Any:
         return dr.gather(type(values), values, dr.gather(mi.UInt32, self._rows, row))
