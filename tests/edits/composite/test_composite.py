@@ -86,6 +86,16 @@ def test_the_rim_of_a_glaring_surface_is_mixed_with_white():
     assert out[48, 48] == pytest.approx(20, rel=1e-3)
 
 
+def test_new_metal_hides_the_texture_that_the_fit_lacks():
+    texture = np.random.default_rng(1).uniform(0.1, 0.3, (24, 24, 3)).astype(np.float32)
+    photo = Photo(texture, Camera(24, 24, 45.0), texture)
+    base, edited = (np.full(texture.shape, v, np.float32) for v in (0.2, 0.4))
+    layers = layers_of(base, edited, np.ones((24, 24), bool))
+    np.testing.assert_allclose(into_photo(photo, layers) - edited, texture - base, atol=1e-5)
+    metal = into_photo(photo, replace(layers, diffuse=np.full((24, 24), 0.1)))
+    np.testing.assert_allclose(metal - edited, 0.1 * (texture - base), atol=1e-5)
+
+
 def test_hdr_stays_hdr():
     scene = rendered_scene()
     bright = scene.photo.original * 20

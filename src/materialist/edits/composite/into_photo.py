@@ -106,9 +106,11 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     """out = edited + factor (photo - base).
 
     The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
-    factor = edited / base, and does not grow (a ratio above 1 is taken as 1).
+    factor = edited / base, and does not grow (a ratio above 1 is taken as 1). New metal hides it.
     """
     factor = np.minimum((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor), 1)
+    if layers.diffuse is not None:
+        factor = factor * layers.diffuse[..., None]
     return layers.edited - layers.base, factor - 1, layers.base
 
 

@@ -49,6 +49,8 @@ class Layers:
     """Whether the light is another one."""
     native: NativeLayer | None = None
     """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
+    diffuse: Array | None = None
+    """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
     covered: Array | None = None
     """[H, W] bool: glass in place of a surface of the photo: the rendering alone is seen; part of `changed`."""
 
@@ -79,7 +81,8 @@ def render_layers(
     layers = difference(
         base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress,
     )  # fmt: skip
-    return replace(layers, relit=relit, native=alone, covered=covered)
+    old, new = (np.maximum(1 - one.materials.metallic, 1e-3) for one in (scene, edited))
+    return replace(layers, relit=relit, native=alone, covered=covered, diffuse=np.minimum(new / old, 1))
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
