@@ -202,8 +202,7 @@ def test_misspelt_options_are_refused(call, tmp_path):
 
 def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
     """Nor in an edit of it, which comes back in the unit of the file, its other pixels bit for bit."""
-    from materialist.edits.composite.composite import composite
-    from materialist.edits.composite.output import write_composite
+    from materialist.edits.composite.composite import composite, write_composite
     from materialist.edits.material.material import edit
     from materialist.io.exr import read_exr, write_exr
     from materialist.io.package import load_scene, save_scene

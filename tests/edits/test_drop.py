@@ -7,10 +7,9 @@ import pytest
 import trimesh
 from made_meshes import box_file, extent, floor_scene
 
-from materialist.edits.drop.convex import convex_pieces
 from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.ground import Field, blocks
-from materialist.edits.drop.physics import GRAVITY, Pose, RigidBody, fall
+from materialist.edits.drop.physics import GRAVITY, Pose, RigidBody, convex_pieces, fall
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import read_model
 from materialist.edits.recipe import apply, read_recipe, write_recipe

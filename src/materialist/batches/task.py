@@ -121,7 +121,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
 
 def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
-    from materialist.edits.composite.output import write_composite
+    from materialist.edits.composite.composite import write_composite
     from materialist.edits.core.notes import effect_notes, warnings_since
     from materialist.edits.recipe import apply
 

@@ -55,7 +55,7 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: bool = 
 def write_result(
     command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
-    from materialist.edits.composite.output import write_composite
+    from materialist.edits.composite.composite import write_composite
     from materialist.edits.core.renderer import paths_for
 
     start, spp = time.monotonic(), rendering.spp or paths_for(scene, edited)

@@ -55,7 +55,7 @@ def render(
     """Path-trace a scene package."""
     from rich.console import Console
 
-    from materialist.edits.composite.output import write_composite
+    from materialist.edits.composite.composite import write_composite
     from materialist.edits.core.notes import PICTURED, is_pictured
     from materialist.io.image import ensure_image_writable
 

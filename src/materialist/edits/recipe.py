@@ -1,7 +1,5 @@
 """A list of edits as a file, so that they can be replayed and batched: `materialist apply SCENE edits.yaml`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -16,7 +16,7 @@ import numpy as np
 from materialist import __version__
 from materialist.camera import unit
 from materialist.color import srgb_levels
-from materialist.edits.core.topology import edge_faults
+from materialist.edits.core.surfaces import edge_faults
 from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import encoded, to_bytes
 from materialist.types import Array, Camera, Lamp, Materials, Scene, Surface

@@ -6,8 +6,6 @@ decided by normals, hardly by places: the front has those of the map, the back t
 of planes fitted to its depth.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,7 +56,13 @@ def closed_proxy(
     or too thin for one.
     """
     inside = surface_in(mask, depth, camera)
-    _check(normal, thickness, inside)
+    if normal.shape != (*inside.shape, 3) or np.shape(thickness) != inside.shape:
+        raise InputError(
+            f"The normals are {normal.shape} and the thickness {np.shape(thickness)}; the mask is {inside.shape}."
+        )
+    own = thickness[inside]
+    if not (np.isfinite(own).all() and own.min() >= 0 and own.max() > 0):
+        raise InputError(f"The thickness goes from {own.min():g} to {own.max():g}; it must be finite, >= 0, not all 0.")
     if back is not None and back.shape != normal.shape:
         raise InputError(f"The normals of the back are {back.shape}, those of the front {normal.shape}.")
     view = _window(depth, normal, inside, thickness, behind, back, camera)
@@ -100,16 +104,6 @@ class _View:
     def pixel(self) -> Array:
         """[h, w] size of a pixel on the front, scene units."""
         return self.depth * spacing(self.rays)
-
-
-def _check(normal: Array, thickness: Array, inside: Array) -> None:
-    if normal.shape != (*inside.shape, 3) or np.shape(thickness) != inside.shape:
-        raise InputError(
-            f"The normals are {normal.shape} and the thickness {np.shape(thickness)}; the mask is {inside.shape}."
-        )
-    own = np.asarray(thickness)[inside]
-    if not (np.isfinite(own).all() and own.min() >= 0 and own.max() > 0):
-        raise InputError(f"The thickness goes from {own.min():g} to {own.max():g}; it must be finite, >= 0, not all 0.")
 
 
 def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:

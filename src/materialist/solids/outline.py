@@ -6,8 +6,6 @@ hull). For bodies that bulge and wave gently the hull is the body itself, but fo
 above and below. Predicted normals are rarely clean enough to tell an axis or a profile; an outline is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

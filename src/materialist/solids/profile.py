@@ -1,8 +1,7 @@
 """The profile of a surface of revolution: the signed distance to its border on a grid of the half plane."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -27,7 +26,7 @@ class Profile:
     """Height of the base, scene units."""
 
     @classmethod
-    def of(cls, line: Array, cell: float, floor: float) -> Profile:
+    def of(cls, line: Array, cell: float, floor: float) -> Self:
         """The profile inside a line [K, 2] (distance from the axis, height) that runs from its foot up to the axis."""
         from scipy.ndimage import gaussian_filter
         from scipy.spatial import cKDTree

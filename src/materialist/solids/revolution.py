@@ -1,7 +1,5 @@
 """A surface of revolution: one profile swept around its axis, as a closed body or an open vessel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Closed surfaces of triangles, made of two sheets over one region of the picture and the wall between them."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -126,7 +124,10 @@ def closed(region: MeshedRegion, sheets: Sheets, camera: Camera) -> Shell:
     count, rim = len(sheets.place), np.unique(region.border)
     index = np.concatenate([np.arange(count), np.arange(count), rim, rim])  # front, back, the wall's two sides
     beyond = np.concatenate([np.zeros(count), sheets.thick, np.zeros(len(rim)), sheets.thick[rim]])
-    vertices, uv = _in_space(sheets.place[index], sheets.front[index], beyond, camera)
+    place = sheets.place[index] + 0.5
+    rays = rays_through(place, camera)
+    vertices = rays * (sheets.front[index] + beyond / np.linalg.norm(rays, axis=-1))[:, None]
+    uv = np.clip(place / [camera.width, camera.height], 0, 1).astype(np.float32)
     a, b = 2 * count + np.searchsorted(rim, region.border).T
     wall = [np.stack([b, a, a + len(rim)], -1), np.stack([b, a + len(rim), b + len(rim)], -1)]
     faces = np.concatenate([region.faces, region.faces[:, ::-1] + count, *wall])
@@ -140,10 +141,3 @@ def _across(points: Array, outward: Array) -> Array:
     ray = unit(points)
     side = np.stack([outward[:, 0], -outward[:, 1], np.zeros(len(outward))], -1)
     return unit(side - (side * ray).sum(-1, keepdims=True) * ray)
-
-
-def _in_space(place: Array, front: Array, beyond: Array, camera: Camera) -> tuple[Array, Array]:
-    """[N, 3] points on the rays through `place` [N, 2], `beyond` [N] along the ray behind planar depth `front` [N]."""
-    rays = rays_through(place + 0.5, camera)
-    points = rays * (front + beyond / np.linalg.norm(rays, axis=-1))[:, None]
-    return points, np.clip((place + 0.5) / [camera.width, camera.height], 0, 1).astype(np.float32)

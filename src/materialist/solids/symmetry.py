@@ -6,8 +6,6 @@ conjugates about that plane and the camera: 1/front + 1/back = 2/plane. So the m
 position and perspective, and needs no guess of how deep the object is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -64,7 +64,7 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
 
 def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
-    from materialist.edits.composite.output import write_composite
+    from materialist.edits.composite.composite import write_composite
 
     loaded, edited = _edited(report, scene, steps)
     picture = mt.composite(loaded, edited, spp=spp, progress=report)

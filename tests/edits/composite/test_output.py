@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from edit_scenes import flat_scene
 
-from materialist.edits.composite.output import is_deep, write_composite
+from materialist.edits.composite.composite import is_deep, write_composite
 from materialist.io.decode import decode
 
 SCENE = flat_scene()

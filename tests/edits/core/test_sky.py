@@ -6,7 +6,7 @@ import numpy as np
 from edit_scenes import block_mask, flat_scene
 
 from materialist.edits.composite.composite import composite
-from materialist.edits.core.sky import photo_sky
+from materialist.edits.core.renderer import photo_sky
 from materialist.edits.glass.glass import glass
 from materialist.edits.light.relight import relight
 from materialist.geometry.build import build_geometry
@@ -39,7 +39,8 @@ def test_the_map_has_the_photo_where_the_photo_shows_sky():
     photographed = row[:, 1] == np.float32(0.3)
     assert 0 < photographed.mean() < 0.2 and (np.diff(row[photographed][:, 2]) >= 0).all()  # bluer to the right
     assert (row[~photographed] > 1).all()  # the fitted light elsewhere
-    assert photo_sky(replace(SCENE, depth=np.full_like(SCENE.depth, 2))) is None
+    whole = replace(SCENE, depth=np.full_like(SCENE.depth, 2))
+    assert photo_sky(whole) is whole.envmap
 
 
 def test_glass_that_bends_nothing_shows_the_sky_behind_it():

@@ -10,9 +10,8 @@ from materialist.camera import project
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.native_layer import native_layer
 from materialist.edits.core.renderer import EditRenderer
-from materialist.edits.insert.insert import insert, put
+from materialist.edits.insert.insert import insert, picture_width, put, support_at
 from materialist.edits.insert.meshes import read_model
-from materialist.edits.insert.support import picture_width, support_at
 from materialist.errors import InputError
 
 UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])

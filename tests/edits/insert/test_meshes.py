@@ -7,7 +7,8 @@ from made_meshes import box_file, floor_scene, gltf_file, tetrahedron_glb, textu
 from PIL import Image
 
 from materialist.color import srgb_to_linear
-from materialist.edits.core.topology import edge_faults
+from materialist.edits.core.surfaces import edge_faults
+from materialist.edits.insert import meshes
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import MeshLimits, creased_normals, files_beside, read_model, repainted
 from materialist.errors import InputError
@@ -127,18 +128,19 @@ def test_what_an_mtl_says_beyond_its_colours(tmp_path):
     assert not read("d 1\nTr 0\nKe 0 0 0").warnings
 
 
-def test_greys_of_16_bits_keep_their_values_and_large_textures_shrink(tmp_path):
+def test_greys_of_16_bits_keep_their_values_and_large_textures_shrink(tmp_path, monkeypatch):
     values = np.linspace(0, 65535, 40).astype(np.uint16)[None].repeat(4, 0)
     Image.fromarray(values).save(tmp_path / "colour.png")
     write(tmp_path / "a.mtl", "newmtl a\nmap_Kd colour.png\n")
     write(tmp_path / "a.obj", f"mtllib a.mtl\n{TRIANGLE}usemtl a\nf 1/1 2/2 3/3\n")
     albedo = read_model(tmp_path / "a.obj").parts[0].surface.albedo
     np.testing.assert_allclose(albedo[0, :, 1], srgb_to_linear(np.linspace(0, 1, 40, dtype=np.float32)), atol=2e-3)
-    small = read_model(tmp_path / "a.obj", limits=MeshLimits(texture=20)).parts[0].surface.albedo
+    monkeypatch.setattr(meshes, "LIMITS", MeshLimits(texture=20))
+    small = read_model(tmp_path / "a.obj").parts[0].surface.albedo
     assert small.shape == (2, 20, 3)
 
 
-def test_bad_meshes_have_a_sentence_each(tmp_path):
+def test_bad_meshes_have_a_sentence_each(tmp_path, monkeypatch):
     obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     bad = [
         (write(tmp_path / "a.obj", ""), "is empty"),
@@ -162,13 +164,12 @@ def test_bad_meshes_have_a_sentence_each(tmp_path):
             read_model(path)
         assert "\n" not in str(error.value)
     box = box_file(tmp_path / "box.ply")
-    for options, sentence in (
-        ({"up": "x"}, "points up"),
-        ({"limits": MeshLimits(faces=11)}, "Decimate"),
-        ({"limits": MeshLimits(megabytes=1e-5)}, "MB"),
-    ):
+    with pytest.raises(InputError, match="points up"):
+        read_model(box, up="x")
+    for limits, sentence in ((MeshLimits(faces=11), "Decimate"), (MeshLimits(megabytes=1e-5), "MB")):
+        monkeypatch.setattr(meshes, "LIMITS", limits)
         with pytest.raises(InputError, match=sentence):
-            read_model(box, **options)
+            read_model(box)
 
 
 def test_what_is_not_manifold_or_not_closed_is_told(tmp_path):

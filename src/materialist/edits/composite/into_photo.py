@@ -1,7 +1,5 @@
 """The difference of two renderings, laid on the photo at its native size (docs/editing.md has the formulas)."""
 
-from __future__ import annotations
-
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,9 +12,6 @@ from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
 from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Photo
 
-WHITE = 0.995
-"""Channel of a linear photo from which it is clipped."""
-
 
 @dataclass(frozen=True)
 class CompositeSettings:
@@ -26,6 +21,9 @@ class CompositeSettings:
     most_detail: float = 2.0  # largest factor on the photo's detail beyond working size under another light
     edge: int = 2  # working pixels to either side of a changed surface's border; derived: the matte's reach
     rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
+    white: float = 0.995  # channel of a linear photo from which it is clipped; derived: 8 bits
+    clipped: float = 0.97  # least channel of a pixel of an emitter from which it is clipped; derived: 8 bits
+    nearly: float = 0.9  # least channel from which a pixel of an emitter may be brighter than it looks
     threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
 
 
@@ -158,18 +156,7 @@ def _in_front(picture: Array, native: NativeLayer | None, hdr: bool) -> Array:
 
 def _unclipped(photo: Array, base: Array) -> Array:
     """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
-    return np.where(photo >= WHITE, np.maximum(photo, base), photo)
-
-
-@dataclass(frozen=True)
-class DimmingSettings:
-    """Where the photo is a lower bound of an emitter's radiance."""
-
-    clipped: float = 0.97  # least channel of a linear photo from which a pixel is clipped; derived: 8 bits
-    nearly: float = 0.9  # least channel from which a pixel may be brighter than it looks; tuned by eye
-
-
-DIMMING = DimmingSettings()
+    return np.where(photo >= DEFAULT.white, np.maximum(photo, base), photo)
 
 
 def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Array | None = None) -> Array:
@@ -189,12 +176,9 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Arr
     white = seen_so.min(-1, keepdims=True)
     own = dim * seen_so
     if not photo.hdr:
-        lifted = own * (
-            1
-            + max(found["radiance"] - 1, 0)
-            * np.clip((white - DIMMING.nearly) / (DIMMING.clipped - DIMMING.nearly), 0, 1)
-        )
+        whole = np.clip((white - DEFAULT.nearly) / (DEFAULT.clipped - DEFAULT.nearly), 0, 1)
+        lifted = own * (1 + max(found["radiance"] - 1, 0) * whole)
         # What is not clipped is as bright as it is, and dimming brightens nothing.
-        own = np.where((white < DIMMING.clipped) & (dim < 1), np.minimum(lifted, seen_so), lifted)
+        own = np.where((white < DEFAULT.clipped) & (dim < 1), np.minimum(lifted, seen_so), lifted)
     picture[box] = np.where(share > 0, share * own + (1 - share) * here, here)
     return picture

@@ -1,9 +1,7 @@
 """New bodies at the photo's native resolution: their own radiance and a soft matte, for the composite."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,17 +12,15 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import area, grown, window
 from materialist.types import Array, Scene
 
-if TYPE_CHECKING:
-    from materialist.render.coverage import Box
+Box = tuple[slice, slice]
+"""Rows and columns of a part of a picture."""
 
 
 @dataclass(frozen=True)
 class NativeSettings:
     """Resolution and paths of the native-resolution layer; tuned by eye unless derived."""
 
-    pixels: int = (
-        1_500_000  # most pixels that are traced; a larger layer is traced smaller, and enlarged; derived: time
-    )
+    pixels: int = 1_500_000  # most that are traced; a larger layer is traced smaller, and enlarged; derived: time
     fewest_paths: int = 32  # paths a native pixel, at least, as the denoiser needs
     most_paths: int = 4  # paths a native pixel, at most, in multiples of those of the picture; derived: time
     margin: int = 3  # working pixels around the bodies that the denoiser sees
@@ -47,15 +43,6 @@ class NativeLayer:
     """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
 
 
-def new_bodies(scene: Scene, edited: Scene) -> list[str]:
-    """Names of the shapes of bodies that `edited` has and `scene` has not, and whose outline is not in the photo.
-
-    The photo's own lights and what is turned to glass in it have the outline that the photo shows.
-    """
-    new = {f"body{k}": body for k, body in enumerate(edited.bodies) if body not in scene.bodies}
-    return [name for name, body in new.items() if not body.name.startswith((PHOTO_LIGHT, PHOTO_GLASS))]
-
-
 def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, clean: bool) -> NativeLayer | None:
     """Trace the bodies and lamps that are new in `edited` at native size; None where the camera sees none of them.
 
@@ -71,13 +58,15 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
     if not is_relit(scene, edited):
         lamps = new_lamps(scene, edited)
-    names = new_bodies(scene, edited) + lamps
+    bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
+    # The photo's own lights and what is turned to glass in it have the outline that the photo shows.
+    own = (name for name, body in bodies.items() if not body.name.startswith((PHOTO_LIGHT, PHOTO_GLASS)))
+    names = [name for name in own if bodies[name] not in scene.bodies] + lamps
     if not names:
         return None
     target = renderer.render_scene(renderer.lit(edited, edited))
     camera, native, working = scene.camera, scene.photo.original.shape[:2], scene.depth.shape
-    shapes = {f"body{k}": body for k, body in enumerate(edited.bodies)}
-    chosen = {name: shapes.get(name) for name in names}
+    chosen = {name: bodies.get(name) for name in names}
     small = first_hits(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
@@ -120,7 +109,7 @@ def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Arra
     return np.asarray(cv2.resize(values, shape[1::-1], interpolation=getattr(cv2, f"INTER_{how}")))
 
 
-def _behind_things(sight: Any, alone: Any, scene: Scene, there: tuple[slice, slice], gap: float) -> Array:
+def _behind_things(sight: Any, alone: Any, scene: Scene, there: Box, gap: float) -> Array:
     """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands `gap` before them.
 
     The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.

@@ -1,7 +1,5 @@
 """Layers of working size brought to the photo's native size along the photo's own edges."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

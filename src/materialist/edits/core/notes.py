@@ -1,7 +1,5 @@
 """Notes of edits in the provenance of a scene, and warnings in its report."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The region of an edit: a mask at working size that has been checked."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.edits.core.renderer import EditRenderer

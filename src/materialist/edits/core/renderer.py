@@ -1,29 +1,28 @@
 """Renderings of a fitted scene and of its edits, with common random numbers."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from materialist.edits.core.sky import photo_sky
+from materialist.camera import project
 from materialist.edits.core.surfaces import PHOTO_LIGHT
+from materialist.envmap import environment, texel_directions
 from materialist.errors import SetupError
 from materialist.geometry.silhouette import window
 from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
+Render = Callable[..., Array]
+"""render(spp, seed, where=None) -> [H, W, 3] float32 linear, `spp` paths a pixel, random numbers by the seed.
 
-class Render(Protocol):
-    """A picture of one scene."""
-
-    def __call__(self, spp: int, seed: int, where: Array | None = None) -> Array:
-        """[H, W, 3] float32 linear, `spp` paths a pixel; equal seeds give equal random numbers.
-
-        where: [H, W] bool: pixels that are traced, the others are 0; None: all.
-        """
-        ...
+where: [H, W] bool: pixels that are traced, the others are 0; None: all.
+"""
+SKY_ROWS = 768
+"""Rows of the largest map with the photo's sky (derived: memory)."""
+CLIPPED = 0.98
+"""Channel of an ordinary photo from which its value is a lower bound (derived: 8 bits)."""
 
 
 class EditRenderer:
@@ -61,8 +60,7 @@ class EditRenderer:
         if is_relit(self.scene, edited) or all(b in old or not is_transparent(b.surface) for b in edited.bodies):
             return shown
         if self._sky is None:
-            sky = photo_sky(self.scene)
-            self._sky = self.scene.envmap if sky is None else sky
+            self._sky = photo_sky(self.scene)
         return replace(shown, envmap=self._sky)
 
     def covered(self, edited: Scene) -> Array:
@@ -132,6 +130,28 @@ class EditRenderer:
         # The base, and the last edit of another shape: a moving lamp must not fill the memory.
         self._built = [*self._built[:1], (scene, target)]
         return target
+
+
+def photo_sky(scene: Scene) -> Array:
+    """[h, 2h, 3] float32 linear: the environment map, with the photo's sky in full detail where the photo shows sky.
+
+    A texel is about a pixel wide. A path through glass so meets what stands in the photo, clouds or the filled
+    background of a removed object. The map as it is where the photo shows no sky.
+    """
+    camera = scene.camera
+    if (scene.depth > 0).all():
+        return scene.envmap
+    rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), max(SKY_ROWS, len(scene.envmap))))
+    directions = texel_directions(rows, 2 * rows).reshape(-1, 3)
+    sky = environment(directions, scene.envmap).astype(np.float32)
+    place, ahead = project(directions, camera)
+    column, row = np.floor(place).astype(int).T
+    seen = (ahead > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
+    seen[seen] = scene.depth[row[seen], column[seen]] == 0
+    photo = scene.photo.linear[row[seen], column[seen]]
+    bound = (photo >= CLIPPED) & (not scene.photo.hdr)
+    sky[seen] = np.where(bound, np.maximum(photo, sky[seen]), photo)
+    return sky.reshape(rows, 2 * rows, 3)
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:

@@ -1,7 +1,5 @@
 """Surfaces of bodies, and bodies that stand for something in the photo, as its lights (`light.emitters`) do."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -62,3 +60,17 @@ def emitting(body: Body, emission: Sequence[float]) -> Body:
     """The body with an emission [3]; a channel of 0 becomes `OFF`."""
     red, green, blue = (max(float(c), OFF) for c in emission)
     return replace(body, surface=replace(body.surface, emission=(red, green, blue)))
+
+
+def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
+    """(edges with one face, edges with three or more) of a mesh of vertices [V, 3] and faces [F, 3].
+
+    Vertices within a millionth of the mesh's size of each other count as one.
+    """
+    from trimesh import Trimesh
+
+    extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
+    mesh = Trimesh(np.round((vertices - vertices.min(0)) / extent * 1e6), faces)  # merges vertices
+    mesh.update_faces((np.diff(np.sort(mesh.faces, 1), axis=1) > 0).all(1))
+    count = np.bincount(mesh.edges_unique_inverse)
+    return int((count == 1).sum()), int((count > 2).sum())

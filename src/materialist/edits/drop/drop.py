@@ -1,7 +1,5 @@
 """Meshes that fall onto the photographed scene (paper, Physical Simulation)."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,12 +10,10 @@ import numpy as np
 
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
-from materialist.edits.drop.convex import convex_pieces, hull
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
-from materialist.edits.drop.physics import Pose, RigidBody, fall, load
-from materialist.edits.insert.insert import moved, put, surface_points
+from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, hull, load
+from materialist.edits.insert.insert import Support, moved, put, support_at, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
-from materialist.edits.insert.support import Support
 from materialist.errors import InputError
 from materialist.geometry.planes import axes
 from materialist.io.video import MAX_FRAMES
@@ -142,7 +138,7 @@ class Falling:
 
 def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: Drop) -> Falling:
     """Meshes over the place where they will fall; see `drop`."""
-    load()
+    load("mujoco")
     meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
     models = [
         repainted(m if isinstance(m, MeshModel) else read_model(m, up=wanted.up), wanted.material) for m in meshes
@@ -182,13 +178,11 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
     """[3] unit direction of gravity, camera frame; see `drop`. Raises InputError for a direction of no length."""
     if gravity is not None:
         direction = np.asarray(gravity, np.float64)
-        if direction.shape != (3,) or not np.isfinite(direction).all() or not np.linalg.norm(direction) > 0:
+        if not (np.isfinite(direction).all() and direction.any()):
             raise InputError(f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0.")
         return direction / np.linalg.norm(direction)
     if support.normal[1] > DEFAULT.upright:
         return -support.normal
-    from materialist.edits.insert.support import support_at
-
     for label in range(int(scene.geometry.plane_label.max(initial=-1)) + 1):
         rows, columns = np.nonzero(scene.geometry.plane_label == label)
         if len(rows):
@@ -275,10 +269,8 @@ def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
         gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
-        if not recent[-1] or (len(recent) > DEFAULT.still and _still(list(recent), falling.what["metres"])):
+        last, metres = recent[-1], falling.what["metres"]
+        still = all(len(look) == len(last) and not moves(look, last, metres) for look in recent)
+        if not last or (len(recent) > DEFAULT.still and still):
             return poses, gone, True
     return poses, gone, False
-
-
-def _still(recent: list[list[Pose]], metres: float) -> bool:
-    return all(len(look) == len(recent[-1]) and not moves(look, recent[-1], metres) for look in recent[:-1])

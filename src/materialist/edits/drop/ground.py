@@ -3,8 +3,6 @@
 Coordinates are those of the simulation: metres, z up. `to_up` [3, 3] and `factor` lead there from the camera frame.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

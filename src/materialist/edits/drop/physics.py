@@ -1,9 +1,10 @@
-"""Rigid bodies falling onto blocks that stay (MuJoCo): metres, seconds, z up."""
+"""Rigid bodies of convex pieces (CoACD) that fall onto blocks that stay (MuJoCo): metres, seconds, z up."""
 
-from __future__ import annotations
-
+import importlib
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,20 @@ FRICTION = (0.6, 0.01, 0.0005)
 """Sliding, torsional (m) and rolling (m)."""
 DENSITY = 600.0
 """kg / m^3; wood. Things of one density fall alike."""
+
+
+@dataclass(frozen=True)
+class ConvexSettings:
+    """When one hull stands for a mesh, and how CoACD takes others apart; tuned by eye."""
+
+    same: float = 1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
+    concave: float = 0.12  # concavity that is left in a piece (CoACD's threshold)
+    pieces: int = 16  # most pieces
+    fine: int = 1500  # triangles from which a mesh is thinned out before it is taken apart
+    coarse: int = 24  # cells along the longest side to which it is thinned out
+
+
+DEFAULT = ConvexSettings()
 
 
 @dataclass(frozen=True)
@@ -50,7 +65,7 @@ def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: floa
 
     Raises SetupError where mujoco is not installed, InputError where the motion cannot be followed.
     """
-    mujoco = load()
+    mujoco = load("mujoco")
     mujoco.set_mju_user_warning(lambda message: None)  # it would write a file where the command was called
     model = _world(mujoco, things, ground)
     data = mujoco.MjData(model)
@@ -61,13 +76,15 @@ def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: floa
         data.qvel[6 * k : 6 * k + 3] = -np.cross(thing.spin, body.xipos - body.xpos)
         data.qvel[6 * k + 3 : 6 * k + 6] = thing.spin
     mujoco.mj_forward(model, data)
+    warnings = mujoco.mjtWarning
+    diverged = warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL, warnings.mjWARN_BADQACC
     done = 0
     for frame in range(frames):
         target = round(frame / fps / STEP)
         while done < target:
             mujoco.mj_step(model, data)
             done += 1
-        if any(data.warning[kind].number for kind in _diverged(mujoco)):
+        if any(data.warning[int(kind)].number for kind in diverged):
             raise InputError("The things fly apart in the simulation; choose a smaller spin, or larger metres.")
         mujoco.mj_forward(model, data)
         mujoco.mj_energyPos(model, data)
@@ -77,21 +94,14 @@ def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: floa
         yield [Pose(b.xpos.copy(), b.xmat.reshape(3, 3).copy(), energy) for b in bodies]
 
 
-def load():
-    """The mujoco module. Raises SetupError with the command that installs it."""
+def load(name: str) -> Any:
+    """The module mujoco or coacd. Raises SetupError with the command that installs it."""
     try:
-        import mujoco
+        return importlib.import_module(name)
     except ImportError as error:
         raise SetupError(
             "Falling objects need two more packages; install them with: pip install 'materialist[physics]'"
         ) from error
-    return mujoco
-
-
-def _diverged(mujoco) -> tuple[int, ...]:
-    """The warnings of a state that is no number any more."""
-    kinds = mujoco.mjtWarning
-    return int(kinds.mjWARN_BADQPOS), int(kinds.mjWARN_BADQVEL), int(kinds.mjWARN_BADQACC)
 
 
 def _world(mujoco, things: list[RigidBody], ground: list[Array]):
@@ -119,3 +129,40 @@ def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
         type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, friction=list(FRICTION), condim=4, density=DENSITY,
         solref=list(STIFF), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
     )  # fmt: skip
+
+
+def hull(points: Array) -> Array:
+    """[n, 3] corners of the convex hull of points [m, 3], m >= 4; flat ones are given a thickness."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError:
+        size = max(float(np.ptp(points, axis=0).max()), 1e-9)
+        thick = np.concatenate([points, *(points + shift for shift in 0.01 * size * np.eye(3))])
+        return thick[ConvexHull(thick).vertices]
+
+
+def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array]:
+    """Corners [n, 3] of convex pieces that together make up a mesh: one hull where that is nearly all of it.
+
+    Raises SetupError where coacd is not installed and the mesh is not nearly convex.
+    """
+    from scipy.spatial import ConvexHull
+    from trimesh import Trimesh
+
+    vertices = np.asarray(vertices, np.float64)
+    outer, mesh = hull(vertices), Trimesh(vertices, faces, validate=True)
+    if mesh.is_watertight and ConvexHull(outer).volume <= DEFAULT.same * abs(mesh.volume):
+        return [outer]
+    coacd = load("coacd")
+    logging.getLogger("coacd").setLevel(logging.ERROR)
+    coacd.set_log_level("error")
+    if len(faces) > DEFAULT.fine:
+        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / DEFAULT.coarse
+        mesh = Trimesh(np.round(vertices / cell) * cell, faces, validate=True)
+    parts = coacd.run_coacd(
+        coacd.Mesh(mesh.vertices, mesh.faces), threshold=DEFAULT.concave, max_convex_hull=DEFAULT.pieces,
+        preprocess_resolution=30, resolution=400, mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
+    )  # fmt: skip
+    return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [outer]

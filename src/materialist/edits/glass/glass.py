@@ -1,7 +1,5 @@
 """An object of the photo turned to glass (paper, Material Transparency Editing)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +8,9 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_region
+from materialist.edits.core.surfaces import PHOTO_GLASS
 from materialist.edits.glass.thickness import ObjectThickness, object_thickness, objects_in
-from materialist.edits.remove.native import resized
+from materialist.edits.remove.patches import resized
 from materialist.edits.remove.remove import remove
 from materialist.geometry.membrane import nearest
 from materialist.geometry.slopes import blurred_normals
@@ -23,7 +22,6 @@ from materialist.types import Array, Body, Scene, Surface
 SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only a surface of revolution can be open at the top; this glass is hollow, and closed."
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
-NAME = "photo glass"
 
 
 def glass(
@@ -52,7 +50,7 @@ def glass(
     else:
         shells = [_shell(scene, removed, part, found, options.hollow) for part, found in each]
         shell = joined(shells)
-        body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, glass_surface(scene, options), NAME)
+        body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, glass_surface(scene, options), PHOTO_GLASS)
         notes = _unlike(each, shells, options.hollow)
         edited = warned(replace(removed, bodies=(*removed.bodies, body)), *notes)
     what = {

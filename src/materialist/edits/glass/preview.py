@@ -1,19 +1,16 @@
 """Glass while a slider moves: what does not change is made once, and only the pixels of the object are traced."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from materialist.edits.composite.layers import without_fireflies
+from materialist.edits.composite.native_layer import spread
+from materialist.edits.core.renderer import EditRenderer, denoised, photo_sky
 from materialist.edits.glass.glass import glass, glass_surface
 from materialist.errors import InputError
 from materialist.geometry.silhouette import area, window
 from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
-
-if TYPE_CHECKING:
-    from materialist.render.scene import RenderScene
 
 PATHS = 600_000
 """Paths of one picture, as far as FEWEST a pixel allow."""
@@ -34,7 +31,6 @@ class GlassPreview:
     """
 
     def __init__(self, scene: Scene, mask: Array, options: Glass | None = None, **values: Any):
-        from materialist.edits.core.sky import photo_sky
         from materialist.render.coverage import first_hits
         from materialist.render.variant import setup
 
@@ -44,9 +40,9 @@ class GlassPreview:
         setup(options.device)
         self.scene = scene
         # The glass itself is exchanged for every picture.
-        self._edited = glass(scene, mask, options, ior=1.5, transmission=1.0)
-        sky = photo_sky(self._edited)
-        self._light = self._edited.envmap if sky is None else sky
+        edited = glass(scene, mask, options, ior=1.5, transmission=1.0)
+        self._edited = replace(edited, envmap=photo_sky(edited))
+        self._renderer = EditRenderer(self._edited, device=options.device)
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._size = scene.depth.shape
         traced, body = self._target(self._edited.bodies[-1].surface).mi_scene, {self._name: self._edited.bodies[-1]}
@@ -63,8 +59,6 @@ class GlassPreview:
         `spp` paths a working pixel of the object, fewer for objects so large that these are more than PATHS;
         `values`: `ior`, `transmission`, `tint` and `roughness` of this glass.
         """
-        from materialist.edits.composite.native_layer import spread
-        from materialist.edits.core.renderer import denoised
         from materialist.render.native import numbers_in, radiance
         from materialist.render.scene import GLASS_DEPTH
 
@@ -73,15 +67,8 @@ class GlassPreview:
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target, box = self._target(surface), self._box
         paths = max(FEWEST, min(spp, PATHS // area(box)))
-        seen = radiance(
-            target,
-            self._size,
-            numbers_in(self._size, box),
-            spp=paths,
-            seed=seed,
-            max_depth=GLASS_DEPTH,
-            names=[self._name],
-        )
+        where, names = numbers_in(self._size, box), [self._name]
+        seen = radiance(target, self._size, where, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=names)
         traced = denoised(without_fireflies(spread(seen)), self._guide.albedo, self._guide.normal)
         out, share = self._edited.photo.linear.copy(), self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]
@@ -92,15 +79,7 @@ class GlassPreview:
         """[H, W] bool: where a picture is not the photo, for the object stood there and the glass does not."""
         return (self._edited.photo.linear != self.scene.photo.linear).any(-1)
 
-    def _target(self, surface: Surface) -> RenderScene:
-        """The ray tracer's scene with the body of that glass."""
-        from materialist.render.scene import RenderScene
-
-        edited = self._edited
-        bodies = (*edited.bodies[:-1], replace(edited.bodies[-1], surface=surface))
-        target = RenderScene(
-            edited.geometry, edited.camera, bodies=bodies, lamps=edited.lamps, device=self._options.device
-        )  # fmt: skip
-        target.set_materials(edited.materials)
-        target.set_envmap(self._light)
-        return target
+    def _target(self, surface: Surface):
+        """The `RenderScene` with the body of that glass."""
+        bodies = (*self._edited.bodies[:-1], replace(self._edited.bodies[-1], surface=surface))
+        return self._renderer.render_scene(replace(self._edited, bodies=bodies))

@@ -1,7 +1,5 @@
 """How thick the object under a mask is: given, of a surface of revolution, by RefractionNet, or mirrored."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -12,8 +12,6 @@ Where more is known of the back than that, its own normals take the front's plac
 What is reflected at the front is followed to the background, too, and to the environment map from there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 

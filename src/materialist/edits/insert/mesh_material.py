@@ -1,7 +1,5 @@
 """Materials of mesh files as surfaces: glTF's metallic-roughness, OBJ's .mtl, colours of vertices."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mesh files as bodies in a frame of their own: OBJ, PLY, STL, glTF and GLB, read by trimesh."""
 
-from __future__ import annotations
-
 import io
 import json
 import logging
@@ -59,7 +57,48 @@ class MeshModel:
         return np.concatenate([part.vertices for part in self.parts])
 
 
-def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMITS) -> MeshModel:
+class MeshFolder:
+    """The files beside a mesh, as trimesh asks for them (as much of its `Resolver` as its readers use).
+
+    trimesh swallows the errors of a resolver, so this keeps them: `refused` are references that lead outside of the
+    folder by a path, a link or an address, and are never opened; `missing` are files that are not there.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder.resolve()
+        self.opened: list[Path] = []
+        self.refused: list[str] = []
+        self.missing: list[str] = []
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file. Raises InputError for a reference outside of the folder, OSError for a missing file."""
+        name = str(name).strip()
+        path = self._inside(name)
+        if path is None:
+            self.refused.append(name)
+            raise InputError(f"The reference {name} leads outside of {self.folder}.")
+        try:
+            data = path.read_bytes()
+        except OSError:
+            self.missing.append(name)
+            raise
+        self.opened.append(path)
+        return data
+
+    def _inside(self, name: str) -> Path | None:
+        """The path of a reference, None when it leads outside. glTF's percent-encoding is decoded."""
+        spelled = [one.replace("\\", "/") for one in (name, unquote(name))]
+        if any(":" in one.split("/", 1)[0] or one.startswith("/") or "\0" in one for one in spelled):
+            return None
+        paths = [(self.folder / one).resolve() for one in spelled]
+        if not all(path.is_relative_to(self.folder) for path in paths):
+            return None
+        return paths[0] if paths[0].is_file() else paths[1]
+
+    __getitem__ = get
+
+
+def read_model(path: str | Path, *, up: str = "auto") -> MeshModel:
     """Read a mesh file; the middle of its base becomes the origin.
 
     Nothing outside of the file's own folder is opened, whatever it refers to. Normals that are missing are computed,
@@ -73,8 +112,8 @@ def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMIT
     path = Path(path)
     if up not in ("auto", "y", "z"):
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
-    data, folder = _bytes(path, limits), MeshFolder(path.parent)
-    reader = _Reader(path, _gltf_materials(path, data), limits)
+    data, folder = _bytes(path), MeshFolder(path.parent)
+    reader = _Reader(path, _gltf_materials(path, data))
     parts = list(reader.parts(_parsed(path, data, folder)))
     if folder.refused:
         raise InputError(
@@ -84,9 +123,9 @@ def read_model(path: str | Path, *, up: str = "auto", limits: MeshLimits = LIMIT
     count = sum(len(part.faces) for part in parts)
     if count == 0:
         raise InputError(f"{path} has no triangles with an area; give a mesh with faces.")
-    if count > limits.faces:
+    if count > LIMITS.faces:
         raise InputError(
-            f"{path} has {count / 1e6:.1f} million triangles, more than {limits.faces / 1e6:g} million; reduce it "
+            f"{path} has {count / 1e6:.1f} million triangles, more than {LIMITS.faces / 1e6:g} million; reduce it "
             "first (Blender: Modifier > Decimate; MeshLab: Quadric Edge Collapse Decimation)."
         )
     if up == "z" or (up == "auto" and path.suffix.lower() == ".stl"):
@@ -102,7 +141,7 @@ def files_beside(path: Path) -> list[Path]:
     """Files that a mesh file refers to and that were opened for it; none for a file that cannot be read."""
     folder = MeshFolder(path.parent)
     try:
-        _parsed(path, _bytes(path, LIMITS), folder)
+        _parsed(path, _bytes(path), folder)
     except InputError:
         return []
     return list(dict.fromkeys(folder.opened))
@@ -132,13 +171,13 @@ def repainted(model: MeshModel, material: str) -> MeshModel:
     return replace(model, parts=tuple(replace(part, surface=surface) for part in model.parts), warnings=notes)
 
 
-def _bytes(path: Path, limits: MeshLimits) -> bytes:
+def _bytes(path: Path) -> bytes:
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"The mesh {path} ends in '{path.suffix}'; give one of {', '.join(FORMATS)}.")
     try:
         size = path.stat().st_size / 1e6
-        if size > limits.megabytes:
-            raise InputError(f"The mesh {path} has {size:.0f} MB, more than {limits.megabytes:g}; reduce it first.")
+        if size > LIMITS.megabytes:
+            raise InputError(f"The mesh {path} has {size:.0f} MB, more than {LIMITS.megabytes:g}; reduce it first.")
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"The mesh {path} cannot be read: {(error.strerror or str(error)).lower()}.") from error
@@ -199,53 +238,12 @@ def _gltf_materials(path: Path, data: bytes) -> dict[str | None, dict[str, Any]]
     return materials
 
 
-class MeshFolder:
-    """The files beside a mesh, as trimesh asks for them (as much of its `Resolver` as its readers use).
-
-    trimesh swallows the errors of a resolver, so this keeps them: `refused` are references that lead outside of the
-    folder by a path, a link or an address, and are never opened; `missing` are files that are not there.
-    """
-
-    def __init__(self, folder: Path):
-        self.folder = folder.resolve()
-        self.opened: list[Path] = []
-        self.refused: list[str] = []
-        self.missing: list[str] = []
-
-    def get(self, name: str) -> bytes:
-        """The bytes of a file. Raises InputError for a reference outside of the folder, OSError for a missing file."""
-        name = str(name).strip()
-        path = self._inside(name)
-        if path is None:
-            self.refused.append(name)
-            raise InputError(f"The reference {name} leads outside of {self.folder}.")
-        try:
-            data = path.read_bytes()
-        except OSError:
-            self.missing.append(name)
-            raise
-        self.opened.append(path)
-        return data
-
-    def _inside(self, name: str) -> Path | None:
-        """The path of a reference, None when it leads outside. glTF's percent-encoding is decoded."""
-        spelled = [one.replace("\\", "/") for one in (name, unquote(name))]
-        if any(":" in one.split("/", 1)[0] or one.startswith("/") or "\0" in one for one in spelled):
-            return None
-        paths = [(self.folder / one).resolve() for one in spelled]
-        if not all(path.is_relative_to(self.folder) for path in paths):
-            return None
-        return paths[0] if paths[0].is_file() else paths[1]
-
-    __getitem__ = get
-
-
 class _Reader:
     """The meshes of a trimesh scene as bodies."""
 
-    def __init__(self, path: Path, materials: dict[str | None, dict[str, Any]], limits: MeshLimits):
-        self.path, self.materials, self.limits = path, materials, limits
-        self.textures = Textures(limits.texture)
+    def __init__(self, path: Path, materials: dict[str | None, dict[str, Any]]):
+        self.path, self.materials = path, materials
+        self.textures = Textures(LIMITS.texture)
         self.notes: list[str] = []
 
     def parts(self, scene: Any) -> Iterator[Body]:
@@ -286,7 +284,7 @@ class _Reader:
         if given is not None and len(given) == len(vertices):
             normals = _unit(np.asarray(given, np.float64) @ np.linalg.pinv(transform[:3, :3]))
         else:
-            corner = creased_normals(vertices, faces, self.limits.crease).reshape(-1, 3)
+            corner = creased_normals(vertices, faces, LIMITS.crease).reshape(-1, 3)
             vertices, uv = vertices[faces.ravel()], uv[faces.ravel()]
             normals, faces = corner, np.arange(faces.size).reshape(-1, 3)
         if face_uv is not None:

@@ -1,7 +1,5 @@
 """In-photo emitters: windows and lamps that the photo shows, found and turned into surfaces that can be dimmed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

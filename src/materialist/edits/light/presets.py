@@ -1,7 +1,5 @@
 """Light to choose from: environment maps that are computed, not photographed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Other light for a fitted scene: a map, a turn, a sun, lamps, moving ones (paper, Object insertion and relighting)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -152,8 +150,6 @@ def read_envmap(path: str | Path) -> Array:
 
 def rotated(envmap: Array, degrees: float) -> Array:
     """[h, 2h, 3] turned about the vertical; > 0 to the right of the camera. Between columns, linear."""
-    if not np.isfinite(degrees):
-        raise InputError(f"The rotation is {degrees} degrees; give a finite number.")
     columns = degrees / 360 * envmap.shape[1]
     whole = int(np.floor(columns))
     share = np.float32(columns - whole)

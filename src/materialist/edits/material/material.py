@@ -1,7 +1,5 @@
 """Edits of albedo, roughness and metallic inside a region (paper, Opaque Material Editing)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -69,7 +67,11 @@ def _base_colour(scene: Scene, weight: Array, wanted: MaterialEdit) -> tuple[Arr
     if wanted.albedo is not None and wanted.texture is not None:
         raise InputError("Give an albedo or a texture, not both; hue, saturation and value can go with either.")
     if wanted.texture is not None:
-        picture = read_texture(wanted.texture) if isinstance(wanted.texture, str | Path) else wanted.texture
+        picture = wanted.texture
+        if isinstance(picture, str | Path):
+            from materialist.io.photo import decode_photo
+
+            picture = np.clip(decode_photo(Path(picture)).over(1.0), 0, 1)
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
         return projected(scene, region, picture, wanted.texture_scale), list(np.shape(picture))
     if wanted.albedo is not None:
@@ -87,13 +89,6 @@ def _changed(old: Array, wanted: float | str | None) -> Array:
 def _mix(old: Array, new: Array, weight: Array) -> Array:
     """float32; old exactly where the weight is 0, new exactly where it is 1."""
     return np.where(weight >= 1, new, old + (new - old) * weight).astype(np.float32)
-
-
-def read_texture(path: str | Path) -> Array:
-    """[h, w, 3] float32 linear picture in [0, 1]. Raises InputError."""
-    from materialist.io.photo import decode_photo
-
-    return np.clip(decode_photo(Path(path)).over(1.0), 0, 1)
 
 
 def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -> Array:

@@ -1,8 +1,6 @@
 """A picture of what is behind the object: patches of the photo, a given one, or a diffusion model's (paper, Background
 Inpainting)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,8 +9,7 @@ import numpy as np
 
 from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edits.remove.behind import HiddenGeometry
-from materialist.edits.remove.native import resized
-from materialist.edits.remove.patches import patched
+from materialist.edits.remove.patches import patched, resized
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.io.image import same_aspect
 from materialist.options import Removal

@@ -1,7 +1,5 @@
 """Depth and normals of what an object hides: planes go on, everything else is spanned from its surroundings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

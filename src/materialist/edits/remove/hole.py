@@ -1,7 +1,5 @@
 """The pixels that taking an object away concerns."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

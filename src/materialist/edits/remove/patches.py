@@ -5,8 +5,6 @@ go on through the hole. They come from the surfaces that go on there or from nea
 guide prefers those of the same surface, as far away.
 """
 
-from __future__ import annotations
-
 import sys
 import threading
 from dataclasses import dataclass
@@ -14,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.edits.remove.native import resized
 from materialist.errors import SetupError
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
@@ -99,3 +96,13 @@ def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) 
             f"Filling what was hidden needs the package PyPatchMatch ({error}); install it with: {sys.executable} -m "
             "pip install --force-reinstall --no-deps PyPatchMatch, or give a background."
         ) from error
+
+
+def resized(picture: Array, shape: tuple[int, ...]) -> Array:
+    """[h, w] or [h, w, C] at another size (rows, columns, ...), averaged when it shrinks."""
+    import cv2
+
+    if picture.shape[:2] == shape[:2]:
+        return picture.copy()
+    how = cv2.INTER_AREA if picture.shape[0] > shape[0] else cv2.INTER_LINEAR
+    return np.asarray(cv2.resize(np.ascontiguousarray(picture, np.float32), shape[1::-1], interpolation=how))

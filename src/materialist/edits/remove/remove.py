@@ -1,7 +1,5 @@
 """The scene without one of its objects (paper, Background Inpainting): what was behind it, in maps, depth and photo."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -13,10 +11,11 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import picture_behind
 from materialist.edits.remove.behind import behind
 from materialist.edits.remove.hole import evidence_notes, make_hole
-from materialist.edits.remove.native import with_hole
+from materialist.edits.remove.patches import resized
 from materialist.geometry.membrane import membrane
+from materialist.geometry.silhouette import window
 from materialist.options import Removal
-from materialist.types import Array, Materials, Scene
+from materialist.types import Array, Materials, Photo, Scene
 
 FLOOR = 0.05
 """Radiance up to which an albedo or a re-rendering differs from the photo by a sum, beyond it by a factor (by eye)."""
@@ -45,11 +44,13 @@ def remove(
     found = behind(scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera)
     picture, how, warnings = picture_behind(scene, options, hole.painted, ~bodies, found)
     photo = with_hole(scene.photo, picture, hole.painted)
-    shown = denoised(scene.rerender, scene.materials.albedo, scene.normal)
+    old = scene.materials
+    shown = denoised(scene.rerender, old.albedo, scene.normal)
+    spanned = (membrane(np.clip(v, 0, 1), ~hole.painted) for v in (old.roughness, old.metallic))
     removed = replace(
         scene, photo=photo, depth=found.depth, normal=found.normal,
         geometry=rebuilt(scene, found.depth, found.normal, scene.camera),
-        materials=carried_materials(scene.materials, photo.linear, hole.painted),
+        materials=Materials(np.minimum(carried(old.albedo, photo.linear, hole.painted), 1), *spanned),
         rerender=np.where(hole.painted[..., None], carried(shown, photo.linear, hole.painted), scene.rerender),
     )  # fmt: skip
     what = {
@@ -71,7 +72,25 @@ def carried(values: Array, photo: Array, hole: Array) -> Array:
     return np.where(hole[..., None], told, values).astype(np.float32)
 
 
-def carried_materials(old: Materials, photo: Array, hole: Array) -> Materials:
-    """Materials with the hole filled as the photo [H, W, 3] is; roughness and metallic are spanned."""
-    spanned = (membrane(np.clip(v, 0, 1), ~hole) for v in (old.roughness, old.metallic))
-    return Materials(np.minimum(carried(old.albedo, photo, hole), 1), *spanned)
+def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
+    """The photo with a picture [h, w, 3] linear of any size in the hole [H, W] bool; elsewhere bit for bit itself."""
+    original, share = photo.original.copy(), _outline(hole, photo.original.shape[:2])
+    box = window(hole, share.shape)
+    over, large = share[box][..., None], resized(picture, share.shape)[box]
+    original[box] = np.where(over > 0, over * large + (1 - over) * original[box], original[box])
+    linear = np.where(hole[..., None], resized(picture, hole.shape), photo.linear).astype(np.float32)
+    return replace(photo, linear=linear, original=original)
+
+
+def _outline(mask: Array, native: tuple[int, ...]) -> Array:
+    """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards."""
+    import cv2
+
+    hard = cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
+    if native == mask.shape:
+        return hard.astype(np.float32)
+    smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
+    share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
+    thin = mask & (cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0)
+    thin = cv2.resize(thin.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
+    return np.where(thin > 0, 1, hard * share).astype(np.float32)

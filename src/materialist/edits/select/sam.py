@@ -1,7 +1,5 @@
 """SAM 2 (Ravi et al. 2024), the paper's way to select, where its weights are there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,8 +11,6 @@ from materialist.types import Array
 
 REPO = "facebook/sam2.1-hiera-tiny"
 _MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
-_CORNERS = (2, 3)
-"""Labels of the two corners of a box among the points; 1 is a click on the object."""
 
 
 def segment(
@@ -45,7 +41,7 @@ def segment(
     scale = np.array([side / width, side / height])
     corners = [] if box is None else [box[:2], box[2:]]
     spots = (np.array([*points, *corners], np.float32) + 0.5 * (box is None)) * scale
-    labels = [1] * len(points) + list(_CORNERS[: len(corners)])
+    labels = [1] * len(points) + ([] if box is None else [2, 3])  # clicks on the object, the two corners
     with torch.inference_mode():
         output = model(
             pixel_values=_pixels(linear, side).to(target),
@@ -53,7 +49,10 @@ def segment(
             input_labels=torch.tensor(labels, dtype=torch.int32, device=target)[None, None],
             multimask_output=len(spots) == 1,
         )
-    return _best(output, height, width)
+    masks, scores = output.pred_masks[0, 0].float(), output.iou_scores[0, 0]
+    best = masks[int(scores.argmax())][None, None]
+    large = torch.nn.functional.interpolate(best, (height, width), mode="bilinear", align_corners=False)
+    return (large[0, 0] > 0).cpu().numpy()
 
 
 def folder_of(where: str) -> Any:
@@ -81,13 +80,3 @@ def _pixels(linear: Array, side: int):
         encoded, (side, side), mode="bilinear", align_corners=False, antialias=True
     )
     return (square - torch.tensor(_MEAN).view(1, 3, 1, 1)) / torch.tensor(_STD).view(1, 3, 1, 1)
-
-
-def _best(output: Any, height: int, width: int) -> Array:
-    """The mask with the best predicted overlap, at the size of the photo."""
-    import torch
-
-    masks, scores = output.pred_masks[0, 0].float(), output.iou_scores[0, 0]
-    logits = masks[int(scores.argmax())][None, None]
-    large = torch.nn.functional.interpolate(logits, (height, width), mode="bilinear", align_corners=False)
-    return (large[0, 0] > 0).cpu().numpy()

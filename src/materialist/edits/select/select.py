@@ -1,7 +1,5 @@
 """Regions by click, box or mask (paper, Opaque Material Editing: one object, chosen by the user)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 
