@@ -154,7 +154,7 @@ def apply(
         if step.skipped:
             continue
         try:
-            edited = _MAKERS[step.kind](scene, edited, replace(step, seed=seed, device=device))
+            edited = _MAKERS.get(step.kind, _in_region)(scene, edited, replace(step, seed=seed, device=device))
         except InputError as error:
             raise InputError(f"Step {number} ({step.kind}): {error}") from error
     return edited
@@ -181,8 +181,8 @@ def _left(scene: Scene, edited: Scene, region: Array) -> Array:
     return region & ~gone
 
 
-def _options(step: Step) -> Any:
-    """The dataclass of the step's options, of what the file says beside its region or place."""
+def options_of(step: Step) -> Any:
+    """The dataclass of the step's options, of what it says beside its region or place. Raises InputError."""
     kind = OPTIONS[step.kind]
     known = declarations(kind)
     shared = {name: getattr(step, name) for name in ("seed", "device") if name in known}
@@ -196,13 +196,13 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     region = [name for name in REGION if name in step.options]
     if region and "dim" not in step.options:
         raise InputError(f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out.")
-    wanted = _options(step)
+    wanted = options_of(step)
     return relight(edited, wanted, lights=region_of(scene, step) if region else None, fitted=scene)
 
 
 def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
     _needs(step, "insert: {mesh: mug.glb, at: [310, 220]}")
-    wanted = _options(step)
+    wanted = options_of(step)
     for place in _places(step):
         edited = insert(edited, _file(step, "mesh"), place, wanted)
     return edited
@@ -211,7 +211,7 @@ def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
 def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
     _needs(step, "drop: {mesh: [mug.glb, ball.ply], at: [310, 220]}")
     meshes = [beside(step.folder, "mesh", one) for one in _listed(step.options["mesh"])]
-    return settle(edited, meshes, _places(step), _options(step))
+    return settle(edited, meshes, _places(step), options_of(step))
 
 
 def _needs(step: Step, example: str) -> None:
@@ -224,25 +224,15 @@ def _places(step: Step) -> list[Any]:
     return [numbers(one, 2, "at") for one in several(step.options["at"])]
 
 
-def _remove(scene: Scene, edited: Scene, step: Step) -> Scene:
-    return remove(edited, _left(scene, edited, region_of(scene, step)), _options(step), fitted=scene)
+def _in_region(scene: Scene, edited: Scene, step: Step) -> Scene:
+    region, options = _left(scene, edited, region_of(scene, step)), options_of(step)
+    if step.kind == "edit":
+        return edit(edited, region, options)
+    return (glass if step.kind == "glass" else remove)(edited, region, options, fitted=scene)
 
 
-def _glass(scene: Scene, edited: Scene, step: Step) -> Scene:
-    region, options = glass_arguments(scene, step)
-    return glass(edited, _left(scene, edited, region), options, fitted=scene)
-
-
-def glass_arguments(scene: Scene, step: Step) -> tuple[Array, Glass]:
-    """([H, W] bool region, options) of a glass step. Raises InputError."""
-    return region_of(scene, step), _options(step)
-
-
-_MAKERS = {
-    "edit": lambda scene, edited, step: edit(edited, _left(scene, edited, region_of(scene, step)), _options(step)),
-    "relight": _relight, "insert": _insert, "drop": _drop, "glass": _glass, "remove": _remove,
-}  # fmt: skip
-"""Kind of step -> (original scene, scene so far, step) -> scene."""
+_MAKERS = {"relight": _relight, "insert": _insert, "drop": _drop}
+"""Kind of step -> (original scene, scene so far, step) -> scene; `_in_region` for the others."""
 
 
 def _file(step: Step, name: str) -> Path:

@@ -52,19 +52,9 @@ def closed_proxy(
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the back stays before it.
         back: [H, W, 3] unit normals of the back, outwards, where they are known better than by its depth.
 
-    Raises InputError for shapes that differ, a thickness that is negative or not finite, or a mask without a surface
-    or too thin for one.
+    Raises InputError for a mask without a surface or too thin for one.
     """
     inside = surface_in(mask, depth, camera)
-    if normal.shape != (*inside.shape, 3) or np.shape(thickness) != inside.shape:
-        raise InputError(
-            f"The normals are {normal.shape} and the thickness {np.shape(thickness)}; the mask is {inside.shape}."
-        )
-    own = thickness[inside]
-    if not (np.isfinite(own).all() and own.min() >= 0 and own.max() > 0):
-        raise InputError(f"The thickness goes from {own.min():g} to {own.max():g}; it must be finite, >= 0, not all 0.")
-    if back is not None and back.shape != normal.shape:
-        raise InputError(f"The normals of the back are {back.shape}, those of the front {normal.shape}.")
     view = _window(depth, normal, inside, thickness, behind, back, camera)
     view = replace(view, thickness=_thickness(view))
     shell = _closed(view, camera)

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.errors import InputError
 from materialist.geometry.silhouette import border_distance, object_size, spacing, surface_in
 from materialist.types import Array, Camera
 
@@ -38,8 +37,6 @@ def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera
     Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
-    if normal.shape != (*inside.shape, 3):
-        raise InputError(f"The normals are {normal.shape}, the camera needs {(*inside.shape, 3)}.")
     return mirrored(depth, normal, inside, pixel_rays(camera))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import materialist as mt
-from materialist.edits.recipe import REGION, Step, apply, glass_arguments
+from materialist.edits.recipe import REGION, Step, apply, options_of, region_of
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
@@ -61,7 +61,7 @@ def checked(scene: Scene, step: Step) -> tuple[Array, Tint]:
 
     Raises InputError for values out of range, and for a region without a surface.
     """
-    region, options = glass_arguments(scene, step)
+    region, options = region_of(scene, step), options_of(step)
     if not (region & (scene.depth > 0)).any():
         raise InputError("The selection covers only sky; select a surface.")
     return region, options.tint
@@ -201,15 +201,15 @@ def _body(path: str, folder: str, others: str, glass: str) -> Any:
     from materialist.edits.glass.preview import GlassPreview
 
     scene = _loaded(path)
-    region, options = glass_arguments(scene, Step("glass", json.loads(glass), Path(folder)))
+    step = Step("glass", json.loads(glass), Path(folder))
     edited = apply(scene, [Step(kind, given, Path(folder)) for kind, given in json.loads(others)])
-    return GlassPreview(edited, region, options)
+    return GlassPreview(edited, region_of(scene, step), options_of(step))
 
 
 def trace(report: Reporter, request: Request) -> Pane | None:
     """The pane of one request; None where a newer one came meanwhile. Raises InputError."""
     path, folder, glass = request["scene"], request["folder"], request["glass"]
-    _, options = glass_arguments(_loaded(path), Step("glass", glass, Path(folder)))
+    options = options_of(Step("glass", glass, Path(folder)))
     report("build", 0, 1)
     fixed = {name: value for name, value in glass.items() if name not in VALUES}
     preview = _body(path, folder, json.dumps(request["others"]), json.dumps(fixed))

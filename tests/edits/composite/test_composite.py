@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
-from materialist.edits.composite.composite import composite, developed, pictures
+from materialist.edits.composite.composite import composite, developed, is_deep, pictures, write_composite
 from materialist.edits.composite.into_photo import DEFAULT, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.native_layer import NativeLayer
@@ -17,9 +18,12 @@ from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
+from materialist.io.decode import decode
+from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
 
 MASK = block_mask(36, 48)
+FLAT = flat_scene()
 
 
 def layers_of(base, edited, changed, relit=False):
@@ -141,8 +145,6 @@ def test_many_edits_are_those_made_one_by_one():
 
 
 def test_developed_scenes_start_from_the_composite(tmp_path):
-    from materialist.io.package import load_scene, save_scene
-
     scene = rendered_scene(2)
     edited = relight(edit(scene, MASK, roughness=0.2), lamps=[lamp(scene, 30, 10, 2.5, 3000, 1.0)])
     picture = scene.photo.original * 0.5
@@ -203,3 +205,30 @@ def test_a_lone_bright_pixel_is_brought_down_and_a_highlight_stays():
     np.testing.assert_array_equal(without_fireflies(highlight), highlight)
     where = np.zeros((9, 9), bool)
     np.testing.assert_array_equal(without_fireflies(picture, where), picture)
+
+
+def photo_from(path):
+    linear = decode(path).linear
+    return replace(FLAT.photo, linear=linear, original=linear, path=str(path), source=path.read_bytes())
+
+
+@pytest.mark.parametrize(("dtype", "side"), [(np.uint8, 16), (np.uint16, 256)])
+def test_every_value_comes_back(tmp_path, dtype, side):
+    pixels = np.arange(side**2).astype(dtype).reshape(side, side)[..., None].repeat(3, -1)
+    cv2.imwrite(str(tmp_path / "a.png"), pixels)
+    photo = photo_from(tmp_path / "a.png")
+    write_composite(tmp_path / "b.png", photo.original, photo)
+    back = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED)
+    assert back.dtype == dtype and is_deep(photo) == (dtype == np.uint16)
+    np.testing.assert_array_equal(back, pixels)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+
+
+def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):
+    data = cv2.imencode(".png", np.full((36, 48, 3), 30000, np.uint16))[1].tobytes()
+    scene = replace(FLAT, photo=replace(FLAT.photo, source=data, path="a.png"))
+    save_scene(developed(scene, scene, scene.photo.original), tmp_path / "b.scene")
+    again = load_scene(tmp_path / "b.scene")
+    assert again.photo.source is None and is_deep(again.photo)
+    save_scene(developed(FLAT, FLAT, FLAT.photo.original), tmp_path / "c.scene")
+    assert not is_deep(load_scene(tmp_path / "c.scene").photo)

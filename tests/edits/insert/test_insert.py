@@ -58,7 +58,7 @@ def test_bad_places_and_numbers(box):
     for place, options, sentence in [
         ((40, 3), {}, "sky"), ((400, 30), {}, "outside the photo"), ((40, -1), {}, "outside the photo"),
         ((40, 50), {"scale": 0.0}, "scale"), ((40, 50), {"scale": 100.0}, "behind the camera"),
-        ((40, 50), {"turn": np.nan}, "turn"), ((40, 50), {"size": -1.0}, "size"), ("here", {}, "two numbers"),
+        ((40, 50), {"turn": np.nan}, "turn"), ((40, 50), {"size": -1.0}, "size"), ("here", {}, "must be 2 numbers"),
     ]:  # fmt: skip
         with pytest.raises(InputError, match=sentence):
             insert(scene, box, place, **options)

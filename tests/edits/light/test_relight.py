@@ -6,8 +6,20 @@ import numpy as np
 import pytest
 from edit_scenes import flat_scene
 
+from materialist.edits.core.notes import effect_notes
 from materialist.edits.core.renderer import EditRenderer
-from materialist.edits.light.relight import kelvin_colour, lamp, moving_light, read_envmap, relight, rotated, with_sun
+from materialist.edits.light import presets
+from materialist.edits.light.relight import (
+    checked_envmap,
+    kelvin_colour,
+    lamp,
+    moving_light,
+    read_envmap,
+    relight,
+    rotated,
+    with_sun,
+)  # fmt: skip
+from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.types import Materials
@@ -141,3 +153,19 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
     np.testing.assert_allclose(suns[1].envmap, relight(SCENE, sun=(90, 40)).envmap, atol=1e-6)
     with pytest.raises(InputError, match="frames is 1"):
         next(moving_light(SCENE, 1))
+
+
+def test_lights_are_environment_maps():
+    made = {name: presets.light(name, 64) for name in presets.names()}
+    assert all(checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20 for light in made.values())
+    assert made["Window"][:, 64:].sum() > made["Window"][:, :64].sum()  # on the right
+    assert made["Noon"][:32].sum() > made["Noon"][32:].sum()  # from above
+
+
+def test_a_light_without_effect_is_named_and_nothing_else():
+    dimmed, photo = relight(SCENE, ambient=0.5), SCENE.photo.original
+    (note,) = effect_notes(SCENE, dimmed, photo * np.float32(0.99))
+    assert "of 255 levels" in note and "lamp" in note
+    assert effect_notes(SCENE, dimmed, photo * np.float32(0.5)) == []
+    painted = edit(SCENE, np.ones(SCENE.depth.shape, bool), hue=120)
+    assert effect_notes(SCENE, painted, photo) == []

@@ -38,15 +38,6 @@ def test_floor_and_wall_go_on_and_meet_in_a_line():
     assert np.abs(found.normal - normal)[right].max() < 0.02
 
 
-def table():
-    """Depth, normal and plane of a table that ends at depth 2 before a wavy background farther away, of no plane."""
-    depth, normal, _ = room()
-    rows, columns = np.indices(depth.shape)
-    end = depth > 2.0
-    depth = np.where(end, 3.5 + 0.3 * np.sin(columns / 7) * np.cos(rows / 5), depth)
-    return depth, np.where(end[..., None], [0.0, 0, 1], normal), np.where(end, LOOSE, 0)
-
-
 def test_a_table_goes_on_behind_things_that_stand_on_it():
     depth, normal, plane = room()
     plane = np.where(plane == 1, 0, plane)

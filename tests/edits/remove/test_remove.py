@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from edit_scenes import block_mask, flat_scene, rendered_scene, tetrahedron
 
-from materialist.color import srgb_levels
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.region import body_coverage
+from materialist.edits.remove.hole import make_hole
 from materialist.edits.remove.remove import remove
 from materialist.errors import InputError
 
@@ -56,11 +56,6 @@ def test_the_composite_shows_the_wall_and_keeps_the_rest():
     np.testing.assert_array_equal(picture[far], scene.photo.original[far])
 
 
-def levels_off(picture, photo, where):
-    """Share of the pixels of a mask that differ by 3 of 255 levels or more."""
-    return (np.abs(srgb_levels(picture).astype(int) - srgb_levels(photo)).max(-1) >= 3)[where].mean()
-
-
 @pytest.mark.parametrize("white", [False, True])
 def test_outside_the_hole_the_photo_stays(white):
     """Also where it is clipped, so that the hole is filled with what was there."""
@@ -74,7 +69,6 @@ def test_outside_the_hole_the_photo_stays(white):
     removed = remove(scene, MASK, shadow=0)
     picture = composite(scene, removed, spp=8)
     far = np.kron(far_from(MASK, 3), np.ones((2, 2), bool))
-    assert levels_off(picture, scene.photo.original, far) == 0
     np.testing.assert_array_equal(picture[far], scene.photo.original[far])
 
 
@@ -119,3 +113,21 @@ def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
     for nothing_left, covering in ((only_sky_behind, mask), (scene, np.ones((36, 48), bool))):
         with pytest.raises(InputError, match="covers 100% of the photo's surfaces"):
             remove(nothing_left, covering)
+
+
+def on_floor():
+    """The flat scene, its lower half a floor."""
+    scene = flat_scene()
+    floor = np.where(np.arange(36)[:, None] >= 20, 0, -1).astype(np.int8) * np.ones((1, 48), np.int8)
+    normal = np.where(floor[..., None] == 0, [0.0, 1, 0], scene.normal).astype(np.float32)
+    return replace(scene, normal=normal, geometry=replace(scene.geometry, plane_label=floor))
+
+
+def test_a_given_shadow_widens_the_hole_on_the_ground_alone():
+    plain, wide = (
+        make_hole(on_floor(), MASK, grow=0.006, shadow=shadow, bodies=np.zeros_like(MASK)) for shadow in (0.0, 0.5)
+    )
+    np.testing.assert_array_equal(plain.painted, plain.gone)
+    more = wide.painted & ~wide.gone
+    assert more[20:].any() and not more[:20].any()
+    np.testing.assert_array_equal(wide.gone, plain.gone)

@@ -4,6 +4,7 @@ import numpy as np
 
 from materialist.edits.core.renderer import EditRenderer
 from materialist.errors import InputError
+from materialist.option_kinds import numbers
 from materialist.types import Array, Scene
 
 HIDDEN = 0.5
@@ -49,10 +50,7 @@ def body_coverage(scene: Scene) -> Array:
 def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:
     """(column, row) of a point (x, y) at working size. Raises InputError when it lies outside the picture."""
     width, height = scene.camera.width, scene.camera.height
-    try:
-        x, y = (float(v) for v in point)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The {name} must be two numbers X,Y, not {point!r}.") from error
+    x, y = numbers(point, 2, name)
     if not (0 <= x < width and 0 <= y < height):
         raise InputError(
             f"The {name} {x:g},{y:g} lies outside the photo, which is {width} x {height} pixels at working size."

@@ -62,8 +62,6 @@ class GlassPreview:
         from materialist.render.native import numbers_in, radiance
         from materialist.render.scene import GLASS_DEPTH
 
-        if spp < 1:
-            raise InputError(f"spp is {spp}; give at least 1 path a pixel.")
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target, box = self._target(surface), self._box
         paths = max(FEWEST, min(spp, PATHS // area(box)))

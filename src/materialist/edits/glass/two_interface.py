@@ -20,7 +20,6 @@ import numpy as np
 from materialist.bsdf.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
 from materialist.camera import pixel_rays, project, rays_through, unit
 from materialist.envmap import bilinear, environment
-from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import surface_in
 from materialist.geometry.slopes import back_normals
@@ -76,14 +75,8 @@ def two_interface(
         options: `ior`, `tint` and `roughness` count here.
         back: [H, W, 3] unit outward normals of the back, read at the exit's place in the picture; d1 is then the
             distance to the surface that `thickness` describes. None: the paper's assumption, -N_p of the front there.
-
-    Raises InputError for maps of another size than the camera's.
     """
     inside = surface_in(mask, depth, camera)
-    for name, value in (("thickness", thickness), ("background depth", behind.depth), ("normals", normal),
-                        ("background", behind.picture), ("back", normal if back is None else back)):  # fmt: skip
-        if value.shape[:2] != inside.shape:
-            raise InputError(f"The {name} has shape {value.shape}, the camera needs {inside.shape}.")
     front = Front(camera, normal, depth, inside, back, None if back is None else thickness)
     d1 = thickness[inside]
     side, tint = SIDES[options.roughness > 0], np.asarray(options.tint, float)

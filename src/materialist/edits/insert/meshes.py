@@ -15,8 +15,7 @@ import numpy as np
 
 from materialist.camera import unit
 from materialist.color import srgb_to_linear
-from materialist.edits.core.surfaces import uniform_surface
-from materialist.edits.core.topology import edge_faults
+from materialist.edits.core.surfaces import edge_faults, uniform_surface
 from materialist.edits.insert.mesh_material import GREY, Textures, coloured, gltf_left_out, gltf_surface, mtl_surface
 from materialist.errors import InputError
 from materialist.option_kinds import parse_colour
@@ -148,7 +147,7 @@ def files_beside(path: Path) -> list[Path]:
 
 
 def repainted(model: MeshModel, material: str) -> MeshModel:
-    """The model in another material: `as-is`, `glass`, `mirror`, a linear "R,G,B" or "#rrggbb". Raises InputError.
+    """The model in another material: `as-is`, `glass`, `mirror`, a linear "R,G,B" or "#rrggbb".
 
     Glass is smooth with an index of 1.5; the mirror's albedo is 0.95; a colour is dielectric with roughness 0.5.
     """
@@ -159,12 +158,7 @@ def repainted(model: MeshModel, material: str) -> MeshModel:
     elif material == "mirror":
         surface = uniform_surface(0.95, 0.03, 1.0)
     else:
-        try:
-            surface = uniform_surface(np.asarray(parse_colour(material)), 0.5, 0.0)
-        except InputError as error:
-            raise InputError(
-                f"The material is {material!r}; give as-is, glass, mirror, R,G,B in [0, 1], or #rrggbb."
-            ) from error
+        surface = uniform_surface(np.asarray(parse_colour(material)), 0.5, 0.0)
     notes = model.warnings
     if material == "glass" and not model.closed:
         notes = (*notes, f"{model.name} is not closed, so its glass has holes; close the mesh for a solid look.")

@@ -37,21 +37,18 @@ class Hole:
 
 
 def make_hole(
-    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array | None = None
+    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array
 ) -> Hole:  # fmt: skip
     """The pixels that a removal concerns; `grow` and `shadow` as of `materialist.Removal`.
 
-    `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay; None for nowhere.
-
-    Raises:
-        InputError: a mask that is empty, of another size, all sky, or (nearly) all of the photo.
+    `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay.
+    Raises InputError for a mask that is empty, of another size, all sky, or (nearly) all of the photo.
     """
     from skimage.morphology import remove_small_holes
 
     own = checked_region(scene, mask) > 0.5
     if not own.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
-    bodies = np.zeros_like(own) if bodies is None else bodies
     gone = grown(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
     if (gone & surface).sum() > SETTINGS.most * surface.sum() or (gone | ~surface).all():

@@ -8,6 +8,7 @@ import numpy as np
 from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
 from materialist.edits.select.objects import Box, object_at, object_in
 from materialist.errors import InputError
+from materialist.option_kinds import numbers
 from materialist.types import Array, Scene
 
 METHODS = ("network", "grabcut", "sam2")
@@ -75,10 +76,7 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
 
 def _box(scene: Scene, box: Sequence[float]) -> Box:
     """The box cut to the photo."""
-    try:
-        x0, y0, x1, y1 = (float(v) for v in box)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"The box must be (x0, y0, x1, y1), not {box!r}.") from error
+    x0, y0, x1, y1 = numbers(box, 4, "box")
     width, height = scene.camera.width, scene.camera.height
     left, right = np.clip(sorted((x0, x1)), 0, width)
     top, bottom = np.clip(sorted((y0, y1)), 0, height)
