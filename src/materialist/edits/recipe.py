@@ -240,5 +240,4 @@ def _file(step: Step, name: str) -> Path:
 
 
 def _listed(value: Any) -> list[Any]:
-    """One file name, or a list of them, as a list."""
     return value if isinstance(value, list) and value else [value]

@@ -40,18 +40,11 @@ class Axis:
         height = away @ self.up
         return np.stack([np.linalg.norm(away - height[..., None] * self.up, axis=-1), height], -1)
 
-    def leaning(self, points: Array, normals: Array) -> Array:
-        """[N, 2] unit normals of the profile at points [N, 3] with normals [N, 3]."""
-        return unit(np.stack([(normals * self._out(points)).sum(-1), normals @ self.up], -1))
-
     def spread(self, points: Array, leaning: Array) -> Array:
         """[N, 3] unit normals at points [N, 3] where the profile leans by [N, 2]."""
-        return unit(leaning[:, :1] * self._out(points) + leaning[:, 1:] * self.up)
-
-    def _out(self, points: Array) -> Array:
-        """[N, 3] unit, across the axis, to points [N, 3]."""
         away = points - self.foot
-        return unit(away - (away @ self.up)[:, None] * self.up)
+        out = unit(away - (away @ self.up)[:, None] * self.up)
+        return unit(leaning[:, :1] * out + leaning[:, 1:] * self.up)
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,8 @@ def test_edited_light_is_noted_and_warned_about():
     [
         ({"envmap": np.ones((8, 8, 3))}, "twice as wide"),
         ({"envmap": np.ones((8, 16))}, "twice as wide"),
-        ({"envmap": np.full((8, 16, 3), np.nan)}, "NaN"),
-        ({"envmap": -np.ones((8, 16, 3))}, "negative"),
+        ({"envmap": np.full((8, 16, 3), np.nan)}, "from nan to nan"),
+        ({"envmap": -np.ones((8, 16, 3))}, "from -1 to -1"),
         ({"envmap": np.zeros((8, 16, 3))}, "black"),
         ({"envmap": np.ones((8, 16, 3)), "gain": "lots"}, "lots"),
         ({"ambient": 0}, "black"),

@@ -2,16 +2,38 @@
 
 import numpy as np
 import pytest
+from edit_scenes import scene_of
 from PIL import Image
-from table_top import overlap, table_top
 
+from materialist.edits.select.sam import segment
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
+from materialist.types import Camera
 
 
 @pytest.fixture(scope="module")
 def table():
-    return table_top()
+    """A textured ball with a handle, and a second ball, on a shaded floor; and the masks of the two."""
+    h, w = 120, 160
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[:h, :w]
+    ball = (x - 60) ** 2 + (y - 60) ** 2 < 28**2
+    ring = np.abs(np.hypot(x - 94, y - 60) - 12) < 3.5
+    first, second = ball | (ring & (x > 85)), (x - 130) ** 2 + (y - 85) ** 2 < 14**2
+    colour = np.broadcast_to([0.45, 0.42, 0.38], (h, w, 3)) * (0.7 + 0.4 * y / h)[..., None]
+    colour = np.where(
+        first[..., None], np.array([0.7, 0.2, 0.05]) * (0.7 + 0.5 * (60 - x) / 60)[..., None].clip(0.4, 1.3), colour
+    )
+    colour = np.where(second[..., None], [0.1, 0.2, 0.5], colour)
+    photo = (colour * rng.uniform(0.85, 1.15, (h, w, 1))).astype(np.float32).clip(0.01, 1)
+    depth = np.where(first, 2.0, np.where(second, 2.3, 3.0)).astype(np.float32)
+    depth[:4] = 0
+    scene = scene_of(Camera(w, h, 40.0), depth, np.broadcast_to([0, 0, 1], (h, w, 3)), photo, completion="none")
+    return scene, first, second
+
+
+def overlap(a, b):
+    return (a & b).sum() / (a | b).sum()
 
 
 @pytest.mark.parametrize("click", [(50, 50), (75, 70), (45, 75)])
@@ -74,3 +96,42 @@ def around(mask, more):
 def test_boxes_need_not_be_exact(table, which, more):
     scene, *things = table
     assert overlap(select(scene, box=around(things[which], more)), things[which]) > 0.85
+
+
+@pytest.fixture(scope="module")
+def model_folder(tmp_path_factory):
+    """SAM 2 with a tiny network of random weights: the code path, not the masks."""
+    transformers = pytest.importorskip("transformers", reason="needs the optional extra 'hub'")
+    import torch
+
+    torch.manual_seed(0)
+    size = 64
+    backbone = transformers.Sam2HieraDetConfig(
+        hidden_size=8, num_attention_heads=1, image_size=[size, size], blocks_per_stage=[1, 1, 2, 1],
+        embed_dim_per_stage=[8, 16, 32, 64], num_attention_heads_per_stage=[1, 1, 2, 2],
+        window_size_per_stage=[4, 4, 4, 2],
+        global_attention_blocks=[3], window_positional_embedding_background_size=[4, 4],
+    )  # fmt: skip
+    vision = transformers.Sam2VisionConfig(
+        backbone_config=backbone, backbone_channel_list=[64, 32, 16, 8], fpn_hidden_size=32,
+        backbone_feature_sizes=[[size // 4] * 2, [size // 8] * 2, [size // 16] * 2],
+    )  # fmt: skip
+    prompt = transformers.Sam2PromptEncoderConfig(hidden_size=32, image_size=size, patch_size=16, mask_input_channels=4)
+    decoder = transformers.Sam2MaskDecoderConfig(
+        hidden_size=32, mlp_dim=32, num_attention_heads=2, iou_head_hidden_dim=16, num_hidden_layers=1
+    )
+    config = transformers.Sam2Config(vision_config=vision, prompt_encoder_config=prompt, mask_decoder_config=decoder)
+    folder = tmp_path_factory.mktemp("sam2")
+    transformers.Sam2Model(config).save_pretrained(folder)
+    return folder
+
+
+PHOTO = np.random.default_rng(0).random((30, 44, 3), np.float32)
+
+
+def test_clicks_and_boxes_give_masks_of_the_photo(model_folder):
+    for points, box in (([(20, 10)], None), ([(20, 10), (25, 12)], None), ([], (5, 5, 30, 25))):
+        mask = segment(PHOTO, points, box, where=str(model_folder), device="cpu")
+        assert mask.shape == (30, 44) and mask.dtype == bool
+    again = segment(PHOTO, [], (5, 5, 30, 25), where=str(model_folder), device="cpu")
+    np.testing.assert_array_equal(mask, again)

@@ -104,7 +104,6 @@ def compared(scene: Scene, edited: Scene) -> Scene:
 
 
 def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
-    """Whether two edits of a scene are compared with the same scene."""
     if dimmed_emitters(scene, one) != dimmed_emitters(scene, other) or one.photo is not other.photo:
         return False
     return one.photo is scene.photo or (one.geometry is other.geometry and one.materials is other.materials)

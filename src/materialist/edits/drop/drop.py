@@ -137,7 +137,6 @@ class Falling:
 
 
 def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: Drop) -> Falling:
-    """Meshes over the place where they will fall; see `drop`."""
     load("mujoco")
     meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
     models = [
@@ -148,7 +147,7 @@ def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: D
     places = _places(at, len(models))
     stood = [put(scene, model, place, scale=wanted.scale) for model, place in zip(models, places)]
     direction = down(scene, stood[0][1], wanted.gravity)
-    to_up = upright(direction)
+    to_up = np.concatenate([axes(-direction), -direction[None]])
     factor = wanted.metres / max(longest for *_, longest in stood)
     points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
     lifts = _lifts(points, wanted.height * wanted.metres)
@@ -193,13 +192,7 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
     return np.array([0.0, -1.0, 0.0])
 
 
-def upright(direction: Array) -> Array:
-    """[3, 3] rotation from the camera frame to one whose z axis is against gravity."""
-    return np.concatenate([axes(-direction), -direction[None]])
-
-
 def _places(at: Any, count: int) -> list[tuple[float, float]]:
-    """A place for each mesh."""
     several = bool(np.ndim(at[0])) if len(at) else False
     places = [tuple(place) for place in at] if several else [tuple(at)] * count
     if len(places) == 1:
@@ -243,7 +236,6 @@ def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: 
 
 
 def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: RigidBody, pose: Pose) -> Body:
-    """The body of the camera frame where the thing is now."""
     turn = to_up.T @ pose.turn @ to_up
     # In metres, z up: x -> R (x + shift - first centre) + centre.
     move = (pose.turn @ (shift - thing.centre) + pose.centre) / factor @ to_up

@@ -78,6 +78,5 @@ class GlassPreview:
         return (self._edited.photo.linear != self.scene.photo.linear).any(-1)
 
     def _target(self, surface: Surface):
-        """The `RenderScene` with the body of that glass."""
         bodies = (*self._edited.bodies[:-1], replace(self._edited.bodies[-1], surface=surface))
         return self._renderer.render_scene(replace(self._edited, bodies=bodies))

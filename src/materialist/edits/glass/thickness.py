@@ -101,7 +101,6 @@ def object_thickness(
 
 
 def _given(method: str | Array | Path, inside: Array) -> Array:
-    """[H, W] float32 of a map or a file, checked."""
     if isinstance(method, str | Path):
         if not Path(method).is_file():
             raise InputError(f"The thickness is {str(method)!r}; give a file, or one of {', '.join(METHODS)}.")

@@ -184,7 +184,6 @@ def _bytes(path: Path) -> bytes:
 
 
 def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
-    """trimesh's scene of the file."""
     import trimesh
 
     quiet = logging.getLogger("trimesh")

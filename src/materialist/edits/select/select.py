@@ -75,7 +75,6 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
 
 
 def _box(scene: Scene, box: Sequence[float]) -> Box:
-    """The box cut to the photo."""
     x0, y0, x1, y1 = numbers(box, 4, "box")
     width, height = scene.camera.width, scene.camera.height
     left, right = np.clip(sorted((x0, x1)), 0, width)
