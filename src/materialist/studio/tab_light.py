@@ -57,7 +57,7 @@ def wire(context: PageContext) -> None:
         if event.index == 0:
             session.light(envmap=None, gain=None)
         else:
-            session.light(envmap=_written(session, presets.names()[int(event.index) - 1]), gain="auto")
+            session.light(envmap=_written(session, list(presets.LIGHTS)[int(event.index) - 1]), gain="auto")
         return context.picture(session)
 
     parts["lights"].select(choose, None, context.picture_parts, **LIVE)
@@ -107,4 +107,4 @@ def _gallery() -> list[tuple[Array, str]]:
     from materialist.io.display import light
 
     own = np.full((64, 128, 3), 225, np.uint8)
-    return [(own, OWN), *((light(presets.light(name, 64)), name) for name in presets.names())]
+    return [(own, OWN), *((light(presets.light(name, 64)), name) for name in presets.LIGHTS)]

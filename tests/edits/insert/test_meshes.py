@@ -75,30 +75,28 @@ def test_colours_of_vertices_become_texels(tmp_path):
     np.testing.assert_allclose(seen[body.faces[right].ravel()], np.tile(RED, (3 * right.sum(), 1)), atol=1e-3)
 
 
-@pytest.mark.parametrize("where", ["../secret.mtl", "/etc/hostname", "sub/../../secret.mtl", "http://a.b/c.mtl"])
-def test_material_files_outside_are_never_followed(tmp_path, where):
+@pytest.mark.parametrize(
+    ("made", "where"),
+    [
+        *(("mtl", where) for where in ("../secret.mtl", "/etc/hostname", "sub/../../secret.mtl", "http://a.b/c.mtl")),
+        *(("texture", where) for where in ("../secret.png", "..\\secret.png", "file:///etc/hostname", "link.png")),
+        *(("uri", f"{where}tri.bin") for where in ("../", "%2e%2e/", "http://a.b/", "file:", "/")),
+        *(("image", f"{where}tri.bin") for where in ("../", "%2e%2e/", "http://a.b/", "file:", "/")),
+    ],
+)
+def test_what_lies_outside_is_never_followed(tmp_path, made, where):
+    folder = tmp_path / "in"
+    (folder / "sub").mkdir(parents=True)
     (tmp_path / "secret.mtl").write_text("newmtl paint\nKd 1 0 0\n")
-    (tmp_path / "in" / "sub").mkdir(parents=True)
-    with pytest.raises(InputError, match="outside of its folder"):
-        read_model(textured_obj(tmp_path / "in", mtl=where))
-
-
-@pytest.mark.parametrize("where", ["../secret.png", "..\\secret.png", "file:///etc/hostname", "link.png"])
-def test_textures_outside_are_never_followed(tmp_path, where):
-    (tmp_path / "in").mkdir()
     Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "secret.png")
-    (tmp_path / "in" / "link.png").symlink_to(tmp_path / "secret.png")
-    with pytest.raises(InputError, match="outside of its folder"):
-        read_model(textured_obj(tmp_path / "in", texture=where))
-
-
-@pytest.mark.parametrize("uri", ["../tri.bin", "%2e%2e/tri.bin", "http://a.b/tri.bin", "file:tri.bin", "/tri.bin"])
-def test_gltf_addresses_outside_are_never_followed(tmp_path, uri):
-    (tmp_path / "in").mkdir()
+    (folder / "link.png").symlink_to(tmp_path / "secret.png")
     gltf_file(tmp_path, "tri.bin")
-    for path in (gltf_file(tmp_path / "in", uri), gltf_file(tmp_path / "in", "tri.bin", image=uri)):
-        with pytest.raises(InputError, match="outside of its folder"):
-            read_model(path)
+    if made in ("mtl", "texture"):
+        path = textured_obj(folder, **{made: where})
+    else:
+        path = gltf_file(folder, **{"uri": "tri.bin", made: where})
+    with pytest.raises(InputError, match="outside of its folder"):
+        read_model(path)
 
 
 def test_missing_and_damaged_textures_are_told_and_a_constant_serves(tmp_path):

@@ -156,7 +156,7 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
 
 
 def test_lights_are_environment_maps():
-    made = {name: presets.light(name, 64) for name in presets.names()}
+    made = {name: presets.light(name, 64) for name in presets.LIGHTS}
     assert all(checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20 for light in made.values())
     assert made["Window"][:, 64:].sum() > made["Window"][:, :64].sum()  # on the right
     assert made["Noon"][:32].sum() > made["Noon"][32:].sum()  # from above

@@ -5,7 +5,6 @@ import sys
 import numpy as np
 import pytest
 
-from materialist.edits.remove import patches
 from materialist.edits.remove.patches import patched
 from materialist.errors import SetupError
 
@@ -82,4 +81,3 @@ def test_a_missing_library_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "patchmatch", None)
     with pytest.raises(SetupError, match="pip install --force-reinstall --no-deps PyPatchMatch"):
         filled(stripes(), hole_in((72, 96)))
-    assert not patches._LOCK.locked()

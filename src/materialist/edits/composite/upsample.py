@@ -10,9 +10,6 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import window
 from materialist.types import Array
 
-STRIP = 128
-"""Native rows handled at a time: bounds the memory."""
-
 
 @dataclass(frozen=True)
 class MatteSettings:
@@ -32,6 +29,7 @@ class UpsampleSettings:
     """Joint bilateral upsampling: standard deviations; tuned by eye."""
 
     colour: float = 0.06  # of the colour weight, sRGB-encoded: about a just visible step
+    strip: int = 128  # native rows handled at a time; derived: memory
     radius: float = 0.8  # of the spatial weight, working pixels, over 4 x 4 of them
 
 
@@ -39,7 +37,7 @@ MATTE = MatteSettings()
 UPSAMPLE = UpsampleSettings()
 
 
-def strips(height: int, size: int = STRIP, start: int = 0) -> Iterator[slice]:
+def strips(height: int, size: int = UPSAMPLE.strip, start: int = 0) -> Iterator[slice]:
     """Slices of at most `size` rows that cover `height` rows, from `start` on."""
     return (slice(top, min(top + size, height)) for top in range(start, height, size))
 

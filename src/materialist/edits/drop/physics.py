@@ -11,21 +11,16 @@ import numpy as np
 from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
-STEP = 1e-3
-"""Seconds; at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper than that."""
-GRAVITY = 9.81
-STIFF = (4e-3, 1.0)
-"""Time constant and damping ratio of contacts: as stiff as the step allows, and no bouncing."""
-FRICTION = (0.6, 0.01, 0.0005)
-"""Sliding, torsional (m) and rolling (m)."""
-DENSITY = 600.0
-"""kg / m^3; wood. Things of one density fall alike."""
-
 
 @dataclass(frozen=True)
-class ConvexSettings:
-    """When one hull stands for a mesh, and how CoACD takes others apart; tuned by eye."""
+class PhysicsSettings:
+    """How things move and touch, and the convex pieces that stand for them; tuned by eye unless derived."""
 
+    step: float = 1e-3  # seconds: at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper; derived
+    gravity: float = 9.81  # m / s^2
+    stiff: tuple[float, float] = (4e-3, 1.0)  # of contacts: time constant, as short as the step allows, and damping
+    friction: tuple[float, float, float] = (0.6, 0.01, 0.0005)  # sliding, torsional (m) and rolling (m)
+    density: float = 600.0  # kg / m^3: wood; things of one density fall alike
     same: float = 1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
     concave: float = 0.12  # concavity that is left in a piece (CoACD's threshold)
     pieces: int = 16  # most pieces
@@ -33,7 +28,7 @@ class ConvexSettings:
     coarse: int = 24  # cells along the longest side to which it is thinned out
 
 
-DEFAULT = ConvexSettings()
+DEFAULT = PhysicsSettings()
 
 
 @dataclass(frozen=True)
@@ -80,7 +75,7 @@ def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: floa
     diverged = warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL, warnings.mjWARN_BADQACC
     done = 0
     for frame in range(frames):
-        target = round(frame / fps / STEP)
+        target = round(frame / fps / DEFAULT.step)
         while done < target:
             mujoco.mj_step(model, data)
             done += 1
@@ -106,8 +101,8 @@ def load(name: str) -> Any:
 
 def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
-    spec.option.timestep = STEP
-    spec.option.gravity = [0, 0, -GRAVITY]
+    spec.option.timestep = DEFAULT.step
+    spec.option.gravity = [0, 0, -DEFAULT.gravity]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable for things that spin fast
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # later versions always find several contacts
@@ -126,8 +121,8 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
 def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
     spec.add_mesh(name=name, uservert=np.ascontiguousarray(corners, np.float64).ravel().tolist())
     body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, friction=list(FRICTION), condim=4, density=DENSITY,
-        solref=list(STIFF), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, density=DEFAULT.density, friction=list(DEFAULT.friction),
+        condim=4, solref=list(DEFAULT.stiff), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
     )  # fmt: skip
 
 

@@ -11,16 +11,11 @@ ROWS = 128
 Colour = tuple[float, float, float]
 
 
-def names() -> list[str]:
-    """The lights in the order of the gallery."""
-    return list(_LIGHTS)
-
-
 def light(name: str, rows: int = ROWS) -> Array:
     """[rows, 2 rows, 3] float32 linear radiance, centre column along -Z; see docs/conventions.md."""
     elevation = 90 - 180 * (np.arange(rows) + 0.5) / rows
     azimuth = 360 * (np.arange(2 * rows) + 0.5) / (2 * rows) - 180
-    return np.ascontiguousarray(_LIGHTS[name](*np.meshgrid(azimuth, elevation)), np.float32)
+    return np.ascontiguousarray(LIGHTS[name](*np.meshgrid(azimuth, elevation)), np.float32)
 
 
 def _panel(az: Array, el: Array, at: tuple[float, float], size: tuple[float, float], colour: Colour) -> Array:
@@ -53,7 +48,7 @@ def _up(el: Array) -> Array:
     return np.sin(np.radians(np.maximum(el, 0)))
 
 
-_LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
+LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
     "Softboxes": lambda az, el: (
         _room(el, (0.10, 0.10, 0.11), (0.06, 0.06, 0.06))
         + _panel(az, el, (-70, 40), (60, 50), (9, 8.73, 8.28))
@@ -79,3 +74,4 @@ _LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
     ),
     "Even": lambda az, el: np.ones((*el.shape, 3)),
 }
+"""Name -> radiance [h, w, 3] at azimuths and elevations [h, w], degrees; in the order of the gallery."""
