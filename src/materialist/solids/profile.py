@@ -47,14 +47,10 @@ class Profile:
         return cls(gaussian_filter(whole, 1.0, mode="nearest")[:, shape[1] - 1 :], cell, low, floor)
 
     @property
-    def high(self) -> float:
-        """Height of the grid above the base, scene units."""
-        return self.low + (self.values.shape[0] - MARGIN) * self.cell - self.floor
-
-    @property
-    def wide(self) -> float:
-        """Distance from the axis up to which the body may reach, scene units."""
-        return self.values.shape[1] * self.cell
+    def size(self) -> tuple[float, float]:
+        """Distance from the axis, and height above the base, up to which the body may reach, scene units."""
+        rows, columns = self.values.shape
+        return columns * self.cell, self.low + (rows - MARGIN) * self.cell - self.floor
 
     def at(self, places: Array) -> Array:
         """[...] the function at places [..., 2]: below 0 in the body."""

@@ -91,8 +91,9 @@ class Revolution:
         """[N] planar depths of the first and of the last point of rays [N, 3] in the body, NaN where they pass it."""
         profile, step = self.profile, 0.5 * self.profile.cell
         length = np.linalg.norm(rays, axis=-1)
-        middle = self.axis.foot + (profile.floor + profile.high / 2) * self.axis.up
-        reach = float(np.hypot(profile.wide, profile.high / 2))
+        wide, high = profile.size
+        middle = self.axis.foot + (profile.floor + high / 2) * self.axis.up
+        reach = float(np.hypot(wide, high / 2))
         steps = np.arange(-reach, reach, step)
         found = np.full((2, len(rays)), np.nan)
         for k in range(0, len(rays), DEFAULT.block):
