@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.edits.core.renderer import is_relit
 from materialist.types import Array, Scene
 
 LITTLE = 5 / 255
@@ -32,8 +33,6 @@ def warnings_since(scene: Scene, edited: Scene) -> list[str]:
 
 def effect_notes(scene: Scene, edited: Scene, picture: Array) -> list[str]:
     """What to say of a composite [H0, W0, 3] linear under another light that hardly differs from the photo."""
-    from materialist.edits.core.renderer import is_relit
-
     if not is_relit(scene, edited):
         return []
     change = float(np.abs(linear_to_srgb(picture) - linear_to_srgb(scene.photo.original)).mean())

@@ -172,6 +172,5 @@ def surface_points(body: Body) -> Array:
     """[n, 3] points evenly over the body's surface, always the same ones."""
     from trimesh import Trimesh, sample
 
-    return np.asarray(
-        sample.sample_surface(Trimesh(body.vertices, body.faces, process=False), SETTINGS.samples, seed=0)[0]
-    )
+    mesh = Trimesh(body.vertices, body.faces, process=False)
+    return np.asarray(sample.sample_surface(mesh, SETTINGS.samples, seed=0)[0])

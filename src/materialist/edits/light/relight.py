@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from materialist.camera import pixel_rays
+from materialist.color import LUMINANCE, luminance
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
@@ -104,8 +105,6 @@ def kelvin_colour(kelvin: float) -> Array:
 
     Chromaticity by the cubic fits of Kim et al. (2002). Raises InputError outside 1667 to 25000 K.
     """
-    from materialist.color import LUMINANCE
-
     if not 1667 <= kelvin <= 25000:
         raise InputError(f"The lamp has {kelvin:g} K; a colour temperature lies between 1667 and 25000.")
     t = 1000.0 / kelvin
@@ -168,8 +167,6 @@ def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 
         raise InputError(f"The sun's azimuth is {azimuth:g}; it must lie in [-360, 360] degrees.")
     if not (np.isfinite(elevation) and -90 <= elevation <= 90):
         raise InputError(f"The sun's elevation is {elevation:g}; it must lie in [-90, 90] degrees.")
-    from materialist.color import luminance
-
     angle = _angle_to(envmap.shape[0], azimuth, elevation)  # [h, 2h] degrees
     solid = row_solid_angle(envmap.shape[0])[:, None]  # [h, 1]
     texel = 180 / envmap.shape[0]
