@@ -9,6 +9,7 @@ from geometry_scenes import plane_depth, sphere_depth
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import LID, NO_ROOM, SOLID, glass
+from materialist.edits.glass.preview import GlassPreview
 from materialist.edits.glass.thickness import object_thickness, objects_in
 from materialist.errors import InputError
 from materialist.types import Camera
@@ -160,3 +161,31 @@ def test_thin_masks_give_no_warnings_of_numpy(place, recwarn):
     mask[place] = True
     glass(flat_scene(), mask, model="two-interface")
     assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]
+
+
+@pytest.fixture(scope="module")
+def preview():
+    return GlassPreview(rendered_scene(), MASK, thickness="symmetry")
+
+
+def test_inside_a_preview_is_the_final_picture_and_outside_the_photo(preview):
+    scene = preview.scene
+    quick = preview.picture(ior=1.3, tint=(1, 0.5, 0.5), spp=64)
+    final = composite(scene, glass(scene, MASK, ior=1.3, tint=(1, 0.5, 0.5), thickness="symmetry"), spp=128)
+    inner = np.zeros_like(MASK)
+    inner[14:22, 14:24] = MASK[14:22, 14:24]
+    assert np.abs(quick - final)[inner].mean() < 0.1 * final[inner].mean()
+    np.testing.assert_array_equal(quick[:6], scene.photo.linear[:6])
+    assert quick.dtype == np.float32 and (quick >= 0).all()
+
+
+def test_the_glass_of_a_preview_is_exchanged_and_comes_back(preview):
+    clear = preview.picture(spp=16)
+    red = preview.picture(tint=(1, 0.2, 0.2), spp=16)
+    frosted = preview.picture(roughness=0.5, spp=16)
+    coated = preview.picture(transmission=0.5, spp=16)
+    ratio = (red[MASK].mean(0) + 0.01) / (clear[MASK].mean(0) + 0.01)
+    assert ratio[1] < 0.75 and ratio[0] > 0.9
+    for other in (frosted, coated):
+        assert np.abs(other - clear)[MASK].max() > 0.01
+    np.testing.assert_array_equal(preview.picture(spp=16), clear)

@@ -1,4 +1,4 @@
-"""Surfaces of bodies, and bodies that stand for something in the photo, as its lights (`light.emitters`) do."""
+"""Surfaces of bodies, whether they are closed, and bodies that stand for something in the photo, as its lights do."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -6,15 +6,7 @@ import numpy as np
 
 from materialist.edits.core.notes import is_edited, warned
 from materialist.edits.core.region import checked_region
-from materialist.edits.core.surfaces import (
-    KEY,
-    OFF,
-    PHOTO_LIGHT,
-    emitting,
-    triple,
-    uniform_surface,
-    with_emitters,
-)
+from materialist.edits.core.surfaces import KEY, OFF, PHOTO_LIGHT, emitting, triple, uniform_surface, with_emitters
 from materialist.errors import InputError
 from materialist.geometry.build import part
 from materialist.geometry.silhouette import disc
