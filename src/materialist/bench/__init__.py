@@ -1,7 +1,5 @@
 """Benchmarks: each measures the project with numbers that a reader can repeat, and writes a report folder."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from typing import Any

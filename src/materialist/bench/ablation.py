@@ -10,8 +10,6 @@ roughness and metallic not predicted but 0.5, the smallest L_re on the way. `fov
 the true depth at a wrong field of view, and the same under another light (relit).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -7,8 +7,6 @@ compares with the single inversions: negative where starting Python and compilin
 the same by hash, or the benchmark fails.
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import tempfile

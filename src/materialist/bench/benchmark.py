@@ -1,7 +1,5 @@
 """What every benchmark has: options as the fields of a frozen dataclass, rows, lists of names, times, commands."""
 
-from __future__ import annotations
-
 import inspect
 import os
 import subprocess

@@ -5,8 +5,6 @@ are wall clock until the last of them ends. Two processes share the processors, 
 time that threads take from each other. A first inversion, not counted, fills the kernel cache.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Iterator

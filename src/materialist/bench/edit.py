@@ -8,8 +8,6 @@ of bringing it into a photo of 24 megapixels (without the paths); CPU seconds ha
 does. sheet.png, from the left: photo, truth, ceiling, edit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Edits of `bench edit` and `bench photo-alone`: what is done to a fitted scene, and the same in the true one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial

@@ -13,8 +13,6 @@ the left: photo, true glass, two_interface by true and by predicted d, closed by
 inpainted background.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

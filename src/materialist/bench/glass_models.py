@@ -4,8 +4,6 @@ Backgrounds are meshes that reflect the light: they are lit, and do not glow, so
 caustics on them, as in a fitted scene.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any

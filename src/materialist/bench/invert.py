@@ -10,8 +10,6 @@ gradients; medians after a warm-up) in one process: with the cached transport, a
 depth 4, the paper's.
 """
 
-from __future__ import annotations
-
 import json
 import tempfile
 from collections import Counter

@@ -12,8 +12,6 @@ are those of the light fit and its ray tracing and for `inversion` those of all 
 processors. The first sample's hold the compilation of kernels that the computer has not met before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import chain, product

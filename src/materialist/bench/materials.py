@@ -12,8 +12,6 @@ standard deviation of log depth error; `order` the part of random pixel pairs in
 Normals: mean angle, degrees. sheet.png: the photo, and the maps of each predictor and the true ones under each other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@
 REPORT/runs/NAME, its figures into REPORT/rows/NAME.json. report.html and report.md are written after every run.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -14,8 +14,6 @@ and reflection alone; `glass` is the largest object turned to glass, `remove` th
 truth, and the pictures of the rows after `untouched`. An edit that the program refuses has no row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -7,8 +7,6 @@ is the photo as it was, `diffused` fills the mask from its border (Telea), `remo
 plate, and the pictures of the rows after `untouched`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

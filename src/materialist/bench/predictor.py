@@ -4,8 +4,6 @@ Uniform noise as the photo, batch 1. `network` is the forward pass alone, what t
 from the photo to the maps, resizing and refinement included.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reports of benchmarks: all rows as JSON, the means as a Markdown table, a plot, and a sheet of pictures."""
 
-from __future__ import annotations
-
 import json
 import os
 import platform

@@ -6,8 +6,6 @@ network's, `true` ones the truth; `network` is what `select` does by itself, `gr
 intersection over union with the object's mask; `good` and `lost` are the shares above 0.8 and below 0.3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product

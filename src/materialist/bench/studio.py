@@ -10,8 +10,6 @@ decoded picture of that value. Memory is the resident set of the server.
 Kept is by how much it has grown, from one page that was opened on the scene and closed to 20 more.
 """
 
-from __future__ import annotations
-
 import contextlib
 import shutil
 import socket

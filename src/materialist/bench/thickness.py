@@ -7,8 +7,6 @@ Captured meshes (`DIR/meshes/GROUP`, `--data`): exact maps. `symmetry` is the pa
 mirrored across the view of the object's middle.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -7,8 +7,6 @@ albedo contradicts: 0 is perfect. Brightness is the mean of linear red, green an
 `constant` is the albedo that is the same everywhere and only agrees with the 'E's, `photo` the photo itself.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass

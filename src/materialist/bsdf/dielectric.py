@@ -3,8 +3,6 @@
 Directions are unit vectors [..., 3] along which light is followed; normals are unit and point against the ray.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.bsdf import ggx

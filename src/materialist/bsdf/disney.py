@@ -4,8 +4,6 @@ f_r = f_s + (1 - M) f_d. Choices that the paper leaves open (docs/rendering.md):
 Mitsuba; alpha = R^2 is at least `ggx.MIN_ALPHA`; both sides of a surface shade alike.
 """
 
-from __future__ import annotations
-
 from materialist.bsdf.ggx import distribution, library, smith_g1
 
 ETA = 1.5

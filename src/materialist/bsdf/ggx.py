@@ -3,8 +3,6 @@
 Directions are components (x, y, z) in the local shading frame, z along the normal; alpha = roughness^2.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

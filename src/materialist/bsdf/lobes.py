@@ -3,8 +3,6 @@
 Directions are unit vectors in the local shading frame, above the surface.
 """
 
-from __future__ import annotations
-
 import drjit as dr
 import mitsuba as mi
 

@@ -3,8 +3,6 @@
 `TransportEngine` shades from cached transport; `PathEngine` is the paper's: Mitsuba's path replay backpropagation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ The paper's are MLPs on sinusoidal encodings; texels, spherical harmonics, direc
 ablations. A field is a torch module; calling it gives the map or the materials.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """An inversion from the prior to the re-rendering: geometry, light with the prior's materials, materials under it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Environment map optimisation (paper, Progressive Differentiable Rendering)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Losses of the fit; torch tensors, any shape that broadcasts."""
 
-from __future__ import annotations
-
 import torch
 
 from materialist.fit.settings import Encoding, Loss, MaterialSettings

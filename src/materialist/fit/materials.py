@@ -1,7 +1,5 @@
 """Material properties optimisation (paper, Progressive Differentiable Rendering)."""
 
-from __future__ import annotations
-
 import torch
 from torch import nn
 

@@ -1,7 +1,5 @@
 """The one optimisation loop: Adam, a step-wise falling learning rate, early stopping, progress."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field

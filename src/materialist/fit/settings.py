@@ -3,8 +3,6 @@
 The defaults of the classes are the paper's (Implementation Details), or leave out what the paper does not have.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -5,8 +5,6 @@ one vertex per surface (the paper's duplication), and the farther surface is con
 so that no ray through the picture passes between them. See docs/geometry.md for why corners and not centres.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

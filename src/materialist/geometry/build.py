@@ -1,7 +1,5 @@
 """The scene's shape in one call: mesh of the depth map, continued planes, creases."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 

@@ -4,8 +4,6 @@ Nothing that the picture shows changes: inside the picture only what lies behind
 where the picture shows open sky nothing is.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Occlusion cuts: which neighbouring pixels of a depth map lie on different surfaces (paper, Mesh Reconstruction)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Values carried smoothly into places where they are not known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.geometry.silhouette import window

@@ -1,7 +1,5 @@
 """The silhouette of one object in a picture: its pixels, their distance to it, the object's size."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.errors import InputError

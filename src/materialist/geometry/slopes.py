@@ -1,7 +1,5 @@
 """Slopes of a depth map, and the normals of a surface that is seen from within."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.camera import unit

@@ -5,8 +5,6 @@ moved aside). The next write of a folder to the same target recognises both by n
 process still runs. A process of another machine cannot be asked, so its folders stay for a day.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import platform

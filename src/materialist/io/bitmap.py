@@ -1,7 +1,5 @@
 """Pictures of integers and float TIFFs, by Pillow and OpenCV, to linear Rec.709."""
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Image files of any common kind to linear Rec.709 at native size, upright."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Maps, errors and light as pictures for people: [H, W, 3] uint8; sheets of them; and their PNG and JPEG files."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """OpenEXR files, through the reference library: float32 survives a round trip bit for bit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path

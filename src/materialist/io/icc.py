@@ -4,8 +4,6 @@ Matrix profiles (sRGB, Display P3, Adobe RGB, ProPhoto, every camera and display
 of the file; printing, grey and table profiles go through LittleCMS at 8 bits (`decode`).
 """
 
-from __future__ import annotations
-
 import struct
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Pictures out (sRGB PNG, linear EXR), and maps and masks in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

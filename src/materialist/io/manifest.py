@@ -1,7 +1,5 @@
 """The files of a scene package, checked by their headers before anything is decoded."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The PLY is written and read here and not by a mesh library, because every float 
 and the plane of each face.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The contact sheet: what a person looks at first."""
 
-from __future__ import annotations
-
 import textwrap
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The scene package: a folder that holds everything of a Scene (format: docs/conventions.md)."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """A photograph from a file: decoded, upright, linear, at working size, with its camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path

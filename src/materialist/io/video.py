@@ -1,7 +1,5 @@
 """Videos and folders of frames, written whole or not at all."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from pathlib import Path

@@ -4,8 +4,6 @@ Images go in as linear Rec.709 and are compared as a viewer sees them: sRGB-enco
 name of the function says otherwise.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.color import linear_to_srgb

@@ -1,7 +1,5 @@
 """LPIPS (Zhang et al. 2018) where its package and the weights of its backbone are installed; nothing is downloaded."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

@@ -7,8 +7,6 @@ in units of the true depth, as it is and after one factor (least squares); the s
 deviation of log predicted - log true. Normals are compared by their angle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.color import linear_to_srgb

@@ -1,7 +1,5 @@
 """What light and materials do not explain of a photo, as a factor on its re-rendering."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.ndimage import gaussian_filter
 

@@ -5,8 +5,6 @@ EfficientNet-Lite", 2020). Batch normalisation is folded into the convolutions, 
 Google trained them on the photographs of ImageNet (Apache 2.0; docs/training.md).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from pathlib import Path

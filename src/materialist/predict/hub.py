@@ -3,8 +3,6 @@
 A model is loaded whole or not at all, and nothing is downloaded here.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 from collections.abc import Collection

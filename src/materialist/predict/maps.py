@@ -1,7 +1,5 @@
 """The predictors `maps:DIR` and `moge:DIR`: maps that another tool has written (docs/predictors.md)."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Only `download` uses the network, and only `materialist models download` calls it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

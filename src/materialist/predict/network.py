@@ -1,7 +1,5 @@
 """Networks that this project trains: an architecture stored with the weights, one file format, a small U-Net."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

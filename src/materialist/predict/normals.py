@@ -1,7 +1,5 @@
 """Normals from depth."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.camera import pixel_rays

@@ -1,7 +1,5 @@
 """What a predictor is: names of the maps, the base class, the constant predictor, and a prior from several of them."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Predictors by name."""
 
-from __future__ import annotations
-
 from importlib import import_module
 
 from materialist.errors import InputError

@@ -1,7 +1,5 @@
 """Planar depth from depths without scale and shift (docs/predictors.md, "Relative depth")."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

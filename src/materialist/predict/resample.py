@@ -1,7 +1,5 @@
 """Maps of one size brought to another, each by the rule that its meaning asks for."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

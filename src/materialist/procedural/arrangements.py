@@ -1,7 +1,5 @@
 """Random arrangements of objects on a floor, and cameras that look at them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The procedural data set on disk: whole samples only, made by one process or several, resumable."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import time

@@ -4,8 +4,6 @@
 turned at random and have a mean luminance of 1.
 """
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Callable
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Random physically plausible materials: which tile, which colours, which finish."""
 
-from __future__ import annotations
-
 import colorsys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What a data set holds: options of `materialist train data`; nothing slow is imported here."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path

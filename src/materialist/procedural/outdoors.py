@@ -1,7 +1,5 @@
 """Streets, yards and open ground under a sky; and still lifes on a plain ground in any surroundings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

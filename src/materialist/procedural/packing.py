@@ -1,7 +1,5 @@
 """A world as flat buffers in the camera frame, for the path tracer to gather from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

@@ -1,7 +1,5 @@
 """Procedural albedo patterns: seamless colour pictures."""
 
-from __future__ import annotations
-
 import colorsys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What lies between radiance and the pixels of a JPEG: camera, developing, compression; batches of tensors."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

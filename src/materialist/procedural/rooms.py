@@ -1,7 +1,5 @@
 """Rooms: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.procedural import lights, walls

@@ -1,7 +1,5 @@
 """One labelled picture: a random world, rendered, denoised and exposed like a photograph."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

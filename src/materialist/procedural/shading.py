@@ -1,7 +1,5 @@
 """What the path tracer knows about a point: surface, material, light. Dr.Jit code on flat buffers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -5,8 +5,6 @@ the path tracer's kernel and its largest buffer never change. Channels, all in [
 1 towards the third colour, 2 brightness grain (0.5 none), 3 first to second roughness.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

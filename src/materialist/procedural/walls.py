@@ -1,7 +1,5 @@
 """Walls of rooms with windows, doors and what hangs on them: x along the wall, y up, z into the room."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """A whole scene before it is rendered: parts with materials, light from afar, openings, and a camera."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np

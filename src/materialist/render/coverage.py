@@ -1,7 +1,5 @@
 """What the camera sees of bodies, at any resolution: coverage of pixels, and guides for denoisers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Denoising of finished pictures (Intel Open Image Denoise); never used inside an optimisation."""
 
-from __future__ import annotations
-
 import sys
 from typing import Any
 

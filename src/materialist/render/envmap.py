@@ -1,7 +1,5 @@
 """The project's environment map in Mitsuba's terms."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.envmap import row_solid_angle

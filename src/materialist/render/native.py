@@ -1,7 +1,5 @@
 """Some pixels of a picture, path traced, at the camera's resolution or another."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

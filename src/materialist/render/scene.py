@@ -1,7 +1,5 @@
 """A scene that is built once and rendered many times: geometry fixed, materials and light exchanged."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

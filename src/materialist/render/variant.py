@@ -1,7 +1,5 @@
 """LLVM and the Mitsuba variant: the only place that chooses either."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

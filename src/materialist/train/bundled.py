@@ -1,7 +1,5 @@
 """The bundled network, trained on procedural pictures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The state of a run on disk, written whole or not at all, and the lines of its log."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """ClickNet, trained on pictures of `train data` as photographs with the maps that the bundled network finds in them."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Losses between maps [B, C, H, W], over the pixels that a mask [B, 1, H, W] keeps; each is a scalar."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import torch

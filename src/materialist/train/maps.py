@@ -1,7 +1,5 @@
 """What the networks that predict all maps have in common: pictures with true maps, scores and a sheet."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """MatNet trained as the paper says (sections "Material Prediction Network" and "Implementation Details")."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -3,8 +3,6 @@
 All on [B, C, H, W] tensors of the training's device: a card that waits for processors learns nothing.
 """
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """RefractionNet, trained on views of procedural shapes with the thickness that camera rays find in them."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How long a run lasts, the learning rate that follows from it, and requests to stop early."""
 
-from __future__ import annotations
-
 import math
 import signal
 import threading

@@ -1,7 +1,5 @@
 """The stream of training batches: which examples are drawn, and in which order."""
 
-from __future__ import annotations
-
 import logging
 import signal
 from collections.abc import Callable, Generator

@@ -1,7 +1,5 @@
 """Lookups in an equirectangular environment map, in the project's convention (docs/conventions.md)."""
 
-from __future__ import annotations
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np

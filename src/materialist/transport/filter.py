@@ -5,8 +5,6 @@ same surface by normal and plane distance, has all of it. Radius and normal tole
 levels keep their detail.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 T is stored for a subset of pixels at the resolution of the fit; b is what arrives from other surfaces.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

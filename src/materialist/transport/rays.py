@@ -5,8 +5,6 @@ A lobe alone seldom meets a low sun: of 256 cosine-weighted rays one in twelve p
 alone; a narrow lobe falls between them. Each ray counts by the balance heuristic (Veach and Guibas 1995).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Shading from the transport tables: one call gives the radiance of every pixel, with gradients, without noise."""
 
-from __future__ import annotations
-
 import torch
 
 from materialist.bsdf.disney import combine, quadratic

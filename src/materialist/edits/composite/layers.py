@@ -1,7 +1,5 @@
 """The base and the edited picture, rendered with the same random numbers, and what truly differs between them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

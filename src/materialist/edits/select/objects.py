@@ -1,7 +1,5 @@
 """The object at clicks or in a box: ClickNet where it is certain, else GrabCut (Rother et al. 2004)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ Medians also print the photo's texture onto every slope, and a mesh with such st
 `with_relief` makes depth smooth along a surface, broken where it steps to another one.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import cv2

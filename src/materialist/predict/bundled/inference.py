@@ -1,7 +1,5 @@
 """From a photo of any size to maps: what happens around the bundled network."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

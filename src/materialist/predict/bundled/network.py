@@ -6,8 +6,6 @@ learn from scratch with far fewer pictures than a transformer. Two attention blo
 whole picture. Everything is relative to the camera rays, so that any field of view and any crop can be told.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

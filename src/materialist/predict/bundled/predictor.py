@@ -1,7 +1,5 @@
 """The predictor `bundled`: the network that ships with the package; docs/training.md tells how it was made."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 

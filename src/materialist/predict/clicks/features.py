@@ -1,7 +1,5 @@
 """What ClickNet sees of a photo: its colours, normals and depth, and how they differ from those at the clicks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Clicks are told as Xu et al. 2016 do it, by maps of the distance to them, and by
 colour, in geometry, and in the features of an image classifier, which know parts of one thing by their kind.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 from torch.nn import functional as F

@@ -1,7 +1,5 @@
 """From clicks on a photo to the object that they lie on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Its encoder is DINOv2 (Oquab et al. 2023), its decoders are DPT (Ranftl et al. 2
 the parameter names of the published checkpoints.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass

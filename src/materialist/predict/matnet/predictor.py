@@ -1,7 +1,5 @@
 """The predictor `matnet[:FILE|:HUB_ID]`: the paper's network with published or own weights (docs/predictors.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from pathlib import Path
 

@@ -6,8 +6,6 @@ and learns where that is wrong. Normals have an answer of their own because glas
 thickness says little about which way the back leans.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor
 

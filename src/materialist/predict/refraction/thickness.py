@@ -1,7 +1,5 @@
 """From a photo and its maps to the thickness of one object in it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 The first part of what one can look down on is its top.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -4,8 +4,6 @@ Every shape is about 1 high and wide, its middle at the origin, +Y up. Its surfa
 vessel has an inside and a rim, a closed bottle a cavity whose faces look into it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

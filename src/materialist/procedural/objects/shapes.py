@@ -1,7 +1,5 @@
 """Procedural triangle meshes with texture coordinates: closed solids, and sheets, tubes and leaves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What stands outdoors: houses, cars, trees, bushes, people, posts, walls. Base on y = 0, metres."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from materialist.procedural import materials as m

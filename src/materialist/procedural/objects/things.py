@@ -1,7 +1,5 @@
 """Movable things, 3 to 60 centimetres high: what stands on tables, shelves and floors. Base on y = 0."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path

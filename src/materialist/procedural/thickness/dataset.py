@@ -5,8 +5,6 @@ under an ambient gradient and one or two distant lights, a highlight at times, n
 not drawn, since the network is not shown it.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How far RefractionNet and the symmetry prior are from true thickness and true backs."""
 
-from __future__ import annotations
-
 import numpy as np
 import torch
 

@@ -1,7 +1,5 @@
 """Where straight rays enter and leave a mesh (paper, Refraction Network Details: the optical path length d_GT)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import drjit as dr
