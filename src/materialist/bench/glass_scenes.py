@@ -1,5 +1,7 @@
 """Objects in front of a textured floor and wall, as a photo shows them opaque and as they truly look as glass."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice, zip_longest

@@ -1,5 +1,7 @@
 """The paper's simplified Disney BRDF as a Mitsuba plugin (`materialist_disney`)."""
 
+from __future__ import annotations
+
 import drjit as dr
 import mitsuba as mi
 

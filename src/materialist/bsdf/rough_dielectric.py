@@ -5,6 +5,8 @@ every single-scattering model (Walter et al. 2007): a fifth at a roughness of 0.
 light leaves after all; it is given to the ways that are known, by one factor for each direction to the eye and side.
 """
 
+from __future__ import annotations
+
 from functools import lru_cache
 from typing import Any
 

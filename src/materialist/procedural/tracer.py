@@ -6,6 +6,8 @@ luminous faces of the mesh. The reflectance is that of `bsdf` (paper, section Pr
 the balance heuristic between the BSDF and one draw from {envmap, portals, luminous faces}.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cache
 

@@ -1,5 +1,7 @@
 """Materials of bodies as Mitsuba BSDFs: the scene's own BRDF, and (rough) dielectric interfaces."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -5,6 +5,8 @@ ROUGHNESS_LEVELS are traced against the mesh. What is kept of a ray is one integ
 face it hit. Directions are regenerated from their index, so that a gather is pure memory traffic.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any
 
