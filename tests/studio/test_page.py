@@ -43,6 +43,23 @@ def test_select_edit_undo(page, running):
     assert not page.errors
 
 
+def test_progress_is_at_the_picture_and_stop_never_under_the_cursor(page, running):
+    page.set_viewport_size({"width": 1280, "height": 720})
+    opened(page, running[0])
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    slide(page, "hue", 120)
+    page.get_by_role("button", name="Final picture").dblclick()
+    page.wait_for_selector("#frame #progress .bar")
+    for part in ("#progress", "#stop"):
+        box = page.locator(part).bounding_box()
+        assert box["y"] + box["height"] <= 720, part
+    page.wait_for_selector("#stage .badge >> text=Path traced, 256")
+    page.wait_for_selector("#stop", state="hidden")
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+
+
 def test_what_cannot_be_done_is_said_on_the_page(page, running):
     opened(page, running[0])
     page.get_by_role("button", name="Select nothing").click()
@@ -204,15 +221,16 @@ def test_the_whole_story(page, running, tmp_path):
     page.get_by_label("Working size").click()
     page.get_by_role("option", name="256").click()
     page.click("#start")
-    page.wait_for_selector("#fit .bar")
-    page.click("#cancel")
-    page.wait_for_selector("#fit >> text=Stopped")
-    page.wait_for_selector("#cancel", state="hidden")
+    page.wait_for_selector("#stage .badge >> text=being taken apart")  # the photo is on the stage
+    assert pixels(page).shape[:2] == (100, 150)
+    page.click("#stop")
+    page.wait_for_selector("#progress >> text=Stopped")
+    page.wait_for_selector("#stop", state="hidden")
     page.click("#start")
-    page.wait_for_selector("#cancel", state="visible")
+    page.wait_for_selector("#stop", state="visible")
     page.wait_for_timeout(2000)
     page.reload()
-    page.wait_for_selector("#fit .bar")  # the work goes on
+    page.wait_for_selector("#progress .bar")  # the work goes on
     page.wait_for_selector(READY)
     click_photo(page, 0.3, 0.8)
     page.wait_for_selector("#stage .view[data-selected=yes]")

@@ -55,10 +55,15 @@ def build(studio: Studio) -> Any:
 
 
 def _left(parts: dict[str, Any]) -> None:
-    parts["stage"] = gr.HTML(
-        {"picture": "", "width": 0, "height": 0, "badge": ""}, html_template=asset("stage.html"),
-        js_on_load=asset("stage.js"), elem_id="stage",
-    )  # fmt: skip
+    with gr.Column(elem_id="frame"):
+        parts["stage"] = gr.HTML(
+            {"picture": "", "width": 0, "height": 0, "badge": ""}, html_template=asset("stage.html"),
+            js_on_load=asset("stage.js"), elem_id="stage",
+        )  # fmt: skip
+        # Not beside a button that starts a job: it must not come to lie where one was just clicked.
+        with gr.Row(elem_id="strip"):
+            parts["progress"] = gr.HTML("", elem_id="progress", js_on_load=None)
+            parts["stop"] = gr.Button("Stop", size="sm", variant="stop", visible=False, min_width=70, elem_id="stop")
     with gr.Row(elem_id="tools"):
         tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
         tools.append(("Place an object", "place"))
@@ -79,9 +84,6 @@ def _left(parts: dict[str, Any]) -> None:
         parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
         parts["draft"] = gr.Button("Quick look, path traced", size="sm", min_width=150)
         parts["final"] = gr.Button("Final picture", size="sm", variant="primary", min_width=120)
-    parts["progress"] = gr.HTML("", elem_id="progress", js_on_load=None)
-    # Not beside "Final picture": it must not come to lie where that was just clicked.
-    parts["stop"] = gr.Button("Stop", size="sm", variant="stop", visible=False)
     parts["steps"] = gr.HTML([], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps")
 
 
@@ -129,7 +131,7 @@ def _turned_to(context: PageContext, session: Session) -> dict[Any, Any]:
 
 
 def _wire_final(context: PageContext) -> None:
-    """Path-traced pictures, and the button that stops the one that this page asked for."""
+    """Path-traced pictures, and the button that stops whatever this page asked for."""
 
     def render(spp: int) -> Any:
         @context.handler
@@ -138,12 +140,16 @@ def _wire_final(context: PageContext) -> None:
             _ = session.scene
             if not session.edits.active:
                 raise InputError("There is no edit to render yet: change something first.")
-            if (yield from context.traced(session, spp, "progress", "stop")) is not None:
+            if (yield from context.traced(session, spp)) is not None:
                 yield {context["stage"]: stage(session), context["steps"]: steps(session)}
 
         return run
 
-    outputs = [*context.picture_parts, context["progress"], context["stop"]]
+    @context.handler
+    def stop(request: gr.Request) -> None:
+        context.session(request).stop(context.studio.jobs)
+
+    outputs = [*context.picture_parts, *context.job_parts]
     context["final"].click(render(SETTINGS.final_spp), None, outputs, **LONG)
     context["draft"].click(render(SETTINGS.draft_spp), None, outputs, **LONG)
-    context.stops("stop", "final")
+    context["stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")

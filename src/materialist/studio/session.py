@@ -86,9 +86,9 @@ class Session:
         self.running = [*(one for one in self.running if not one.over), job]
 
     def stop(self, jobs: JobQueue, *kinds: str) -> None:
-        """Stop the jobs of some kinds that this page asked for."""
+        """Stop the jobs of some kinds, or all, that this page asked for."""
         for job in self.running:
-            if job.kind in kinds:
+            if not kinds or job.kind in kinds:
                 jobs.stop(job)
 
     @property

@@ -1,5 +1,6 @@
 """The picture on the stage with its label, and what the page shows of a scene: maps, and a report in words."""
 
+from pathlib import Path
 from time import time
 from typing import Any
 
@@ -12,7 +13,7 @@ from materialist.io import display
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import EditList
 from materialist.studio.preview import LIVE
-from materialist.studio.selection import data_url
+from materialist.studio.selection import Selection, data_url
 from materialist.studio.session import Session
 from materialist.types import Array, Scene
 
@@ -53,6 +54,13 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
         return {**shown, "picture": photo, "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off
     return {**shown, "picture": jpeg_url(linear), "badge": badge, "waiting": waiting}
+
+
+def waiting_photo(file: Path) -> dict[str, Any]:
+    """A photo (JPEG) that is being taken apart, without anything to click."""
+    shown = {"width": 0, "height": 0, "lamps": [], "waiting": False, "bad": False, "serial": time()}
+    picture = data_url(file.read_bytes(), "jpeg")
+    return {**shown, **Selection().pictures, "picture": picture, "badge": "Your photo, being taken apart"}
 
 
 def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:

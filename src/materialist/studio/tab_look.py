@@ -28,7 +28,6 @@ def layout(context: PageContext) -> None:
             buttons=["fullscreen"], elem_id="maps",
         )  # fmt: skip
         parts["mesh_button"] = gr.Button("Show the mesh", size="sm")
-        parts["mesh_progress"] = gr.HTML("", js_on_load=None)
         parts["mesh"] = gr.Model3D(
             label="The mesh: drag to turn, wheel to zoom", height=380, clear_color=(0.9, 0.92, 0.94, 1.0),
             interactive=False, elem_id="mesh",
@@ -59,7 +58,7 @@ def wire(context: PageContext) -> None:
             return
         scene = str(session.project.scene)
         job = studio.submit(session, tasks.mesh, session.workspace, scene=scene, output=str(file))
-        yield from context.follow(job)
+        yield from context.following(job)
 
     @context.handler
     def show_mesh(request: gr.Request) -> Any:
@@ -68,7 +67,7 @@ def wire(context: PageContext) -> None:
 
     parts["look"].select(look, None, [parts["compare"], parts["report"], parts["maps"]], **LONG)
     # Two steps: the viewer loads nothing when its value is sent twice, as the end of a generator does.
-    made = parts["mesh_button"].click(make_mesh, None, parts["mesh_progress"], **LONG)
+    made = parts["mesh_button"].click(make_mesh, None, context.job_parts, **LONG)
     made.then(show_mesh, None, parts["mesh"], **LONG)
 
 

@@ -41,7 +41,6 @@ def layout(context: PageContext) -> None:
             parts["height"] = slider("height", "How high above, in its own sizes", 0.1, maximum=5)
             parts["rest"] = gr.Button("Let it fall, and lie there", elem_id="rest", size="sm")
             gr.Markdown("Once more, and it tumbles in another way.")
-            parts["fall_progress"] = gr.HTML("", js_on_load=None)
 
 
 def _layout_glass(parts: dict[str, Any]) -> None:
@@ -119,7 +118,7 @@ def _wire_following(context: PageContext) -> None:
             with client.changed:
                 client.changed.wait(0.5)
 
-    outputs = [*context.picture_parts, context["progress"]]
+    outputs = [*context.picture_parts, *context.job_parts]
     context["stage"].follow(follow, None, outputs, trigger_mode="always_last", **LONG)
 
 
@@ -129,11 +128,8 @@ def _wire_fall(context: PageContext) -> None:
     @context.handler
     def rest(height: float, request: gr.Request) -> Any:
         session = context.session(request)
-        yield {parts["fall_progress"]: box("It falls …")}
-        try:
-            notes = session.shown(" ".join(objects.let_fall(session, float(height))))
-        finally:
-            yield {parts["fall_progress"]: ""}
-        yield {**context.everything(session), parts["fall_progress"]: box(notes) if notes else ""}
+        yield {parts["progress"]: box("It falls …")}
+        notes = session.shown(" ".join(objects.let_fall(session, float(height))))
+        yield {**context.everything(session), parts["progress"]: box(notes) if notes else ""}
 
-    parts["rest"].click(rest, parts["height"], [*context.all_parts, parts["fall_progress"]], **LONG)
+    parts["rest"].click(rest, parts["height"], [*context.all_parts, *context.job_parts], **LONG)

@@ -13,7 +13,7 @@ from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.session import Session
-from materialist.studio.stage import stage
+from materialist.studio.stage import stage, waiting_photo
 from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box
 from materialist.studio.workspace import Project
 
@@ -36,10 +36,7 @@ def layout(context: PageContext) -> None:
             )  # fmt: skip
             parts["size"] = gr.Dropdown(list(SIZES), value=512, label="Working size", min_width=130)
             parts["fov"] = gr.Textbox("auto", label="Field of view, degrees", max_lines=1, min_width=130)
-        with gr.Row():
-            parts["start"] = gr.Button("Take the photo apart", variant="primary", elem_id="start", min_width=160)
-            parts["cancel"] = gr.Button("Cancel", variant="stop", visible=False, elem_id="cancel", min_width=90)
-        parts["fit"] = gr.HTML("", elem_id="fit", js_on_load=None)
+        parts["start"] = gr.Button("Take the photo apart", variant="primary", elem_id="start")
         parts["found"] = gr.Gallery(
             label="Found so far", columns=3, height="auto", visible=False, object_fit="contain", interactive=False,
             buttons=[],
@@ -99,8 +96,8 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield {parts["file"]: studio.public_copy(studio.start)}
 
     opening = [
-        *context.all_parts, parts["fit"], parts["found"], parts["cancel"], parts["start"], parts["last"], parts["tabs"],
-        parts["projects"], parts["progress"],
+        *context.all_parts, *context.job_parts,
+        *(parts[name] for name in ("found", "start", "last", "tabs", "projects")),
     ]  # fmt: skip
     wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov")]
     sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **LONG)
@@ -108,7 +105,6 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     parts["example"].input(choose_example, parts["example"], parts["file"], **LONG)
     parts["start"].click(start, wanted, opening, **LONG)
     parts["continue"].click(resume, parts["projects"], opening, **LONG)
-    context.stops("cancel", "invert")
     page.load(arrive, parts["last"], [parts["file"], *opening], **LONG)
 
 
@@ -149,28 +145,26 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     """Progress and first pictures of an inversion until it is over."""
     parts, studio = context.parts, context.studio
     session.note_job(job)
-    yield {
-        parts["last"]: project.name,
-        parts["cancel"]: gr.update(visible=True),
-        parts["start"]: gr.update(interactive=False),
-    }
+    yield {parts["last"]: project.name, parts["start"]: gr.update(interactive=False)}
     shown = 0
-    for html in context.follow(job):
-        update: dict[Any, Any] = {parts["fit"]: html}
+    for update in context.following(job):
         if len(job.found) > shown:
+            latest = {f["name"]: project.folder / f["file"] for f in job.found}
+            photo = latest.pop(tasks.PHOTO)
+            if not shown:
+                update[parts["stage"]] = waiting_photo(photo)
             shown = len(job.found)
-            latest = {f["name"]: f for f in job.found}
-            pictures = [(studio.public_copy(project.folder / f["file"]), f["name"]) for f in latest.values()]
-            update[parts["found"]] = gr.update(value=pictures, visible=True)
+            pictures = [(studio.public_copy(file), name) for name, file in latest.items()]
+            update[parts["found"]] = gr.update(value=pictures, visible=bool(pictures))
         yield update
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
-    still_open = session.project.name if session.project else ""
-    yield {
-        parts["cancel"]: gr.update(visible=False), parts["start"]: gr.update(interactive=True),
-        **({parts["found"]: gr.update(visible=False, value=[]), parts["last"]: still_open} if failed else {}),
+    before = {
+        parts["found"]: gr.update(visible=False, value=[]), parts["stage"]: stage(session),
+        parts["last"]: session.project.name if session.project else "",
     }  # fmt: skip
+    yield {parts["start"]: gr.update(interactive=True), **(before if failed else {})}
 
 
 def _resume(context: PageContext, session: Session, name: str) -> Iterator[dict[Any, Any]]:
@@ -189,7 +183,7 @@ def _resume(context: PageContext, session: Session, name: str) -> Iterator[dict[
 def _show_project(context: PageContext, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
     """Show a project: its photo at once, the edits when the preview is ready."""
     parts = context.parts
-    yield {parts["fit"]: box("Opening …")}
+    yield {parts["progress"]: box("Opening …")}
     context.studio.open(session, project.name)
     live = session.live
     if live is None:
@@ -199,7 +193,7 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
         **context.controls(session), parts["stage"]: stage(session, with_edits=False), **context.listed(session),
         parts["last"]: project.name,
         parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
-        parts["fit"]: box("Getting the live preview ready …", 0.6), parts["found"]: gr.update(visible=False, value=[]),
+        parts["found"]: gr.update(visible=False, value=[]),
         parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),
     }  # fmt: skip
     live.wait()
@@ -207,7 +201,7 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
         shown = context.everything(session)
         bad = shown[parts["stage"]]["bad"]
         words = "Take out of the list, or switch off, what cannot be applied." if bad else _READY
-        yield {**shown, parts["fit"]: box("Open."), parts["progress"]: box(words, bad=bad)}
+        yield {**shown, parts["progress"]: box(words, bad=bad)}
 
 
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:

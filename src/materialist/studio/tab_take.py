@@ -33,10 +33,7 @@ def layout(context: PageContext) -> None:
     with gr.Tab("Take away", id="take"):
         choices = [(title, kind) for kind, (title, _) in KINDS.items()]
         parts["what"] = gr.Radio(choices, value="png", label="What to take", elem_id="what")
-        with gr.Row():
-            parts["make"] = gr.Button("Prepare the file", variant="primary", elem_id="make", min_width=140)
-            parts["make_stop"] = gr.Button("Stop", variant="stop", visible=False, min_width=80)
-        parts["make_progress"] = gr.HTML("", js_on_load=None, elem_id="make_progress")
+        parts["make"] = gr.Button("Prepare the file", variant="primary", elem_id="make")
         parts["download"] = gr.DownloadButton("Download", visible=False, elem_id="download")
         parts["recipe"] = gr.File(
             label="Load an edits.yaml, or the zip with its masks", type="filepath", height=150, elem_id="recipe",
@@ -49,7 +46,7 @@ def layout(context: PageContext) -> None:
 
 def wire(context: PageContext) -> None:
     parts = context.parts
-    outputs = [parts[name] for name in ("make_progress", "download", "make_stop", "stage")]
+    outputs = [*context.job_parts, parts["download"], parts["stage"]]
 
     @context.handler
     def make(what: str, request: gr.Request) -> Any:
@@ -66,7 +63,7 @@ def wire(context: PageContext) -> None:
                 raise InputError("There is no edit to take away yet: change something first.")
             pack(session.edits.steps, session.workspace / EDITS, file)
         elif what in ("png", "exr"):
-            final = yield from context.traced(session, SETTINGS.final_spp, "make_progress", "make_stop")
+            final = yield from context.traced(session, SETTINGS.final_spp)
             if final is None:
                 return
             shutil.copyfile(final.path.with_suffix(file.suffix), file)
@@ -75,16 +72,15 @@ def wire(context: PageContext) -> None:
                 session, tasks.take, session.workspace, scene=str(session.project.scene), steps=session.edits.active,
                 output=str(file), what=what,
             )  # fmt: skip
-            yield from context.following(job, "make_progress", "make_stop")
+            yield from context.following(job)
             if job.state != DONE:
                 return
         label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
         yield {
             parts["download"]: gr.update(value=context.studio.public_copy(file), label=label, visible=True),
-            parts["make_progress"]: box("Ready."),
+            parts["progress"]: box("The file is ready."),
             parts["stage"]: stage(session),
         }
 
     parts["make"].click(make, parts["what"], outputs, **LONG)
-    context.stops("make_stop", "take", "final")
     context.on_upload("recipe", Session.read_edits, everything=True, **{**LONG, "queue": True, "trigger_mode": "once"})

@@ -19,6 +19,8 @@ from materialist.types import Array, Materials, Prediction, Scene
 Steps = tuple[Step, ...]
 Task = Callable[..., None]
 """task(report, **arguments)."""
+PHOTO = "photo"
+"""The name under which an inversion shows its photo, before anything is found."""
 
 
 def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> None:
@@ -40,6 +42,7 @@ def invert(
     picture = replace(mt.read_photo(photo, size=size, fov=fov), path=title)
     folder = Path(scene).parent
     show = lambda name, value: _show(report, folder, name, value)  # noqa: E731
+    show(PHOTO, picture.linear)
     done = mt.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show)
     report("save", 0, 1)
     mt.save_scene(done, scene, force=True)

@@ -62,6 +62,7 @@ class PageContext:
                 try:
                     yield from (outputs or gr.skip() for outputs in function(*args, **kwargs))
                 except Exception as error:
+                    yield {self["progress"]: "", self["stop"]: gr.update(visible=False)}
                     raise self.message(error) from error
 
             return steps
@@ -115,6 +116,11 @@ class PageContext:
     def all_parts(self) -> list[Any]:
         return [*self.picture_parts, *(self[name] for name in CONTROLS)]
 
+    @property
+    def job_parts(self) -> list[Any]:
+        """Outputs of every handler that is a generator."""
+        return [self["progress"], self["stop"]]
+
     def on(
         self, event: Any, change: Callable[..., Any], inputs: Any = None, *, everything: bool = False,
         more: tuple[Any, ...] = (), **how: Any,
@@ -146,19 +152,14 @@ class PageContext:
         sent = self.on(self[name].upload, lambda session, file: change(session, Path(file)), self[name], **how)
         sent.failure(lambda: None, None, self[name], **LIVE)
 
-    def following(self, job: Job, words: str, stop: str) -> Iterator[dict[Any, Any]]:
-        """Updates of the component `words` and of the button `stop` until a job is over."""
-        for html in self.follow(job):
-            yield {self[words]: html, self[stop]: gr.update(visible=not job.over)}
-
-    def follow(self, job: Job) -> Iterator[str]:
-        """The state of a job as HTML whenever it changed, until it is over; the last one says how it ended."""
+    def following(self, job: Job) -> Iterator[dict[Any, Any]]:
+        """Updates of the progress and its button whenever a job has moved on; the last one says how it ended."""
         last = None
         while not job.over:
             if (state := self.state(job)) != last:
-                yield (last := state)
+                yield {self["progress"]: (last := state), self["stop"]: gr.update(visible=True)}
             time.sleep(SETTINGS.poll_seconds)
-        yield self.state(job)
+        yield {self["progress"]: self.state(job), self["stop"]: gr.update(visible=False)}
 
     def state(self, job: Job) -> str:
         """The state of a job as HTML."""
@@ -173,7 +174,7 @@ class PageContext:
         part = min(1.0, job.done / job.total) if job.total else 0.0
         return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
-    def traced(self, session: Session, spp: int, words: str, stop: str) -> Generator[Any, Any, FinalPicture | None]:
+    def traced(self, session: Session, spp: int) -> Generator[Any, Any, FinalPicture | None]:
         """Path-trace the edits of a page, if that is not done yet, with the updates of `following`.
 
         Returns the picture, which the session keeps; None where the job failed or was stopped.
@@ -185,20 +186,11 @@ class PageContext:
         target = self.studio.final_file(session)
         given = {"scene": str(project.scene), "steps": steps, "output": str(target), "spp": spp}
         job = self.studio.submit(session, tasks.final, target.parent, **given)
-        yield from self.following(job, words, stop)
+        yield from self.following(job)
         if job.state != DONE:
             return None
         session.final = FinalPicture(steps, target, spp)
         return session.final
-
-    def stops(self, button: str, *kinds: str) -> None:
-        """Let a button stop the jobs of some kinds that its page asked for."""
-
-        @self.handler
-        def stop(request: gr.Request) -> None:
-            self.session(request).stop(self.studio.jobs, *kinds)
-
-        self[button].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
 
 
 def failure(job: Job) -> str:

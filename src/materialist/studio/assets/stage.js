@@ -12,12 +12,12 @@ function show() {
   const v = props.value || {};
   if (v.serial && v.serial < serial) return;  // overtaken by a newer one
   serial = v.serial || serial;
-  if (v.width) { width = v.width; height = v.height; marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    view.style.maxWidth = `calc(72vh * ${width / height})`; }  // a portrait must not push its tools out of sight
-  view.classList.toggle("empty", !width);
-  if (v.picture !== undefined && v.picture !== photo.getAttribute("src")) {
-    if (v.picture) photo.src = v.picture; else { photo.removeAttribute("src"); width = 0; view.classList.add("empty"); }
-  }
+  if (v.width !== undefined) { width = v.width; height = v.height; }  // 0: nothing can be clicked
+  if (width) marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  if (v.picture) { if (v.picture !== photo.getAttribute("src")) photo.src = v.picture; }
+  else if (v.picture !== undefined) photo.removeAttribute("src");
+  view.classList.toggle("empty", !photo.hasAttribute("src"));
+  view.style.cursor = width ? "" : "default";
   if (v.badge !== undefined) { badge.textContent = v.badge; view.dataset.kind = v.bad ? "bad" : v.badge.startsWith("Path traced") ? "final" : "live"; }
   if (v.fill !== undefined && v.fill !== maskUrl) {
     maskUrl = v.fill;
@@ -79,6 +79,8 @@ function ring(e) {
   if (e && width && tool() === "brush") marks.append(circle(...at(e), size(), `ring ${down || mode(e)}`));
 }
 
+// A portrait must not push its tools out of sight.
+photo.addEventListener("load", () => { view.style.maxWidth = `calc(72vh * ${photo.naturalWidth / photo.naturalHeight})`; });
 view.addEventListener("pointerdown", (e) => {
   if (!width || e.button || !e.isPrimary) return;
   down = mode(e); path = [at(e)]; cross.style.display = "none"; cursor = null;
