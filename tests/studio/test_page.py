@@ -86,9 +86,16 @@ def test_by_keyboard_alone(page, running):
         page.keyboard.press("ArrowLeft")
     page.keyboard.press("Enter")
     page.wait_for_selector("#stage .view[data-selected=yes]")
+    for key, tool in (("2", "Box"), ("3", "Brush"), ("1", "Click")):
+        page.keyboard.press(key)
+        assert page.get_by_role("radio", name=tool, exact=True).is_checked()
+    outline = "getComputedStyle(document.activeElement.closest('label') || document.activeElement).outlineStyle"
+    page.keyboard.press("Tab")  # to the tools
+    assert page.evaluate(outline) == "solid"
     page.locator("#hue input[type=range]").focus()
     for _ in range(3):
         page.keyboard.press("ArrowRight")
+    assert page.evaluate(outline) == "solid"
     page.wait_for_selector("#steps >> text=/hue [1-3]/")
     page.locator("#steps [data-key=remove-0]").focus()
     page.keyboard.press("Enter")

@@ -67,7 +67,7 @@ def _left(parts: dict[str, Any]) -> None:
     with gr.Row(elem_id="tools"):
         tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
         tools.append(("Place an object", "place"))
-        parts["tool"] = gr.Radio(tools, value="click", label="Tool", scale=3, min_width=220)
+        parts["tool"] = gr.Radio(tools, value="click", label="Tool (keys 1 to 5)", scale=3, min_width=220)
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
         parts["brush"] = gr.Slider(

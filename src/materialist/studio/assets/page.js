@@ -17,7 +17,9 @@
   }).observe(document.body, { childList: true, subtree: true });
   document.addEventListener("keydown", (e) => {
     const key = e.key.toLowerCase(), typing = e.target.matches("textarea, input:not([type=range], [type=checkbox], [type=radio])");
-    if (!(e.ctrlKey || e.metaKey) || typing || (key !== "z" && key !== "y")) return;
+    if (typing || e.altKey) return;
+    if (!(e.ctrlKey || e.metaKey)) return document.querySelectorAll("#tools fieldset:first-child input")[key - 1]?.click();
+    if (key !== "z" && key !== "y") return;
     e.preventDefault();
     document.getElementById(key === "y" || e.shiftKey ? "redo" : "undo").click();
   });
