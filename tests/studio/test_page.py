@@ -31,7 +31,7 @@ def test_select_edit_undo(page, running):
     page.wait_for_function("document.querySelector('#stage .badge').textContent === 'Live preview'")
     page.get_by_role("tab", name="Light").click()
     page.locator("#lights button").nth(5).click()
-    page.wait_for_selector("#steps >> text=light-sunset")
+    page.wait_for_selector("#steps >> text=sunset")
     for keys, count in (("Control+z", 1), ("Control+Shift+z", 2), ("Control+z", 1)):
         page.keyboard.press(keys)
         page.wait_for_function(f"document.querySelectorAll('#steps li').length === {count}")
@@ -257,7 +257,7 @@ def test_the_whole_story(page, running, tmp_path):
     assert subprocess.run(["unzip", "-tq", str(file)], capture_output=True).returncode == 0
     page.get_by_label("Picture, PNG").check()
     page.click("#make")
-    page.wait_for_selector("#download >> text=.png")
+    page.wait_for_selector("#download >> text=coffee-edited.png")
     with page.expect_download() as download:
         page.click("#download")
     download.value.save_as(tmp_path / "a.png")

@@ -90,6 +90,7 @@ def test_glass_follows_its_slider(page, running):
     assert float(value) == 0.3
     page.get_by_role("button", name="Remove: edit 1").click()
     page.wait_for_function("document.querySelector('#stage .badge').textContent === 'Photo'")
+    assert not page.inner_text("#progress")  # nothing is said of a glass that is gone
     assert not page.errors
 
 
@@ -103,12 +104,12 @@ def test_an_object_falls_on_the_page(page, running):
     page.get_by_role("option", name="Cube").click()
     page.wait_for_function("document.body.dataset.tool === 'place'")
     click_photo(page, 0.75, 0.8)
-    page.wait_for_selector("#steps >> text=Object: mesh thing-cube")
+    page.wait_for_selector("#steps >> text=Object: cube")
     page.get_by_role("button", name="Let it fall").first.click()
     page.click("#rest")
-    page.wait_for_selector("#steps >> text=/Fallen: mesh thing-cube/")
+    page.wait_for_selector("#steps >> text=/Fallen: cube/")
     page.get_by_role("button", name="Undo").click()
-    page.wait_for_selector("#steps >> text=Object: mesh thing-cube")
+    page.wait_for_selector("#steps >> text=Object: cube")
     page.get_by_role("button", name="Remove: edit 1").click()
     page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
     assert not page.errors

@@ -11,7 +11,7 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
 from materialist.studio.controls import control_values, set_option
-from materialist.studio.edit_list import EditList
+from materialist.studio.edit_list import EditList, summary
 from materialist.studio.preview import LivePreview, free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
@@ -247,3 +247,18 @@ def test_ticking_and_moving_leave_the_current_one():
     assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None
     assert edits.moved(0, 1).current == 2 and edits.moved(1, 1).current == 1 and edits.moved(2, -1).current == 1
     assert EditList((A, B, C)).moved(0, 1).current is None and EditList((A, B, C)).toggled(1).current is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "text"),
+    [
+        ("insert", {"mesh": "thing-ball.ply", "at": ["384", "297"], "scale": "1.2"}, "Object: ball, scale 1.2"),
+        ("drop", {"mesh": ["mesh-0123456789ab.glb"], "at": ["9", "9"], "seed": "1"}, "Fallen: own"),
+        ("relight", {"envmap": "light-sunset.exr", "gain": "auto", "ambient": "0.5"}, "Light: sunset, brightness 0.5"),
+        ("edit", {"mask": "mask-0123456789ab.png", "value": "0.2", "albedo": "#ff0000"},
+         "Material: brightness 0.2, colour #ff0000"),
+        ("glass", {"mask": "mask-0123456789ab.png", "ior": "1.2"}, "Glass: refraction 1.2"),
+    ],
+)  # fmt: skip
+def test_a_summary_has_the_words_of_the_page(kind, options, text):
+    assert summary(Step(kind, options)) == text

@@ -26,6 +26,19 @@ def test_a_title_is_never_a_path(tmp_path, title):
     assert shown and len(shown) <= 60 and not set("<>\n\0") & set(shown)
 
 
+@pytest.mark.parametrize(
+    ("title", "stem"),
+    [
+        ("My kitchen.JPG", "My-kitchen"),
+        ("Example: coffee", "coffee"),
+        ("../../etc/passwd", "etc-passwd"),
+        ("..", "photo"),
+    ],
+)
+def test_downloads_carry_the_name_of_the_photo(tmp_path, title, stem):
+    assert WorkFolder(tmp_path).new(title, "me").stem == stem
+
+
 def test_a_damaged_card_hides_its_project_alone(tmp_path):
     work = WorkFolder(tmp_path)
     broken, good = work.new("a", "me"), work.new("b", "me")

@@ -13,8 +13,14 @@ _WORDS = {
 }  # fmt: skip
 _PLAIN = {"remove": "the object", "glass": "clear"}
 """Summary of a step without options."""
-_SILENT = ("mask", "click", "box", "with", "skip", "thickness")
+_SILENT = ("mask", "click", "box", "with", "skip", "thickness", "at", "seed", "gain")
 """Options that a summary leaves out: the picture shows them."""
+_NAMES = {
+    "mesh": "", "envmap": "", "value": "brightness", "albedo": "colour", "ior": "refraction", "ambient": "brightness",
+}  # fmt: skip
+"""Options that are not called so on the page."""
+_OURS = re.compile(r"(?:thing|light)-([a-z]+)")
+"""The name of a file that the studio computes."""
 _OWN = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """The name that `workspace.store` gives an uploaded file."""
 
@@ -80,7 +86,8 @@ def with_options(step: Step, **options: Any) -> Step:
 
 def summary(step: Step) -> str:
     """A step in a few words."""
-    parts = [f"{name.replace('_', ' ')} {_short(value)}" for name, value in step.options.items() if name not in _SILENT]
+    shown = {name: value for name, value in step.options.items() if name not in _SILENT}
+    parts = [f"{_NAMES.get(name, name.replace('_', ' '))} {_short(value)}".strip() for name, value in shown.items()]
     return f"{_WORDS.get(step.kind, step.kind)}: {', '.join(parts) or _PLAIN.get(step.kind, 'as it is')}"
 
 
@@ -90,4 +97,5 @@ def _short(value: Any) -> str:
     file = re.fullmatch(r"(.*[A-Za-z_].*)\.\w+", str(value))
     if file is None:
         return str(value)
-    return "own" if _OWN.fullmatch(file[1]) else file[1]
+    ours = _OURS.fullmatch(file[1])
+    return "own" if _OWN.fullmatch(file[1]) else ours[1] if ours else file[1]

@@ -50,7 +50,8 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
     try:
         linear = live.picture(steps, client)
     except MaterialistError as error:
-        photo, badge = jpeg_url(live.scene.photo.linear), f"The photo without its edits: {session.shown(str(error))}"
+        photo, why = jpeg_url(live.scene.photo.linear), session.shown(str(error))
+        badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
         return {**shown, "picture": photo, "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off
     return {**shown, "picture": jpeg_url(linear), "badge": badge, "waiting": waiting}

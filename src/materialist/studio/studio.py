@@ -147,11 +147,14 @@ class Studio:
         """Where a page's path-traced pictures lie, without the suffix; they go when the studio ends."""
         return self.work.cache / f"final-{session.mark}"
 
-    def public_copy(self, file: Path) -> str:
-        """A copy of a result in the cache, the only place of served files, in a folder with a random name."""
+    def public_copy(self, file: Path, name: str = "") -> str:
+        """A copy of a result in the cache, the only place of served files, in a folder with a random name.
+
+        `name` is another name for the file.
+        """
         folder = self.work.cache / secrets.token_hex(16)
         try:
             folder.mkdir()
-            return str(shutil.copyfile(file, folder / file.name))
+            return str(shutil.copyfile(file, folder / (name or file.name)))
         except OSError as error:
             raise OutputError(f"The file {file.name} cannot be handed over: {error.strerror or error}.") from error

@@ -109,7 +109,7 @@ def _wire_following(context: PageContext) -> None:
         while client is not None and client is session.glass:
             state = client.state
             if not state.waiting:
-                end = box(session.shown(state.words), bad=True) if state.bad else box("The glass follows its sliders.")
+                end = box(session.shown(state.words), bad=True) if state.bad else ""
                 yield {**context.picture(session), context["progress"]: end}
                 return
             if state.words != said:

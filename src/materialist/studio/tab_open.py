@@ -198,10 +198,7 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
     }  # fmt: skip
     live.wait()
     if session.live is live:
-        shown = context.everything(session)
-        bad = shown[parts["stage"]]["bad"]
-        words = "Take out of the list, or switch off, what cannot be applied." if bad else _READY
-        yield {**shown, parts["progress"]: box(words, bad=bad)}
+        yield {**context.everything(session), parts["progress"]: box(_READY)}
 
 
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:

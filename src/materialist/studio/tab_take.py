@@ -54,7 +54,8 @@ def wire(context: PageContext) -> None:
         if what not in KINDS:
             raise InputError("Choose one of the listed things.")
         _ = session.scene
-        assert session.project is not None
+        project = session.project
+        assert project is not None
         yield {parts["download"]: gr.update(visible=False)}
         file = session.workspace / f"take-{what}{KINDS[what][1]}"
         if what == "edits":
@@ -69,15 +70,16 @@ def wire(context: PageContext) -> None:
             shutil.copyfile(final.path.with_suffix(file.suffix), file)
         else:
             job = context.studio.submit(
-                session, tasks.take, session.workspace, scene=str(session.project.scene), steps=session.edits.active,
+                session, tasks.take, session.workspace, scene=str(project.scene), steps=session.edits.active,
                 output=str(file), what=what,
             )  # fmt: skip
             yield from context.following(job)
             if job.state != DONE:
                 return
-        label = f"Download {file.name} ({file.stat().st_size / 1e6:.1f} MB)"
+        name = f"{project.stem}-{'edited' if what in ('png', 'exr') else what}{file.suffix}"
+        label = f"Download {name} ({file.stat().st_size / 1e6:.1f} MB)"
         yield {
-            parts["download"]: gr.update(value=context.studio.public_copy(file), label=label, visible=True),
+            parts["download"]: gr.update(value=context.studio.public_copy(file, name), label=label, visible=True),
             parts["progress"]: box("The file is ready."),
             parts["stage"]: stage(session),
         }

@@ -36,7 +36,7 @@ _PERSON = re.compile(r"[a-z0-9]{2,32}")
 class Project:
     folder: Path
     title: str
-    """For display; often the name of the uploaded file. Never part of a path."""
+    """For display; often the name of the uploaded file. Part of a path as `stem` only."""
     owner: str
     scene: Path
     """The scene package; inside the folder unless the studio was started on a scene elsewhere."""
@@ -44,6 +44,12 @@ class Project:
     @property
     def name(self) -> str:
         return self.folder.name
+
+    @property
+    def stem(self) -> str:
+        """The title as the start of a file name: letters, digits, hyphens."""
+        bare = re.sub(r"^Example: |\.[A-Za-z]\w{1,3}$", "", self.title)
+        return re.sub(r"\W+", "-", bare).strip("-")[:50] or "photo"
 
     @property
     def ready(self) -> bool:
