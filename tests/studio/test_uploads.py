@@ -19,7 +19,7 @@ from materialist.studio.session import Session
     ("name", "content", "message"),
     [
         ("a.exe", b"MZ", "not a photo"), ("a.svg", b"<svg/>", "not a photo"), ("a.png", b"hello", "not an image"),
-        ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "not a readable EXR"),
+        ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "no readable EXR"),
         ("a.hdr", b"#?RADIANCE\n\n", "no size"), ("noending", b"x", "not a photo"),
         ("a.png", png_header(30_000, 30_000), "megapixels"), ("a.png", png_header(30_000, 2_500), "75 megapixels"),
         ("a.png", png_header(30_000, 100), "longer than"), ("a.png", png_header(4, 4), "at least"),

@@ -23,7 +23,7 @@ class PatchSettings:
     """How a hole is filled; tuned on 6 photos by eye, 10 photos with an object pasted in and 6 made ones."""
 
     longest: int = 768  # longer side, pixels, at which patches are matched; more: finer texture, slower
-    radius: int = 5  # pixels to each side of a patch's middle; more: longer edges go on, fewer patches fit
+    radius: float = 1 / 150  # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
     near: float = 0.4  # distance to the hole, in its sizes, up to which anything may be copied; more: other things
     guide: float = 0.25  # weight of the guide beside the patches' colours; more: less from other surfaces
     inverse: float = 0.3  # guide: of inverse depth, relative to that of the nearest things
@@ -86,10 +86,11 @@ def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) 
     try:
         import patchmatch
 
+        radius = max(2, round(SETTINGS.radius * max(gap.shape)))
         with _LOCK:
             patchmatch.set_random_seed(seed)
             return np.asarray(patchmatch.inpaint_regularity(
-                levels, gap, guide, global_mask=kept, patch_size=SETTINGS.radius, guide_weight=SETTINGS.guide
+                levels, gap, guide, global_mask=kept, patch_size=radius, guide_weight=SETTINGS.guide
             ))  # fmt: skip
     except (ImportError, RuntimeError) as error:
         raise SetupError(
