@@ -112,6 +112,10 @@ def test_on_a_phone(browser, running):
     page.locator("#metallic").scroll_into_view_if_needed()
     box = page.locator("#stage .view").bounding_box()
     assert box["y"] + box["height"] > 60, "the picture is out of sight while its sliders move"
+    page.evaluate("scrollTo(0, 0)")
+    for name in ("Open", "Material", "Light", "Objects", "Look", "Take away"):
+        box = page.get_by_role("tab", name=name).bounding_box()
+        assert box["y"] + box["height"] <= 844, name
     for name in ("Open", "Light"):
         page.get_by_role("tab", name=name).click()
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -273,4 +277,8 @@ def test_every_tab_opens_without_a_scene(page, tmp_path):
             page.get_by_role("tab", name=name).click()
             page.wait_for_timeout(700)
             assert not page.locator(".toast-wrap .error, .toast-body.error").count(), name
+        page.set_viewport_size({"width": 390, "height": 844})
+        assert page.locator("#file").bounding_box()["y"] < 250  # the first thing on a phone
+        page.locator("#examples button").first.click()
+        page.wait_for_selector("#facts >> text=coffee.png is ready")
         assert not page.errors

@@ -41,7 +41,7 @@ def build(studio: Studio) -> Any:
         with gr.Row(elem_id="body"):
             with gr.Column(scale=5, min_width=320, elem_id="left"):
                 _left(parts)
-            with gr.Column(scale=4, min_width=320), gr.Tabs(selected="open") as tabs:
+            with gr.Column(scale=4, min_width=320), gr.Tabs(selected="open", overflow_behavior="wrap") as tabs:
                 parts["tabs"] = tabs
                 for tab in (tab_open, *TABS):
                     tab.layout(context)

@@ -2,10 +2,12 @@
 
 import shutil
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import gradio as gr
+import numpy as np
 
 import materialist as mt
 from materialist.errors import InputError
@@ -16,6 +18,7 @@ from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
 from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box
 from materialist.studio.workspace import Project
+from materialist.types import Array
 
 SIZES = tuple((f"{side} pixels", side) for side in (256, 384, 512, 768, 1024))
 _READY = "Ready: click an object, then move a slider."
@@ -41,10 +44,13 @@ def layout(context: PageContext) -> None:
             label="Found so far", columns=3, height="auto", visible=False, object_fit="contain", interactive=False,
             buttons=[],
         )  # fmt: skip
+        gr.Markdown("Or take an example photo:")
+        parts["examples"] = gr.Gallery(
+            _examples(), label="Example photos", show_label=False, columns=4, height="auto", allow_preview=False,
+            object_fit="cover", interactive=False, buttons=[], elem_id="examples", format="jpeg",
+        )  # fmt: skip
         parts["projects"] = gr.Dropdown([], label="Continue where you left", value=None, elem_id="projects")
         parts["continue"] = gr.Button("Continue", size="sm", elem_id="continue")
-        names = [(f"{name.capitalize()} ({credit})", name) for name, (_, credit) in EXAMPLES.items()]
-        parts["example"] = gr.Dropdown(names, label="Or take an example photo", value=None, elem_id="example")
 
 
 def wire(context: PageContext, page: gr.Blocks) -> None:
@@ -61,16 +67,19 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         return box(f"{name} is ready.")
 
     @context.handler
-    def choose_example(name: str | None) -> Any:
-        return None if name is None else gr.update(value=None)
+    def choose_example(event: gr.SelectData) -> str:
+        name = [*EXAMPLES][int(event.index)]
+        gr.Info(EXAMPLES[name][1], title="Example photo")
+        file = example_path(name)
+        return studio.public_copy(file, f"{name}{file.suffix}")
 
     @context.handler
-    def start(file: str | None, example: str | None, predictor: str, size: int, fov: str, request: gr.Request):
+    def start(file: str | None, predictor: str, size: int, fov: str, request: gr.Request):
         session = context.session(request)
         if file is not None and Path(file).suffix.lower() == ".zip":
             project = _unpack(context, session, Path(file))
         else:
-            project, job = _start_inversion(context, session, file, example, predictor, size, fov)
+            project, job = _start_inversion(context, session, file, predictor, size, fov)
             yield from _follow_inversion(context, session, project, job)
             if not project.ready:
                 return
@@ -99,28 +108,37 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         *context.all_parts, *context.job_parts,
         *(parts[name] for name in ("found", "start", "last", "tabs", "projects")),
     ]  # fmt: skip
-    wanted = [parts[name] for name in ("file", "example", "predictor", "size", "fov")]
+    wanted = [parts[name] for name in ("file", "predictor", "size", "fov")]
     sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **LONG)
     sent.failure(lambda: None, None, parts["file"], **LONG)  # what was refused is not there
-    parts["example"].input(choose_example, parts["example"], parts["file"], **LONG)
+    parts["examples"].select(choose_example, None, parts["file"], **LONG)
     parts["start"].click(start, wanted, opening, **LONG)
     parts["continue"].click(resume, parts["projects"], opening, **LONG)
     page.load(arrive, parts["last"], [parts["file"], *opening], **LONG)
 
 
+@cache
+def _examples() -> list[tuple[Array, str]]:
+    """Small pictures of the example photos, with their names."""
+    import cv2
+
+    photos = {name: np.asarray(cv2.imread(str(example_path(name))))[..., ::-1] for name in EXAMPLES}
+    small = lambda photo: cv2.resize(photo, None, fx=(s := 240 / photo.shape[1]), fy=s, interpolation=cv2.INTER_AREA)  # noqa: E731
+    return [(small(photo), name.capitalize()) for name, photo in photos.items()]
+
+
 def _start_inversion(
-    context: PageContext, session: Session, file: str | None, example: str | None, predictor: str, size: int, fov: str
+    context: PageContext, session: Session, file: str | None, predictor: str, size: int, fov: str
 ) -> tuple[Project, Job]:
     """A project with its photo in it, and the inversion in the queue."""
     studio = context.studio
-    if file is None and not example:
+    if file is None:
         raise InputError("Drop a photo first, or choose an example.")
     if predictor not in {value for _, value in PREDICTORS}:
         raise InputError("Choose one of the listed ways to make the first guess.")
-    source = Path(file) if file is not None else example_path(str(example))
-    title = source.name if file is not None else f"Example: {example}"
+    source = Path(file)
     suffix = uploads.checked_picture(source, source.name)
-    project = studio.work.new(title, session.person)
+    project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
     shutil.copyfile(source, photo)
     job = studio.submit(
