@@ -96,7 +96,11 @@ def _along(up: Array, seen: _Seen) -> tuple[float, Revolution | None]:
     if alike < DEFAULT.alike:
         return 0.0, None
     ahead = np.cross(across, up)
-    found = [_placed(up, ahead * np.sign(ahead @ middle), seen, round_top) for round_top in (True, False)]
+    first = Axis(up, ahead * np.sign(ahead @ middle))  # at distance 1
+    border = _border(silhouette_field(seen.inside), first, seen.camera)
+    if border is None:
+        return 0.0, None
+    found = [_placed(first, border, seen, round_top) for round_top in (True, False)]
     seen_so = [(body, *body.front(seen.inside, seen.rays)) for body in found if body is not None]
     if not seen_so:
         return 0.0, None
@@ -150,22 +154,20 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
     return plane(angle), 1 - unlike(angle)
 
 
-def _placed(up: Array, ahead: Array, seen: _Seen, round_top: bool) -> Revolution | None:
+def _placed(first: Axis, border: tuple[Array, float], seen: _Seen, round_top: bool) -> Revolution | None:
     """The body where the depth map has its front, or as far away as the ground that it stands on.
 
-    Its upper end is round, or flat.
+    first: its axis at distance 1. border: as of `_border`. Its upper end is round, or flat.
     """
-    field = silhouette_field(seen.inside)
-    first = Axis(up, ahead)  # at distance 1
-    found = _profile_line(field, first, seen.camera, round_top)
-    if found is None:
+    whole, cell = border
+    line = _capped(whole, float(np.linalg.norm(first.foot)), seen.camera, cell, round_top)
+    if line is None:
         return None
-    line, cell = found
     base, high = float(line[0, 1]), float(np.ptp(line[:, 1]))
     front, _ = Revolution(first, Profile.of(line, cell, base)).front(seen.inside, seen.rays)
     both = seen.inside & (front > 0)
     away = float(np.median(seen.depth[both] / front[both])) if both.any() else 1.0
-    ground = ground_height(Axis(up, np.zeros(3)), seen.behind, seen.inside, seen.rays)
+    ground = ground_height(Axis(first.up, np.zeros(3)), seen.behind, seen.inside, seen.rays)
     floor = base * away
     if np.isfinite(ground):
         near = abs(ground - floor) < DEFAULT.standing * high * away
@@ -178,11 +180,11 @@ def _placed(up: Array, ahead: Array, seen: _Seen, round_top: bool) -> Revolution
     down = unit(line[0] - line[3])
     foot = line[0] + down * (max(line[0, 1] - floor, 0) + cell * away) / max(float(-down[1]), 1e-3)
     line = np.concatenate([[np.maximum(foot, [0, -np.inf])], line])
-    return Revolution(Axis(up, away * ahead), Profile.of(line, cell * away, floor))
+    return Revolution(Axis(first.up, away * first.foot), Profile.of(line, cell * away, floor))
 
 
-def _profile_line(field: Array, axis: Axis, camera: Camera, round_top: bool) -> tuple[Array, float] | None:
-    """The border [K, 2] of the visual hull from its foot to the axis, its upper end rounded, and the size of a cell.
+def _border(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | None:
+    """The border [K, 2] of the visual hull from its lower to its upper end, and the size of a cell.
 
     None where nothing stays inside the outline.
     """
@@ -206,8 +208,7 @@ def _profile_line(field: Array, axis: Axis, camera: Camera, round_top: bool) -> 
     if not lines or len(longest := max(lines, key=len)) < 12:
         return None
     line = longest[:, ::-1] * cell + [0, low]  # (distance, height)
-    capped = _capped(line if line[0, 1] < line[-1, 1] else line[::-1], far, pixel, cell, round_top)
-    return None if capped is None else (capped, cell)
+    return line if line[0, 1] < line[-1, 1] else line[::-1], cell
 
 
 def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array:
@@ -232,14 +233,14 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     return (halves[0] + halves[1]) / 2
 
 
-def _capped(line: Array, far: float, pixel: float, cell: float, round_top: bool) -> Array | None:
+def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: bool) -> Array | None:
     """A line from the lower to the upper end without what the camera does not see, and a round or flat upper end.
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
     from scipy.interpolate import splev, splprep
 
-    spline, along = splprep(line.T, s=len(line) * (DEFAULT.stairs * pixel) ** 2)
+    spline, along = splprep(line.T, s=len(line) * (DEFAULT.stairs * far / camera.focal) ** 2)
     smooth = np.stack(splev(along, spline), -1)
     step = unit(np.stack(splev(along, spline, der=1), -1))
     # The lower end is seen from above over its near rim, the upper one over its far rim.

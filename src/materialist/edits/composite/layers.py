@@ -18,8 +18,8 @@ from materialist.types import Array, Scene
 class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
-    first: int = 16  # of the paths a pixel, one in so many of each half finds out where the edit reaches
-    least_first: int = 8  # and no fewer than so many
+    first: int = 16  # one in so many of all paths, in each half, finds out where the edit reaches
+    least_first: int = 8  # paths of each half that do so at the least; decides below 256 paths
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
     visible: float = 1 / 255  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
     sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
