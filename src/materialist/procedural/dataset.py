@@ -22,7 +22,7 @@ from materialist.procedural.sample import make_sample
 from materialist.render.variant import setup
 
 FORMAT = 1
-CONTENT = 8
+CONTENT = 9
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")

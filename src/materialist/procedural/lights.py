@@ -14,6 +14,7 @@ import numpy as np
 
 from materialist.color import luminance
 from materialist.io.exr import read_exr
+from materialist.procedural import patterns
 from materialist.procedural.objects.shapes import turn_upright
 from materialist.procedural.options import captures
 from materialist.types import Array
@@ -169,11 +170,40 @@ def _room(rng: np.random.Generator) -> Radiance:
     return radiance
 
 
+def _clouds(rng: np.random.Generator) -> Radiance:
+    """A sky of any colour between deep blue and haze, with clouds from a few to many, and a sun that they may hide."""
+    sun = _axis(rng.uniform(-np.pi, np.pi), np.radians(rng.uniform(8, 70)))
+    zenith = np.array(colorsys.hsv_to_rgb(rng.uniform(0.54, 0.63), rng.uniform(0.3, 0.85), 1)) * rng.uniform(0.3, 0.9)
+    horizon = zenith + (_tint(rng, 0.15) - zenith) * rng.uniform(0.4, 1)
+    ground = np.array([0.3, 0.26, 0.2]) * rng.uniform(0.4, 1.2)
+    width, power, colour = np.radians(rng.uniform(1.5, 3)), rng.uniform(0.1, 1.5), _tint(rng, rng.uniform(0, 0.4))
+    field = (0.75 * patterns.noise(rng, rng.uniform(1.4, 2)) + 0.25 * patterns.noise(rng, 1.2)).astype(np.float32)
+    least, soft, thick = np.quantile(field, rng.uniform(0, 0.95)), rng.uniform(0.08, 0.4), rng.uniform(0.3, 0.8)
+    bright, dark, spacing = rng.uniform(1, 2), rng.uniform(0.2, 0.9), rng.uniform(15, 60)
+
+    def radiance(d: Array) -> Array:
+        y = d[..., 1:2]
+        # Clouds lie on a plane above; where it is seen flat, haze covers them.
+        at = (d[..., [0, 2]] / np.maximum(y, 0.04) * spacing).astype(np.float32)
+        above = (
+            cv2.remap(field, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)[..., None] - least
+        )
+        density = _step(above, soft) * _step(y - 0.02, 0.12)
+        angle = np.arccos(np.clip(d @ sun, -1, 1))[..., None]
+        lit = bright * (1 + 0.7 * np.exp(-angle / 0.4)) * (1 - (1 - dark) * _step(above, thick)) * colour
+        sky = horizon + (zenith - horizon) * np.clip(y, 0, 1) ** 0.6
+        disc = np.exp(-((angle / width) ** 2)) * (power / width**2) * (1 - density) ** 2
+        sky = sky + (lit - sky) * density + (disc + 0.6 * np.exp(-angle / 0.25)) * colour
+        return sky + (ground - sky) * (1 - _step(y + 0.03, 0.06))
+
+    return radiance
+
+
 _KINDS = (_sky, _studio, _room, _overcast)
 
 
-ROWS = 192
-"""Rows of a procedural envmap."""
+ROWS = 256
+"""Rows of a procedural envmap, as many as the captures have."""
 
 
 def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
@@ -182,19 +212,17 @@ def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array
         picture = captured(rng, captures)
         if luminance(picture[: len(picture) // 3]).mean() > 0.8 * luminance(picture).mean():
             return picture
-    return procedural(rng, (_sky, _overcast))
+    return procedural(rng, (_sky, _overcast, _clouds, _clouds))
 
 
 def around(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
     """[h, 2h, 3] float32: any surroundings: captures mostly, a studio, a room, a sky."""
     if captures and rng.random() < 0.65:
         return captured(rng, captures)
-    return procedural(rng)
+    return procedural(rng, (*_KINDS, _clouds))
 
 
-def procedural(
-    rng: np.random.Generator, kinds: tuple[Callable[[np.random.Generator], Radiance], ...] = _KINDS
-) -> Array:
+def procedural(rng: np.random.Generator, kinds: tuple[Callable[[np.random.Generator], Radiance], ...]) -> Array:
     """[ROWS, 2 ROWS, 3] float32: one of the kinds, each as likely; its mean luminance is 1."""
     return levelled(kinds[rng.integers(len(kinds))](rng)(directions(ROWS)).astype(np.float32))
 

@@ -22,7 +22,7 @@ def pattern(rng: np.random.Generator, kind: str, *, metal: bool = False, natural
     first = _colour(rng, metal, natural)
     second = _colour(rng, metal, natural) if rng.random() < 0.5 else first * rng.uniform(0.25, 0.6)
     mix = _KINDS[kind](rng)[..., None]  # [SIZE, SIZE, 1] in [0, 1]
-    grain = 1 + 0.05 * (_noise(rng, 1.0)[..., None] - 0.5)
+    grain = 1 + 0.05 * (noise(rng, 1.0)[..., None] - 0.5)
     return np.clip((first * (1 - mix) + second * mix) * grain, 0.03, 0.9).astype(np.float32)
 
 
@@ -37,7 +37,7 @@ def _colour(rng: np.random.Generator, metal: bool, natural: bool) -> Array:
     return np.array(colorsys.hsv_to_rgb(rng.random(), saturation, value))
 
 
-def _noise(rng: np.random.Generator, slope: float) -> Array:
+def noise(rng: np.random.Generator, slope: float) -> Array:
     """[SIZE, SIZE] periodic noise with spectrum 1 / f**slope, in [0, 1]."""
     f = np.hypot(np.fft.fftfreq(SIZE)[:, None], np.fft.fftfreq(SIZE)[None, :])
     f[0, 0] = 1
@@ -68,8 +68,8 @@ def _stripes(rng: np.random.Generator) -> Array:
 def _wood(rng: np.random.Generator) -> Array:
     x, y = _axes()
     n = int(rng.integers(5, 10))
-    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * y + 1.2 * _noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * x)))
-    return np.clip(0.7 * rings**2 + 0.3 * _noise(rng, 0.8), 0, 1)
+    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * y + 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * x)))
+    return np.clip(0.7 * rings**2 + 0.3 * noise(rng, 0.8), 0, 1)
 
 
 def _spots(rng: np.random.Generator) -> Array:
@@ -85,7 +85,7 @@ def _spots(rng: np.random.Generator) -> Array:
 _KINDS = {
     "plain": lambda rng: np.zeros((SIZE, SIZE)),
     "checker": _checker,
-    "noise": lambda rng: _noise(rng, 1.6),
+    "noise": lambda rng: noise(rng, 1.6),
     "stripes": _stripes,
     "wood": _wood,
     "spots": _spots,

@@ -14,7 +14,7 @@ from materialist.render.denoise import denoise
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 
-PROBE = 4
+PROBE = 3
 """Label rays a pixel and axis."""
 LIGHT_SPP = 128
 """Rays of each of its texels."""

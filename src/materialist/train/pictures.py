@@ -29,7 +29,7 @@ _PLANES = ("image", "shading", "albedo", "roughness", "metallic", "normal", "dep
 class AugmentSettings:
     """How much pictures are changed; all by eye."""
 
-    capacity: int = 20000  # most pictures in a card's memory, 2 MB each at 256 pixels
+    capacity: int = 12000  # most pictures in a card's memory, 2 MB each at 256 pixels
     refill: int = 256  # new samples from which on a card reads them
     readers: int = 6  # processes that read them
     least_crop: float = 0.55  # smallest crop, as a part of the picture's shorter side
