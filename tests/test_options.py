@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from materialist import Drop, Glass, Insertion, InvertOptions, MaterialEdit, Relight, Removal
+from materialist.cli.options import Rendering
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.options import ExportOptions
@@ -55,6 +56,10 @@ def test_texts_mean_what_the_values_do(tmp_path):
         (Removal, {"seed": 1.5}, "The seed is 1.5; give a whole number."),
         (Removal, {"shadow": "yes"}, "The shadow must be a number, or auto, not 'yes'."),
         (Relight, {"rotate": float("nan")}, "The rotation is nan; give a finite number."),
+        (Relight, {"rotate": "1..b"}, "The rotation must be a number, or A..B, not 'b'."),
+        (Rendering, {"upscale": "none.py:twice"}, "The upscale is none.py:twice; give FILE.py:FUNCTION"),
+        (Rendering, {"upscale": f"{__file__}:twice"}, "has no function 'twice'"),
+        (Glass, {"back": "same"}, "which only the two-interface model knows"),
         (Relight, {"sun": (1, 2, 3)}, "The sun must be 2 numbers"),
         (Relight, {"lamps": [[1, 2, 3]]}, "The lamp must be 5 numbers"),
         (Insertion, {"material": "wood"}, "The material is 'wood'; give as-is, glass, mirror, R,G,B"),

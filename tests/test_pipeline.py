@@ -146,6 +146,21 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
     assert {"read", "predict", "geometry", "light", "rerender"} <= set(told)
 
 
+def test_the_papers_preset_takes_nothing_that_the_paper_does_not(folder, monkeypatch):
+    """No continued planes, no pasted sky, no photo as indirect light; the light is an MLP at 512 x 256."""
+    from materialist.fit import invert as fitting
+    from materialist.transport.cache import TransportCache
+
+    sent, slots = [], TransportCache.slot_radiance
+    monkeypatch.setattr(fitting, "paste_visible_sky", lambda *_, **__: pytest.fail("a sky was pasted"))
+    monkeypatch.setattr(TransportCache, "slot_radiance", lambda self, r: sent.append(r) or slots(self, r))
+    given = options(folder, preset="paper", settings=short("paper", 2, 2))
+    scene = invert(**{name: value for name, value in given.items() if name != "envmap_size"})
+    assert scene.envmap.shape == (256, 512, 3) and scene.provenance["completion"] == "none"
+    assert (scene.geometry.mesh.face_plane < 0).all()
+    assert len(sent) == 2 and sent == [None, None]
+
+
 def test_mask_is_taken_at_working_size(folder):
     mask = np.zeros((HEIGHT, WIDTH), bool)
     mask[6:12, 4:12] = True

@@ -184,6 +184,15 @@ def _text(number: float) -> str:
     return f"{int(number)}" if math.isfinite(number) and number == int(number) else f"{number:g}"
 
 
+def _span(declared: Option, called: str, value: Any) -> Any:
+    """A number, or the two that a film goes through: a pair, or a text such as 30..90."""
+    ends = value.split("..") if isinstance(value, str) else value
+    declared = replace(declared, choices=("A..B",))
+    if isinstance(ends, list | tuple) and len(ends) == 2:
+        return tuple(_number(declared, called, end) for end in ends)
+    return _number(declared, called, value)
+
+
 def _whole(declared: Option, called: str, value: Any) -> int:
     number = _number(declared, called, value)
     if number != int(number):
@@ -243,8 +252,28 @@ def _lamp(declared: Option, called: str, value: Any) -> Any:
     return numbers(value, 5, called) if isinstance(value, str | list | tuple) else value
 
 
+def _function(declared: Option, called: str, value: Any) -> Any:
+    """A function itself, or one that a text such as FILE.py:FUNCTION names; the file is run."""
+    if callable(value):
+        return value
+    from runpy import run_path
+
+    path, _, name = str(value).rpartition(":")
+    if not Path(path).is_file():
+        raise InputError(f"The {called} is {value}; give FILE.py:FUNCTION, with a file that is there.")
+    try:
+        found = run_path(path).get(name)
+    except Exception as error:  # whatever a user's file raises
+        raise InputError(f"The {called} {path} cannot be run: {type(error).__name__}: {error}.") from error
+    if not callable(found):
+        raise InputError(f"The {called} {path} has no function '{name}'; write FILE.py:FUNCTION.")
+    return found
+
+
 _CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
     "number": _number,
+    "span": _span,
+    "function": _function,
     "whole": _whole,
     "shift": _shift,
     "numbers": lambda declared, called, value: numbers(value, declared.count, called),

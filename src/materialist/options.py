@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from materialist.errors import InputError
 from materialist.option_kinds import Colour, OperationOptions, option
 
 if TYPE_CHECKING:
@@ -89,10 +90,18 @@ class Glass(Removal):
     model: str = option(
         "closed", "closed: path-traced; two-interface: as in the paper.", kind="word",
         choices=("closed", "two-interface"))
+    back: str = option(
+        "found", "two-interface: the normals of the back that was found, or the same as the front's, as in the paper.",
+        kind="word", choices=("found", "same"))
     thickness: Array | str | Path = option(
         "auto", "How thick it is; a file has scene units.", kind="file",
         choices=("auto", "network", "symmetry", "half-turn"), metavar="auto|network|symmetry|FILE")
     """One of the methods, or [H, W] along the camera rays, or a file of that."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.back == "same" and self.model == "closed":
+            raise InputError("The back is 'same', which only the two-interface model knows; take that model, too.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +120,9 @@ class Relight(OperationOptions):
         None, "Factor on it; auto keeps the photo's mean light.", low=0, high=1e6, ends="(]", choices=("auto",),
         needs="envmap", metavar="auto|G")
     """None: `auto` for a file, whose exposure is not known, and 1 for an array."""
-    rotate: float = option(0.0, "Turn the light to the right.", called="rotation", unit="degrees", metavar="DEG")
+    rotate: float | tuple[float, float] = option(
+        0.0, "Turn the light to the right; a film's from A to B.", kind="span", called="rotation", unit="degrees",
+        metavar="DEG|A..B")
     sun: tuple[float, float] | None = option(
         None, "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, metavar="AZ,EL")
     sun_power: float = option(

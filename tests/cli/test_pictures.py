@@ -72,6 +72,10 @@ def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(run, f
     assert run(*common, "--full-render", "--no-denoise", "-o", tmp_path / "b.png")[0] == 0
     full = np.asarray(Image.open(tmp_path / "b.png"))
     assert full.shape == photo.shape and (full[:8] != photo[:8]).any()
+    (tmp_path / "f.py").write_text("def twice(p):\n    return p.repeat(2, 0).repeat(2, 1)\n")
+    large = ["--full-render", "--no-denoise", "--upscale", f"{tmp_path / 'f.py'}:twice"]
+    assert run(*common, *large, "-o", tmp_path / "l.png")[0] == 0
+    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "l.png")), full.repeat(2, 0).repeat(2, 1))
 
 
 def test_apply_replays_the_list(run, folder, tmp_path):
@@ -168,6 +172,11 @@ def test_drop_films_into_a_folder(run, folder, tmp_path):
     first, last = (np.asarray(Image.open(f)).astype(float) for f in (frames[0], frames[-1]))
     assert np.abs(first - last).max() > 20
     assert len(load_scene(tmp_path / "end.scene").bodies) == 1
+    code, shown, err = run(
+        "drop", folder / "floor.scene", folder / "box.ply", "--at", "24,28", "--frames", 2, "--spp", 2, "--rotate",
+        "-90..90", "--json", "-o", tmp_path / "turned",
+    )  # fmt: skip
+    assert code == 0 and [edit.get("rotate") for edit in facts(shown)["edits"]] == [None, 90], err
 
 
 EDIT, RELIGHT, GLASS = ("edit", "a.scene"), ("relight", "a.scene"), ("glass", "a.scene", "--mask", "block.png")
@@ -189,11 +198,13 @@ INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
         ((*HUE, "--save", "a.scene"), "out.png", "--force"),
         ((*HUE, "--save", "out.scene"), "out.scene/a.png", "beside"),
         ((*HUE, "--full-render", "--save", "out.scene"), "out.png", "leave one of them out"),
+        ((*HUE, "--upscale", "box.ply:f"), "out.png", "--upscale says nothing without --full-render"),
         (RELIGHT, "out.png", "No light"),
         ((*RELIGHT, "--sun", "10,100"), "out.png", "elevation is 100"),
         ((*RELIGHT, "--lamp", "1,2,3,99999,1"), "out.png", "99999"),
         ((*TURN, "--frames", "4"), "out.png", ".mp4"),
         ((*TURN, "--frames", "1"), "out", "frames is 1"),
+        ((*RELIGHT, "--rotate", "1..9"), "out.png", "one picture has one number"),
         (TURN, "out.mp4", "--frames 48"),
         ((*TURN, "--sun-power", "2"), "out.png", "--sun-power says nothing without --sun"),
         ((*TURN, "--mask", "block.png"), "out.png", "--mask says nothing without --dim"),
@@ -204,6 +215,7 @@ INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
         (("select", "a.scene", "--click", "1,1"), "out.exr", ".png"),
         ((*GLASS, "--thickness", "none.exr"), "out.png", "none.exr"),
         ((*GLASS, "--model", "two-interface", "--full-render"), "out.png", "--model closed"),
+        ((*GLASS, "--back", "same"), "out.png", "only the two-interface model"),
         (("glass", "a.scene", "--mask", "all.png"), "out.png", "mark one object only"),
         (("remove", "a.scene", "--mask", "block.png", "--inpaint", "magic"), "out.png", "give sd:FOLDER"),
         ((*INSERT, "box.ply", "--at", "here"), "out.png", "2 numbers"),

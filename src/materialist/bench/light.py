@@ -216,7 +216,9 @@ def fit(
         field = envmap_field(light, seed=seed, start=begin and begin.radiance)
         steps = fit_light(problem, target, field, light, start=begin, seed=seed).steps
         found = field(max(light.height, 16))
-    envmap = paste_visible_sky(prepared_envmap(found, height), photo.linear, given.depth > 0, photo.camera)
+    envmap = prepared_envmap(found, height)
+    if named.light.sky:
+        envmap = paste_visible_sky(envmap, photo.linear, given.depth > 0, photo.camera)
     return envmap, steps, mesh
 
 

@@ -197,14 +197,20 @@ def drop(
     run: Run,
     frames: Annotated[int, typer.Option(metavar="N", help="Length of the film.")] = 48,
     fps: FramesPerSecond = FPS,
+    rotate: Annotated[
+        str | None, typer.Option(metavar="DEG|A..B", help="Meanwhile the light turns to the right, from A to B.")
+    ] = None,
     rendering: Rendering = Rendering(spp=32),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
     from materialist.edits.insert.meshes import read_model
+    from materialist.edits.light.relight import moving_light
 
+    light = Relight.read({} if rotate is None else {"rotate": rotate})
     check_before(output, rendering, run, video=True)
     places: Any = [numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = mt.load_scene(scene)
-    film = mt.drop(loaded, models, places, options, frames=frames, fps=fps)
+    film: Any = mt.drop(loaded, models, places, options, frames=frames, fps=fps)
+    film = film if rotate is None else moving_light(film, frames, light)
     write_film("drop", loaded, film, output, rendering, run, frames=frames, fps=fps)

@@ -76,6 +76,9 @@ class Rendering(OperationOptions):
     denoise: bool = option(
         True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
+    upscale: Any = option(
+        None, "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.", kind="function",
+        needs="full_render", metavar="FILE.py:FUNCTION")
     save: Path | None = option(None, "Write the edited scene as well.", kind="file", metavar="SCENE2")
 
 

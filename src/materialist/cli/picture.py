@@ -62,7 +62,7 @@ def write_result(
     with stage_progress(quiet=run.as_json) as progress:
         picture = mt.composite(
             scene, edited, spp=spp, seed=run.seed, full_render=rendering.full_render,
-            denoise=rendering.denoise, device=run.device, progress=progress,
+            upscale=rendering.upscale, denoise=rendering.denoise, device=run.device, progress=progress,
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=run.force)
     told = {"image": str(output), "spp": spp, "seconds": time.monotonic() - start}
@@ -87,7 +87,7 @@ def write_film(
     with stage_progress(quiet=run.as_json) as progress:
         made = pictures(
             scene, kept("scene", film), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
-            full_render=rendering.full_render, progress=progress, count=frames,
+            full_render=rendering.full_render, upscale=rendering.upscale, progress=progress, count=frames,
         )  # fmt: skip
         write_frames(output, kept("picture", made), fps=fps, force=run.force)
     told = {"video": str(output), "frames": frames, "fps": fps, "seconds": time.monotonic() - start}

@@ -42,12 +42,12 @@ radiance [P, 3], differentiable."""
 class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
-    radiance: [H, W, 3] what the surfaces send to each other: the photograph.
+    radiance: [H, W, 3] what the surfaces send to each other: the photograph; None: nothing, as the paper writes L_i.
     light_height: rows of the environment map inside the light fit.
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, radiance: Array, *, seed: int = 0, light_height: int = 32,
+        self, geometry: Geometry, camera: Camera, radiance: Array | None, *, seed: int = 0, light_height: int = 32,
         cache: CacheSettings | None = None, progress=None,
     ):  # fmt: skip
         self.cache = TransportCache(geometry, camera, cache, seed=seed, progress=progress)

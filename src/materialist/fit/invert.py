@@ -81,11 +81,12 @@ class Fit:
         begin = start_light(photo, settings, setup.prior.light, problem)
         light = envmap_field(settings, seed=setup.seed, start=begin.radiance)
         result = fit_light(problem, photo, light, settings, start=begin, seed=setup.seed, progress=self.progress)
-        envmap = prepared_envmap(light(max(settings.height, 16)), setup.envmap_height)
-        surface = np.zeros(setup.photo.linear.shape[:2], bool)
-        surface.reshape(-1)[self.engine.pixels.numpy()] = True
-        white = HDR_CLIP if setup.photo.hdr else CLIPPED
-        state.envmap = paste_visible_sky(envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
+        state.envmap = prepared_envmap(light(max(settings.height, 16)), setup.envmap_height)
+        if settings.sky:
+            surface = np.zeros(setup.photo.linear.shape[:2], bool)
+            surface.reshape(-1)[self.engine.pixels.numpy()] = True
+            white = HDR_CLIP if setup.photo.hdr else CLIPPED
+            state.envmap = paste_visible_sky(state.envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
@@ -212,8 +213,9 @@ def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress
     if setup.engine == "path":
         surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
         return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
+    radiance = setup.photo.linear if setup.settings.photo_light else None
     return TransportEngine(
-        geometry, camera, setup.photo.linear, seed=seed, light_height=setup.settings.light_grid, progress=progress
+        geometry, camera, radiance, seed=seed, light_height=setup.settings.light_grid, progress=progress
     )
 
 

@@ -34,6 +34,7 @@ class LightSettings:
     height: int = 256  # paper; rows of the field's map
     encoding: Encoding = "linear"
     clipped: bool = False  # a rendering brighter than a clipped photo channel is no error
+    sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
     chroma: float = 0.0  # weight of the colourfulness of log radiance; larger: whiter; tuned on 5 scenes
@@ -71,6 +72,7 @@ class FitSettings:
 
     light: LightSettings
     materials: MaterialSettings
+    photo_light: bool = False  # with cached transport, surfaces light each other as the photo shows them; paper: V L_E
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
 
@@ -94,6 +96,7 @@ DEFAULT = FitSettings(
         height=24,
         encoding="srgb",
         clipped=True,
+        sky=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
         chroma=0.1,
@@ -113,6 +116,7 @@ DEFAULT = FitSettings(
             ),
         ),
     ),
+    photo_light=True,
     light_grid=24,
     rerender_spp=32,
 )

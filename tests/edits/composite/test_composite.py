@@ -158,17 +158,17 @@ def test_developed_scenes_start_from_the_composite(tmp_path):
 
 
 def test_the_plain_rendering_goes_through_a_super_resolution():
-    scene = rendered_scene(native=2)
+    scene = rendered_scene()
     edited = relight(scene, ambient=0.5)
-    double = lambda picture, size: np.kron(picture, np.ones((2, 2, 1)))  # noqa: E731
+    double = lambda picture: np.kron(picture, np.ones((2, 2, 1)))  # noqa: E731
     plain = composite(scene, edited, spp=4, full_render=True, denoise=False)
     np.testing.assert_array_equal(plain, EditRenderer(scene).pair(edited)[1](4, 0))
     large = composite(scene, edited, spp=4, full_render=True, denoise=False, upscale=double)
     np.testing.assert_allclose(large, np.kron(plain, np.ones((2, 2, 1))), rtol=1e-6)
-    same = lambda picture, size: picture  # noqa: E731
     for options, words in (
-        ({"upscale": same}, "full_render"),
-        ({"upscale": same, "full_render": True}, "upscale gave"),
+        ({"upscale": double}, "full_render"),
+        ({"upscale": lambda picture: picture[1:], "full_render": True}, "return a larger picture"),
+        ({"upscale": lambda picture: 1 / 0, "full_render": True}, "upscale failed: ZeroDivisionError"),
         ({"spp": 1}, "spp is 1"),
     ):
         with pytest.raises(InputError, match=words):

@@ -149,6 +149,13 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
     more = [s.envmap for s in moving_light(SCENE, 4, rotate=450)]
     np.testing.assert_allclose(more[3], rotated(SCENE.envmap, 450), atol=1e-6)  # by as much as was asked
     np.testing.assert_allclose(more[1], rotated(SCENE.envmap, 150), atol=1e-6)
+    film = [edit(SCENE, SCENE.depth > 0, hue=k) for k in (0, 30, 60)]
+    span = list(moving_light(film, 3, rotate="-30..50"))
+    for k, made in enumerate(span):
+        np.testing.assert_allclose(made.envmap, rotated(SCENE.envmap, 40 * k - 30), atol=1e-6)
+        assert made.materials is film[k].materials
+    with pytest.raises(InputError, match=r"rotation is -30\.\.50; one picture"):
+        relight(SCENE, rotate=(-30, 50))
     suns = list(moving_light(SCENE, 2, suns=((0, 20), (90, 40))))
     np.testing.assert_allclose(suns[1].envmap, relight(SCENE, sun=(90, 40)).envmap, atol=1e-6)
     with pytest.raises(InputError, match="frames is 1"):

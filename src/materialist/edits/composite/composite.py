@@ -17,8 +17,8 @@ from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.image import write_image
 from materialist.types import Array, Materials, Photo, Scene
 
-Upscale = Callable[[Array, tuple[int, int]], Array]
-"""upscale(picture [H, W, 3] linear, (H0, W0)) -> [H0, W0, 3] linear."""
+Upscale = Callable[[Array], Array]
+"""upscale(picture [H, W, 3] linear) -> a larger one, linear."""
 RERENDERED = 64
 """Paths a pixel of the re-rendering of an edited scene that is kept."""
 
@@ -36,28 +36,20 @@ def composite(
         spp: paths per pixel, of each of the two renderings; None: 128 for new glass, else 64.
         full_render: the plain rendering of the edited scene [H, W, 3], as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
-        upscale: with `full_render`, a super-resolution of yours that brings the rendering to the photo's native size
+        upscale: with `full_render`, a super-resolution of yours that enlarges the rendering, by as much as it does
             (paper, appendix Post-Processing with Super-Resolution). The composite has the photo's own detail instead.
 
-    Raises InputError for `upscale` without `full_render`, or a result of it that is not a picture of native size; for
+    Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
-    if upscale is not None and not full_render:
-        raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     renderer = EditRenderer(compared(scene, edited), device=device)
-    picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise, progress)
-    if upscale is None:
-        return picture
-    shape = scene.photo.original.shape
-    large = np.asarray(upscale(picture, (shape[0], shape[1])), np.float32)
-    if large.shape != shape or not np.isfinite(large).all():
-        raise InputError(f"upscale gave {large.shape}, not {shape} (finite, linear); resize what it returns.")
-    return np.maximum(large, 0)
+    return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
 
 def pictures(
     scene: Scene, edits: Iterable[Scene], *, spp: int | None = 64, seed: int = 0, full_render: bool = False,
-    denoise: bool = True, device: str = "auto", progress=None, count: int | None = None,
+    denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
+    count: int | None = None,
 ) -> Iterator[Array]:  # fmt: skip
     """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
 
@@ -73,7 +65,7 @@ def pictures(
         if edited is not before:
             if before is None or not _same_base(scene, before, edited):
                 renderer = EditRenderer(compared(scene, edited), device=device)
-            picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise)
+            picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale)
         before = edited
         yield picture
     tick("frames", total, total)
@@ -111,15 +103,18 @@ def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
 
 def _picture(
     renderer: EditRenderer, scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool,
-    progress=None,
+    upscale: Upscale | None, progress=None,
 ) -> Array:  # fmt: skip
     """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
     spp = spp or paths_for(scene, edited)
+    if upscale is not None and not full_render:
+        raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     if full_render:
         if is_pictured(edited):
             raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
         picture = renderer.pair(edited)[1](spp, seed)
-        return denoised(picture, *renderer.guides(edited)) if denoise else picture
+        picture = denoised(picture, *renderer.guides(edited)) if denoise else picture
+        return picture if upscale is None else _enlarged(picture, upscale)
     layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
     photo, dimmed = renderer.scene.photo, dimmed_emitters(scene, edited)
     picture = into_photo(photo, layers)
@@ -127,6 +122,18 @@ def _picture(
         return picture
     before = None if layers.native is None else layers.native.share
     return in_photo(picture, photo, renderer.emitter_pixels(edited), dimmed, before)
+
+
+def _enlarged(picture: Array, upscale: Upscale) -> Array:
+    """The picture [H, W, 3] as a super-resolution makes it; values below 0 are 0. Raises InputError."""
+    try:
+        large = np.asarray(upscale(picture), np.float32)
+    except Exception as error:  # whatever a user's function raises
+        raise InputError(f"upscale failed: {type(error).__name__}: {error}.") from error
+    larger = large.ndim == 3 and large.shape[2] == 3 and min(np.subtract(large.shape, picture.shape)) >= 0
+    if not larger or not np.isfinite(large).all():
+        raise InputError(f"upscale gave {large.shape} for {picture.shape}; return a larger picture, finite and linear.")
+    return np.maximum(large, 0)
 
 
 def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, device: str = "auto") -> Scene:

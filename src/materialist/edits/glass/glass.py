@@ -55,7 +55,7 @@ def glass(
         edited = warned(replace(removed, bodies=(*removed.bodies, body)), *notes)
     what = {
         "ior": options.ior, "transmission": options.transmission, "tint": list(options.tint),
-        "roughness": options.roughness, "hollow": options.hollow, "model": options.model,
+        "roughness": options.roughness, "hollow": options.hollow, "model": options.model, "back": options.back,
         "thickness": ", ".join(dict.fromkeys(found.method for _, found in each)), "pixels": int(own.sum()),
     }  # fmt: skip
     return noted(edited, "glass", what)
@@ -103,7 +103,8 @@ def _two_interface(
     clear, behind = options.transmission, Backdrop(photo.linear, removed.depth, envmap)
     for part, found in each:
         seen, front, facing = _front(scene, part, found)
-        back = back_of(front, seen, found.solid, found.back, scene.camera)
+        same = options.back == "same"
+        back = None if same else back_of(front, seen, found.solid, found.back, scene.camera)
         one = two_interface(scene.camera, facing, front, seen, found.solid, behind, options, back)
         picture = np.where(seen[..., None], one, picture)
         own |= seen

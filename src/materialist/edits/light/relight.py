@@ -44,6 +44,8 @@ def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | Non
     Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
     wanted = resolved(scene, Relight.given(options, **values))
+    if isinstance(wanted.rotate, tuple):
+        raise InputError(f"The rotation is {'..'.join(map('{:g}'.format, wanted.rotate))}; one picture has one number.")
     if wanted.dim is not None:
         from materialist.edits.light.emitters import dimmed
 
@@ -212,24 +214,29 @@ def _warnings(scene: Scene) -> list[str]:
 
 
 def moving_light(
-    scene: Scene, count: int, options: Relight | None = None, *, suns: tuple[tuple[float, float], ...] = (),
-    **values: Any,
+    scene: Scene | Sequence[Scene], count: int, options: Relight | None = None, *,
+    suns: tuple[tuple[float, float], ...] = (), **values: Any,
 ) -> Iterator[Scene]:  # fmt: skip
-    """`count` relit scenes: the light turns by `rotate` degrees in all, the sun and one lamp follow their stations.
+    """`count` relit scenes: the light turns by `rotate` degrees in all, or from A to B; the sun and one lamp follow
+    their stations.
 
     Several suns or lamps are stations of one that moves in straight lines at even time between them; a single one
     stands still. With nothing that moves the light makes a full turn. Lights that the photo shows (`lights`, or those
     that are found) stay where they are, all frames with the same `dim` (None: they are part of what turns).
-    `options` and `values` are those of `relight`. Raises InputError for a count outside 2 to 3600.
+    scene: one, or one for each frame, in which things move. `options` and `values` are those of `relight`. Raises
+    InputError for a count outside 2 to 3600.
     """
     if not 2 <= count <= MAX_FRAMES:
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
-    wanted = resolved(scene, Relight.given(options, **values))
-    turn, lamps = wanted.rotate, wanted.lamps
-    if not turn and len(suns) < 2 and len(lamps) < 2:
-        turn = 360.0
-    if wanted.dim is not None or wanted.lights is not None:
-        scene = relight(scene, dim=wanted.dim, lights=wanted.lights)  # once: finding the lights takes a rendering
+    film = [scene] * count if isinstance(scene, Scene) else scene
+    wanted = resolved(film[0], Relight.given(options, **values))
+    lamps, (first, last) = wanted.lamps, wanted.rotate if isinstance(wanted.rotate, tuple) else (0.0, wanted.rotate)
+    if not (first or last) and len(suns) < 2 and len(lamps) < 2:
+        last = 360.0
+    turn = last - first
+    if isinstance(scene, Scene) and (wanted.dim is not None or wanted.lights is not None):
+        # Once: finding the lights takes a rendering.
+        film = [relight(scene, dim=wanted.dim, lights=wanted.lights)] * count
         wanted = replace(wanted, dim=None, lights=None)
     closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
     for k in range(count):
@@ -239,7 +246,7 @@ def moving_light(
         if lamps:
             x, y, z, *power, radius = _between([(*one.position, *one.power, one.radius) for one in lamps], t)
             lamp = Lamp((x, y, z), triple(power), radius)
-        yield relight(scene, wanted, rotate=t * turn, sun=sun, lamps=(lamp,) if lamp else ())
+        yield relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=(lamp,) if lamp else ())
 
 
 def _between(stations: Sequence[tuple[float, ...]], t: float) -> list[float]:
