@@ -1,5 +1,6 @@
-"""Numpy arrays for Dr.Jit, safe to be read by whole vectors of the processor."""
+"""Numpy arrays for Dr.Jit, safe to be read by whole vectors of the processor, and for torch beside it."""
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,23 @@ def integers(mi, array: Array) -> Any:
 def tensor(mi, array: Array) -> Any:
     """`mi.TensorXf` of the array's shape."""
     return mi.TensorXf(floats(mi, array), np.shape(array))
+
+
+def torch_device() -> str:
+    """Where torch computes beside the renderer: `cuda` where Mitsuba renders there and torch can, else `cpu`."""
+    mi = sys.modules.get("mitsuba")  # to import it here would be to choose its LLVM
+    if mi is None or not (mi.variant() or "").startswith("cuda"):
+        return "cpu"
+    import torch
+
+    return "cuda" if torch.cuda.is_available() else "cpu"
+
+
+def placed(values: Any) -> Any:
+    """The array or torch tensor as a torch tensor on `torch_device()`."""
+    import torch
+
+    return torch.as_tensor(values).to(torch_device())
 
 
 def _padded(array: Array, kind) -> Array:

@@ -8,7 +8,7 @@ from materialist.errors import InputError
 
 BENCHMARKS = (
     "photo-alone", "invert", "beside", "batch", "light", "ablation", "materials", "whdr", "predictor", "thickness",
-    "select", "glass", "edit", "plate", "studio", "paper",
+    "select", "glass", "edit", "plate", "studio", "paper", "gpu",
 )  # fmt: skip
 """Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""
 

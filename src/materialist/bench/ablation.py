@@ -22,6 +22,7 @@ import torch
 from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
+from materialist.buffers import placed
 from materialist.fit.engine import prepared_envmap
 from materialist.fit.invert import FitSetup, prepare
 from materialist.fit.light import envmap_field, fit_light
@@ -84,7 +85,7 @@ class _Photo:
         """`other` [h, 2h, 3] is the light of the relit pictures."""
         self.bench, self.sample, self.other = bench, sample, other
         self.camera = sample.photo.camera
-        self.photo = torch.from_numpy(sample.photo.linear.reshape(-1, 3))
+        self.photo = placed(sample.photo.linear.reshape(-1, 3))
 
     @cached_property
     def prior(self) -> Prediction:
@@ -128,7 +129,7 @@ class _Photo:
         with torch.no_grad():
             maps = model()
             render(maps)
-        image = _maps(self.prior.materials).index_copy(0, engine.pixels, maps).numpy()
+        image = _maps(self.prior.materials).index_put((engine.pixels,), maps).cpu().numpy()
         image = image.reshape(self.camera.height, self.camera.width, 5)
         found = Materials(np.ascontiguousarray(image[..., :3]), image[..., 3].copy(), image[..., 4].copy())
         picture = prepared.render(found, envmap, self.bench.spp, self.bench.seed + 1)
@@ -145,7 +146,7 @@ class _Photo:
 def _maps(materials: Materials) -> torch.Tensor:
     """[H W, 5] albedo, roughness, metallic."""
     maps = np.dstack(tuple(vars(materials).values()))
-    return torch.from_numpy(maps.reshape(-1, 5).astype(np.float32))
+    return placed(maps.reshape(-1, 5).astype(np.float32))
 
 
 def _stages(targets: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tuple[MaterialStage, ...]:

@@ -20,10 +20,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-import torch
 
 from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, materialist, numbers, timed
 from materialist.bench.report import Column, Report
+from materialist.buffers import placed
 from materialist.errors import InputError
 from materialist.fit.engine import PathEngine, TransportEngine
 from materialist.geometry.build import build_geometry
@@ -101,7 +101,7 @@ class InvertBench(Benchmark):
             for size in sizes:
                 yield inversion(self, case, size, folder, *options)
             if self.step_size:
-                yield _step_row(self, case, folder)
+                yield step_row(self, case, folder)
 
 
 def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int) -> InvertedPhoto:
@@ -171,7 +171,7 @@ def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
     return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}
 
 
-def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
+def step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     """One step of a material fit, cached and by Mitsuba's path replay backpropagation, in this process.
 
     Both render at full resolution with gradients of all maps; only the engine differs. The first four cached steps
@@ -181,7 +181,7 @@ def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     setup(bench.device)
     size, seed = bench.step_size, bench.seed
     photo = read_photo(_at_least(case, size, folder), size=size, fov=case.fov)
-    prior = get_predictor(case.predictor).predict(photo, seed=seed)
+    prior = get_predictor(case.predictor, device=bench.device).predict(photo, seed=seed)
     camera, light = photo.camera, np.full((256, 512, 3), 0.6, np.float32)
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
     cached: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
@@ -189,8 +189,8 @@ def _step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     mesh = RenderScene(geometry, camera, device=bench.device)
     path: Any = PathEngine(mesh, camera, cached.pixels.numpy(), seed=seed)
     stacked = np.dstack(tuple(vars(prior.materials).values())).reshape(-1, 5)
-    maps = torch.from_numpy(stacked.astype(np.float32))[cached.pixels]
-    target = torch.from_numpy(photo.linear.reshape(-1, 3))[cached.pixels]
+    maps = placed(stacked.astype(np.float32))[cached.pixels]
+    target = placed(photo.linear.reshape(-1, 3))[cached.pixels]
 
     def seconds(problem: Any, steps: int) -> list[float]:
         def step() -> None:

@@ -19,12 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
 from materialist.bench.edits import staged
 from materialist.bench.report import CEILING, Column, Report
+from materialist.buffers import placed
 from materialist.fit.engine import PathEngine, prepared_envmap
 from materialist.fit.invert import FitSetup, prepare
 from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
@@ -206,7 +206,7 @@ def fit(
         setup = FitSetup(photo, given, named, completion, envmap_height=height, seed=seed, device=device)
         prepared = prepare(setup)
         engine, mesh = prepared.fit.engine, prepared.renderer
-    problem, target = engine.light_problem(given.materials), torch.from_numpy(photo.linear.reshape(-1, 3))
+    problem, target = engine.light_problem(given.materials), placed(photo.linear.reshape(-1, 3))
     begin: Any = None if given.light is None else start_light(target, named.light, given.light, problem)
     if method.field in ("constant", "prior"):
         steps, found = 0, begin.radiance if method.field == "prior" else constant_light(problem, target)
@@ -235,7 +235,7 @@ def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: st
 
 def constant_light(problem: Any, photo: Any) -> Any:
     """[h, 2h, 3] tensor of the colour that explains the photo [H W, 3] with the least square error."""
-    dark, lit = (problem.render(torch.full((problem.height, 2 * problem.height, 3), v)) for v in (0.0, 1.0))
+    dark, lit = (problem.render(photo.new_full((problem.height, 2 * problem.height, 3), v)) for v in (0.0, 1.0))
     gain, missing = lit - dark, photo[problem.pixels] - dark
     colour = ((missing * gain).sum(0) / (gain**2).sum(0)).clamp(min=0)
     return colour.expand(problem.height, 2 * problem.height, 3)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.edits.composite.into_photo import onto_working
 from materialist.edits.composite.layers import Layers, changed_pixels
@@ -110,7 +111,7 @@ class Preview:
         d0, d1, d2 = tables.diffuse.split(3, -1)
         lobes = torch.cat([d0 + r * (d1 + r * d2), specular_at(tables, roughness)], -1)
         guide, pixels = self._engine.guide, torch.from_numpy(self._engine.cache.pixels.astype(np.int64))
-        grid = torch.zeros(guide.scale.numel(), 9)
+        grid = lobes.new_zeros(guide.scale.numel(), 9)
         grid[pixels] = lobes
         smooth = joint_filter(grid.view(*guide.scale.shape, 9), self._taps).view(-1, 9)[pixels]
         # Levels below the first filtered one stay sharp; the one before it is where that begins.
@@ -130,10 +131,8 @@ class Preview:
 
     def _maps(self, materials: Materials):
         """Albedo [P, 3], roughness and metallic [P] of the surface pixels; torch."""
-        import torch
-
         maps = (materials.albedo.reshape(-1, 3), materials.roughness.ravel(), materials.metallic.ravel())
-        return [torch.from_numpy(values[self._engine.cache.pixels]) for values in maps]
+        return [placed(values[self._engine.cache.pixels]) for values in maps]
 
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""
@@ -144,7 +143,7 @@ class Preview:
         return environment(rays, envmap).astype(np.float32)
 
     def _image(self, shaded, sky: Array) -> Array:
-        picture = self._engine.cache.image(shaded.numpy())
+        picture = self._engine.cache.image(shaded.cpu().numpy())
         flat = picture.reshape(-1, 3)
         flat[self._engine.sky] = sky
         return picture

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.fit.fields import resize_envmap
 from materialist.transport.cache import CacheSettings, Tables, TransportCache
@@ -27,7 +28,7 @@ class LightProblem:
     """Rendering as a function of the light, materials fixed."""
 
     pixels: torch.Tensor
-    """[Q] int64 row-major pixels that `render` answers for."""
+    """[Q] int64 row-major pixels that `render` answers for, on the CPU; all else is on `buffers.torch_device()`."""
     height: int
     """Rows of the environment map that `render` takes."""
     render: Callable[[torch.Tensor], torch.Tensor]
@@ -63,10 +64,10 @@ class TransportEngine:
         rows = _subset(rng, count, min(1.0, max(share, LEAST_PIXELS / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
         matrix = light_matrix(self.cache, materials, rows, self.light_height)
-        indirect = matrix.indirect(torch.from_numpy(self.cache.slot_radiance(self.radiance)))
+        indirect = matrix.indirect(placed(self.cache.slot_radiance(self.radiance)))
         direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-        index, weight = (torch.from_numpy(v) for v in bilinear(direction, matrix.shape))
+        index, weight = (placed(v) for v in bilinear(direction, matrix.shape))
 
         def render(envmap: torch.Tensor) -> torch.Tensor:
             flat = envmap.reshape(-1, 3)
@@ -103,16 +104,16 @@ class PathEngine:
         )
 
     def light_problem(self, materials: Materials) -> LightProblem:
-        maps = [torch.from_numpy(np.ascontiguousarray(values)) for values in vars(materials).values()]
+        maps = [placed(np.ascontiguousarray(values)) for values in vars(materials).values()]
         everything = torch.arange(self.camera.width * self.camera.height)
         return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
-        light = torch.from_numpy(np.ascontiguousarray(envmap, dtype=np.float32))
+        light = placed(np.ascontiguousarray(envmap, dtype=np.float32))
         h, w = self.camera.height, self.camera.width
 
         def render(maps: torch.Tensor) -> torch.Tensor:
-            full = torch.zeros(h * w, 5).index_copy(0, self.pixels, maps).view(h, w, 5)
+            full = maps.new_zeros(h * w, 5).index_put((self.pixels,), maps).view(h, w, 5)
             parts = [part.contiguous() for part in (full[..., :3], full[..., 3], full[..., 4])]
             return self._render(*parts, light).reshape(-1, 3)[self.pixels]
 
@@ -125,7 +126,7 @@ Engine = TransportEngine | PathEngine
 
 def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:
     """[height, 2 height, 3] float32 numpy map from a torch map of any size."""
-    return resize_envmap(envmap.detach(), height).contiguous().numpy().astype(np.float32)
+    return resize_envmap(envmap.detach(), height).contiguous().cpu().numpy().astype(np.float32)
 
 
 def _subset(rng, size: int, share: float) -> Array:
@@ -139,6 +140,6 @@ def _subset(rng, size: int, share: float) -> Array:
 
 def _guide(cache: TransportCache, camera: Camera) -> Guide:
     position = np.array(cache.position).T
-    image = lambda v: torch.from_numpy(cache.image(v))  # noqa: E731
+    image = lambda v: placed(cache.image(v))  # noqa: E731
     scale = image(-position[:, 2:] / camera.focal)[..., 0]
     return Guide(image(position), image(np.array(cache.normal).T), scale.clamp_min(1e-9))

@@ -43,7 +43,7 @@ class EnvmapMLP(nn.Module):
         offset = torch.rand(2, generator=jitter) - 0.5 if jitter is not None else torch.zeros(2)
         v = (torch.arange(height) + 0.5 + offset[0])[:, None] / height
         u = (torch.arange(2 * height) + 0.5 + offset[1])[None, :] / (2 * height)
-        u, v = torch.broadcast_tensors(u, v)
+        u, v = (x.to(self.net[0].weight) for x in torch.broadcast_tensors(u, v))
         if self.coordinates == "uv":
             x = torch.stack([u, v], -1)
         else:
@@ -73,7 +73,7 @@ class EnvmapSH(nn.Module):
         self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
-        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree))
+        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree)).to(self.coefficients)
         return functional.softplus(basis @ self.coefficients)
 
 
@@ -138,7 +138,7 @@ class MaterialUNet(nn.Module):
 
     def __init__(self, prior: torch.Tensor, pixels: torch.Tensor, height: int, width: int, *, channels: int = 32):
         super().__init__()
-        grid = torch.zeros(height * width, 5)
+        grid = prior.new_zeros(height * width, 5)
         grid[pixels] = prior
         pad_h, pad_w = -height % 4, -width % 4
         image = grid.view(1, height, width, 5).permute(0, 3, 1, 2)

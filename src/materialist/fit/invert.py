@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from materialist.buffers import placed
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
 from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
 from materialist.fit.losses import CLIPPED
@@ -94,7 +95,7 @@ class Fit:
         start, setup = time.perf_counter(), self.setup
         problem, pixels = self.engine.material_problem(state.envmap), self.engine.pixels
         held = remapped(state.maps) if settings.remap else state.maps
-        inside = None if setup.mask is None else torch.from_numpy(setup.mask.reshape(-1)[pixels.numpy()])
+        inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
         model = material_field(held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed)
         results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
         summaries = [r.summary() for r in results]
@@ -116,16 +117,16 @@ class Fit:
     def materials(self, state: FitState) -> Materials:
         """Full-size maps of the state; the prior's values where there is no surface."""
         out = _stacked(self.setup.prior.materials)
-        out[self.engine.pixels.numpy()] = state.maps.numpy()
+        out[self.engine.pixels.numpy()] = state.maps.cpu().numpy()
         out = out.reshape(*self.setup.photo.linear.shape[:2], 5)
         return Materials(np.ascontiguousarray(out[..., :3]), out[..., 3].copy(), out[..., 4].copy())
 
     def prior_maps(self) -> torch.Tensor:
         """[P, 5] the prior's albedo, roughness and metallic of the surface pixels."""
-        return torch.from_numpy(_stacked(self.setup.prior.materials))[self.engine.pixels]
+        return placed(_stacked(self.setup.prior.materials))[self.engine.pixels]
 
     def _photo(self) -> torch.Tensor:
-        return torch.from_numpy(np.ascontiguousarray(self.setup.photo.linear.reshape(-1, 3)))
+        return placed(np.ascontiguousarray(self.setup.photo.linear.reshape(-1, 3)))
 
 
 def _stacked(materials: Materials) -> Array:

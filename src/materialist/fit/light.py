@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from materialist.buffers import placed, torch_device
 from materialist.camera import pixel_rays
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
@@ -36,8 +37,8 @@ def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | Non
     """
     if prior is None or settings.field != "texels":
         grey = float(min(max(float(photo.mean()) / settings.start_albedo, 1e-3), settings.start))
-        return LightStart(torch.full((settings.height, 2 * settings.height, 3), grey), None)
-    light, scale = torch.from_numpy(np.ascontiguousarray(prior[..., :3])), torch.from_numpy(prior[..., 3:].copy())
+        return LightStart(photo.new_full((settings.height, 2 * settings.height, 3), grey), None)
+    light, scale = placed(np.ascontiguousarray(prior[..., :3])), placed(prior[..., 3:].copy())
     radiance = resize_envmap(light, settings.height).clamp_min(1e-3)
     target = photo[problem.pixels]
     with torch.no_grad():
@@ -51,15 +52,15 @@ def envmap_field(settings: LightSettings, *, seed: int = 0, start: torch.Tensor 
     """A fresh field of the kind the settings name; texels begin at `start`, a map [h, 2h, 3]."""
     torch.manual_seed(seed)
     if settings.field == "mlp":
-        return EnvmapMLP()
+        return EnvmapMLP().to(torch_device())
     if settings.field == "mlp-uv":
-        return EnvmapMLP(coordinates="uv")
+        return EnvmapMLP(coordinates="uv").to(torch_device())
     if settings.field == "sh":
-        return EnvmapSH(3)
+        return EnvmapSH(3).to(torch_device())
     if settings.field == "texels":
         if start is None:
             start = torch.full((settings.height, 2 * settings.height, 3), settings.start)
-        return EnvmapTexels(resize_envmap(start, settings.height))
+        return EnvmapTexels(placed(resize_envmap(start, settings.height)))
     raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
 
 
@@ -75,7 +76,7 @@ def fit_light(
     before = 0.0 if start is None else resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log()
     trust = None
     if start is not None and start.scale is not None:
-        angle = torch.from_numpy(row_solid_angle(problem.height)).float().view(-1, 1, 1)
+        angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
         trust = angle / angle.mean() / resize_envmap(start.scale.expand(-1, -1, 3), problem.height)
     jitter = torch.Generator().manual_seed(seed)
 

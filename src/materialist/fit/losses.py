@@ -37,7 +37,7 @@ def consistency(maps: torch.Tensor, prior: torch.Tensor, settings: MaterialSetti
     It is L1 (paper), or with an `l2` loss the square of the encoded albedo's, roughness's and metallic's change.
     """
     albedo, roughness, metallic = settings.weights
-    weights = maps.new_tensor([albedo / 3] * 3 + [roughness, metallic])
+    weights = torch.tensor([albedo / 3] * 3 + [roughness, metallic]).to(maps)
     if settings.loss == "l2":
         encoded = encode(maps[:, :3], settings.encoding) - encode(prior[:, :3], settings.encoding)
         change = torch.cat([encoded, maps[:, 3:] - prior[:, 3:]], 1).square()

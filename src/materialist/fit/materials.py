@@ -33,7 +33,7 @@ def material_field(
         field = MaterialUNet(start, pixels, camera.height, camera.width)
     else:
         raise InputError(f"Material field is '{settings.field}'; choose mlp, maps or unet.")
-    return field if inside is None else Unified(field, inside)
+    return (field if inside is None else Unified(field, inside)).to(start.device)
 
 
 def fit_materials(

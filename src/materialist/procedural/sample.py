@@ -69,10 +69,10 @@ def worth_seeing(probe: dict[str, Array]) -> bool:
 def _developed(world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions) -> dict[str, Array]:
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)
-    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, device=tracer.device)
+    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal)
     # The shading is of white surfaces: a guide of their texture would print it into the shading.
     covered = (probe["owner"] >= 0).mean(2, dtype=np.float32)
-    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, device=tracer.device)
+    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal)
     labels = labels_of(probe)
     gain = exposure(image, rng) * balance(shading, rng)
     light = tracer.light(

@@ -45,7 +45,7 @@ class SampleTracer:
     """One packed world, ready to be rendered."""
 
     def __init__(self, packed: Packed, camera: Camera, *, device: str = "auto"):
-        self.device = "cuda" if setup(device).variant().startswith("cuda") else "cpu"
+        setup(device)
         if camera.width * camera.height % VECTOR:
             raise InputError(f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4.")
         self.camera = camera

@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from materialist.buffers import placed, torch_device
 from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
 
-def denoise(image: Array, *, albedo: Array, normal: Array, device: str = "cpu") -> Array:
+def denoise(image: Array, *, albedo: Array, normal: Array) -> Array:
     """[H, W, 3] float32 linear without the path tracer's noise, guided by the scene's own maps, whose edges stay.
 
     image: [H, W, 3] linear radiance, >= 0, any range. albedo: [H, W, 3] linear, in [0, 1].
-    normal: [H, W, 3] unit, or 0 where there is no surface. device: where the filter runs, `cpu` or `cuda`.
+    normal: [H, W, 3] unit, or 0 where there is no surface. The filter runs on `buffers.torch_device()`.
 
     Equal inputs give equal pictures on one machine. Raises InputError where the guides are not of the image's size,
     SetupError where pyoidn is missing or broken.
@@ -31,12 +32,10 @@ def denoise(image: Array, *, albedo: Array, normal: Array, device: str = "cpu") 
     height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
     pictures: list[Any] = [_padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
-    if device == "cuda":
-        import torch
-
-        pictures = [torch.from_numpy(p).cuda() for p in pictures]
+    if on_card := torch_device() == "cuda":
+        pictures = [placed(p) for p in pictures]
     clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True)
-    clean = clean.cpu().numpy() if device == "cuda" else clean
+    clean = clean.cpu().numpy() if on_card else clean
     return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
 
 

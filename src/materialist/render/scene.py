@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from materialist.buffers import floats, integers, tensor
-from materialist.errors import InputError
+from materialist.buffers import floats, integers, tensor, torch_device
+from materialist.errors import InputError, SetupError
 from materialist.geometry.build import part
 from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
 from materialist.render.envmap import check_envmap, emitter, on_mitsuba_grid
@@ -113,13 +113,16 @@ class RenderScene:
 
         Continued planes follow the means of the maps, and so do their gradients. The scene keeps materials and light.
 
-        albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors.
+        albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors on
+            `buffers.torch_device()`, where the answer is, too.
         spp: samples per pixel of the image; its gradient uses as many, with another seed. max_depth: as in `render`.
         """
         import drjit as dr
         import torch
 
         _check_options(spp, max_depth)
+        if self.mi.variant().startswith("cuda") != (torch_device() == "cuda"):
+            raise SetupError("PyTorch here computes on the CPU alone: choose --device cpu, or install one for CUDA.")
         integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
 
         @dr.wrap(source="torch", target="drjit")

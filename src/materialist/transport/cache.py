@@ -18,7 +18,7 @@ import torch
 from materialist.bsdf.disney import diffuse_coefficients, schlick
 from materialist.bsdf.ggx import alpha_of, smith_g1
 from materialist.bsdf.lobes import face_towards, lifted, visible_normal
-from materialist.buffers import floats, integers
+from materialist.buffers import floats, integers, placed
 from materialist.transport.environment import EnvmapPyramid
 from materialist.types import Array, Camera, Geometry, Mesh
 
@@ -48,7 +48,7 @@ class CacheSettings:
 
 @dataclass(frozen=True)
 class Tables:
-    """What a material step needs of light and geometry, for P surface pixels; torch float32, on the CPU."""
+    """What a material step needs of light and geometry, for P surface pixels; float32, on `buffers.torch_device()`."""
 
     diffuse: torch.Tensor
     """[P, 9]: D0, D1, D2 (RGB each); diffuse radiance is A (1 - M) (D0 + D1 R + D2 R^2)."""
@@ -156,7 +156,7 @@ class TransportCache:
             )  # fmt: skip
             sums = _gather_diffuse(*args) if k == 0 else _gather_specular(*args)
             dr.eval(*sums)
-            out.append(torch.cat([s.torch().T for s in sums], -1) / count)
+            out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
         return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous())
 
     def slot_radiance(self, radiance: Array | None) -> Array:

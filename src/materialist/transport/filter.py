@@ -49,7 +49,7 @@ def taps(guide: Guide) -> Iterator[Tap]:
 
 def joint_filter(values: torch.Tensor, neighbours: Iterable[Tap]) -> torch.Tensor:
     """Average `values` [H, W, C] over neighbours that lie on the same surface, as `taps` gives them."""
-    total, norm = torch.zeros_like(values), torch.zeros(values.shape[:2])
+    total, norm = torch.zeros_like(values), values.new_zeros(values.shape[:2])
     for dy, dx, weight in neighbours:
         total.addcmul_(_shifted(values, dy, dx), weight[..., None])
         norm += weight
@@ -72,7 +72,7 @@ def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables
     """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
     kept = first_filtered()
     stack = torch.cat([tables.diffuse, *tables.specular[kept:]], -1)
-    grid = torch.zeros(guide.scale.numel(), stack.shape[1])
+    grid = stack.new_zeros(guide.scale.numel(), stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
     smooth = joint_filter(grid.view(*guide.scale.shape, -1), taps(guide)).view(len(grid), -1)[pixels]

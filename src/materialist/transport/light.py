@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 import torch
 
+from materialist.buffers import placed
 from materialist.transport.cache import MISS, TransportCache
 from materialist.transport.rays import rays
 from materialist.types import Array, Materials
@@ -18,13 +19,13 @@ from materialist.types import Array, Materials
 
 @dataclass(frozen=True)
 class LightMatrix:
-    """Radiance of Q pixels as a linear function of an envmap with h x 2h texels; torch float32.
+    """Radiance of Q pixels as a linear function of an envmap with h x 2h texels; float32, on `buffers.torch_device()`.
 
     Everything comes in two parts: what the albedo multiplies, and the rest.
     """
 
     pixels: torch.Tensor
-    """[Q] int64 row-major pixel indices."""
+    """[Q] int64 row-major pixel indices, on the CPU."""
     shape: tuple[int, int]
     """(h, 2h) of the envmap."""
     parts: torch.Tensor
@@ -43,7 +44,7 @@ class LightMatrix:
     def indirect(self, slot_radiance: torch.Tensor) -> torch.Tensor:
         """[2, Q, 3] light of each part by way of other surfaces, given what leaves each slot [S, 3]."""
         light = slot_radiance[self.hit_index[1]]
-        sums = torch.zeros(2, len(self.pixels), 3)
+        sums = light.new_zeros(2, len(self.pixels), 3)
         for part in range(2):
             sums[part].index_add_(0, self.hit_index[0], light * self.hit_weight[:, part : part + 1])
         return sums
@@ -96,10 +97,10 @@ def light_matrix(
         for part, weight in zip(parts, some.weights, strict=True):
             add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
         hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
-    row, slots, hit_weight = (torch.from_numpy(np.concatenate(h)) for h in zip(*hits, strict=True))
+    row, slots, hit_weight = (__import__("torch").as_tensor(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, parts, torch.stack([row, slots.long()]), hit_weight,
-        torch.from_numpy(albedo.astype(np.float32)),
+        torch.from_numpy(pixels.astype(np.int64)), shape, placed(parts), torch.stack([row, slots.long()]), hit_weight,
+        placed(albedo.astype(np.float32)),
     )  # fmt: skip
 
 

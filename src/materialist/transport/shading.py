@@ -19,11 +19,11 @@ def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metalli
 
 def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
     """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P]."""
-    levels = roughness.new_tensor(ROUGHNESS_LEVELS)
+    levels = torch.tensor(ROUGHNESS_LEVELS).to(roughness)
     r = roughness.clamp(levels[0], levels[-1])
     low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
     t = ((r - levels[low]) / (levels[low + 1] - levels[low]))[:, None]
     flat = tables.specular.view(-1, 6)
-    index = low * len(r) + torch.arange(len(r))
+    index = low * len(r) + torch.arange(len(r), device=r.device)
     s_low, s_high = flat[index], flat[index + len(r)]
     return s_low + t * (s_high - s_low)
