@@ -97,7 +97,7 @@ def light_matrix(
         for part, weight in zip(parts, some.weights, strict=True):
             add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
         hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
-    row, slots, hit_weight = (__import__("torch").as_tensor(np.concatenate(h)) for h in zip(*hits, strict=True))
+    row, slots, hit_weight = (placed(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
         torch.from_numpy(pixels.astype(np.int64)), shape, placed(parts), torch.stack([row, slots.long()]), hit_weight,
         placed(albedo.astype(np.float32)),
