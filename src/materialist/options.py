@@ -43,6 +43,10 @@ class MaterialEdit(OperationOptions):
         1.0, "Its size; 1 covers the region once.", low=0, high=100, ends="(]", needs="texture")
     roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **_SHIFT)
     metallic: float | str | None = option(None, "The same for metallic.", **_SHIFT)
+    grow: float = option(
+        0.0, "Grow the region, or shrink it (below 0), by this share of the picture's longer side.", low=-0.2, high=0.2)
+    feather: float = option(
+        0.0, "Width of its soft border, share of the longer side.", low=0, high=0.2)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -145,8 +145,12 @@ CONTRAST = """() => {
   return low; }"""
 
 
-def test_text_is_readable_and_things_have_names(page, running):
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_is_readable_and_things_have_names(page, running, scheme):
+    page.emulate_media(color_scheme=scheme)
     opened(page, running[0])
+    paper = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
+    assert (max(page.evaluate(paper)) < 64) == (scheme == "dark")
     for name in ("Open", "Material", "Light", "Objects", "Look", "Take away"):
         page.get_by_role("tab", name=name).click()
         page.wait_for_timeout(300)

@@ -1,7 +1,7 @@
 """The brush, falling objects and live glass in a real browser."""
 
 import pytest
-from studio_browser import click_photo, mask, move, opened, pixels, place, press, slide
+from studio_browser import PICTURE, click_photo, mask, move, opened, pixels, place, press, slide
 
 MASK = "getComputedStyle(document.querySelector('#stage .fill')).maskImage"
 
@@ -44,6 +44,53 @@ def test_the_brush_paints_and_rubs_out(page, running):
     page.get_by_role("button", name="Remove: edit 1").click()
     page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
     assert not page.errors
+
+
+def test_what_is_zoomed_is_hit_where_it_is_seen(page, running):
+    opened(page, running[0])
+    press(page, "Brush")
+    move(page, "brush", 2)
+    wide = "parseFloat(document.querySelector('#stage .sheet').style.width)"
+    x, y = place(page, 0.4, 0.5)
+    page.mouse.move(x, y)
+    page.mouse.wheel(0, -400)
+    page.wait_for_function(f"Math.abs({wide} - 272) < 1")
+    page.keyboard.down("Control")
+    page.mouse.down()
+    page.mouse.move(x + 60, y + 40, steps=3)
+    page.mouse.up()
+    page.keyboard.up("Control")
+    assert mask(page) is None  # who drags the picture selects nothing
+    page.mouse.click(x + 60, y + 40)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    rows, columns = mask(page).nonzero()
+    assert abs(rows.mean() + 0.5 - 0.5 * 48) < 1 and abs(columns.mean() + 0.5 - 0.4 * 64) < 1
+    page.locator("#stage .view").focus()
+    page.keyboard.press("0")
+    page.wait_for_function(f"{wide} === 100")
+    assert not page.errors
+
+
+def test_the_photo_is_seen_as_long_as_a_key_is_held(page, running):
+    opened(page, running[0])
+    photo = page.evaluate(PICTURE)
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+    slide(page, "hue", 120)
+    before = page.locator("#stage .before")
+    page.keyboard.down("b")
+    assert before.is_visible() and before.get_attribute("src") == photo
+    page.keyboard.up("b")
+    assert not before.is_visible()
+    page.locator("#before").hover()
+    page.mouse.down()
+    assert before.is_visible()
+    page.mouse.up()
+    assert not before.is_visible()
+    slide(page, "feather", 0.1)
+    assert "feather 0.1" in page.inner_text("#steps")
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
 
 
 def test_selecting_by_clicks(page, running):

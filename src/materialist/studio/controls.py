@@ -78,7 +78,7 @@ class Control:
 
 CONTROLS = {
     **{name: Control(MaterialEdit, name) for name in ("hue", "saturation", "value", "roughness", "metallic")},
-    "texture_scale": Control(MaterialEdit, "texture_scale"),
+    **{name: Control(MaterialEdit, name) for name in ("texture_scale", "grow", "feather")},
     "colour": Control(MaterialEdit, "albedo", hex_colour, lambda v: v if str(v).startswith("#") else "#808080"),
     **{name: Control(Relight, name) for name in ("rotate", "ambient", "sun_power")},
     "sun_on": Control(Relight, "sun", value=lambda sun: sun is not None),

@@ -62,6 +62,7 @@ def _left(parts: dict[str, Any]) -> None:
         )  # fmt: skip
         # Not beside a button that starts a job: it must not come to lie where one was just clicked.
         with gr.Row(elem_id="strip"):
+            parts["before"] = gr.Button("Before (hold, or B)", size="sm", min_width=90, elem_id="before")
             parts["progress"] = gr.HTML("", elem_id="progress", js_on_load=None)
             parts["stop"] = gr.Button("Stop", size="sm", variant="stop", visible=False, min_width=70, elem_id="stop")
     with gr.Row(elem_id="tools"):

@@ -144,11 +144,13 @@ def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: i
 
 
 def _theme(gr: Any) -> Any:
-    """Dark ink on light paper, with the fonts of the machine: nothing is fetched."""
+    """Dark ink on light paper, or the other way, with the fonts of the machine: nothing is fetched."""
     sans, mono = ["system-ui", "Segoe UI", "Roboto", "sans-serif"], ["ui-monospace", "Consolas", "monospace"]
     return gr.themes.Base(primary_hue="blue", neutral_hue="gray", font=sans, font_mono=mono).set(
         button_primary_background_fill="#1d4ed8", button_primary_background_fill_hover="#1e40af",
         button_primary_text_color="#ffffff", body_text_color="#16202e", body_text_color_subdued="#475467",
         block_label_text_color="#16202e", block_title_text_color="#16202e", button_cancel_background_fill="#b42318",
-        button_cancel_text_color="#ffffff", slider_color="#1d4ed8",
+        button_cancel_text_color="#ffffff", slider_color="#1d4ed8", body_background_fill="#f6f7f9",
+        border_color_primary="#d5dae2", link_text_color="#1d4ed8", link_text_color_dark="#93b4ff",
+        error_text_color="#8f1d14", error_text_color_dark="#ff9d94",
     )  # fmt: skip

@@ -15,6 +15,7 @@ from materialist.studio.edit_list import EditList
 from materialist.studio.preview import LIVE
 from materialist.studio.selection import Selection, data_url
 from materialist.studio.session import Session
+from materialist.studio.tasks import before_of
 from materialist.types import Array, Scene
 
 
@@ -24,14 +25,15 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
     Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
     page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
     reason on it. The glass of the current step is asked for; `waiting` says whether its picture is still to come. The
-    page ignores a picture with an older `serial` than the one it shows.
+    page ignores a picture with an older `serial` than the one it shows. `before` is the photo, shown while a key is
+    held; empty where `picture` is the photo itself, which the page keeps for live previews (None).
     """
     serial = time()
     with session.lock:
         live, edits, final = session.live, session.edits, session.final
         masks, client = session.selection.pictures, session.glass
     shown = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
-    shown |= {"serial": serial, **masks}
+    shown |= {"serial": serial, "before": None, **masks}
     if live is None:
         return shown
     camera, steps = live.scene.camera, edits.active if with_edits else ()
@@ -40,7 +42,8 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
     off = "; the current edit is switched off" if current is not None and current.skipped else ""
     if final is not None and final.of(steps):
         badge = f"Path traced, {final.spp} paths a pixel{off}"
-        return {**shown, "picture": data_url(final.path.with_suffix(".jpg").read_bytes(), "jpeg"), "badge": badge}
+        picture, before = (jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path)))
+        return {**shown, "picture": picture, "before": before, "badge": badge}
     if current is not None and client is not None and current in steps and glass.is_traced(current):
         client.ask(_others(steps, current), current)
     waiting = client is not None and with_edits and client.state.waiting
@@ -52,16 +55,16 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
     except MaterialistError as error:
         photo, why = jpeg_url(live.scene.photo.linear), session.shown(str(error))
         badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
-        return {**shown, "picture": photo, "badge": badge, "bad": True}
+        return {**shown, "picture": photo, "before": "", "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off
-    return {**shown, "picture": jpeg_url(linear), "badge": badge, "waiting": waiting}
+    before = None if steps else ""
+    return {**shown, "picture": jpeg_url(linear), "before": before, "badge": badge, "waiting": waiting}
 
 
 def waiting_photo(file: Path) -> dict[str, Any]:
     """A photo (JPEG) that is being taken apart, without anything to click."""
-    shown = {"width": 0, "height": 0, "lamps": [], "waiting": False, "bad": False, "serial": time()}
-    picture = data_url(file.read_bytes(), "jpeg")
-    return {**shown, **Selection().pictures, "picture": picture, "badge": "Your photo, being taken apart"}
+    shown = {"width": 0, "height": 0, "lamps": [], "waiting": False, "bad": False, "serial": time(), "before": ""}
+    return {**shown, **Selection().pictures, "picture": jpeg_file(file), "badge": "Your photo, being taken apart"}
 
 
 def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
@@ -100,6 +103,11 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
     return data_url(display.encoded(srgb_levels(linear), "JPEG", quality=SETTINGS.jpeg_quality), "jpeg")
+
+
+def jpeg_file(file: Path) -> str:
+    """A JPEG file as a data URL."""
+    return data_url(file.read_bytes(), "jpeg")
 
 
 def maps(scene: Scene) -> list[tuple[Array, str]]:

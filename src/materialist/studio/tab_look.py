@@ -1,16 +1,12 @@
-"""The tab to look: before and after, every map, the light, the mesh, and the report in plain words."""
+"""The tab to look: every map, the light, the mesh, and the report in plain words."""
 
 from typing import Any
 
 import gradio as gr
-import numpy as np
 
-from materialist.color import srgb_levels
 from materialist.studio import tasks
-from materialist.studio.session import Session
 from materialist.studio.stage import maps, report
 from materialist.studio.widgets import LONG, PageContext
-from materialist.types import Array
 
 MESH = "mesh.glb"
 
@@ -19,9 +15,6 @@ def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Look", id="look") as tab:
         parts["look"] = tab
-        parts["compare"] = gr.ImageSlider(
-            label="Before and after", interactive=False, format="jpeg", buttons=["fullscreen"], elem_id="compare"
-        )
         parts["report"] = gr.Markdown("Open a photo first.", elem_id="report")
         parts["maps"] = gr.Gallery(
             label="What was found", columns=2, height="auto", object_fit="contain", interactive=False, format="jpeg",
@@ -42,11 +35,7 @@ def wire(context: PageContext) -> None:
         session = context.session(request)
         if session.live is None:
             return {}
-        return {
-            parts["compare"]: compared(session),
-            parts["report"]: session.shown(report(session.scene)),
-            parts["maps"]: maps(session.scene),
-        }
+        return {parts["report"]: session.shown(report(session.scene)), parts["maps"]: maps(session.scene)}
 
     @context.handler
     def make_mesh(request: gr.Request) -> Any:
@@ -65,22 +54,7 @@ def wire(context: PageContext) -> None:
         file = context.session(request).workspace / MESH
         return studio.public_copy(file) if file.is_file() else None
 
-    parts["look"].select(look, None, [parts["compare"], parts["report"], parts["maps"]], **LONG)
+    parts["look"].select(look, None, [parts["report"], parts["maps"]], **LONG)
     # Two steps: the viewer loads nothing when its value is sent twice, as the end of a generator does.
     made = parts["mesh_button"].click(make_mesh, None, context.job_parts, **LONG)
     made.then(show_mesh, None, parts["mesh"], **LONG)
-
-
-def compared(session: Session) -> tuple[Array, Array]:
-    """(photo, edits), [h, w, 3] uint8: the path-traced picture where there is one of these edits."""
-    import cv2
-
-    live, steps = session.live, session.edits.active
-    assert live is not None
-    before = srgb_levels(live.scene.photo.linear)
-    if session.final is not None and session.final.of(steps):
-        after: Array = np.asarray(cv2.imread(str(session.final.path.with_suffix(".jpg"))))[..., ::-1]
-        native = srgb_levels(live.scene.photo.original)
-        before = cv2.resize(native, after.shape[1::-1], interpolation=cv2.INTER_AREA)
-        return np.asarray(before), np.ascontiguousarray(after)
-    return before, srgb_levels(live.picture(steps, session.glass))

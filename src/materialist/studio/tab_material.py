@@ -20,6 +20,9 @@ def layout(context: PageContext) -> None:
         parts["roughness"] = slider("roughness", "Roughness: mirror to chalk", 0.01, value=0.5)
         parts["metallic"] = slider("metallic", "Metallic", 0.01, value=0)
         with gr.Row():
+            parts["grow"] = slider("grow", "Grow or shrink", 0.002, minimum=-0.05, maximum=0.05, min_width=120)
+            parts["feather"] = slider("feather", "Soften its border", 0.002, maximum=0.1, min_width=120)
+        with gr.Row():
             parts["colour"] = gr.ColorPicker("#808080", label="One colour instead", min_width=120)
             parts["own"] = gr.Button("Own colours again", size="sm", min_width=120)
         with gr.Accordion("Texture", open=False):
@@ -32,7 +35,7 @@ def layout(context: PageContext) -> None:
 
 def wire(context: PageContext) -> None:
     parts = context.parts
-    context.bind("hue", "saturation", "value", "roughness", "metallic", "texture_scale")
+    context.bind("hue", "saturation", "value", "roughness", "metallic", "texture_scale", "grow", "feather")
     context.on(parts["colour"].input, _coloured, parts["colour"])
     colours = dict.fromkeys(("albedo", "texture", "hue", "saturation", "value"))
     context.on(parts["own"].click, lambda session: session.set("edit", **colours), everything=True)

@@ -66,7 +66,7 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
 
 
 def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int) -> None:
-    """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg."""
+    """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg; the photo so."""
     from materialist.edits.composite.composite import write_composite
 
     loaded, edited = _edited(report, scene, steps)
@@ -74,7 +74,13 @@ def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int) -> 
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
-    write_jpeg(out.with_suffix(".jpg"), picture, longest=2048)
+    for file, shown in ((out.with_suffix(".jpg"), picture), (before_of(out), loaded.photo.original)):
+        write_jpeg(file, shown, longest=2048)
+
+
+def before_of(output: Path) -> Path:
+    """The photo beside a path-traced picture, of its size."""
+    return output.with_name(f"{output.name}-before.jpg")
 
 
 def mesh(report: Reporter, scene: str, output: str) -> None:

@@ -50,6 +50,20 @@ def test_only_the_mask_changes_and_the_rest_is_shared():
     ]
 
 
+def test_a_region_grows_shrinks_and_is_feathered():
+    reached = lambda **values: edit(SCENE, MASK, roughness=1.0, **values).materials.roughness  # noqa: E731
+    rows, columns = MASK.nonzero()
+    for grow in (2 / 48, -2 / 48):
+        row, column = (reached(grow=grow) > 0.5).nonzero()
+        assert row.min() == rows.min() - 48 * grow and column.max() == columns.max() + 48 * grow
+    soft = reached(feather=8 / 48)[(rows.min() + rows.max()) // 2]
+    border = columns.min()
+    assert (np.diff(soft[: border + 3]) >= 0).all() and 0.5 < soft[border - 2] < soft[border + 1] < 1
+    assert abs(soft[border - 1] + soft[border] - 1.5) < 0.02  # half of the change where the border was
+    with pytest.raises(InputError, match="shrink it less"):
+        edit(SCENE, MASK, grow=-0.2, hue=1)
+
+
 def test_shift_and_set_differ_by_the_sign():
     for wanted, expected in (("+0.3", 0.8), ("-0.3", 0.2), ("0.3", 0.3), ("+0.9", 1.0), ("-0.9", 0.0)):
         got = edit(SCENE, MASK, roughness=wanted).materials.roughness[MASK]

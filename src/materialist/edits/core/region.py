@@ -4,6 +4,7 @@ import numpy as np
 
 from materialist.edits.core.renderer import EditRenderer
 from materialist.errors import InputError
+from materialist.geometry.silhouette import disc
 from materialist.option_kinds import numbers
 from materialist.types import Array, Scene
 
@@ -40,6 +41,23 @@ def checked_region(scene: Scene, mask: Array) -> Array:
         what = DIMMED if float((emitters * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
         raise InputError(f"What is marked is {what}, or mark something else.")
     return weight
+
+
+def reshaped(weight: Array, grow: float, feather: float) -> Array:
+    """[H, W] weight of a region that is grown, or shrunk (grow < 0), and then feathered; shares of the longer side.
+
+    Raises InputError when nothing is left of it.
+    """
+    import cv2
+
+    longer = max(weight.shape)
+    if radius := round(abs(grow) * longer):
+        weight = (cv2.dilate if grow > 0 else cv2.erode)(weight, disc(radius))
+    if feather:
+        weight = cv2.GaussianBlur(weight, (0, 0), feather * longer / 4)  # four standard deviations: nearly all of it
+    if not weight.any():
+        raise InputError(f"Shrunk by {-grow:g} of the longer side nothing is left of the region; shrink it less.")
+    return np.asarray(weight)
 
 
 def body_coverage(scene: Scene) -> Array:

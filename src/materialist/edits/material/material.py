@@ -9,7 +9,7 @@ import numpy as np
 from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
-from materialist.edits.core.region import checked_region
+from materialist.edits.core.region import checked_region, reshaped
 from materialist.errors import InputError
 from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
@@ -27,7 +27,7 @@ def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **value
     Raises InputError for a mask of another size or empty, or a value out of its range.
     """
     wanted = MaterialEdit.given(options, **values)
-    weight = checked_region(scene, mask)
+    weight = reshaped(checked_region(scene, mask), wanted.grow, wanted.feather) * (scene.depth > 0)
     materials = scene.materials
     colour, texture = _base_colour(scene, weight, wanted)
     if wanted.hue or wanted.saturation or wanted.value:
@@ -37,7 +37,8 @@ def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **value
         _mix(materials.roughness, _changed(materials.roughness, wanted.roughness), weight),
         _mix(materials.metallic, _changed(materials.metallic, wanted.metallic), weight),
     )
-    shifts = {name: getattr(wanted, name) for name in ("hue", "saturation", "value") if getattr(wanted, name)}
+    names = ("hue", "saturation", "value", "grow", "feather")
+    shifts = {name: getattr(wanted, name) for name in names if getattr(wanted, name)}
     levels = {"albedo": wanted.albedo, "roughness": wanted.roughness, "metallic": wanted.metallic, "texture": texture}
     entry = {**shifts, **{name: level for name, level in levels.items() if level is not None}}
     return noted(replace(scene, materials=new), "material", {**entry, "pixels": int((weight > 0.5).sum())})

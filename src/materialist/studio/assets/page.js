@@ -1,5 +1,4 @@
 () => {
-  document.body.classList.remove("dark");
   document.documentElement.lang = "en";
   // Of an event that skips the queue Gradio shows no error.
   const note = document.createElement("div");
@@ -15,9 +14,14 @@
       if (name) box.setAttribute("aria-label", name.textContent.trim());
     }
   }).observe(document.body, { childList: true, subtree: true });
+  // The photo is seen as long as a key or the button is held.
+  const hold = (on) => document.querySelector("#stage .view")?.classList.toggle("held", on);
+  document.addEventListener("pointerdown", (e) => { if (e.target.id === "before") hold(true); });
+  for (const over of ["keyup", "pointerup", "pointercancel", "blur"]) window.addEventListener(over, () => hold(false));
   document.addEventListener("keydown", (e) => {
     const key = e.key.toLowerCase(), typing = e.target.matches("textarea, input:not([type=range], [type=checkbox], [type=radio])");
     if (typing || e.altKey) return;
+    if (key === "b" || (e.target.id === "before" && (key === " " || key === "enter"))) hold(true);
     if (!(e.ctrlKey || e.metaKey)) return document.querySelectorAll("#tools fieldset:first-child input")[key - 1]?.click();
     if (key !== "z" && key !== "y") return;
     e.preventDefault();

@@ -1,12 +1,16 @@
 // The stage: shows a picture and its mask, and turns pointer and keys into picks at working pixels.
 const view = element.querySelector(".view");
+const sheet = element.querySelector(".sheet");
 const photo = element.querySelector(".photo");
+const before = element.querySelector(".before");
 const fill = element.querySelector(".fill");
 const outline = element.querySelector(".outline");
 const badge = element.querySelector(".badge");
 const marks = element.querySelector(".marks");
 const cross = element.querySelector(".cross");
-let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0;
+let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0, plain = "";
+let zoom = 1, left = 0, top = 0, grip = null;  // the sheet's size and place, shares of the view's
+const fingers = new Map();
 
 function show() {
   const v = props.value || {};
@@ -16,6 +20,8 @@ function show() {
   if (width) marks.setAttribute("viewBox", `0 0 ${width} ${height}`);
   if (v.picture) { if (v.picture !== photo.getAttribute("src")) photo.src = v.picture; }
   else if (v.picture !== undefined) photo.removeAttribute("src");
+  if (v.before === "") plain = v.picture;  // what is shown is the photo
+  if (v.picture) before.src = v.before || plain;
   view.classList.toggle("empty", !photo.hasAttribute("src"));
   view.style.cursor = width ? "" : "default";
   if (v.badge !== undefined) { badge.textContent = v.badge; view.dataset.kind = v.bad ? "bad" : v.badge.startsWith("Path traced") ? "final" : "live"; }
@@ -52,9 +58,18 @@ function mode(e) {
   return document.body.dataset.mode || "new";
 }
 function at(e) {
-  const box = view.getBoundingClientRect();
+  const box = sheet.getBoundingClientRect();
   const clamp = (v, top) => Math.min(Math.max(v, 0), top - 0.01);
   return [clamp((e.clientX - box.left) / box.width * width, width), clamp((e.clientY - box.top) / box.height * height, height)];
+}
+// Zoom by a factor about a place of the window, which moves on by (dx, dy).
+function look(factor, x, y, dx = 0, dy = 0) {
+  const box = view.getBoundingClientRect(), old = zoom;
+  zoom = Math.min(Math.max(zoom * factor, 1), 16);
+  const moved = (edge, place, by) => Math.min(Math.max(place + by - (place - edge) * zoom / old, 1 - zoom), 0);
+  left = moved(left, (x - box.left) / box.width, dx / box.width);
+  top = moved(top, (y - box.top) / box.height, dy / box.height);
+  for (const [name, share] of [["width", zoom], ["height", zoom], ["left", left], ["top", top]]) sheet.style[name] = `${100 * share}%`;
 }
 function send(what) { view.classList.add("busy"); setTimeout(() => view.classList.remove("busy"), 4000); trigger("pick", what); }
 
@@ -80,17 +95,36 @@ function ring(e) {
 }
 
 // A portrait must not push its tools out of sight.
-photo.addEventListener("load", () => { view.style.maxWidth = `calc(72vh * ${photo.naturalWidth / photo.naturalHeight})`; });
+photo.addEventListener("load", () => {
+  view.style.aspectRatio = `${photo.naturalWidth} / ${photo.naturalHeight}`;
+  view.style.maxWidth = `calc(72vh * ${photo.naturalWidth / photo.naturalHeight})`;
+});
+view.addEventListener("wheel", (e) => {
+  if (!width || (zoom === 1 && e.deltaY > 0)) return;  // the page scrolls on
+  e.preventDefault();
+  look(Math.exp(-e.deltaY * (e.deltaMode ? 33 : 1) / 400), e.clientX, e.clientY);
+}, { passive: false });
 view.addEventListener("pointerdown", (e) => {
-  if (!width || e.button || !e.isPrimary) return;
+  if (!width) return;
+  fingers.set(e.pointerId, e);
+  if (e.button === 1 || e.ctrlKey || e.metaKey) { grip = e; view.setPointerCapture(e.pointerId); e.preventDefault(); return; }
+  if (!e.isPrimary) { down = null; trace(); }
+  if (e.button || !e.isPrimary) return;
   down = mode(e); path = [at(e)]; cross.style.display = "none"; cursor = null;
   if (tool() === "box" || tool() === "brush") { view.setPointerCapture(e.pointerId); e.preventDefault(); trace(); ring(e); }
 });
 view.addEventListener("pointermove", (e) => {
+  const old = fingers.get(e.pointerId), other = [...fingers.values()].find((f) => f !== old);
+  if (old) fingers.set(e.pointerId, e);
+  if (old && other) {  // two fingers: each moves the middle by half
+    const far = (f) => Math.hypot(f.clientX - other.clientX, f.clientY - other.clientY);
+    look(far(e) / Math.max(far(old), 1), (old.clientX + other.clientX) / 2, (old.clientY + other.clientY) / 2, (e.clientX - old.clientX) / 2, (e.clientY - old.clientY) / 2);
+  } else if (grip) { look(1, 0, 0, e.clientX - grip.clientX, e.clientY - grip.clientY); grip = e; }
   if (!e.isPrimary) return;
   if (down && tool() !== "click") { path.push(at(e)); trace(); }
   ring(e);
 });
+for (const over of ["pointerup", "pointercancel", "pointerleave"]) view.addEventListener(over, (e) => { fingers.delete(e.pointerId); grip = null; });
 view.addEventListener("pointerleave", () => { if (!down) ring(null); });
 view.addEventListener("pointercancel", () => { down = null; trace(); ring(null); });
 view.addEventListener("pointerup", (e) => {
@@ -107,12 +141,20 @@ function finish(kind, how) {
 // Keys: arrows move a cross, Enter or Space clicks there; Shift and Alt as with the pointer.
 view.addEventListener("keydown", (e) => {
   if (!width) return;
+  const factor = e.ctrlKey || e.metaKey ? 0 : { "+": 1.5, "=": 1.5, "-": 1 / 1.5, 0: 0.01 }[e.key];
+  if (factor) {
+    const box = (cursor ? cross : view).getBoundingClientRect();
+    return look(factor, box.left + box.width / 2, box.top + box.height / 2);
+  }
   const step = (e.ctrlKey ? 1 : Math.max(width, height) / 40);
   const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[e.key];
   if (move) {
     cursor = cursor || [width / 2, height / 2];
     cursor = [Math.min(Math.max(cursor[0] + move[0] * step, 0), width - 1), Math.min(Math.max(cursor[1] + move[1] * step, 0), height - 1)];
     cross.style.display = "block"; cross.style.left = `${100 * cursor[0] / width}%`; cross.style.top = `${100 * cursor[1] / height}%`;
+    const box = view.getBoundingClientRect(), here = cross.getBoundingClientRect();  // it stays in sight
+    const back = (from, to, low, high) => Math.max(low - from, 0) + Math.min(high - to, 0);
+    look(1, 0, 0, back(here.left, here.right, box.left, box.right), back(here.top, here.bottom, box.top, box.bottom));
     e.preventDefault();
   } else if ((e.key === "Enter" || e.key === " ") && cursor) {
     const kind = tool() === "brush" || tool() === "box" ? "brush" : tool();
