@@ -1,7 +1,5 @@
 """The main job on a tiny photograph with maps: every field of the scene, both engines, bad options."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -52,21 +50,13 @@ def folder(tmp_path_factory):
 
 def options(folder, **changes) -> dict:
     """Arguments of a run that takes a second."""
-    settings = changes.pop("settings", None) or short()
+    from materialist.fit.settings import PRESETS
+
+    settings = PRESETS[changes.pop("settings", "default")].at_most(changes.pop("steps", 10))
     return {
         "photo": folder / "photo.png", "predictor": f"maps:{folder}", "fov": 45.0, "size": WIDTH,
         "envmap_size": (32, 16), "spp": 8, "settings": settings, "device": "cpu", **changes,
     }  # fmt: skip
-
-
-def short(preset="default", steps=4, light_steps=10):
-    """A preset with a few steps."""
-    from materialist.fit.settings import preset as named
-
-    settings = named(preset)
-    stages = tuple(replace(s, schedule=replace(s.schedule, max_steps=steps)) for s in settings.materials.stages)
-    light = replace(settings.light, schedule=replace(settings.light.schedule, max_steps=light_steps))
-    return replace(settings, light=light, materials=replace(settings.materials, stages=stages))
 
 
 @pytest.fixture(scope="module")
@@ -134,9 +124,7 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
 
     monkeypatch.setitem(engine.PathEngine.__init__.__kwdefaults__, "spp", 2)
     told = []
-    scene = invert(
-        **options(folder, engine="path", settings=short("paper", 3, 3), progress=lambda *a: told.append(a[0]))
-    )
+    scene = invert(**options(folder, engine="path", settings="paper", steps=3, progress=lambda *a: told.append(a[0])))
     assert scene.provenance["engine"] == "path"
     assert scene.provenance["preset"] == "paper"
     names = [stage["name"] for stage in scene.report.stages]
@@ -154,7 +142,7 @@ def test_the_papers_preset_takes_nothing_that_the_paper_does_not(folder, monkeyp
     sent, slots = [], TransportCache.slot_radiance
     monkeypatch.setattr(fitting, "paste_visible_sky", lambda *_, **__: pytest.fail("a sky was pasted"))
     monkeypatch.setattr(TransportCache, "slot_radiance", lambda self, r: sent.append(r) or slots(self, r))
-    given = options(folder, preset="paper", settings=short("paper", 2, 2))
+    given = options(folder, preset="paper", settings="paper", steps=2)
     scene = invert(**{name: value for name, value in given.items() if name != "envmap_size"})
     assert scene.envmap.shape == (256, 512, 3) and scene.provenance["completion"] == "none"
     assert (scene.geometry.mesh.face_plane < 0).all()

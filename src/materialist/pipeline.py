@@ -76,12 +76,10 @@ def invert(
     from materialist.fit import invert as fitting
     from materialist.fit.invert import FitSetup
     from materialist.fit.settings import preset as named
-    from materialist.geometry.build import SYNONYMS
 
     settings = wanted.settings or named(preset, hdr=picture.hdr)
-    completion = "none" if (wanted.completion, preset) == ("auto", "paper") else wanted.completion
     fit_setup = FitSetup(
-        picture, prior, settings, SYNONYMS.get(completion, completion), wanted.engine,
+        picture, prior, settings, wanted.completion, wanted.engine,
         envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
         device=wanted.device, spp=wanted.spp,
     )  # fmt: skip

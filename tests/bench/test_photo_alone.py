@@ -10,6 +10,7 @@ from materialist import bench
 from materialist.bench.edits import true_scene
 from materialist.bench.photo_alone import SCENE_SEED, PhotoAloneBench, light_error, unseen_sample, with_truth
 from materialist.errors import InputError
+from materialist.fit.settings import PAPER
 from materialist.procedural import arrangements, lights
 from materialist.procedural.options import HELD_OUT
 from materialist.procedural.synthetic import make_sample
@@ -75,4 +76,8 @@ def test_a_run_has_maps_and_edits(mitsuba, monkeypatch, tmp_path):
     assert list(rows)[:2] == ["maps: prior", "maps: fitted"]
     assert rows["maps: fitted"]["albedo"] == 100 and rows["maps: fitted"]["light"] < 1e-6
     assert rows["relight: fitted"]["inside"] > rows["relight: untouched"]["inside"] + 3
+    inverted = []
+    monkeypatch.setattr(pipeline, "invert", lambda *_, **how: inverted.append(how) or true_scene(sample))
+    bench.run("photo-alone", output=tmp_path / "p", scenes=1, size=32, kinds="relight", spp=4, truth_spp=16, paper=3)
+    assert inverted[1]["engine"] == "path" and inverted[1]["settings"] == PAPER.at_most(3)
     assert (out / "sheet.png").exists() and PhotoAloneBench().scenes >= 24

@@ -58,14 +58,6 @@ def room():
     return Room()
 
 
-def short(settings: FitSettings, steps: int = 15) -> FitSettings:
-    """The same settings with fewer steps."""
-    cut = lambda schedule: replace(schedule, max_steps=min(steps, schedule.max_steps))  # noqa: E731
-    stages = tuple(replace(s, schedule=cut(s.schedule)) for s in settings.materials.stages)
-    light = replace(settings.light, schedule=cut(settings.light.schedule))
-    return replace(settings, light=light, materials=replace(settings.materials, stages=stages))
-
-
 @pytest.fixture(scope="module")
 def fitted(room):
     fit = room.fit(DEFAULT)
@@ -105,27 +97,27 @@ def test_true_materials_and_light_stay(room):
 
 
 def test_equal_seeds_give_equal_results(room):
-    first, again = (room.fit(short(DEFAULT), seed=3).run() for _ in range(2))
+    first, again = (room.fit(DEFAULT.at_most(15), seed=3).run() for _ in range(2))
     assert first.maps.equal(again.maps)
     np.testing.assert_array_equal(first.envmap, again.envmap)
 
 
 def test_mask_unifies_roughness_and_metallic(room):
     mask = room.truth.metallic == 1
-    fit = room.fit(short(DEFAULT), mask=mask)
+    fit = room.fit(DEFAULT.at_most(15), mask=mask)
     materials = fit.materials(fit.run())
     for values in (materials.roughness, materials.metallic):
         assert float(np.ptp(values[mask])) < 1e-6
         assert float(np.ptp(values[~mask])) > 0.05
     assert float(materials.albedo[mask].std(0).max()) > 1e-3
-    first = room.fit(short(DEFAULT, 2), mask=mask, strategy="white-light-first").run()
+    first = room.fit(DEFAULT.at_most(2), mask=mask, strategy="white-light-first").run()
     assert [s["name"] for s in first.stages] == ["roughness+metallic", "light", "albedo"]
 
 
 @pytest.mark.parametrize("settings", [PAPER, DEFAULT], ids=["paper", "default"])
 def test_white_light_first(room, settings):
     """Roughness and metallic from 0.5 under white light, then the light, then albedo alone (appendix)."""
-    fit = room.fit(short(settings, steps=4), strategy="white-light-first")
+    fit = room.fit(settings.at_most(4), strategy="white-light-first")
     state = fit.run()
     assert [s["name"] for s in state.stages][:3] == ["roughness+metallic", "light", "albedo"]
     moved = (state.maps[:, 3:] - 0.5).abs()
@@ -135,7 +127,7 @@ def test_white_light_first(room, settings):
 
 def test_papers_first_stage_leaves_albedo_alone(room):
     stage = MaterialStage(("roughness", "metallic"), Schedule(learning_rate=3e-4, max_steps=3))
-    settings = replace(short(PAPER, 3), materials=replace(PAPER.materials, stages=(stage,)))
+    settings = replace(PAPER.at_most(3), materials=replace(PAPER.materials, stages=(stage,)))
     fit = room.fit(settings)
     state = fit.run()
     prior = fit.prior_maps()
@@ -146,7 +138,7 @@ def test_papers_first_stage_leaves_albedo_alone(room):
 
 def test_the_unet_starts_from_the_same_maps(room):
     """The ablation of the network type compares like with like: all start from the remapped prior."""
-    settings = short(replace(PAPER, materials=replace(PAPER.materials, field="unet")), 1)
+    settings = replace(PAPER, materials=replace(PAPER.materials, field="unet")).at_most(1)
     fit = room.fit(settings)
     state = fit.run()
     expected = 0.7 * fit.prior_maps()[:, 3:] + 0.2
@@ -156,7 +148,7 @@ def test_the_unet_starts_from_the_same_maps(room):
 @pytest.mark.parametrize("field", ["mlp-uv", "sh"])
 def test_every_light_field_learns(room, field):
     light = replace(DEFAULT.light, field=field, height=16, schedule=Schedule(learning_rate=5e-3, max_steps=25))
-    fit = room.fit(short(replace(DEFAULT, light=light), 25))
+    fit = room.fit(replace(DEFAULT, light=light).at_most(25))
     stage = next(s for s in fit.run().stages if s["name"] == "light")
     assert stage["loss_last"] < 0.97 * stage["loss_first"]
 
@@ -166,7 +158,7 @@ def test_papers_engine_runs_the_same_fit(room):
     pixels = np.arange(camera.width * camera.height)
     engine = PathEngine(room.path, camera, pixels, spp=4, max_depth=2, envmap_height=ENVMAP_HEIGHT)
     settings = replace(
-        short(PAPER, 6), light=replace(PAPER.light, height=ENVMAP_HEIGHT, schedule=Schedule(max_steps=6))
+        PAPER.at_most(6), light=replace(PAPER.light, height=ENVMAP_HEIGHT, schedule=Schedule(max_steps=6))
     )
     fit = Fit(room.setup(settings), engine)
     state = fit.run()
@@ -203,7 +195,7 @@ def test_visible_sky_is_pasted_where_it_is_seen():
 
 def test_a_result_has_two_independent_halves(room):
     told = {}
-    setup = replace(room.setup(short(PAPER, 3), room.truth), completion="none", spp=4, device="cpu")
+    setup = replace(room.setup(PAPER.at_most(3), room.truth), completion="none", spp=4, device="cpu")
     result = invert(setup, found=told.__setitem__)
     assert result.spp == 4 and not np.array_equal(*result.halves)
     np.testing.assert_allclose(result.rerender, np.mean(result.halves, 0), rtol=1e-6)

@@ -23,9 +23,7 @@ from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
-from materialist.fit.engine import prepared_envmap
 from materialist.fit.invert import FitSetup, prepare
-from materialist.fit.light import envmap_field, fit_light
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
@@ -99,11 +97,10 @@ class _Photo:
         """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
         height, seed = self.sample.envmap.shape[0], self.bench.seed
         shared: dict[str, Any] = {"envmap_height": height, "seed": seed, "device": self.bench.device}
-        prepared: Any = prepare(FitSetup(self.sample.photo, self.prior, PAPER, "planes", **shared))
-        engine, light = prepared.fit.engine, envmap_field(PAPER.light, seed=seed)
-        engine.cache.trace()
-        fit_light(engine.light_problem(self.prior.materials), self.photo, light, PAPER.light, seed=seed)
-        return prepared, prepared_envmap(light(PAPER.light.height), height)
+        prepared: Any = prepare(FitSetup(self.sample.photo, self.prior, PAPER, **shared))
+        state = prepared.fit.start()
+        prepared.fit.fit_light(state, self.prior.materials)
+        return prepared, state.envmap
 
     def materials(self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False) -> Row:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""

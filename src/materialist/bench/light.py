@@ -25,9 +25,8 @@ from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, time
 from materialist.bench.edits import staged
 from materialist.bench.report import CEILING, Column, Report
 from materialist.buffers import placed
-from materialist.fit.engine import PathEngine, prepared_envmap
 from materialist.fit.invert import FitSetup, prepare
-from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
+from materialist.fit.light import start_light
 from materialist.fit.settings import preset
 from materialist.geometry.build import build_geometry
 from materialist.option_kinds import option
@@ -38,6 +37,9 @@ from materialist.types import Array, Materials, Prediction
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
 """Albedo, roughness and metallic of the paper's runs without given materials."""
+
+FITLESS = ("constant", "prior")
+"""One colour of light, and the light that the network predicts."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,9 @@ class Method:
     shape: str = "true"
     """The depth and normals that are given: `true` or `predicted`."""
     field: str | None = None
-    """Another light field than the preset's: mlp, mlp-uv, texels, sh; without a fit `constant`, one colour, and
-    `prior`, the light that the network predicts."""
+    """Another light field than the preset's: mlp, mlp-uv, texels, sh, or one of FITLESS."""
     height: int | None = None
     """Another height of the field's map than the preset's."""
-    path_height: int = 256
-    """Rows of the envmap that the path engine renders with."""
 
 
 METHODS = {
@@ -71,7 +70,6 @@ METHODS = {
     "prior predicted": Method(maps="predicted", shape="predicted", field="prior"),
     "paper path": Method("paper", "path"),
     "paper path w/o mat": Method("paper", "path", maps="neutral"),
-    "paper path 128x64": Method("paper", "path", path_height=64),
     "paper uv": Method("paper", field="mlp-uv"),
     "paper low": Method("paper", height=16),
     "paper uv low": Method("paper", field="mlp-uv", height=16),
@@ -166,9 +164,9 @@ class _Stage:
         bench = self.bench
         for name in methods:
             method, completion = METHODS[name], bench.completion
-            mesh = self.mesh(completion) if method.engine == "path" else None
-            options: dict[str, Any] = {"mesh": mesh, "seed": bench.seed, "device": bench.device}
-            (envmap, steps, mesh), cost = timed(fit, self.sample, method, completion, **options)
+            (envmap, steps, mesh), cost = timed(
+                fit, self.sample, method, completion, seed=bench.seed, device=bench.device
+            )
             seen = self._on(mesh, self.sample.truth.materials, envmap)["mesh_psnr"]
             yield {"method": name, **self._of_light(envmap), "mesh_psnr": seen, "steps": steps, **cost}
 
@@ -192,34 +190,31 @@ class _Stage:
 
 
 def fit(
-    sample: SyntheticSample, method: Method, completion: str, *, mesh: Any = None, seed: int = 0, device: str = "auto"
+    sample: SyntheticSample, method: Method, completion: str, *, seed: int = 0, device: str = "auto"
 ) -> tuple[Array, int, Any]:
     """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of the depth that is given, in
-    how many steps, and the scene of that mesh. `mesh` is the one that the path engine renders."""
+    how many steps, and the scene of that mesh."""
     photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
     given = given_maps(sample, method, seed=seed, device=device)
-    engine: Any
-    if method.engine == "path":
-        pixels = np.flatnonzero(given.depth > 0)
-        engine = PathEngine(mesh, photo.camera, pixels, envmap_height=method.path_height, seed=seed)
-    else:
-        setup = FitSetup(photo, given, named, completion, envmap_height=height, seed=seed, device=device)
-        prepared = prepare(setup)
-        engine, mesh = prepared.fit.engine, prepared.renderer
-    problem, target = engine.light_problem(given.materials), placed(photo.linear.reshape(-1, 3))
-    begin: Any = None if given.light is None else start_light(target, named.light, given.light, problem)
-    if method.field in ("constant", "prior"):
-        steps, found = 0, begin.radiance if method.field == "prior" else constant_light(problem, target)
-    else:
-        light = named.light
+    light = named.light
+    if method.field not in FITLESS:
         light = replace(light, field=method.field or light.field, height=method.height or light.height)
-        field = envmap_field(light, seed=seed, start=begin and begin.radiance)
-        steps = fit_light(problem, target, field, light, start=begin, seed=seed).steps
-        found = field(max(light.height, 16))
-    envmap = prepared_envmap(found, height)
-    if named.light.sky:
-        envmap = paste_visible_sky(envmap, photo.linear, given.depth > 0, photo.camera)
-    return envmap, steps, mesh
+    setup = FitSetup(
+        photo, given, replace(named, light=light), completion, method.engine, envmap_height=height, seed=seed,
+        device=device,
+    )  # fmt: skip
+    prepared = prepare(setup)
+    fit, state = prepared.fit, prepared.fit.start()
+    if method.field in FITLESS:
+        problem, target = fit.engine.light_problem(given.materials), placed(photo.linear.reshape(-1, 3))
+        if method.field == "constant":
+            found = constant_light(problem, target)
+        else:
+            found = start_light(target, light, given.light, problem).radiance
+        state.envmap = fit.prepared_light(found)
+    else:
+        fit.fit_light(state, given.materials)
+    return state.envmap, sum(stage["steps"] for stage in state.stages), prepared.renderer
 
 
 def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:

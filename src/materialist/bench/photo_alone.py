@@ -4,7 +4,8 @@ Every second photo shows procedural objects under procedural light; the others (
 under captured light, of those that no training set may use. Colours are as often as things have them. The photo and its
 field of view are given. Rows: `untouched` is the photo as it was; `fitted` is the inversion with the predictor;
 `+ light`, `+ albedo`, `+ geometry` and `+ albedo, geometry` are the same with that much of the truth in place of what
-was predicted (the true light replaces the fitted one); `ceiling` is the edit with the true maps, light and depth.
+was predicted (the true light replaces the fitted one); `ceiling` is the edit with the true maps, light and depth;
+`paper` is the inversion by `--engine path --preset paper`: PRB at 64 spp, the MLP at 512 x 256, its stopping rules.
 
 `maps` rows compare `prior` and `fitted` maps with the truth: albedo after one factor (sRGB PSNR), roughness, normals
 (degrees), log depth (RMSE), and the light's spherical harmonics after one factor (relative error, 1 is as bad as
@@ -22,11 +23,12 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics, pipeline
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
+from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist.bench.edits import KINDS, Edit, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.edits.composite.composite import composite
 from materialist.errors import InputError
+from materialist.fit.settings import PAPER
 from materialist.metrics.maps import best_scale, score
 from materialist.option_kinds import option
 from materialist.procedural.synthetic import SyntheticSample, make_sample
@@ -53,6 +55,7 @@ class PhotoAloneBench(Benchmark):
         Column("depth", "log depth RMSE", "lower"),
         Column("light", "SH error, relative", "lower"),
         Column("rerender", "re-rendering PSNR", "higher", 2),
+        *(Column(f"{name}_l1", f"{name} L1 from prior", "") for name in ("albedo", "roughness", "metallic")),
         Column("seconds", "fit s", "lower", 1),
     )
     plotted = ("inside", "albedo", "light")
@@ -63,6 +66,9 @@ class PhotoAloneBench(Benchmark):
     predictor: str = option("bundled", "Where the maps come from.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
     decompose: bool = option(False, "Adds the rows that are given a part of the truth.", kind="switch")
+    paper: int = option(
+        0, "Adds rows by the paper's own algorithm, of at most so many steps a stage; 0: none.", **COUNT_OR_0
+    )
     spp: int = option(128, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(256, "Paths a pixel of the truth.", **COUNT)
 
@@ -91,10 +97,13 @@ class PhotoAloneBench(Benchmark):
 
         def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
             found, cost = timed(pipeline.invert, sample.photo, **shared, **how)
-            return found, {**cost, "rerender": metrics.psnr(found.rerender, sample.photo.linear)}
+            left = {f"{key[9:]}_l1": v for key, v in found.report.metrics.items() if key.startswith("prior_l1_")}
+            return found, {**cost, **left, "rerender": metrics.psnr(found.rerender, sample.photo.linear)}
 
         scene, cost = inverted(predictor=self.predictor)
         yield "fitted", scene, cost
+        if self.paper:
+            yield "paper", *inverted(predictor=self.predictor, engine="path", settings=PAPER.at_most(self.paper))
         if not self.decompose:
             return
         for given in GIVEN:

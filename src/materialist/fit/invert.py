@@ -15,7 +15,7 @@ from materialist.fit.losses import CLIPPED
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
-from materialist.geometry.build import build_geometry
+from materialist.geometry.build import SYNONYMS, build_geometry
 from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction
@@ -28,7 +28,8 @@ class FitSetup:
     photo: Photo
     prior: Prediction
     settings: FitSettings
-    completion: str = "floors"
+    completion: str = "auto"
+    """`auto` becomes that of the settings."""
     engine: str = "transport"
     envmap_height: int = 256
     tau: float = 6.0
@@ -41,6 +42,10 @@ class FitSetup:
     device: str = "auto"
     spp: int | None = None
     """Paths a pixel of the re-rendering; None: `settings.rerender_spp`."""
+
+    def __post_init__(self) -> None:
+        given = self.settings.completion if self.completion == "auto" else self.completion
+        object.__setattr__(self, "completion", SYNONYMS.get(given, given))
 
 
 @dataclass
@@ -62,33 +67,44 @@ class Fit:
     engine: Engine
     progress: Progress | None = None
 
+    def start(self) -> FitState:
+        """The prior's maps under a white light."""
+        height = self.setup.envmap_height
+        return FitState(self.prior_maps(), np.ones((height, 2 * height, 3), np.float32))
+
     def run(self) -> FitState:
         """Fit; returns maps and light."""
-        setup, height = self.setup, self.setup.envmap_height
-        state = FitState(self.prior_maps(), np.ones((height, 2 * height, 3), np.float32))
+        setup, state = self.setup, self.start()
         if setup.strategy == "white-light-first":
             return self._white_light_first(state)
         settings = setup.settings.materials
         if setup.mask is not None:  # what the mask makes one value moves, too
             last = replace(settings.stages[-1], targets=tuple(COLUMNS))
             settings = replace(settings, stages=(*settings.stages[:-1], last))
-        self._fit_light(state, setup.prior.materials)
+        self.fit_light(state, setup.prior.materials)
         self._fit_materials(state, settings)
         return state
 
-    def _fit_light(self, state: FitState, materials: Materials) -> None:
+    def fit_light(self, state: FitState, materials: Materials) -> None:
+        """Find the state's light, under which these materials look like the photo."""
         start, setup, photo = time.perf_counter(), self.setup, self._photo()
         settings, problem = setup.settings.light, self.engine.light_problem(materials)
         begin = start_light(photo, settings, setup.prior.light, problem)
         light = envmap_field(settings, seed=setup.seed, start=begin.radiance)
         result = fit_light(problem, photo, light, settings, start=begin, seed=setup.seed, progress=self.progress)
-        state.envmap = prepared_envmap(light(max(settings.height, 16)), setup.envmap_height)
-        if settings.sky:
-            surface = np.zeros(setup.photo.linear.shape[:2], bool)
-            surface.reshape(-1)[self.engine.pixels.numpy()] = True
-            white = HDR_CLIP if setup.photo.hdr else CLIPPED
-            state.envmap = paste_visible_sky(state.envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
+        state.envmap = self.prepared_light(light(max(settings.height, 16)))
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
+
+    def prepared_light(self, radiance: torch.Tensor) -> Array:
+        """[h, 2h, 3] a found light of any size, with the photo's own sky where the settings want it."""
+        setup = self.setup
+        envmap = prepared_envmap(radiance, setup.envmap_height)
+        if not setup.settings.light.sky:
+            return envmap
+        surface = np.zeros(setup.photo.linear.shape[:2], bool)
+        surface.reshape(-1)[self.engine.pixels.numpy()] = True
+        white = HDR_CLIP if setup.photo.hdr else CLIPPED
+        return paste_visible_sky(envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
 
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
         """From the state's maps, which L_cons holds on to."""
@@ -110,7 +126,7 @@ class Fit:
         schedule = settings.stages[0].schedule
         state.maps[:, 3:] = 0.5
         self._fit_materials(state, replace(settings, stages=(MaterialStage(("roughness", "metallic"), schedule),)))
-        self._fit_light(state, self.materials(state))
+        self.fit_light(state, self.materials(state))
         self._fit_materials(state, replace(settings, stages=(MaterialStage(("albedo",), schedule),)))
         return state
 

@@ -72,9 +72,16 @@ class FitSettings:
 
     light: LightSettings
     materials: MaterialSettings
+    completion: str = "none"  # what `--completion auto` is; paper
     photo_light: bool = False  # with cached transport, surfaces light each other as the photo shows them; paper: V L_E
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
+
+    def at_most(self, steps: int) -> "FitSettings":
+        """The same with no more steps in any stage."""
+        cut = lambda one: replace(one, schedule=replace(one.schedule, max_steps=min(steps, one.schedule.max_steps)))  # noqa: E731
+        stages = tuple(cut(stage) for stage in self.materials.stages)
+        return replace(self, light=cut(self.light), materials=replace(self.materials, stages=stages))
 
 
 _MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
@@ -116,6 +123,7 @@ DEFAULT = FitSettings(
             ),
         ),
     ),
+    completion="floors",
     photo_light=True,
     light_grid=24,
     rerender_spp=32,
