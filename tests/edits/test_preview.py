@@ -1,5 +1,7 @@
 """Previews from cached transport against the path tracer."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from edit_scenes import block_mask, rendered_scene
@@ -43,3 +45,24 @@ def test_nothing_changed_is_the_photo(preview):
     far = np.s_[:8]
     np.testing.assert_array_equal(changed[far], preview.scene.photo.linear[far])
     assert (changed[MASK] != preview.scene.photo.linear[MASK]).any(-1).all()
+
+
+def test_kept_tables_are_taken_and_damaged_ones_made_again(preview, tmp_path):
+    scene, file = preview.scene, tmp_path / "preview.npz"
+    edited = edit(scene, MASK, hue=120)
+    made = Preview(scene, file)
+    whole, picture = file.read_bytes(), made.picture(edited)
+    traced = lambda one: "_engine" in vars(one)  # noqa: E731
+    again = Preview(scene, file)
+    np.testing.assert_array_equal(again.picture(edited), picture)
+    assert traced(made) and not traced(again)
+    while again.prepare():
+        pass
+    light = relight(scene, ambient=2.0)
+    np.testing.assert_array_equal(again.render(light), made.render(light))
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 255
+    for content in (b"", whole[: len(whole) // 2], bytes(flipped)):
+        file.write_bytes(content)
+        assert traced(Preview(scene, file)) and file.read_bytes() == whole
+    assert traced(Preview(replace(scene, envmap=2 * scene.envmap), file))

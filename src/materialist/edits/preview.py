@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import zlib
+from contextlib import suppress
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -14,7 +19,8 @@ from materialist.edits.composite.layers import Layers, changed_pixels
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.envmap import environment
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
+from materialist.io.atomic import whole_file
 from materialist.types import Array, Materials, Scene
 
 if TYPE_CHECKING:
@@ -24,6 +30,8 @@ if TYPE_CHECKING:
 
 RAYS = (48, 12)
 """Diffuse and specular rays a pixel, three quarters of the fit's: a new light is gathered sooner."""
+VERSION = 1
+"""Of the tables on disk; another one where the same scene gives other tables."""
 LEAST_AMBIENT = 1e-3
 """Factor on the fitted map below which the map cannot be scaled back."""
 
@@ -34,25 +42,56 @@ class Preview:
     What surfaces send to each other stays that of the fitted scene (for another light: of one shading under it), so
     that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once
     (seconds), keep it.
+
+    file: where the tables of the fitted light are kept (.npz). Where it has those of this scene, nothing is traced
+        before there is another light; what cannot be read, or is of another scene, is made again.
     """
 
-    def __init__(self, scene: Scene):
+    def __init__(self, scene: Scene, file: Path | None = None):
         from materialist.render.variant import setup
 
         setup()
-        from materialist.fit.engine import TransportEngine
-        from materialist.transport.cache import CacheSettings, TransportCache
-        from materialist.transport.filter import taps
+        from materialist.transport.cache import Tables
 
-        self.scene = scene
-        rays = CacheSettings(*RAYS)
-        self._engine = TransportEngine(scene.geometry, scene.camera, scene.rerender, seed=0, cache=rays)
-        # A few rays a pixel are enough for what surfaces pass on: it is averaged again where it arrives.
-        self._quick = TransportCache(scene.geometry, scene.camera, CacheSettings(8, 1))
-        self._tables = self._engine.tables(scene.envmap)
-        self._taps = list(taps(self._engine.guide))
+        self.scene, key = scene, _key(scene)
+        kept = _read(file, key)
+        if kept is None:
+            tables = vars(self._engine.tables(scene.envmap)).items()
+            kept = {name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16) for name, v in tables}
+            kept["pixels"] = self._engine.cache.pixels
+            if file is not None:
+                with suppress(OutputError), whole_file(file, force=True) as whole:
+                    np.savez(whole, key=key, **kept)
+        self._pixels = kept["pixels"].astype(np.int64)
+        self._skies = np.setdiff1d(np.arange(scene.depth.size), self._pixels)
+        self._tables = Tables(*(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular")))
         self._other: tuple[Array, Tables] | None = None
         self._base = self._image(self._shaded(scene.materials, self._tables), self._sky(scene.envmap))
+
+    @cached_property
+    def _engine(self):
+        from materialist.fit.engine import TransportEngine
+        from materialist.transport.cache import CacheSettings
+
+        scene, rays = self.scene, CacheSettings(*RAYS)
+        return TransportEngine(scene.geometry, scene.camera, scene.rerender, seed=0, cache=rays)
+
+    @cached_property
+    def _quick(self):
+        """A few rays a pixel: enough for what surfaces pass on, which is averaged again where it arrives."""
+        from materialist.transport.cache import CacheSettings, TransportCache
+
+        return TransportCache(self.scene.geometry, self.scene.camera, CacheSettings(8, 1))
+
+    @cached_property
+    def _taps(self):
+        from materialist.transport.filter import taps
+
+        return list(taps(self._engine.guide))
+
+    def prepare(self) -> bool:
+        """Trace the next part of what another light will need, a second or so; False where all is there."""
+        return self._quick.trace_next() or self._engine.cache.trace_next()
 
     def render(self, edited: Scene) -> Array:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
@@ -110,7 +149,7 @@ class Preview:
         r = roughness[:, None]
         d0, d1, d2 = tables.diffuse.split(3, -1)
         lobes = torch.cat([d0 + r * (d1 + r * d2), specular_at(tables, roughness)], -1)
-        guide, pixels = self._engine.guide, torch.from_numpy(self._engine.cache.pixels.astype(np.int64))
+        guide, pixels = self._engine.guide, torch.from_numpy(self._pixels)
         grid = lobes.new_zeros(guide.scale.numel(), 9)
         grid[pixels] = lobes
         smooth = joint_filter(grid.view(*guide.scale.shape, 9), self._taps).view(-1, 9)[pixels]
@@ -132,18 +171,38 @@ class Preview:
     def _maps(self, materials: Materials):
         """Albedo [P, 3], roughness and metallic [P] of the surface pixels; torch."""
         maps = (materials.albedo.reshape(-1, 3), materials.roughness.ravel(), materials.metallic.ravel())
-        return [placed(values[self._engine.cache.pixels]) for values in maps]
+        return [placed(values[self._pixels]) for values in maps]
 
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""
-        rays = pixel_rays(self.scene.camera).reshape(-1, 3)[self._engine.sky]
+        rays = pixel_rays(self.scene.camera).reshape(-1, 3)[self._skies]
         if not len(rays):
             return np.zeros((0, 3), np.float32)
         rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         return environment(rays, envmap).astype(np.float32)
 
     def _image(self, shaded, sky: Array) -> Array:
-        picture = self._engine.cache.image(shaded.cpu().numpy())
-        flat = picture.reshape(-1, 3)
-        flat[self._engine.sky] = sky
-        return picture
+        flat = np.empty((self.scene.depth.size, 3), np.float32)
+        flat[self._pixels], flat[self._skies] = shaded.cpu().numpy(), sky
+        return flat.reshape(*self.scene.depth.shape, 3)
+
+
+def _key(scene: Scene) -> str:
+    """What the tables of a scene depend on, as a text."""
+    mesh, total = scene.geometry.mesh, 0
+    for values in (*vars(mesh).values(), scene.rerender, scene.envmap):
+        total = zlib.crc32(values.tobytes(), total)
+    return f"{VERSION} {RAYS} {scene.camera} {total:08x}"
+
+
+def _read(file: Path | None, key: str) -> dict[str, Any] | None:
+    """The arrays of a file that were written under this key; None where there are none."""
+    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
+        if file is not None:
+            with np.load(file) as kept:
+                return (
+                    {name: kept[name] for name in ("pixels", "diffuse", "specular")}
+                    if str(kept["key"]) == key
+                    else None
+                )
+    return None

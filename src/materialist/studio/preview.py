@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,13 +37,19 @@ _LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 
 
 class LivePreview:
-    """A fitted scene, its preview (which takes seconds to build), and the last edited scenes."""
+    """A fitted scene, its preview (seconds to build, unless `file` has its tables), and the last edited scenes."""
 
-    def __init__(self, scene: Scene):
+    def __init__(self, scene: Scene, file: Path | None = None):
         self.scene = scene
         self._edited: dict[str, Scene] = {}
         self._panes: dict[str, tuple[Array, glass.Tint]] = {}
-        self._preview: Future[Any] = _THREAD.submit(_build, scene)
+        self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
+        _THREAD.submit(self._prepare, self._preview)
+
+    def _prepare(self, built: Future[Any]) -> None:
+        """Get ready for another light part by part: pictures come between."""
+        if built is self._preview and built.exception() is None and built.result().prepare():
+            _THREAD.submit(self._prepare, built)
 
     @property
     def ready(self) -> bool:
@@ -126,10 +133,10 @@ def _kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any
     return found
 
 
-def _build(scene: Scene) -> Any:
+def _build(scene: Scene, file: Path | None) -> Any:
     from materialist.edits.preview import Preview
 
-    return Preview(scene)
+    return Preview(scene, file)
 
 
 def free_memory() -> Future[None]:

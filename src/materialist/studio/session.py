@@ -109,7 +109,8 @@ class Session:
             ) from error
         with self.lock:
             self.close()
-            self.project, self.live, self.glass = project, LivePreview(loaded), GlassClient(project.scene)
+            self.project, self.glass = project, GlassClient(project.scene)
+            self.live = LivePreview(loaded, project.folder / "preview.npz")
             self.edits, self._kept = EditList(steps), kept
 
     def close(self) -> None:

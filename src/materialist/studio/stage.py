@@ -57,8 +57,8 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
         badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
         return {**shown, "picture": photo, "before": "", "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off
-    before = None if steps else ""
-    return {**shown, "picture": jpeg_url(linear), "before": before, "badge": badge, "waiting": waiting}
+    shown |= {"before": None if steps else "", "badge": badge, "waiting": waiting}
+    return {**shown, "picture": jpeg_url(linear)}
 
 
 def waiting_photo(file: Path) -> dict[str, Any]:

@@ -126,14 +126,21 @@ class TransportCache:
         dr.eval(hits)
         return hits
 
+    def trace_next(self) -> bool:
+        """Find what the rays of the next lobe meet; False where those of all are found."""
+        k = len(self._hits)
+        if k == len(self.lobes):
+            return False
+        self._hits.append(self._trace(*self.lobes[k], diffuse=k == 0))
+        if self._progress is not None:
+            self._progress("trace", k + 1, len(self.lobes))
+        dr.sync_thread()  # so that whoever measures this sees it
+        return True
+
     def trace(self) -> list[mi.UInt32]:
         """What the rays of every lobe meet, found on first use; the light fit never asks."""
-        for k, (count, alpha) in enumerate(self.lobes):
-            if k == len(self._hits):
-                self._hits.append(self._trace(count, alpha, diffuse=k == 0))
-                if self._progress is not None:
-                    self._progress("trace", k + 1, len(self.lobes))
-        dr.sync_thread()  # so that whoever measures this sees it
+        while self.trace_next():
+            pass
         return self._hits
 
     def gather(self, envmap: Array, radiance: Array | None) -> Tables:
