@@ -38,7 +38,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "studio": SCENE | EDITING | {"exporters", "jobs", "pipeline"},
     "procedural": SCENE | {"predict"},
     "train": {"io", "render", "predict", "procedural"},
-    "bench": SCENE | EDITING | {"batches", "fit", "pipeline", "predict", "procedural", "solids"},
+    "bench": SCENE | EDITING | {"batches", "exporters", "fit", "pipeline", "predict", "procedural", "solids"},
     "doctor": {"predict", "render"},
     "cli": SCENE
     | EDITING

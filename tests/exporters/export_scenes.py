@@ -63,18 +63,6 @@ def renderer(scene: Scene) -> RenderScene:
     return made
 
 
-def load_xml(mi, path, **options):
-    """Mitsuba's scene of an XML file. Its reader waits for ever where Dr.Jit has one thread (OMP_NUM_THREADS=1)."""
-    import drjit as dr
-
-    count = dr.thread_count()
-    dr.set_thread_count(max(count, 2))
-    try:
-        return mi.load_file(str(path), **options)
-    finally:
-        dr.set_thread_count(count)
-
-
 def document(scene: Scene) -> dict:
     """The JSON in a scene's GLB."""
     data = glb_bytes(scene, [*scene_parts(scene), *body_parts(scene)])

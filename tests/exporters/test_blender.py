@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import stat
-import subprocess
 import sys
 
 import numpy as np
@@ -13,6 +12,7 @@ import pytest
 from export_scenes import renderer, room
 
 import materialist as mt
+from materialist.exporters.blender import run_script
 from materialist.io.exr import read_exr
 
 BPY = os.environ.get("MATERIALIST_TEST_BPY", "")
@@ -48,7 +48,7 @@ def test_the_folder_holds_what_the_script_reads(tmp_path):
 def test_without_blender_the_script_stays(tmp_path, monkeypatch):
     from materialist.exporters import blender
 
-    monkeypatch.setattr(blender, "_find_blender", lambda _: None)
+    monkeypatch.setattr(blender, "find_blender", lambda _: None)
     done = mt.export(room(), tmp_path / "room.blend", shadow_catcher=True)
     assert done.path == tmp_path / "room" and not (tmp_path / "room.blend").exists()
     assert (done.path / "build.py").is_file()
@@ -76,8 +76,8 @@ def by_cycles(scene, tmp_path, *options):
     if not shutil.which(BPY):
         pytest.skip("needs MATERIALIST_TEST_BPY, the path of a Python that has bpy")
     folder = mt.export(scene, tmp_path / "out", to="blend").path
-    command = [BPY, str(folder / "build.py"), "--", "--fitted-material", "--render", str(tmp_path / "r.exr")]
-    subprocess.run([*command, *options], check=True, capture_output=True)
+    asked = ["--fitted-material", "--render", f"{tmp_path}/r.exr", *options]
+    run_script([BPY], folder / "build.py", tmp_path / "r.blend", asked)
     return read_exr(tmp_path / "r.exr")[..., :3]
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from export_scenes import document, load_xml, renderer, room
+from export_scenes import document, renderer, room
 
 from materialist.edits.core.surfaces import uniform_surface
 from materialist.exporters.glb import passing
@@ -44,7 +44,7 @@ def test_glb_has_textures_that_repeat_and_glass():
     assert names[-3:] == ["body0", "body1", "camera"]
     checks, glass = content["materials"][-2:]
     texture = content["textures"][checks["pbrMetallicRoughness"]["baseColorTexture"]["index"]]
-    assert content["samplers"][texture["sampler"]]["wrapS"] == 10497
+    assert content["samplers"][texture["sampler"]]["wrapS"] == 10497 and len(document(room())["samplers"]) == 1
     assert glass["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 1
     np.testing.assert_allclose(glass["extensions"]["KHR_materials_ior"]["ior"], 1.4)
     np.testing.assert_allclose(passing(body_parts(scene)[1]).albedo[0, 0], [0.9, 0.5, 0.4])
@@ -79,7 +79,7 @@ def test_mitsuba_renders_the_same_picture(tmp_path, surface):
     expected = target.render(spp=64, seed=1, max_depth=GLASS_DEPTH)
     done = export(scene, tmp_path / "scene", to="mitsuba")
     own = done.path.with_name("scene_materialist.xml")
-    loaded = load_xml(target.mi, own, spp=64, max_depth=GLASS_DEPTH)
+    loaded = target.mi.load_file(str(own), parallel=False, spp=64, max_depth=GLASS_DEPTH)
     picture = np.array(target.mi.render(loaded, seed=2))[..., :3]
     plate = np.s_[16:24, 14:26]
     np.testing.assert_allclose(picture[plate].mean((0, 1)), expected[plate].mean((0, 1)), rtol=0.05, atol=0.01)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from export_scenes import load_xml, renderer, room
+from export_scenes import renderer, room
 
 from materialist.exporters.mitsuba_xml import write_mitsuba
 from materialist.exporters.parts import scene_parts
@@ -25,7 +25,7 @@ def test_it_renders_as_ours_does(written, capfd):
     scene, folder = written
     target = renderer(scene)
     mi = target.mi
-    loaded = load_xml(mi, folder / OWN, spp=64, max_depth=3)
+    loaded = mi.load_file(str(folder / OWN), parallel=False, spp=64, max_depth=3)
     ours = [target.render(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
     theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
     # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.
@@ -46,7 +46,7 @@ def test_normals_that_lean_away_from_the_eye_are_ours(tmp_path):
     scene = replace(scene, geometry=replace(scene.geometry, mesh=replace(mesh, normals=normals)))
     write_mitsuba(tmp_path, scene, scene_parts(scene))
     target = renderer(scene)
-    loaded = load_xml(target.mi, tmp_path / OWN, spp=256, max_depth=3)
+    loaded = target.mi.load_file(str(tmp_path / OWN), parallel=False, spp=256, max_depth=3)
     ours, theirs = target.render(spp=256, seed=1, max_depth=3), np.array(target.mi.render(loaded, seed=2))
     blocks = [image.reshape(5, 8, 8, 8, 3).mean((1, 3)) for image in (ours, theirs)]
     np.testing.assert_allclose(blocks[1], blocks[0], rtol=0.05)  # inside `twosided`: 0.19
@@ -59,7 +59,7 @@ def test_lamps_light_it_as_they_light_ours(tmp_path):
     scene = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (30.0, 20.0, 5.0), 0.05),))
     write_mitsuba(tmp_path, scene, scene_parts(scene))
     mi = setup("auto")
-    loaded = load_xml(mi, tmp_path / OWN, spp=64)
+    loaded = mi.load_file(str(tmp_path / OWN), parallel=False, spp=64)
     theirs, ours = np.array(mi.render(loaded, seed=1)), render_scene(scene, spp=64)
     np.testing.assert_allclose(theirs.mean((0, 1)), ours.mean((0, 1)), rtol=0.03)
     assert ours.mean() > 1.3 * render_scene(replace(scene, lamps=()), spp=16).mean()

@@ -1,8 +1,5 @@
-"""A whole fit with torch on another device than the processor: nothing of the one meets anything of the other.
-
-The other device is made up, for machines without a card: its tensors call themselves `meta`, keep their values in the
-processor's memory, and refuse, as those of CUDA do, to be combined with others.
-"""
+"""A whole fit with torch on another device than the processor, made up for machines without a card: its tensors call
+themselves `meta`, keep their values in the processor's memory, and refuse, as those of CUDA do, to meet others."""
 
 from dataclasses import replace
 
@@ -20,8 +17,6 @@ from materialist.fit.settings import DEFAULT, PAPER
 from materialist.render.scene import RenderScene
 from materialist.types import Scene
 
-INDEXING = ("index", "index_put", "index_put_", "_index_put_impl_")
-
 
 class Far(torch.Tensor):
     __torch_dispatch__ = classmethod(lambda *_: NotImplemented)  # OtherDevice computes
@@ -38,22 +33,19 @@ class OtherDevice(TorchDispatchMode):
     def __torch_dispatch__(self, function, types, args=(), kwargs=None):
         name, kwargs = function._schema.name.removeprefix("aten::"), dict(kwargs or {})
         # Numbers, and places in a tensor, may come from the processor.
-        counts = lambda t: isinstance(t, Far) or (t.is_floating_point() if name in INDEXING else t.dim())  # noqa: E731
-        tensors = [t for t in tree_leaves((args, kwargs)) if isinstance(t, torch.Tensor) and counts(t)]
-        far = {isinstance(t, Far) for t in tensors}
+        indexing = name in ("index", "index_put", "index_put_", "_index_put_impl_")
+        counts = lambda t: isinstance(t, Far) or (t.is_floating_point() if indexing else t.dim())  # noqa: E731
+        far = {isinstance(t, Far) for t in tree_leaves((args, kwargs)) if isinstance(t, torch.Tensor) and counts(t)}
         assert len(far) < 2 or name in ("_to_copy", "copy_"), f"{name} mixes devices"
         device = kwargs.pop("device", None)
         there = True in far if device is None else torch.device(device).type == "meta"
         near_args, near_kwargs = tree_map_only(Far, lambda t: t.near, (args, kwargs))
         found = function(*near_args, **near_kwargs)
-        if name.endswith("_"):
-            return args[0]
-        return tree_map_only(torch.Tensor, Far, found) if there else found
+        return args[0] if name.endswith("_") else tree_map_only(torch.Tensor, Far, found) if there else found
 
 
 @pytest.fixture
 def elsewhere(monkeypatch):
-    """Torch's device beside the renderer is the other one, and so is what the renderer takes and gives."""
     render = RenderScene.render_torch
 
     def render_there(scene, *tensors, **options):
@@ -72,13 +64,12 @@ def test_a_fit_elsewhere_finds_what_it_finds_here(engine, preset, request):
     room = Room(16)
     setup = room.setup(preset.at_most(2), spp=2, engine=engine, completion="none", mask=np.eye(16) > 0)
     prior = replace(setup.prior, light=np.full((8, 16, 4), 0.5, np.float32))
-    setup = replace(setup, prior=prior)
-    here = invert(setup)
+    here = invert(setup := replace(setup, prior=prior))
     request.getfixturevalue("elsewhere")
     there = invert(setup)
     np.testing.assert_allclose(there.envmap, here.envmap, rtol=1e-4)
     np.testing.assert_allclose(there.materials.albedo, here.materials.albedo, atol=1e-5)
     if engine == "transport":  # and the quick look
-        geometry, seen = there.prepared.geometry, (prior.normal, prior.depth)
-        scene = Scene(room.camera, room.photo, prior, there.materials, *seen, geometry, there.envmap, there.rerender)
+        seen = there.materials, prior.normal, prior.depth, there.prepared.geometry, there.envmap, there.rerender
+        scene = Scene(room.camera, room.photo, prior, *seen)
         assert Preview(scene).render(replace(scene, envmap=2 * scene.envmap)).mean() > 0

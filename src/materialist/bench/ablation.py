@@ -16,14 +16,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
 import torch
 
 from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
-from materialist.fit.invert import FitSetup, prepare
+from materialist.fit.invert import FitSetup, prepare, replaced, stacked
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
@@ -32,7 +31,7 @@ from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.render.scene import RenderScene
-from materialist.types import Array, Materials, Prediction
+from materialist.types import Array, Prediction
 
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
@@ -106,7 +105,7 @@ class _Photo:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
         prepared, envmap = self.fitted
         engine: Any = prepared.fit.engine
-        prior = _maps(self.prior.materials)
+        prior = placed(stacked(self.prior.materials))
         if blind:
             prior[:, 3:] = 0.5
         prior = prior[engine.pixels]
@@ -126,9 +125,7 @@ class _Photo:
         with torch.no_grad():
             maps = model()
             render(maps)
-        image = _maps(self.prior.materials).index_put((engine.pixels,), maps).cpu().numpy()
-        image = image.reshape(self.camera.height, self.camera.width, 5)
-        found = Materials(np.ascontiguousarray(image[..., :3]), image[..., 3].copy(), image[..., 4].copy())
+        found = replaced(self.prior.materials, engine.pixels, maps)
         picture = prepared.render(found, envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {**self.against_photo(method, picture), "loss": loss, "steps": sum(r.steps for r in results)}
@@ -138,12 +135,6 @@ class _Photo:
         photo = self.sample.photo.linear
         compared = {name: getattr(metrics, name)(picture, photo) for name in ("psnr", "ssim", "mse")}
         return {"method": method, **compared}
-
-
-def _maps(materials: Materials) -> torch.Tensor:
-    """[H W, 5] albedo, roughness, metallic."""
-    maps = np.dstack(tuple(vars(materials).values()))
-    return placed(maps.reshape(-1, 5).astype(np.float32))
 
 
 def _stages(targets: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tuple[MaterialStage, ...]:

@@ -1,10 +1,9 @@
 """`bench gpu`: what each stage costs on the processor and on a CUDA card.
 
-Wall seconds, each device in a process of its own; `--device cpu` or `cuda` measures one of them in this process.
-`bundled network` is the median forward pass at 512 x 512 (the paper: 18 ms on its card), `bundled predict` all of a
-prediction; `step` is one step of the material fit with gradients, by cached transport and by Mitsuba's PRB (64 spp,
-depth 4). The stages of the inversion are those of report.json, the `edit` and the `glass` are of what `click` selects,
-brought into the photo. Stages that render compile kernels that the computer has not met before: quote a second run.
+Wall seconds, each device in a process of its own; with `--device cpu` or `cuda` one of them in this process. `bundled
+network` is the median forward pass at 512 x 512 (the paper: 18 ms on its card), `step` one of the material fit with
+gradients, by cached transport and by Mitsuba's PRB (64 spp, depth 4); edit and glass are of what `click` selects, and
+brought into the photo. Stages that render compile kernels which the computer has not met: quote a second run.
 """
 
 import json
@@ -18,7 +17,7 @@ import torch
 
 from materialist import pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers, timed
-from materialist.bench.invert import STAGES, InvertBench, InvertedPhoto, stages, step_row
+from materialist.bench.invert import STAGES, stages, step_row
 from materialist.bench.predictor import PredictorBench
 from materialist.bench.report import Column, Report
 from materialist.edits.composite.composite import composite
@@ -39,25 +38,20 @@ class GpuBench(Benchmark):
     photo: str = option("example:coffee", "A file or example:NAME.", kind="name")
     click: str = option("150,230", "Where its object is, x and y at 512 pixels.", kind="name")
     size: int = option(512, "Longer side.", **SIZE)
-    step_size: int = option(256, "Longer side for single steps.", **SIZE)
     runs: int = option(50, "Forward passes; a tenth of it more do not count.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         there = cuda_usable() and torch.cuda.is_available()
         report.settings["card"] = torch.cuda.get_device_name() if there else "none that Mitsuba and PyTorch can use"
         if self.device != "auto":
-            for stage, seconds in self._measured(report):
-                yield {"method": stage, "sample": self.photo, self.device: seconds}
+            yield from ({"method": k, "sample": self.photo, self.device: s} for k, s in self._measured(report))
             return
-        found: dict[str, Row] = {}
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as folder:
             for device in ("cpu", "cuda")[: 1 + there]:  # a process keeps its device
                 options = asdict(replace(self, device=device))
                 given = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
                 materialist("bench", "gpu", "-o", f"{folder}/{device}", *given)
-                for row in json.loads(Path(folder, device, "report.json").read_text())["rows"]:
-                    found[row["method"]] = found.get(row["method"], {}) | row
-        yield from found.values()
+                yield from json.loads(Path(folder, device, "report.json").read_text())["rows"]
 
     def _measured(self, report: Report) -> Iterator[tuple[str, float]]:
         """(stage, seconds) on this process's device."""
@@ -73,8 +67,5 @@ class GpuBench(Benchmark):
         changes = {"edit": lambda: edit(scene, mask, hue=120), "glass": lambda: glass(scene, mask, **shared)}
         for name, change in changes.items():
             yield name, timed(lambda change=change: composite(scene, change(), **shared))[1]["seconds"]
-        steps = InvertBench(step_size=self.step_size, **shared)
-        with tempfile.TemporaryDirectory(prefix="materialist-bench-") as folder:
-            step = step_row(steps, InvertedPhoto(self.photo, self.photo, "bundled"), Path(folder))
-        yield "step, cached", step["cached_step_ms"] / 1000
-        yield "step, PRB", step["prb_step_s"]
+        step = step_row(scene.photo, scene.prior, self)
+        yield from {"step, cached": step["cached_step_ms"] / 1000, "step, PRB": step["prb_step_s"]}.items()

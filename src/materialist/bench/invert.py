@@ -14,6 +14,7 @@ import json
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,11 +22,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, materialist, numbers, timed
+from materialist.bench.benchmark import COUNT, COUNT_OR_0, Benchmark, Row, materialist, numbers, timed
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
 from materialist.errors import InputError
 from materialist.fit.engine import PathEngine, TransportEngine
+from materialist.fit.invert import stacked
 from materialist.geometry.build import build_geometry
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
@@ -35,18 +37,14 @@ from materialist.predict import get_predictor
 from materialist.procedural.synthetic import make_sample
 from materialist.render.scene import RenderScene
 from materialist.render.variant import setup
+from materialist.types import Photo, Prediction
 
 NATIVE = 512
 """Longer side of the synthetic photo; larger working sizes enlarge it."""
 STAGES = {
-    "predict": "prior",
-    "geometry": "mesh",
-    "scene": "scene",
-    "engine": "cache",
-    "light": "light",
-    "materials": "materials",
-    "rerender": "re-render",
-}
+    "predict": "prior", "geometry": "mesh", "scene": "scene", "engine": "cache", "light": "light",
+    "materials": "materials", "rerender": "re-render",
+}  # fmt: skip
 """Stages of report.json, and what the table calls them; see `stages` for the rest."""
 
 
@@ -90,6 +88,7 @@ class InvertBench(Benchmark):
     step_size: int = option(512, "Size of the step comparison; 0: none.", **COUNT_OR_0)
     preset: str = option("default", "That of `invert`.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
+    at_once: int = option(1, "With 2 or more, so many inversions at the same time, too.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         sizes = numbers("sizes", self.sizes, 16, 8192)
@@ -100,8 +99,19 @@ class InvertBench(Benchmark):
             options = ("--preset", self.preset, "--completion", self.completion)
             for size in sizes:
                 yield inversion(self, case, size, folder, *options)
+                if self.at_once > 1:
+                    yield self._together(case, size, folder, *options)
             if self.step_size:
-                yield step_row(self, case, folder)
+                photo = read_photo(_at_least(case, self.step_size, folder), size=self.step_size, fov=case.fov)
+                prior = get_predictor(case.predictor, device=self.device).predict(photo, seed=self.seed)
+                yield step_row(photo, prior, self) | {"sample": case.name}
+
+    def _together(self, case: InvertedPhoto, size: int, folder: Path, *options: str) -> Row:
+        """The row of `at_once` inversions: the time until the last of them ends. Twice that of one is fair for two."""
+        places = [Path(tempfile.mkdtemp(dir=folder)) for _ in range(self.at_once)]
+        with ThreadPoolExecutor(self.at_once) as pool:
+            cost = timed(lambda: list(pool.map(lambda place: inversion(self, case, size, place, *options), places)))[1]
+        return {"method": f"{self.at_once} at once, {size}", "sample": case.name, "seconds": cost["seconds"]}
 
 
 def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int) -> InvertedPhoto:
@@ -171,25 +181,20 @@ def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
     return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}
 
 
-def step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
+def step_row(photo: Photo, prior: Prediction, bench: Benchmark) -> Row:
     """One step of a material fit, cached and by Mitsuba's path replay backpropagation, in this process.
 
     Both render at full resolution with gradients of all maps; only the engine differs. The first four cached steps
     allocate memory, and the first one of PRB compiles kernels; they do not count. The light is grey, which changes no
     cost.
     """
-    setup(bench.device)
-    size, seed = bench.step_size, bench.seed
-    photo = read_photo(_at_least(case, size, folder), size=size, fov=case.fov)
-    prior = get_predictor(case.predictor, device=bench.device).predict(photo, seed=seed)
-    camera, light = photo.camera, np.full((256, 512, 3), 0.6, np.float32)
+    seed, camera, light = bench.seed, photo.camera, np.full((256, 512, 3), 0.6, np.float32)
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
     cached: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
     problem, traced = timed(lambda: cached.material_problem(light))
     mesh = RenderScene(geometry, camera, device=bench.device)
     path: Any = PathEngine(mesh, camera, cached.pixels.numpy(), seed=seed)
-    stacked = np.dstack(tuple(vars(prior.materials).values())).reshape(-1, 5)
-    maps = placed(stacked.astype(np.float32))[cached.pixels]
+    maps = placed(stacked(prior.materials))[cached.pixels]
     target = placed(photo.linear.reshape(-1, 3))[cached.pixels]
 
     def seconds(problem: Any, steps: int) -> list[float]:
@@ -202,7 +207,6 @@ def step_row(bench: InvertBench, case: InvertedPhoto, folder: Path) -> Row:
     slow = np.median(seconds(path.material_problem(light), 3)[1:])
     return {
         "method": f"one step, {camera.width} × {camera.height}",
-        "sample": case.name,
         "cached_step_ms": 1000 * fast,
         "prb_step_s": slow,
         "prb_per_cached": slow / fast,

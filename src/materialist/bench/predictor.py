@@ -38,11 +38,8 @@ class PredictorBench(Benchmark):
     size: int = option(512, "Width and height of the photo.", **SIZE)
     warmups: int = option(50, "Calls that do not count.", **COUNT_OR_0)
     runs: int = option(500, "Calls that do.", **COUNT)
-    threads: int = option(0, "Of torch; 0 leaves their number.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        if self.threads:
-            torch.set_num_threads(self.threads)
         report.settings.update(threads=torch.get_num_threads(), cores=os.cpu_count())
         noise = np.random.default_rng(self.seed).random((self.size, self.size, 3), dtype=np.float32)
         photo = Photo(linear=noise, camera=Camera(self.size, self.size), original=noise)

@@ -40,11 +40,11 @@ def export_blend(
     program = None
     if wants_file:
         ensure_writable(path, force, None)
-        program = _find_blender(blender)
+        program = find_blender(blender)
     if program is not None:
         with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as result:
             write_blender_assets(Path(scratch), scene, parts)
-            _run(_command(program, Path(scratch) / "build.py", result, options), result)
+            run_script(program, Path(scratch) / "build.py", result, options)
         return Exported(path)
     folder = path.with_suffix("") if wants_file else path
     with export_folder(folder, force, "blend") as whole:
@@ -104,7 +104,7 @@ def _look(part: Part) -> dict:
     return look
 
 
-def _find_blender(named: str | None) -> list[str] | None:
+def find_blender(named: str | None) -> list[str] | None:
     """The start of a command that runs a script in Blender, or None. Raises SetupError where `named` is no program."""
     found = shutil.which(named or "blender")
     if found is None and named is not None:
@@ -121,7 +121,9 @@ def _command(program: list[str], script: Path, output: Path, options: list[str])
     return [*start, str(script), "--", "-o", str(output), *options]
 
 
-def _run(command: list[str], result: Path) -> None:
+def run_script(program: list[str], script: Path, result: Path, options: list[str]) -> None:
+    """Let the program build `result` by the script. Raises SetupError where it does not."""
+    command = _command(program, script, result, options)
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=60 * _MINUTES)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -29,7 +29,7 @@ _LINEAR, _LINEAR_MIPMAP_LINEAR, _REPEAT = 9729, 9987, 10497
 
 def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
     """One self-contained file: header, JSON chunk, binary chunk (glTF 2.0 specification, section 4)."""
-    document = _Document()
+    document = _Document(any(part.surface is not None for part in parts))
     meshes = [document.add_part(part) for part in parts]
     nodes: list[dict] = [{"name": part.name, "mesh": mesh} for part, mesh in zip(parts, meshes)]
     nodes.append({"name": "camera", "camera": 0})
@@ -77,7 +77,7 @@ def _light(lamp: Lamp) -> dict:
 class _Document:
     """Meshes, materials, textures and the buffer behind them, as they are added."""
 
-    def __init__(self) -> None:
+    def __init__(self, bodies: bool) -> None:
         self.data = bytearray()
         self.extensions: set[str] = set()
         self.content: dict[str, list] = {
@@ -85,7 +85,7 @@ class _Document:
             "samplers": [
                 {"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP},
                 {"magFilter": _LINEAR, "minFilter": _LINEAR_MIPMAP_LINEAR, "wrapS": _REPEAT, "wrapT": _REPEAT},
-            ],
+            ][: 1 + bodies],
         }  # fmt: skip
 
     def add_part(self, part: Part) -> int:

@@ -132,23 +132,28 @@ class Fit:
 
     def materials(self, state: FitState) -> Materials:
         """Full-size maps of the state; the prior's values where there is no surface."""
-        out = _stacked(self.setup.prior.materials)
-        out[self.engine.pixels.numpy()] = state.maps.cpu().numpy()
-        out = out.reshape(*self.setup.photo.linear.shape[:2], 5)
-        return Materials(np.ascontiguousarray(out[..., :3]), out[..., 3].copy(), out[..., 4].copy())
+        return replaced(self.setup.prior.materials, self.engine.pixels, state.maps)
 
     def prior_maps(self) -> torch.Tensor:
         """[P, 5] the prior's albedo, roughness and metallic of the surface pixels."""
-        return placed(_stacked(self.setup.prior.materials))[self.engine.pixels]
+        return placed(stacked(self.setup.prior.materials))[self.engine.pixels]
 
     def _photo(self) -> torch.Tensor:
         return placed(np.ascontiguousarray(self.setup.photo.linear.reshape(-1, 3)))
 
 
-def _stacked(materials: Materials) -> Array:
+def stacked(materials: Materials) -> Array:
     """[H * W, 5] float32 albedo, roughness, metallic."""
     maps = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
     return np.concatenate(maps, -1).reshape(-1, 5).astype(np.float32)
+
+
+def replaced(materials: Materials, pixels: torch.Tensor, maps: torch.Tensor) -> Materials:
+    """The materials with maps [P, 5] in the place of those pixels."""
+    out = stacked(materials)
+    out[pixels.numpy()] = maps.cpu().numpy()
+    out = out.reshape(*materials.roughness.shape, 5)
+    return Materials(np.ascontiguousarray(out[..., :3]), out[..., 3].copy(), out[..., 4].copy())
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Environment map optimisation (paper, Progressive Differentiable Rendering)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,17 +52,15 @@ def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | Non
 def envmap_field(settings: LightSettings, *, seed: int = 0, start: torch.Tensor | None = None) -> nn.Module:
     """A fresh field of the kind the settings name; texels begin at `start`, a map [h, 2h, 3]."""
     torch.manual_seed(seed)
-    if settings.field == "mlp":
-        return EnvmapMLP().to(torch_device())
-    if settings.field == "mlp-uv":
-        return EnvmapMLP(coordinates="uv").to(torch_device())
-    if settings.field == "sh":
-        return EnvmapSH(3).to(torch_device())
-    if settings.field == "texels":
-        if start is None:
-            start = torch.full((settings.height, 2 * settings.height, 3), settings.start)
-        return EnvmapTexels(placed(resize_envmap(start, settings.height)))
-    raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
+    if start is None:
+        start = torch.full((settings.height, 2 * settings.height, 3), settings.start)
+    fresh: dict[str, Callable[[], nn.Module]] = {
+        "mlp": EnvmapMLP, "mlp-uv": lambda: EnvmapMLP(coordinates="uv"),
+        "texels": lambda: EnvmapTexels(resize_envmap(start, settings.height)), "sh": EnvmapSH,
+    }  # fmt: skip
+    if settings.field not in fresh:
+        raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
+    return fresh[settings.field]().to(torch_device())
 
 
 def fit_light(

@@ -1,5 +1,7 @@
 """Material properties optimisation (paper, Progressive Differentiable Rendering)."""
 
+from collections.abc import Callable
+
 import torch
 from torch import nn
 
@@ -25,15 +27,14 @@ def material_field(
 ) -> nn.Module:  # fmt: skip
     """A fresh field around `start` [P, 5]; with `inside` [P] bool, roughness and metallic are one value there."""
     torch.manual_seed(seed)
-    if settings.field == "mlp":
-        field: nn.Module = MaterialMLP(start)
-    elif settings.field == "maps":
-        field = MaterialMaps(start)
-    elif settings.field == "unet":
-        field = MaterialUNet(start, pixels, camera.height, camera.width)
-    else:
+    fresh: dict[str, Callable[[], nn.Module]] = {
+        "mlp": lambda: MaterialMLP(start), "maps": lambda: MaterialMaps(start),
+        "unet": lambda: MaterialUNet(start, pixels, camera.height, camera.width),
+    }  # fmt: skip
+    if settings.field not in fresh:
         raise InputError(f"Material field is '{settings.field}'; choose mlp, maps or unet.")
-    return (field if inside is None else Unified(field, inside)).to(start.device)
+    field = fresh[settings.field]().to(start.device)
+    return field if inside is None else Unified(field, inside)
 
 
 def fit_materials(

@@ -113,8 +113,7 @@ class RenderScene:
 
         Continued planes follow the means of the maps, and so do their gradients. The scene keeps materials and light.
 
-        albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32 torch tensors on
-            `buffers.torch_device()`, where the answer is, too.
+        albedo: [H, W, 3]; roughness, metallic: [H, W]; envmap: [h, 2h, 3]. Float32, on `buffers.torch_device()`.
         spp: samples per pixel of the image; its gradient uses as many, with another seed. max_depth: as in `render`.
         """
         import drjit as dr
