@@ -34,6 +34,7 @@ class DropSettings:
 DEFAULT = DropSettings()
 
 
+UNSEEN = "What fell came to rest where the camera does not look; try another place, height or seed."
 Mesh = str | Path | MeshModel
 """A file, or what `meshes.read_model` made of it."""
 Places = tuple[float, float] | Sequence[tuple[float, float]]
@@ -71,6 +72,8 @@ def drop(
         if poses is None or moves(poses, frame, wanted.metres):
             last, poses = falling.at(frame), frame
         film.append(last)
+    if not _in_view(scene, last):
+        film[-1] = warned(last, UNSEEN)
     return film
 
 
@@ -99,11 +102,14 @@ def settle(scene: Scene, meshes: Sequence[Mesh], at: Places, options: Drop | Non
             f"After {DEFAULT.longest:g} seconds not everything that fell is at rest; it stays where it is then."
         )
     edited = falling.at(poses, gone)
+    return warned(edited, *notes, *[UNSEEN] * (not _in_view(scene, edited)))
+
+
+def _in_view(scene: Scene, edited: Scene) -> bool:
+    """Whether the picture shows a vertex of what the edited scene has more, were nothing before it."""
     size = scene.camera.width, scene.camera.height
-    seen = (project(body.vertices, scene.camera) for body in edited.bodies[len(scene.bodies) :])
-    if not any(((depth > 0) & ((place > 0) & (place < size)).all(-1)).any() for place, depth in seen):
-        notes.append("What fell came to rest where the camera does not look.")
-    return warned(edited, *notes)
+    places = (project(body.vertices, scene.camera) for body in edited.bodies[len(scene.bodies) :])
+    return any(((depth > 0) & ((place > 0) & (place < size)).all(-1)).any() for place, depth in places)
 
 
 @dataclass(frozen=True)
