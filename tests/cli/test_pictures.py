@@ -108,6 +108,15 @@ def test_relight_by_map_lamp_and_frames(run, folder, tmp_path):
     assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == [f"{k:04d}.png" for k in range(3)]
 
 
+@pytest.mark.parametrize("factor, notes", [(0.5, 0), (1, 1)])
+def test_a_film_is_judged_by_the_frame_that_changes_most(run, folder, tmp_path, monkeypatch, factor, notes):
+    photo = load_scene(folder / "a.scene").photo.original
+    made = lambda scene, film, **_: (photo * np.float32(one) for _, one in zip(film, (1, factor, 1)))  # noqa: E731
+    monkeypatch.setattr("materialist.edits.composite.composite.pictures", made)
+    relight = ("relight", folder / "a.scene", "--rotate", 360, "--frames", 3, "--json", "-o", tmp_path / "turn")
+    assert str(facts(run(*relight)[1])["warnings"]).count("of 255 levels") == notes
+
+
 def test_select_writes_a_mask_that_edit_reads(run, folder, tmp_path):
     select = ["select", folder / "a.scene"]
     code, shown, err = run(*select, "--mask", folder / "block.png", "-o", tmp_path / "m.png", "--json")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edit_scenes import flat_scene
 
-from materialist.edits.core.notes import effect_notes
+from materialist.edits.core.notes import effect_notes, mean_change
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light import presets
 from materialist.edits.light.relight import (
@@ -171,8 +171,8 @@ def test_lights_are_environment_maps():
 
 def test_a_light_without_effect_is_named_and_nothing_else():
     dimmed, photo = relight(SCENE, ambient=0.5), SCENE.photo.original
-    (note,) = effect_notes(SCENE, dimmed, photo * np.float32(0.99))
+    (note,) = effect_notes(SCENE, dimmed, mean_change(SCENE, photo * np.float32(0.99)))
     assert "of 255 levels" in note and "lamp" in note
-    assert effect_notes(SCENE, dimmed, photo * np.float32(0.5)) == []
+    assert effect_notes(SCENE, dimmed, mean_change(SCENE, photo * np.float32(0.5))) == []
     painted = edit(SCENE, np.ones(SCENE.depth.shape, bool), hue=120)
-    assert effect_notes(SCENE, painted, photo) == []
+    assert effect_notes(SCENE, painted, mean_change(SCENE, photo)) == []

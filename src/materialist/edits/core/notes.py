@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edits.core.renderer import is_relit
 from materialist.types import Array, Scene
 
 LITTLE = 5 / 255
@@ -31,12 +30,15 @@ def warnings_since(scene: Scene, edited: Scene) -> list[str]:
     return list(dict.fromkeys(edited.report.warnings[len(scene.report.warnings) :]))
 
 
-def effect_notes(scene: Scene, edited: Scene, picture: Array) -> list[str]:
-    """What to say of a composite [H0, W0, 3] linear under another light that hardly differs from the photo."""
-    if not is_relit(scene, edited):
-        return []
-    change = float(np.abs(linear_to_srgb(picture) - linear_to_srgb(scene.photo.original)).mean())
-    if change >= LITTLE:
+def mean_change(scene: Scene, picture: Array) -> float:
+    """How much a composite [H0, W0, 3] linear differs from the photo, sRGB-encoded."""
+    return float(np.abs(linear_to_srgb(picture) - linear_to_srgb(scene.photo.original)).mean())
+
+
+def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
+    """What to say of another light whose picture, or most changed frame, has no more than that `mean_change`."""
+    asked = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
+    if change >= LITTLE or not any(step["kind"] == "light" for step in asked):
         return []
     return [
         f"The new light changes the picture by {255 * change:.1f} of 255 levels in the mean: the light that was found "
