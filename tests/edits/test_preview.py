@@ -38,6 +38,16 @@ def test_light_change_agrees_with_the_path_tracer(preview):
     assert psnr(preview.render(preview.scene), traced(preview.scene)) > 30
 
 
+def test_a_coarse_light_is_near_and_leaves_nothing_behind(preview):
+    one, other = (relight(preview.scene, sun=(azimuth, 40.0), ambient=0.5) for azimuth in (60.0, -60.0))
+    full = preview.render(one)
+    preview.render(other)
+    rough = [preview.render(one, coarse=True) for _ in range(2)][-1]
+    assert psnr(rough, full) > 28 and (rough != full).any()
+    np.testing.assert_array_equal(preview.render(one), full)
+    np.testing.assert_array_equal(preview.render(one, coarse=True), full)  # known by now
+
+
 def test_nothing_changed_is_the_photo(preview):
     same = edit(preview.scene, MASK, hue=0.0)
     np.testing.assert_array_equal(preview.picture(same), preview.scene.photo.linear)

@@ -93,6 +93,20 @@ def test_the_photo_is_seen_as_long_as_a_key_is_held(page, running):
     page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
 
 
+def test_light_that_was_dragged_is_made_again_at_rest(page, running):
+    opened(page, running[0])
+    page.get_by_role("tab", name="Light").click()
+    page.locator("#lights button").nth(5).click()
+    page.wait_for_selector("#steps >> text=sunset")
+    page.evaluate("""() => { window.seen = 0; new MutationObserver(() => window.seen++).observe(
+        document.querySelector('#stage .photo'), {attributes: true, attributeFilter: ['src']}); }""")
+    move(page, "rotate", 90)
+    page.wait_for_function("window.seen === 2")
+    page.get_by_role("button", name="Remove: edit 1").click()
+    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
+    assert not page.errors
+
+
 def test_selecting_by_clicks(page, running):
     opened(page, running[0])
     click_photo(page, 0.39, 0.5)

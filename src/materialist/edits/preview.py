@@ -66,6 +66,7 @@ class Preview:
         self._skies = np.setdiff1d(np.arange(scene.depth.size), self._pixels)
         self._tables = Tables(*(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular")))
         self._other: tuple[Array, Tables] | None = None
+        self._passed_on = scene.rerender
         self._base = self._image(self._shaded(scene.materials, self._tables), self._sky(scene.envmap))
 
     @cached_property
@@ -93,21 +94,22 @@ class Preview:
         """Trace the next part of what another light will need, a second or so; False where all is there."""
         return self._quick.trace_next() or self._engine.cache.trace_next()
 
-    def render(self, edited: Scene) -> Array:
+    def render(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
 
+        `coarse`: another light by a seventh of the rays, surfaces passing on what they did in the picture before.
         Raises InputError when its geometry is not that of the scene this preview was built for.
         """
         if edited.geometry is not self.scene.geometry:
             raise InputError("The preview was built for another geometry; build one for this scene.")
         edited = self._seen(edited)
         fitted = np.array_equal(edited.envmap, self.scene.envmap)
-        shaded = self._shaded(edited.materials, self._tables) if fitted else self._relit(edited)
+        shaded = self._shaded(edited.materials, self._tables) if fitted else self._relit(edited, coarse)
         return self._image(shaded, self._sky(edited.envmap))
 
-    def picture(self, edited: Scene) -> Array:
+    def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""
-        picture, base = self.render(edited), self._base
+        picture, base = self.render(edited, coarse=coarse), self._base
         differs = (picture != base).any(-1)
         changed = changed_pixels(self.scene, edited) & differs
         return onto_working(self.scene.photo, Layers(base, picture, differs, changed, is_relit(self.scene, edited)))
@@ -124,16 +126,20 @@ class Preview:
         light = edited.envmap / ambient if ambient > LEAST_AMBIENT else self.scene.envmap
         return replace(edited, envmap=(light * brought).astype(np.float32))
 
-    def _relit(self, edited: Scene) -> torch.Tensor:
+    def _relit(self, edited: Scene, coarse: bool) -> torch.Tensor:
         """[P, 3] under another light, which surfaces pass on once; its tables are kept until there is a third light."""
         from materialist.bsdf.disney import combine
 
-        if self._other is None or not np.array_equal(edited.envmap, self._other[0]):
-            first = self._quick.gather(edited.envmap, None)
-            passed_on = self._image(self._shaded(edited.materials, first), self._sky(edited.envmap))
-            self._other = (edited.envmap, self._engine.cache.gather(edited.envmap, passed_on))
+        if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
+            tables = self._other[1]
+        else:
+            tables = self._quick.gather(edited.envmap, self._passed_on if coarse else None)
+            self._passed_on = self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
+            if not coarse:
+                tables = self._engine.cache.gather(edited.envmap, self._passed_on)
+                self._other = (edited.envmap, tables)
         albedo, roughness, metallic = self._maps(edited.materials)
-        return combine(albedo, metallic[:, None], *self._filtered(self._other[1], roughness).split(3, -1))
+        return combine(albedo, metallic[:, None], *self._filtered(tables, roughness).split(3, -1))
 
     def _filtered(self, tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
         """[P, 9]: D(R), S0(R) and S1(R) (see `transport.shading`) of each pixel's roughness [P], filtered.

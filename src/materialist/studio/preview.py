@@ -86,7 +86,9 @@ class LivePreview:
         """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
         return _kept(self._panes, (step,), lambda: glass.checked(self.scene, step))
 
-    def picture(self, steps: tuple[Step, ...], client: glass.GlassClient | None = None) -> Array:
+    def picture(
+        self, steps: tuple[Step, ...], client: glass.GlassClient | None = None, *, coarse: bool = False
+    ) -> Array:  # fmt: skip
         """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
 
         Glass comes from the client, or is sketched where the client has no pane yet.
@@ -98,7 +100,7 @@ class LivePreview:
         shaded = edited
         if edited.geometry is not self.scene.geometry:  # the cache knows nothing of what was taken away
             shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
-        picture = _THREAD.submit(preview.picture, shaded).result()
+        picture = _THREAD.submit(preview.picture, shaded, coarse=coarse).result()
         if edited.photo is not self.scene.photo:
             filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
             picture = np.where(filled, edited.photo.linear, picture)

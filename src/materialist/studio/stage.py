@@ -19,21 +19,22 @@ from materialist.studio.tasks import before_of
 from materialist.types import Array, Scene
 
 
-def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
+def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) -> dict[str, Any]:
     """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
 
     Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
     page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
     reason on it. The glass of the current step is asked for; `waiting` says whether its picture is still to come. The
     page ignores a picture with an older `serial` than the one it shows. `before` is the photo, shown while a key is
-    held; empty where `picture` is the photo itself, which the page keeps for live previews (None).
+    held; empty where `picture` is the photo itself, which the page keeps for live previews (None). At rest the page
+    asks for the full picture after a `coarse` one.
     """
     serial = time()
     with session.lock:
         live, edits, final = session.live, session.edits, session.final
         masks, client = session.selection.pictures, session.glass
     shown = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
-    shown |= {"serial": serial, "before": None, **masks}
+    shown |= {"serial": serial, "before": None, "coarse": False, **masks}
     if live is None:
         return shown
     camera, steps = live.scene.camera, edits.active if with_edits else ()
@@ -51,13 +52,13 @@ def stage(session: Session, *, with_edits: bool = True) -> dict[str, Any]:
         del shown["picture"]
         return {**shown, "badge": "Getting the live preview ready …"}
     try:
-        linear = live.picture(steps, client)
+        linear = live.picture(steps, client, coarse=coarse)
     except MaterialistError as error:
         photo, why = jpeg_url(live.scene.photo.linear), session.shown(str(error))
         badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
         return {**shown, "picture": photo, "before": "", "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off
-    shown |= {"before": None if steps else "", "badge": badge, "waiting": waiting}
+    shown |= {"before": None if steps else "", "badge": badge, "waiting": waiting, "coarse": coarse}
     return {**shown, "picture": jpeg_url(linear)}
 
 

@@ -62,10 +62,10 @@ def wire(context: PageContext) -> None:
 
     parts["lights"].select(choose, None, context.picture_parts, **LIVE)
     context.on_upload("own_map", _uploaded)
-    context.bind("rotate", "ambient")
+    context.bind("rotate", "ambient", coarse=True)
     sunny = [parts[name] for name in ("sun_on", "azimuth", "elevation", "sun_power")]
     for part in sunny:
-        context.on(part.input, _sun, sunny)
+        context.on(part.input, _sun, sunny, coarse=True)
     context.on(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
 
 

@@ -90,9 +90,9 @@ class PageContext:
         shown = gr.Error(text, duration=SETTINGS.message_seconds, title=title, print_exception=False)
         return error if isinstance(error, gr.Error) else shown
 
-    def picture(self, session: Session) -> dict[Any, Any]:
+    def picture(self, session: Session, coarse: bool = False) -> dict[Any, Any]:
         """Updates after a change of edits."""
-        return {self["stage"]: stage(session), **self.listed(session)}
+        return {self["stage"]: stage(session, coarse=coarse), **self.listed(session)}
 
     def listed(self, session: Session) -> dict[Any, Any]:
         """The list of edits, and the commands that do the same."""
@@ -123,9 +123,9 @@ class PageContext:
 
     def on(
         self, event: Any, change: Callable[..., Any], inputs: Any = None, *, everything: bool = False,
-        more: tuple[Any, ...] = (), **how: Any,
+        coarse: bool = False, more: tuple[Any, ...] = (), **how: Any,
     ) -> Any:  # fmt: skip
-        """Let an event call change(session, *values of inputs), and show the picture, or everything.
+        """Let an event call change(session, *values of inputs), and show the (coarse) picture, or everything.
 
         `change` returns further updates, of the components `more`, or False where nothing has changed. `how` are
         arguments of Gradio's event beside LIVE.
@@ -137,15 +137,15 @@ class PageContext:
             updates = change(session, *values)
             if updates is False:
                 return {}
-            return {**(self.everything(session) if everything else self.picture(session)), **(updates or {})}
+            return {**(self.everything(session) if everything else self.picture(session, coarse)), **(updates or {})}
 
         outputs = [*(self.all_parts if everything else self.picture_parts), *more]
         return event(run, inputs, outputs, **{**LIVE, **how})
 
-    def bind(self, *names: str) -> None:
+    def bind(self, *names: str, coarse: bool = False) -> None:
         """Let controls set the options that they stand for."""
         for name in names:
-            self.on(self[name].input, partial(set_option, name), self[name])
+            self.on(self[name].input, partial(set_option, name), self[name], coarse=coarse)
 
     def on_upload(self, name: str, change: Callable[[Session, Path], Any], **how: Any) -> None:
         """Let an uploaded file call change(session, file); a file that is refused is taken off the page."""

@@ -8,7 +8,7 @@ const outline = element.querySelector(".outline");
 const badge = element.querySelector(".badge");
 const marks = element.querySelector(".marks");
 const cross = element.querySelector(".cross");
-let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0, plain = "";
+let width = 0, height = 0, maskUrl = "", down = null, path = [], cursor = null, serial = 0, plain = "", rest;
 let zoom = 1, left = 0, top = 0, grip = null;  // the sheet's size and place, shares of the view's
 const fingers = new Map();
 
@@ -36,6 +36,8 @@ function show() {
     view.dataset.selected = v.fill ? "yes" : "";
   }
   if (v.waiting !== undefined) view.dataset.waiting = v.waiting ? "yes" : "";
+  clearTimeout(rest);
+  if (v.coarse) rest = setTimeout(() => trigger("follow", {}), 300);
   if (v.waiting) trigger("follow", {});
   if (v.lamps !== undefined) {
     const r = Math.max(width, height) / 60;
