@@ -122,7 +122,7 @@ def test_white_light_first(room, settings):
     assert [s["name"] for s in state.stages][:3] == ["roughness+metallic", "light", "albedo"]
     moved = (state.maps[:, 3:] - 0.5).abs()
     assert 0 < float(moved.max()) < 0.2
-    assert not state.maps[:, :3].equal(fit.prior_maps()[:, :3])
+    assert not state.maps[:, :3].equal(fit.start().maps[:, :3])
 
 
 def test_papers_first_stage_leaves_albedo_alone(room):
@@ -130,7 +130,7 @@ def test_papers_first_stage_leaves_albedo_alone(room):
     settings = replace(PAPER.at_most(3), materials=replace(PAPER.materials, stages=(stage,)))
     fit = room.fit(settings)
     state = fit.run()
-    prior = fit.prior_maps()
+    prior = fit.start().maps
     torch.testing.assert_close(state.maps[:, :3], prior[:, :3])
     expected = 0.7 * prior[:, 3:] + 0.2
     assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
@@ -141,7 +141,7 @@ def test_the_unet_starts_from_the_same_maps(room):
     settings = replace(PAPER, materials=replace(PAPER.materials, field="unet")).at_most(1)
     fit = room.fit(settings)
     state = fit.run()
-    expected = 0.7 * fit.prior_maps()[:, 3:] + 0.2
+    expected = 0.7 * fit.start().maps[:, 3:] + 0.2
     assert float((state.maps[:, 3:] - expected).abs().max()) < 0.05
 
 

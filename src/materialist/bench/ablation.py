@@ -22,7 +22,7 @@ from materialist import metrics
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
-from materialist.fit.invert import FitSetup, prepare, replaced, stacked
+from materialist.fit.invert import FitSetup, prepare, replaced
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
@@ -105,10 +105,9 @@ class _Photo:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
         prepared, envmap = self.fitted
         engine: Any = prepared.fit.engine
-        prior = placed(stacked(self.prior.materials))
+        prior = prepared.fit.start().maps
         if blind:
             prior[:, 3:] = 0.5
-        prior = prior[engine.pixels]
         held = prior if blind else remapped(prior)
         problem, photo = engine.material_problem(envmap), self.photo[engine.pixels]
         seen: list[float] = []

@@ -1,9 +1,8 @@
 """`bench export`: how near the pictures that other programs make of an export come to the photo.
 
 A photo is inverted and exported, and the files are rendered from its camera: Mitsuba loads its own folder; GLB and USD
-are read back (trimesh, usd-core) and rendered by Mitsuba's `principled` under the light that lies beside them; Cycles
-renders what Blender, where there is one, builds. PSNR, sRGB-encoded, against the photo and against our re-rendering,
-which `another seed` is, too. sheet.png has the photo, the re-rendering and each picture.
+are read back and rendered by Mitsuba's `principled` under the light beside them; Cycles renders what Blender builds.
+PSNR against the photo and against our re-rendering, which `another seed` is, too; sheet.png has these and each picture.
 """
 
 import tempfile

@@ -2,8 +2,7 @@
 
 Wall seconds, each device in a process of its own; with `--device cpu` or `cuda` one of them in this process. `bundled
 network` is the median forward pass at 512 x 512 (the paper: 18 ms on its card), `step` one of the material fit with
-gradients, by cached transport and by Mitsuba's PRB (64 spp, depth 4); edit and glass are of what `click` selects, and
-brought into the photo. Stages that render compile kernels which the computer has not met: quote a second run.
+gradients, cached and by Mitsuba's PRB; edit and glass are of what `click` selects. Quote a second run: one compiles.
 """
 
 import json

@@ -56,7 +56,6 @@ def write_result(
     command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
     from materialist.edits.composite.composite import write_composite
-    from materialist.edits.core.notes import mean_change
     from materialist.edits.core.renderer import paths_for
 
     start, spp = time.monotonic(), rendering.spp or paths_for(scene, edited)
@@ -67,8 +66,7 @@ def write_result(
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=run.force)
     told = {"image": str(output), "spp": spp, "seconds": time.monotonic() - start}
-    change = 1.0 if rendering.full_render else mean_change(scene, picture)
-    finish(command, scene, edited, picture, change, rendering, run, [*lines, f"Look at {output}"], told)
+    finish(command, scene, edited, picture, rendering, run, [*lines, f"Look at {output}"], told)
 
 
 def write_film(
@@ -80,13 +78,13 @@ def write_film(
     from materialist.edits.core.notes import mean_change
     from materialist.io.video import write_frames
 
-    start, last, change = time.monotonic(), {"scene": scene}, 1.0 if rendering.full_render else 0.0
+    start, last, change = time.monotonic(), {"scene": scene}, 0.0
 
     def kept(name: str, items: Iterable[Any]) -> Iterator[Any]:
         nonlocal change
         for item in items:
             last[name] = item
-            if name == "picture" and change < 1:
+            if name == "picture" and not rendering.full_render:
                 change = max(change, mean_change(scene, item))
             yield item
 
@@ -97,18 +95,20 @@ def write_film(
         )  # fmt: skip
         write_frames(output, kept("picture", made), fps=fps, force=run.force)
     told = {"video": str(output), "frames": frames, "fps": fps, "seconds": time.monotonic() - start}
-    finish(command, scene, last["scene"], last["picture"], change, rendering, run, [f"Look at {output}"], told)
+    finish(command, scene, last["scene"], last["picture"], rendering, run, [f"Look at {output}"], told, change)
 
 
 def finish(
-    command: str, scene: Any, edited: Any, picture: Any, change: float, rendering: Rendering, run: Run,
-    lines: list[str], told: dict[str, Any],
+    command: str, scene: Any, edited: Any, picture: Any, rendering: Rendering, run: Run, lines: list[str],
+    told: dict[str, Any], change: float | None = None,
 ) -> None:  # fmt: skip
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
-    from materialist.edits.core.notes import effect_notes, warnings_since
+    from materialist.edits.core.notes import effect_notes, mean_change, warnings_since
 
-    save, warnings = rendering.save, [*warnings_since(scene, edited), *effect_notes(scene, edited, change)]
+    save, warnings = rendering.save, warnings_since(scene, edited)
+    if not rendering.full_render:
+        warnings += effect_notes(scene, edited, mean_change(scene, picture) if change is None else change)
     lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
         mt.save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)

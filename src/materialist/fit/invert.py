@@ -70,7 +70,8 @@ class Fit:
     def start(self) -> FitState:
         """The prior's maps under a white light."""
         height = self.setup.envmap_height
-        return FitState(self.prior_maps(), np.ones((height, 2 * height, 3), np.float32))
+        maps = placed(stacked(self.setup.prior.materials))[self.engine.pixels]
+        return FitState(maps, np.ones((height, 2 * height, 3), np.float32))
 
     def run(self) -> FitState:
         """Fit; returns maps and light."""
@@ -133,10 +134,6 @@ class Fit:
     def materials(self, state: FitState) -> Materials:
         """Full-size maps of the state; the prior's values where there is no surface."""
         return replaced(self.setup.prior.materials, self.engine.pixels, state.maps)
-
-    def prior_maps(self) -> torch.Tensor:
-        """[P, 5] the prior's albedo, roughness and metallic of the surface pixels."""
-        return placed(stacked(self.setup.prior.materials))[self.engine.pixels]
 
     def _photo(self) -> torch.Tensor:
         return placed(np.ascontiguousarray(self.setup.photo.linear.reshape(-1, 3)))
