@@ -51,11 +51,6 @@ def log_total_variation(log_map: torch.Tensor) -> torch.Tensor:
     return (log_map[1:] - log_map[:-1]).abs().mean() + (log_map - log_map.roll(1, 1)).abs().mean()
 
 
-def log_chroma(log_map: torch.Tensor, warm_cool: float) -> torch.Tensor:
-    """Mean colourfulness of log radiance [..., 3]: lights are white, often warm or cool, hardly ever red or green.
-
-    Along black bodies the logarithm of green is about the mean of red's and blue's: leaving that line costs fully,
-    moving on it `warm_cool` as much.
-    """
-    red, green, blue = log_map.unbind(-1)
-    return ((green - (red + blue) / 2).abs() + warm_cool * (red - blue).abs()).mean()
+def log_chroma(log_map: torch.Tensor) -> torch.Tensor:
+    """Mean squared colourfulness of log radiance [..., 3], 0 for grey; squared, so that small lamps have no colour."""
+    return (log_map - log_map.mean(-1, keepdim=True)).square().sum(-1).mean()

@@ -37,9 +37,8 @@ class LightSettings:
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
-    chroma: float = 0.0  # weight of the colourfulness of log radiance; larger: whiter; tuned on 5 scenes
+    chroma: float = 0.0  # weight of the squared colourfulness of the same; larger: whiter; tuned on 12 scenes
     prior: float = 0.0  # weight of the distance from a predicted light, over its scale of error; tuned on 14 scenes
-    warm_cool: float = 0.3  # part of that for a warm or cool light, not a red or green one; by eye, and on 5 scenes
     start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
     start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
 
@@ -106,7 +105,7 @@ DEFAULT = FitSettings(
         sky=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
-        chroma=0.1,
+        chroma=0.5,
         prior=0.01,
     ),
     materials=MaterialSettings(
