@@ -64,6 +64,7 @@ def test_log_total_variation_equals_a_loop():
     assert float(log_total_variation(log_map)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
 
 
-def test_chroma_is_the_spread_of_the_channels():
+def test_chroma_is_the_spread_of_the_channels_and_its_square():
     log_map = torch.tensor([[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], [[2.0, 1.0, 0.0], [-1.0, 2.0, -1.0]]])
-    assert float(log_chroma(log_map)) == pytest.approx((0 + 0 + 2 + 6) / 4)
+    assert float(log_chroma(log_map, 0.0)) == pytest.approx((2**0.5 + 6**0.5) / 4, abs=1e-3)
+    assert float(log_chroma(log_map, 3.0)) == pytest.approx((2**0.5 + 6**0.5 + 3 * (2 + 6)) / 4, abs=1e-3)

@@ -86,7 +86,7 @@ def fit_light(
         if settings.smooth or settings.chroma:
             change = envmap.clamp_min(1e-6).log() - before
             value = value + settings.smooth * log_total_variation(change)
-            value = value + settings.chroma * log_chroma(change)
+            value = value + settings.chroma * log_chroma(change, settings.chroma_square)
             if trust is not None:
                 value = value + settings.prior * (trust * change.abs()).mean()
         return value

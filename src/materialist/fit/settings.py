@@ -37,7 +37,8 @@ class LightSettings:
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
-    chroma: float = 0.0  # weight of the squared colourfulness of the same; larger: whiter; tuned on 12 scenes
+    chroma: float = 0.0  # weight of the colourfulness of the same; larger: whiter; tuned on 12 scenes
+    chroma_square: float = 5.0  # weight of its square beside it; larger: no saturated lamps; tuned on 12 scenes
     prior: float = 0.0  # weight of the distance from a predicted light, over its scale of error; tuned on 14 scenes
     start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
     start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
@@ -105,7 +106,7 @@ DEFAULT = FitSettings(
         sky=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
-        chroma=0.5,
+        chroma=0.05,
         prior=0.01,
     ),
     materials=MaterialSettings(
