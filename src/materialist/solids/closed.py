@@ -26,6 +26,7 @@ class ClosedSettings:
     margin: int = 3  # pixels by which an object that the frame cuts goes on, so that its wall stays out of view
     grid: int = 300  # grid points along a small object; larger objects have one a pixel
     finest: int = 6  # grid points along a pixel, at most
+    clear: float = 0.02  # pixels by which its outline keeps from the points of the grid; derived: no tiny triangles
     nearest: float = 0.995  # the back keeps before this part of the depth behind the object; tuned by eye
     thin: float = 0.004  # least thickness, part of the object's size: front and back never touch; tuned by eye
     least: float = 1e-4  # the same at the border, part of the depth
@@ -141,10 +142,10 @@ def _closed(view: _View, camera: Camera) -> Shell:
     factor = int(np.clip(round(DEFAULT.grid / max(known.shape)), 1, DEFAULT.finest))
     size = (known.shape[1] * factor, known.shape[0] * factor)
     within = cv2.resize(edge.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
-    found = region(_ended(within))
-    if not len(found.faces):
+    points, faces = region(_ended(within))
+    if not len(faces):
         raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
-    place = (found.points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
+    place = (points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
     at = lambda values: _sampled(values, place, order=1)  # noqa: E731
     # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
     # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
@@ -163,7 +164,7 @@ def _closed(view: _View, camera: Camera) -> Shell:
     outward = np.stack([-at(right), -at(down)], -1)
     place = place + np.array([view.left, view.top])
     sheets = Sheets(place, own, through, front_normal, back_normal, outward)
-    return closed(found, sheets, camera)
+    return closed(faces, sheets, camera)
 
 
 def _between(normal: Array, known: Array, place: Array) -> Array:
@@ -180,10 +181,9 @@ def _room(view: _View) -> Array:
 
 
 def _ended(field: Array) -> Array:
-    """The field with its outermost points negative."""
+    """The field with its outermost points negative, and none so near 0 that its border meets a grid point."""
     field[[0, -1]], field[:, [0, -1]] = np.minimum(field[[0, -1]], -1), np.minimum(field[:, [0, -1]], -1)
-    # No crossing exactly on a grid point.
-    return np.where(np.abs(field) < 1e-4, 1e-4, field)
+    return np.copysign(np.maximum(np.abs(field), DEFAULT.clear), field)
 
 
 def _sampled(values: Array, place: Array, order: int = 3) -> Array:

@@ -7,20 +7,6 @@ import numpy as np
 from materialist.camera import rays_through, unit
 from materialist.types import Array, Camera
 
-CLEAR = 0.04
-"""Part of a cell's side that a crossing keeps from its corners: no two points in one place."""
-# Slots of a cell: corners 0 to 3 clockwise from the top left (y down), then the crossings of its top, right, bottom
-# and left side, 4 to 7. Triangles turn as top left, bottom left, bottom right do: counter-clockwise with y up.
-_POLYGONS: dict[int, tuple[tuple[int, ...], ...]] = {
-    1: ((0, 7, 4),), 2: ((1, 4, 5),), 4: ((2, 5, 6),), 8: ((3, 6, 7),),
-    3: ((0, 7, 5, 1),), 6: ((1, 4, 6, 2),), 12: ((2, 5, 7, 3),), 9: ((3, 6, 4, 0),),
-    5: ((0, 7, 4), (2, 5, 6)), 10: ((1, 4, 5), (3, 6, 7)),
-    7: ((1, 0, 7, 6, 2),), 14: ((2, 1, 4, 7, 3),), 13: ((3, 2, 5, 4, 0),), 11: ((0, 3, 6, 5, 1),),
-    15: ((0, 3, 2, 1),),
-}  # fmt: skip
-"""Corner pattern (bit k: corner k is inside) -> polygons; corners across a diagonal stay apart."""
-
-
 class Shell(NamedTuple):
     """A closed surface."""
 
@@ -49,57 +35,23 @@ def inside_out(shell: Shell) -> Shell:
     return Shell(shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv, True)
 
 
-class MeshedRegion(NamedTuple):
-    """A triangulated part of the plane."""
+def region(field: Array) -> tuple[Array, Array]:
+    """The region where `field` [H, W] > 0, as points [V, 2] (x, y) and faces [F, 3]; linear between the grid points.
 
-    points: Array
-    """[V, 2] float64 (x, y), y down."""
-    faces: Array
-    """[F, 3] int64, counter-clockwise seen with y up."""
-    border: Array
-    """[B, 2] int64 edges with one face only, in that face's direction; every vertex on one has one in and one out."""
-
-
-def region(field: Array) -> MeshedRegion:
-    """The region where `field` [H, W] > 0, interpolated linearly between the grid points (x, y) = (column, row).
-
-    Values beyond the grid count as negative at once: a caller who wants a smooth end there leaves a margin.
+    Faces are counter-clockwise seen with y up. No value of the field is 0. Values beyond the grid count as negative at
+    once: a caller who wants a smooth end there leaves a margin.
     """
-    height, width = field.shape
-    inside = field > 0
-    points = np.argwhere(inside)[:, ::-1].astype(np.float64)
-    corner = np.full((height, width), -1, np.int64)
-    corner[inside] = np.arange(len(points))
-    across, found_x = _crossings(field, inside, len(points))
-    down, found_y = _crossings(field.T, inside.T, len(points) + len(found_x))
-    points = np.concatenate([points, found_x, found_y[:, ::-1]])
-    down = down.T  # [H-1, W] vertex on the side between (i, j) and (i+1, j)
-    slots = np.stack(
-        [corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1],
-         across[:-1], down[:, 1:], across[1:], down[:, :-1]], -1,
-    )  # fmt: skip
-    kind = inside[:-1, :-1] + 2 * inside[:-1, 1:] + 4 * inside[1:, 1:] + 8 * inside[1:, :-1]
-    faces = []
-    for pattern, polygons in _POLYGONS.items():
-        cells = slots[kind == pattern]
-        for polygon in polygons:
-            fan = [(polygon[0], polygon[k], polygon[k + 1]) for k in range(1, len(polygon) - 1)]
-            faces.append(cells[:, np.array(fan)].reshape(-1, 3))
-    joined = np.concatenate(faces)
-    edges = np.concatenate([joined[:, [0, 1]], joined[:, [1, 2]], joined[:, [2, 0]]])
-    lone = ~np.isin(edges[:, 0] * len(points) + edges[:, 1], edges[:, 1] * len(points) + edges[:, 0])
-    return MeshedRegion(points, joined, edges[lone])
+    from trimesh import Trimesh
+    from trimesh.intersections import slice_faces_plane
 
-
-def _crossings(field: Array, inside: Array, first: int) -> tuple[Array, Array]:
-    """Vertices on horizontal sides: their numbers [H, W-1] from `first` on, -1 for none, and (x, y) [n, 2]."""
-    crossed = inside[:, :-1] != inside[:, 1:]
-    number = np.full(crossed.shape, -1, np.int64)
-    number[crossed] = first + np.arange(crossed.sum())
-    rows, columns = np.nonzero(crossed)
-    left, right = field[rows, columns], field[rows, columns + 1]
-    part = np.clip(left / (left - right), CLEAR, 1 - CLEAR)
-    return number, np.stack([columns + part, rows], -1).astype(np.float64)
+    y, x = np.indices(field.shape)
+    corner = np.arange(field.size).reshape(field.shape)
+    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    grid = np.stack([x, y, field], -1).reshape(-1, 3)
+    # Both triangles of a cut side have points of their own there, which Trimesh merges.
+    above = Trimesh(*slice_faces_plane(grid, faces, [0, 0, 1], [0, 0, 0])[:2])
+    return np.asarray(above.vertices[:, :2]), np.asarray(above.faces)
 
 
 class Sheets(NamedTuple):
@@ -119,18 +71,24 @@ class Sheets(NamedTuple):
     """[V, 2] direction (y down) in the picture in which the region ends, on its border."""
 
 
-def closed(region: MeshedRegion, sheets: Sheets, camera: Camera) -> Shell:
-    """The closed surface; its wall has vertices of its own, which look across the rays: it is a silhouette."""
-    count, rim = len(sheets.place), np.unique(region.border)
+def closed(region: Array, sheets: Sheets, camera: Camera) -> Shell:
+    """The closed surface over the faces [F, 3] of a region.
+
+    Its wall has vertices of its own, which look across the rays: it is a silhouette.
+    """
+    count = len(sheets.place)
+    edges = np.concatenate([region[:, [0, 1]], region[:, [1, 2]], region[:, [2, 0]]])
+    border = edges[~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])]
+    rim = np.unique(border)
     index = np.concatenate([np.arange(count), np.arange(count), rim, rim])  # front, back, the wall's two sides
     beyond = np.concatenate([np.zeros(count), sheets.thick, np.zeros(len(rim)), sheets.thick[rim]])
     place = sheets.place[index] + 0.5
     rays = rays_through(place, camera)
     vertices = rays * (sheets.front[index] + beyond / np.linalg.norm(rays, axis=-1))[:, None]
     uv = np.clip(place / [camera.width, camera.height], 0, 1).astype(np.float32)
-    a, b = 2 * count + np.searchsorted(rim, region.border).T
+    a, b = 2 * count + np.searchsorted(rim, border).T
     wall = [np.stack([b, a, a + len(rim)], -1), np.stack([b, a + len(rim), b + len(rim)], -1)]
-    faces = np.concatenate([region.faces, region.faces[:, ::-1] + count, *wall])
+    faces = np.concatenate([region, region[:, ::-1] + count, *wall])
     side = _across(vertices[rim], sheets.outward[rim])
     normals = np.concatenate([sheets.front_normal, sheets.back_normal, side, side])
     return Shell(vertices.astype(np.float32), faces.astype(np.int32), normals.astype(np.float32), uv)
