@@ -32,6 +32,13 @@ QUAD = np.array([[TOP_LEFT, BOTTOM_LEFT, BOTTOM_RIGHT], [TOP_LEFT, BOTTOM_RIGHT,
 """[2, 3] the two triangles of a pixel, counter-clockwise seen from the camera."""
 
 
+def grid_faces(rows: int, columns: int) -> Array:
+    """[F, 3] the triangles of a grid of rows x columns points, counter-clockwise where rows run downwards."""
+    index = np.arange(rows * columns).reshape(rows, columns)
+    cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]], -1)
+    return cells.reshape(-1, 4)[:, QUAD].reshape(-1, 3)
+
+
 def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0) -> Mesh:
     """Turn a depth map into a mesh with clean occlusion boundaries.
 

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from skimage.morphology import convex_hull_image
 
 from materialist.camera import rays_through, unproject
+from materialist.geometry.boundary import grid_faces
 from materialist.geometry.planes import Plane, axes
 from materialist.types import Array, Camera, Mesh
 
@@ -31,7 +32,7 @@ class CompletionSettings:
     one_side: float = 0.9  # share of a plane's pixels on one side of another for the planes to stop at each other
     cells: int = 256  # cells of a continuation along the picture's longer side; at least a pixel each
     rim: float = 0.01  # pixels by which the part beyond the frame keeps clear of it, against round-off
-    most_triangles: int = 8000  # of one plane beyond one side of the frame
+    cell: float = 0.2  # size of a continuation's cells beyond the frame, part of the distance from its middle; by eye
 
 
 DEFAULT = CompletionSettings()
@@ -162,28 +163,34 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
 
 def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     """[T, 3, 3] triangles of the plane outside the view frustum, scene units."""
-    basis = axes(sheet.plane.normal)  # [2, 3] right-handed with the normal: faces the camera
     origin = sheet.points.mean(0)
-    square = sheet.half * np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
+    spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
+    reach = np.arcsinh(sheet.half / spread)
+    # Cells grow with the distance from the middle, from as far away as the visible points are in the mean.
+    along = spread * np.sinh(np.linspace(-reach, reach, 2 * int(np.ceil(reach / DEFAULT.cell)) + 1))
+    places = np.stack(np.meshgrid(along, -along), -1).reshape(-1, 2)
+    rest = origin + places @ axes(sheet.plane.normal), grid_faces(len(along), len(along))
     for wall in walls:
-        square = clip(square, _line(wall, basis, origin))
+        rest = _cut(rest, wall)
     side_x, side_y = (camera.width / 2 + DEFAULT.rim) / camera.focal, (camera.height / 2 + DEFAULT.rim) / camera.focal
     # a . p >= 0 inside the frustum: bottom, left, right, top
-    frustum = np.array([[0.0, 1, -side_y], [1, 0, -side_x], [-1, 0, -side_x], [0, -1, -side_y]])
-    spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
-    pieces = []
+    frustum = np.array([[0.0, 1, -side_y, 0], [1, 0, -side_x, 0], [-1, 0, -side_x, 0], [0, -1, -side_y, 0]])
+    pieces = [np.zeros((0, 3, 3))]
     for inward, touched in zip(frustum, sheet.touches):
-        line = _line(np.append(inward, 0), basis, origin)
         if sheet.bounding or touched:
-            piece = clip(square, -line)
-            pieces.append(triangulate(piece, np.zeros(2), 0.2 * spread, 0.2, DEFAULT.most_triangles))
-        square = clip(square, line)  # what is beyond this side is done; go on with the rest
-    return np.concatenate(pieces or [np.zeros((0, 3, 2))]) @ basis + origin
+            points, faces = _cut(rest, -inward)
+            pieces.append(points[faces])
+        rest = _cut(rest, inward)  # what is beyond this side is done; go on with the rest
+    return np.concatenate(pieces)
 
 
-def _line(half_space: Array, basis: Array, origin: Array) -> Array:
-    """[3] the half-space [4] in coordinates of the plane spanned by basis [2, 3] at origin [3]."""
-    return np.append(basis @ half_space[:3], origin @ half_space[:3] + half_space[3])
+def _cut(surface: tuple[Array, Array], half_space: Array) -> tuple[Array, Array]:
+    """The part of a surface (points [V, 3], faces [F, 3]) in a half-space [4], a . p + b >= 0."""
+    from trimesh.intersections import slice_faces_plane
+
+    normal, offset = half_space[:3], half_space[3]
+    points, faces, _ = slice_faces_plane(*surface, normal, -offset / (normal @ normal) * normal)
+    return points, faces
 
 
 def _patch(sheet: _Sheet, corners: Array, camera: Camera) -> Mesh:
@@ -209,42 +216,3 @@ def join(parts: list[Mesh]) -> Mesh:
     faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32)
     names = ("vertices", "normals", "uv", "face_pixel", "face_plane")
     return replace(parts[0], faces=faces, **{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
-
-
-def clip(polygon: Array, line: Array) -> Array:
-    """The part of a convex polygon [N, 2] where line [3] holds: a x + b y + c >= 0. May be empty, [0, 2]."""
-    if not len(polygon):
-        return polygon
-    value = polygon @ line[:2] + line[2]  # [N]
-    after = np.roll(np.arange(len(polygon)), -1)
-    kept = []
-    for i, j in enumerate(after):
-        if value[i] >= 0:
-            kept.append(polygon[i])
-        if (value[i] >= 0) != (value[j] >= 0):
-            kept.append(polygon[i] + (polygon[j] - polygon[i]) * (value[i] / (value[i] - value[j])))
-    return np.array(kept).reshape(-1, 2) if len(kept) > 2 else np.zeros((0, 2))
-
-
-def triangulate(polygon: Array, centre: Array, smallest: float, growth: float, most: int) -> Array:
-    """[T, 3, 2] triangles that tile a convex polygon [N, 2], in its own winding, finer near `centre` [2].
-
-    An edge is at most max(smallest, growth * distance of the triangle from the centre) long, unless that would take
-    more than `most` triangles. Units of the polygon.
-    """
-    if len(polygon) < 3:
-        return np.zeros((0, 3, 2))
-    fan = np.arange(1, len(polygon) - 1)
-    triangles = np.stack([np.broadcast_to(polygon[0], (len(fan), 2)), polygon[fan], polygon[fan + 1]], 1)
-    while len(triangles) < most:
-        edge = np.linalg.norm(np.roll(triangles, -1, 1) - triangles, axis=-1)  # [T, 3] edge k runs from k to k + 1
-        distance = np.linalg.norm(triangles.mean(1) - centre, axis=-1)
-        large = edge.max(1) > np.maximum(smallest, growth * distance)
-        if not large.any():
-            break
-        order = (edge[large].argmax(1)[:, None] + np.arange(3)) % 3  # the longest edge first
-        a, b, c = np.take_along_axis(triangles[large], order[..., None], 1).transpose(1, 0, 2)
-        middle = (a + b) / 2
-        halves = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
-        triangles = np.concatenate([triangles[~large], halves])
-    return triangles

@@ -5,7 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from materialist.camera import rays_through, unit
+from materialist.geometry.boundary import grid_faces
 from materialist.types import Array, Camera
+
 
 class Shell(NamedTuple):
     """A closed surface."""
@@ -45,12 +47,9 @@ def region(field: Array) -> tuple[Array, Array]:
     from trimesh.intersections import slice_faces_plane
 
     y, x = np.indices(field.shape)
-    corner = np.arange(field.size).reshape(field.shape)
-    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
     grid = np.stack([x, y, field], -1).reshape(-1, 3)
     # Both triangles of a cut side have points of their own there, which Trimesh merges.
-    above = Trimesh(*slice_faces_plane(grid, faces, [0, 0, 1], [0, 0, 0])[:2])
+    above = Trimesh(*slice_faces_plane(grid, grid_faces(*field.shape), [0, 0, 1], [0, 0, 0])[:2])
     return np.asarray(above.vertices[:, :2]), np.asarray(above.faces)
 
 
