@@ -55,13 +55,13 @@ class RenderScene:
             "embree_use_robust_intersections": True,
             "sensor": sensor(camera, look_along(mi)),
             "light": emitter(mi),
-            "surface": _sound(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
+            "surface": seen_shape(mi, part(geometry.mesh, -1), _maps_bsdf(mi, height, width)),
         }
         for k in self.planes:
-            description[f"plane{k}"] = _sound(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
+            description[f"plane{k}"] = seen_shape(mi, part(geometry.mesh, k), _maps_bsdf(mi, 2, 2))
         for k, body in enumerate(bodies):
             bsdf = body_bsdf(body.surface, opaque_bsdf(mi, body.surface))
-            description[f"body{k}"] = _sound(mi, body, bsdf, body_emitter(body.surface))
+            description[f"body{k}"] = seen_shape(mi, body, bsdf, body_emitter(body.surface))
         for k, lamp in enumerate(lamps):
             description[f"lamp{k}"] = sphere(lamp)
         self.mi_scene = mi.load_dict(description)
@@ -214,7 +214,8 @@ def beside_u(normals: Array) -> Array:
     return np.where(along, beside, normals).astype(np.float32)
 
 
-def _sound(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -> Any:
+def seen_shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -> Any:
+    """`shape` of a mesh whose normals no shading frame trips over."""
     return shape(mi, replace(mesh, normals=beside_u(mesh.normals)), bsdf, emitter)
 
 
