@@ -17,8 +17,11 @@ def libraries(tmp_path, monkeypatch):
 
     def make(*names):
         for name in names:
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_bytes(b"")
-        monkeypatch.setattr(variant, "_PLACES", [str(tmp_path / "*LLVM*")])
+        monkeypatch.setattr(
+            variant, "_PLACES", [str(tmp_path / f"{below}*LLVM*") for below in ("", "*/lib/", "*/*/lib/")]
+        )
         return tmp_path
 
     return make
@@ -31,6 +34,7 @@ def libraries(tmp_path, monkeypatch):
         (["libLLVM-17.so.1", "libLLVM-18.so.1", "libLLVM.so.22.1"], 18),
         (["libLLVM.so.21.1", "libLLVM.20.dylib", "libLLVM-15.so.1"], 20),
         (["libLLVM-14.0.6.so.1", "libLLVM-18.dylib", "libLLVM.so"], 18),
+        (["llvm/19.1.7/lib/libLLVM.dylib", "llvm@16/lib/libLLVM.dylib"], 19),
     ],
 )
 def test_the_best_library_is_taken(libraries, names, best):

@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 from dataclasses import dataclass
 from functools import lru_cache
@@ -64,31 +63,11 @@ def _remedy() -> str:
 
 
 def llvm_version(path: str) -> int | None:
-    """Major version of an LLVM library by its file name, else by asking it in a process of its own; None if neither."""
+    """Major version of an LLVM library by its name, its folders' or those of what it links to; None without any."""
     if not os.path.exists(path):
         return None
-    for name in (os.path.basename(path), os.path.basename(os.path.realpath(path))):
-        match = re.fullmatch(r"libLLVM(?:-|\.so\.|\.)(\d+)\b.*", name)
-        if match:
-            return int(match.group(1))
-    return _ask(path)
-
-
-_QUESTION = (
-    "import ctypes, sys; l = ctypes.CDLL(sys.argv[1]); v = [ctypes.c_uint() for _ in range(3)];"
-    "l.LLVMGetVersion(*map(ctypes.byref, v)); sys.stdout.write(str(v[0].value))"
-)
-
-
-@lru_cache(maxsize=64)
-def _ask(path: str) -> int | None:
-    """Major version that a library reports to another process (LLVM 16 and later can), else None."""
-    try:
-        command = [sys.executable, "-I", "-S", "-c", _QUESTION, path]
-        result = subprocess.run(command, capture_output=True, text=True, timeout=30)
-    except (OSError, subprocess.TimeoutExpired):
-        return None
-    return int(result.stdout) if result.returncode == 0 and result.stdout.isdigit() else None
+    match = re.search(r"(?:libLLVM(?:-|\.so\.|\.)|llvm[-@/])(\d+)\b", f"{path} {os.path.realpath(path)}")
+    return int(match[1]) if match else None
 
 
 def unloaded(error: BaseException) -> str:
