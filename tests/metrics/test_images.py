@@ -19,12 +19,6 @@ def directions(h: int) -> np.ndarray:
     return np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], -1)
 
 
-def lobe(axis: np.ndarray, sharpness: float = 6.0) -> np.ndarray:
-    """[h, 2h, 3] smooth lobe about a unit axis, one colour."""
-    value = np.exp(sharpness * (directions(H) @ axis - 1))
-    return np.repeat(value[..., None], 3, axis=2) * [1.0, 0.5, 0.25]
-
-
 def test_psnr_of_a_known_offset_on_the_srgb_encoding():
     a = np.full((8, 8, 3), srgb_to_linear(0.5), np.float32)
     b = np.full((8, 8, 3), srgb_to_linear(0.6), np.float32)
@@ -79,16 +73,6 @@ def test_sh_error_of_constant_maps_is_the_difference_times_root_four_pi():
     red = a.copy()
     red[..., 0] = 3
     assert metrics.sh_error(a, red) == pytest.approx(2 * np.sqrt(4 * np.pi / 3), rel=1e-4)
-
-
-def test_resampled_envmap_keeps_its_harmonics_and_wraps():
-    envmap = lobe(np.array([0.0, 0.0, 1.0]))  # behind the camera: across the seam of the map
-    for height in (16, 32, 100, 128):
-        small = metrics.resample_envmap(envmap, height)
-        assert small.shape == (height, 2 * height, 3)
-        assert metrics.sh_error_relative(small, envmap) < 0.02
-    up = metrics.resample_envmap(envmap, 128)
-    assert np.abs(up[:, 0] - up[:, -1]).max() < 1e-5
 
 
 def test_the_residual_finds_smooth_shading_again():

@@ -69,14 +69,10 @@ def download_model(
     as_json: Json = False,
 ) -> None:
     """Fetch a model and check it against the hub's checksums; an interrupted download is taken up again."""
-    from materialist.cli.progress import stage_progress
     from materialist.predict.models import adopt, download, hub_model
 
-    if source is not None:
-        folder = adopt(hub_model(name), source)
-    else:
-        with stage_progress(quiet=as_json) as progress:
-            folder = download(hub_model(name), force=force, progress=progress)
+    model = hub_model(name)
+    folder = adopt(model, source) if source is not None else download(model, force=force)
     report_success(
         "models download", as_json, [f"{name} lies in {folder}; its checksums are written"], folder=str(folder)
     )

@@ -95,9 +95,8 @@ def envmap_metrics(estimate: Array, truth: Array) -> dict[str, float]:
     """The paper's envmap figures (table "Quantitative evaluation of envmap optimization").
 
     SSIM and PSNR are on the maps as they are: the photo fixes the scale of the light. MSE is on linear radiance without
-    clipping. An estimate of another size is first resampled to the size of the truth.
+    clipping. Raises InputError for maps of two sizes.
     """
-    estimate = resample_envmap(estimate, truth.shape[0])
     return {
         "envmap_ssim": ssim(estimate, truth),
         "envmap_psnr": psnr(estimate, truth),
@@ -105,23 +104,6 @@ def envmap_metrics(estimate: Array, truth: Array) -> dict[str, float]:
         "sh_error": sh_error(estimate, truth),
         "sh_error_relative": sh_error_relative(estimate, truth),
     }
-
-
-def resample_envmap(envmap: Array, height: int) -> Array:
-    """Resample an envmap [h, 2h, 3] to [height, 2 height, 3] float32: area means down, wrapping bilinear up."""
-    import cv2
-
-    envmap = np.ascontiguousarray(envmap, np.float32)
-    h, w = envmap.shape[:2]
-    if h == height:
-        return envmap
-    if height < h:
-        return cv2.resize(envmap, (2 * height, height), interpolation=cv2.INTER_AREA)
-    wrapped = cv2.copyMakeBorder(envmap, 0, 0, 1, 1, cv2.BORDER_WRAP)
-    x = (np.arange(2 * height) + 0.5) * w / (2 * height) + 0.5
-    y = (np.arange(height) + 0.5) * h / height - 0.5
-    grid_x, grid_y = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
-    return cv2.remap(wrapped, grid_x, grid_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 def _rms_norm(coefficients: Array) -> float:

@@ -6,7 +6,7 @@ Only `download` uses the network, and only `materialist models download` calls i
 import os
 import re
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
@@ -125,27 +125,14 @@ def weights_file(path: Path) -> Path:
     return found[0]
 
 
-def download(
-    model: HubModel, *, force: bool = False, progress: Callable[[str, int, int], None] = lambda *_: None
-) -> Path:
+def download(model: HubModel, *, force: bool = False) -> Path:
     """Fetch the files that the model needs into its folder, which is returned.
 
     Every file is compared with the hub's own sha256 where it gives one; the list of all checksums is written last.
-    An interrupted download is taken up again; `force` fetches everything again. `progress` is told (file, megabytes
-    done, megabytes in all). Raises WeightsError when the hub cannot be reached, has no such model, or sends other files
-    than it promised; OutputError when the disk is full or read-only.
+    An interrupted download is taken up again; `force` fetches everything again. Raises WeightsError when the hub cannot
+    be reached, lacks the model, or sends other files than it promised; OutputError when the disk is full or read-only.
     """
     from huggingface_hub import HfApi
-    from tqdm import tqdm
-
-    class Bar(tqdm):  # as huggingface_hub makes one for each file; this one draws nothing
-        def __init__(self, *args, desc: str = "", total: int = 0, initial: int = 0, **_):
-            super().__init__(*args, disable=True)
-            self.told, self.size, self.done = desc.rpartition("/")[2], total or 0, initial
-
-        def update(self, n: float | None = 1) -> None:
-            self.done += int(n or 0)
-            progress(self.told, self.done >> 20, max(1, self.size >> 20))
 
     api, folder = HfApi(os.environ.get("HF_ENDPOINT"), library_name="materialist"), folder_of(model)
     try:
@@ -153,7 +140,7 @@ def download(
         promised = {file.rfilename: file.lfs.sha256 if file.lfs else None for file in listing}
         wanted = chosen(promised)
         for name in wanted:
-            api.hf_hub_download(model.repo, name, local_dir=folder, force_download=force, tqdm_class=Bar)
+            api.hf_hub_download(model.repo, name, local_dir=folder, force_download=force)
             if promised[name] not in (None, sha256(folder / name)):
                 (folder / name).unlink()
                 raise ValueError(f"{name} came damaged: its sha256 is not {promised[name]}")
