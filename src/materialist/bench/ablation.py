@@ -1,37 +1,42 @@
-"""`bench ablation`: the paper's tables about its own settings, on synthetic photos, with cached transport.
+"""`bench ablation`: the paper's tables about its own settings, with cached transport.
 
-The paper's ablations, its protocol on our synthetic photos: `--preset paper` with cached transport in place of PRB,
-materials from the predictor under the light that the paper's fit finds for them. PSNR, SSIM and MSE compare the
-path-traced re-rendering with the photo, sRGB-encoded; L_re is the loss that is minimised, of the cached rendering
-(linear), at the end. `delta`: 200 steps, stopped early as in the paper (5 % in 20 steps); ARM moves all materials at
-once, RM&A roughness and metallic first, then albedo. `steps`: half of them on roughness and metallic, half on all.
-`init`: the material network's first weights. `field`: what the materials are written as, 200 steps; `w/o R, M`:
-roughness and metallic not predicted but 0.5, the smallest L_re on the way. `fov`: true maps and light on the mesh of
-the true depth at a wrong field of view, and the same under another light (relit).
+The paper's ablations, its protocol on synthetic photos or, with `--photos`, on real ones: `--preset paper` with cached
+transport in place of PRB, materials from the predictor under the light that the paper's fit finds for them. PSNR, SSIM
+and MSE compare the path-traced re-rendering with the photo, sRGB-encoded; L_re is the loss that is minimised, of the
+cached rendering (linear), at the end. `delta`: 200 steps, stopped early as in the paper (5 % in 20 steps); ARM moves
+all materials at once, RM&A roughness and metallic first, then albedo. `steps`: half of them on roughness and metallic,
+half on all. `init`: the material network's first weights. `field`: what the materials are written as, 200 steps;
+`w/o R, M`: roughness and metallic not predicted but 0.5, the smallest L_re on the way. `fov`: true maps and light on
+the mesh of the true depth at a wrong field of view, and the same under another light (relit); of real photos, light and
+materials are fitted (200 steps) at factors on the field of view that is read or assumed.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
 import torch
 
 from materialist import metrics
+from materialist.bench.batch import chosen
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
+from materialist.errors import InputError
 from materialist.fit.invert import FitSetup, prepare, replaced
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
 from materialist.geometry.build import build_geometry
+from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.procedural.synthetic import SyntheticSample, make_sample
 from materialist.render.scene import RenderScene
-from materialist.types import Array, Prediction
+from materialist.types import Array, Photo, Prediction
 
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
@@ -39,7 +44,7 @@ EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
 
 @dataclass(frozen=True, kw_only=True)
 class AblationBench(Benchmark):
-    """The paper's tables; with `data`, objects come from DATA/meshes and light from DATA/envmaps."""
+    """The paper's tables; with `data`, objects come from DATA/meshes and light from DATA/envmaps, or photos."""
 
     columns = (
         Column("psnr", "PSNR", "higher", 2),
@@ -58,7 +63,8 @@ class AblationBench(Benchmark):
     short: ClassVar = 200  # steps of every other table, paper
 
     tables: str = option("delta,steps,init,field,fov", "With commas.", kind="name")
-    scenes: int = option(3, "Photos.", **COUNT)
+    scenes: int = option(3, "How many photos.", **COUNT)
+    photos: bool = option(False, "Real photos, spread over those of DATA/photos; without DATA examples.", kind="switch")
     size: int = option(64, "Their width and height.", **SIZE)
     predictor: str = option("bundled", "Of first materials and depth; `truth` takes the true ones.", kind="name")
     longest: int = option(1000, "Steps in which the smallest L_re is looked for; the paper has 3000.", **COUNT)
@@ -66,37 +72,47 @@ class AblationBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         wanted = names("tables", self.tables, TABLES)
-        for k in range(self.scenes):
-            sample = make_sample(k, 0, k, size=self.size, data=data, seed=self.seed)
-            other = make_sample(k, 0, k + 1, size=self.size, data=data, seed=self.seed).envmap
-            photo = _Photo(self, sample, other)
+        for photo in self._real(data) if self.photos else self._synthetic(data):
             for name in wanted:
                 for row in TABLES[name](photo):
-                    yield {**row, "sample": sample.name}
+                    yield {**row, "sample": photo.photo.path}
+
+    def _real(self, data: Path | None) -> "Iterator[_Photo]":
+        if self.predictor == "truth":
+            raise InputError("The predictor 'truth' has no maps of real photos; choose another, or leave out --photos.")
+        with TemporaryDirectory() as place:
+            for location in chosen(data, self.scenes, Path(place)):
+                yield _Photo(self, read_photo(location, size=self.size))
+
+    def _synthetic(self, data: Path | None) -> "Iterator[_Photo]":
+        for k in range(self.scenes):
+            sample, other = (
+                make_sample(k, 0, light, size=self.size, data=data, seed=self.seed) for light in (k, k + 1)
+            )
+            yield _Photo(self, sample.photo, sample, other.envmap)
 
 
 class _Photo:
     """One photo: its prior, and the paper's light for it."""
 
-    def __init__(self, bench: AblationBench, sample: SyntheticSample, other: Array):
-        """`other` [h, 2h, 3] is the light of the relit pictures."""
-        self.bench, self.sample, self.other = bench, sample, other
-        self.camera = sample.photo.camera
-        self.photo = placed(sample.photo.linear.reshape(-1, 3))
+    def __init__(
+        self, bench: AblationBench, photo: Photo, sample: SyntheticSample | None = None, other: Array | None = None
+    ):
+        """`other` [h, 2h, 3] is the light of the relit pictures of a synthetic photo."""
+        self.bench, self.photo, self.sample, self.other = bench, photo, sample, other
 
     @cached_property
     def prior(self) -> Prediction:
-        if self.bench.predictor == "truth":
+        if self.bench.predictor == "truth" and self.sample is not None:
             return self.sample.truth
         predictor: Any = get_predictor(self.bench.predictor, device=self.bench.device)
-        return predictor.predict(self.sample.photo, seed=self.bench.seed)
+        return predictor.predict(self.photo, seed=self.bench.seed)
 
     @cached_property
     def fitted(self) -> tuple[Any, Array]:
         """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
-        height, seed = self.sample.envmap.shape[0], self.bench.seed
-        shared: dict[str, Any] = {"envmap_height": height, "seed": seed, "device": self.bench.device}
-        prepared: Any = prepare(FitSetup(self.sample.photo, self.prior, PAPER, **shared))
+        shared: dict[str, Any] = {"seed": self.bench.seed, "device": self.bench.device}
+        prepared: Any = prepare(FitSetup(self.photo, self.prior, PAPER, **shared))
         state = prepared.fit.start()
         prepared.fit.fit_light(state, self.prior.materials)
         return prepared, state.envmap
@@ -109,7 +125,7 @@ class _Photo:
         if blind:
             prior[:, 3:] = 0.5
         held = prior if blind else remapped(prior)
-        problem, photo = engine.material_problem(envmap), self.photo[engine.pixels]
+        problem, photo = engine.material_problem(envmap), placed(self.photo.linear.reshape(-1, 3))[engine.pixels]
         seen: list[float] = []
 
         def render(maps: torch.Tensor) -> torch.Tensor:
@@ -119,7 +135,7 @@ class _Photo:
                 seen.append(float(rendering_loss(error, settings.loss)))
             return radiance
 
-        model = material_field(held, settings, engine.pixels, self.camera, seed=seed)
+        model = material_field(held, settings, engine.pixels, self.photo.camera, seed=seed)
         results = fit_materials(render, photo, model, held, settings)
         with torch.no_grad():
             maps = model()
@@ -131,8 +147,7 @@ class _Photo:
 
     def against_photo(self, method: str, picture: Array) -> Row:
         """A row of a picture [H, W, 3] against the photo, clipped as that is."""
-        photo = self.sample.photo.linear
-        compared = {name: getattr(metrics, name)(picture, photo) for name in ("psnr", "ssim", "mse")}
+        compared = {name: getattr(metrics, name)(picture, self.photo.linear) for name in ("psnr", "ssim", "mse")}
         return {"method": method, **compared}
 
 
@@ -175,16 +190,20 @@ def _field(photo: _Photo) -> Iterator[Row]:
 
 def _fov(photo: _Photo) -> Iterator[Row]:
     """Table fov_syn_ab."""
-    bench, sample, truth = photo.bench, photo.sample, photo.sample.truth
-    relit = sample.render(photo.other, spp=bench.spp, seed=bench.seed + 3)
+    bench, sample, other = photo.bench, photo.sample, photo.other
     for factor in bench.fovs:
-        camera = replace(photo.camera, fov=factor * photo.camera.fov)
+        camera, name = replace(photo.photo.camera, fov=factor * photo.photo.camera.fov), f"fov x {factor:g}"
+        if sample is None or other is None:
+            settings = replace(PAPER.materials, stages=_stages(EACH[1:], bench.short))
+            yield _Photo(bench, replace(photo.photo, camera=camera)).materials(name, settings)
+            continue
+        relit, truth = sample.render(other, spp=bench.spp, seed=bench.seed + 3), sample.truth
         geometry = build_geometry(truth.depth, truth.normal, camera, completion="planes", seed=bench.seed)
         mesh = RenderScene(geometry, camera, device=bench.device)
         mesh.set_materials(truth.materials)
         mesh.set_envmap(sample.envmap)
-        row = photo.against_photo(f"fov x {factor:g}", mesh.render(spp=bench.spp, seed=bench.seed + 1))
-        mesh.set_envmap(photo.other)
+        row = photo.against_photo(name, mesh.render(spp=bench.spp, seed=bench.seed + 1))
+        mesh.set_envmap(other)
         picture = mesh.render(spp=bench.spp, seed=bench.seed + 1)
         yield {**row, "relit_psnr": metrics.psnr(picture, relit)}
 

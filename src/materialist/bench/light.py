@@ -72,6 +72,7 @@ METHODS = {
     "paper path w/o mat": Method("paper", "path", maps="neutral"),
     "paper uv": Method("paper", field="mlp-uv"),
     "paper low": Method("paper", height=16),
+    "paper path low": Method("paper", "path", height=16),
     "paper uv low": Method("paper", field="mlp-uv", height=16),
     "paper sh": Method("paper", field="sh"),
     "paper texels": Method("paper", field="texels", height=32),

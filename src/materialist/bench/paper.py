@@ -44,11 +44,12 @@ class Measure:
     """The part of DIR that is given."""
 
     def data(self, given: Path | None) -> Path | None:
-        """The folder that its benchmark is given: captures only where there are any. Raises MaterialistError."""
+        """The folder that its benchmark is given, where it holds what that reads. Raises MaterialistError."""
         if self.needs and (given is None or not (given / self.needs).exists()):
             raise MaterialistError(f"Not run: it needs --data DIR with {self.needs}.")
-        captures = given is not None and all((given / name).is_dir() for name in ("meshes", "envmaps"))
-        return given / self.folder if given is not None and (self.needs or captures) else None
+        parts = () if self.needs else ("photos",) if self.options.get("photos") else ("meshes", "envmaps")
+        there = given is not None and all((given / name).is_dir() for name in parts)
+        return given / self.folder if given is not None and there else None
 
 
 @dataclass(frozen=True, kw_only=True)
