@@ -9,7 +9,6 @@ from edit_scenes import scene_of
 
 from materialist.io.package import save_scene
 from materialist.studio.selection import read_pick
-from materialist.studio.widgets import PageContext
 from materialist.types import Camera, FitReport, Scene
 
 HEIGHT, WIDTH = 48, 64
@@ -45,15 +44,3 @@ def package(folder: Path) -> Path:
 def click(session, x: float = 25, y: float = 24, mode: str = "new") -> None:
     """A click of the page at a working pixel; by default on the block."""
     session.pick(read_pick({"tool": "click", "mode": mode, "at": [x, y]}))
-
-
-class _Names(dict):
-    """Every component, its name in its place."""
-
-    def __missing__(self, name: str) -> str:
-        return name
-
-
-def named(studio=None) -> PageContext:
-    """What the tabs share, without a page: updates come under the names of components."""
-    return PageContext(studio, _Names())

@@ -4,7 +4,7 @@ import weakref
 
 import numpy as np
 import pytest
-from studio_scenes import block, click, named, room
+from studio_scenes import block, click, room
 
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
@@ -17,7 +17,7 @@ from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.tab_light import place_lamp
-from materialist.studio.widgets import commands
+from materialist.studio.widgets import PageContext, commands
 
 
 def test_an_edit_from_click_to_recipe(session):
@@ -225,7 +225,7 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     other = Session("me")
     other.open(session.project)
     other.live.wait()
-    shown = named().everything(other)
+    shown = PageContext(None).everything(other)
     assert len(shown["steps"]) == 2 and shown["stage"]["picture"] and shown["stage"]["bad"]
     assert words in shown["stage"]["badge"] and shown["steps"][1]["text"] in shown["stage"]["badge"]
     other.act("remove", 1)

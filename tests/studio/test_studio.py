@@ -9,7 +9,6 @@ import urllib.request
 
 import pytest
 from made_tasks import until
-from studio_scenes import named
 from studio_server import free_port
 
 from materialist.errors import InputError
@@ -18,6 +17,7 @@ from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, widgets
 from materialist.studio.server import check_host, new_studio
 from materialist.studio.studio import LOCAL_PERSON
+from materialist.studio.widgets import PageContext
 
 
 def test_people_are_kept_apart(shared):
@@ -94,7 +94,7 @@ def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
 def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
     text = f"/srv/a b.txt: {tmp_path}/photo-001/x.png and '/home/me/y.exr' are damaged; see https://a.example/b (1/2)"
     assert shared.shown(text) == "a b.txt: x.png and 'y.exr' are damaged; see https://a.example/b (1/2)"
-    assert str(tmp_path) not in str(named(shared).message(InputError(text)))
+    assert str(tmp_path) not in str(PageContext(shared).message(InputError(text)))
     session = shared.session("page", "a" * 32)
     session.project = shared.work.new("One", session.person)
     assert str(tmp_path) not in widgets.commands(session) and "photo-001" in widgets.commands(session)
@@ -104,9 +104,9 @@ def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
 
 def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path):
     job = Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
-    assert "Done in" in named(shared).state(job)
+    assert "Done in" in PageContext(shared).state(job)
     job.state, job.message = FAILED, "<script>alert(1)</script>"
-    shown = named(shared).state(job)
+    shown = PageContext(shared).state(job)
     assert "<script>" not in shown and 'role="alert"' in shown
     assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
 

@@ -5,7 +5,7 @@ import zipfile
 import numpy as np
 import pytest
 from made_png import png_header
-from studio_scenes import named, package
+from studio_scenes import package
 
 from materialist.errors import InputError, SceneError
 from materialist.io.decode import image_size
@@ -13,6 +13,7 @@ from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
 from materialist.studio import StudioSettings, archives, tab_open, uploads
 from materialist.studio.session import Session
+from materialist.studio.widgets import PageContext
 
 
 @pytest.mark.parametrize(
@@ -69,7 +70,7 @@ def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_p
     before = studio.work.projects()
     monkeypatch.setattr(tab_open, "SETTINGS", StudioSettings(decoded_bytes=100_000))
     with pytest.raises(SceneError, match="GB of memory") as error:
-        tab_open._unpack(named(studio), Session("me"), tmp_path / "a.zip")
+        tab_open._unpack(PageContext(studio), Session("me"), tmp_path / "a.zip")
     assert studio.work.projects() == before and str(studio.work.root) not in studio.shown(str(error.value))
 
 

@@ -103,42 +103,32 @@ def slider(name: str, label: str, step: float, **narrower: Any) -> Any:
     return gr.Slider(step=step, label=label, buttons=[], **given)
 
 
-def option_text(name: str, value: Any) -> str | None:
-    """The option that a control sets, as the list of edits has it; None for the default."""
+def set_option(name: str, session: Session, value: Any) -> None:
+    """Set the option of a control, or clear it by the default."""
     control = CONTROLS[name]
-    return None if value == control.default else control.text(value)
-
-
-def set_option(name: str, session: Session, value: Any) -> bool | None:
-    """Set the option of a control; False where it is for the next glass, and nothing changes yet."""
-    control, text = CONTROLS[name], option_text(name, value)
-    kind = control.operation.operation
+    text = None if value == control.default else control.text(value)
     if control.operation is Relight:
         session.light(**{control.option: text})
     elif control.operation is Insertion:
         objects.set_option(session, control.option, text)
-    elif control.operation is not Glass or session.current_kind == kind:
-        session.set(kind, **{control.option: text})
     else:
-        return False
-    return None
+        session.set(control.operation.operation, **{control.option: text})
 
 
 def control_values(session: Session) -> dict[str, Any]:
     """Values of the controls as the current step, or the light, has them.
 
-    Without a current edit its controls show what was fitted under the selection; those of glass and of objects then
-    stay as they are, for the next.
+    Without a current edit its controls show what was fitted under the selection, and those of glass its defaults; those
+    of objects then stay as they are, for the next.
     """
     step, light = session.edits.current_step, session.edits.light
     kind, options = (step.kind, step.options) if step is not None else ("", {})
-    given: dict[type[OperationOptions], dict[str, Any]] = {MaterialEdit: options if kind == "edit" else {}}
-    given[Relight] = session.edits.steps[light].options if light is not None else {}
-    given |= {
-        operation: options
-        for operation, kinds in ((Glass, ("glass",)), (Insertion, objects.KINDS), (Drop, ("drop",)))
-        if kind in kinds
-    }
+    given: dict[type[OperationOptions], dict[str, Any]] = {
+        MaterialEdit: options if kind == "edit" else {}, Glass: options if kind == "glass" else {},
+        Relight: session.edits.steps[light].options if light is not None else {},
+    }  # fmt: skip
+    given |= {Insertion: options} if kind in objects.KINDS else {}
+    given |= {Drop: options} if kind == "drop" else {}
     values: dict[str, Any] = {}
     for name, control in CONTROLS.items():
         if control.operation in given:

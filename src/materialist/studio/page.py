@@ -1,6 +1,7 @@
 """The page: the stage with its tools on one side, the tabs on the other; on a phone one below the other."""
 
 import secrets
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -22,7 +23,7 @@ from materialist.studio.selection import read_pick, sam_missing
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import Studio
-from materialist.studio.widgets import LIVE, LONG, PageContext, steps
+from materialist.studio.widgets import PageContext, Updates, steps
 
 TABS = (tab_material, tab_light, tab_object, tab_look, tab_take)
 _HEAD = (
@@ -89,68 +90,51 @@ def _left(parts: dict[str, Any]) -> None:
 
 
 def _wire(context: PageContext) -> None:
+    parts = context.parts
     for name in ("tool", "mode", "brush"):
         script = f"(v) => {{ document.body.dataset.{name} = v; }}"
-        context[name].change(None, context[name], None, js=script, api_visibility="private")
-
-    @context.handler
-    def pick(
-        sam: bool, kelvin: float, power: float, before: float, event: gr.EventData, request: gr.Request
-    ) -> dict[Any, Any]:
-        session, wanted = context.session(request), read_pick(event._data)
-        if wanted["tool"] == "lamp":
-            x, y = wanted["at"]
-            tab_light.place_lamp(session, x, y, kelvin, power, before)
-        elif wanted["tool"] == "place":
-            objects.place(session, *wanted["at"])
-        else:
-            session.pick(wanted, "sam2" if sam else "network")
-        return context.everything(session)
-
-    @context.handler
-    def act(event: gr.EventData, request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        what = str(event._data.get("what"))
-        session.act(what, int(event._data.get("index", -1)))
-        return {**context.everything(session), **(_turned_to(context, session) if what == "choose" else {})}
-
-    every = {**LIVE, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
-    settings = [context[name] for name in ("sam", "kelvin", "power", "before")]
-    context["stage"].pick(pick, settings, context.all_parts, **every)
-    context["steps"].act(act, None, [*context.all_parts, context["tabs"], context["glass_part"]], **every)
+        parts[name].change(None, parts[name], None, js=script, api_visibility="private")
+    every = {"everything": True, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
+    context.live(parts["stage"].pick, _pick, "sam", "kelvin", "power", "before", data=True, **every)
+    context.live(parts["steps"].act, _act, data=True, more=("tabs", "glass_part"), **every)
     for name, change in (("undo", Session.undo), ("redo", partial(Session.undo, again=True))):
-        context.on(context[name].click, change, everything=True, trigger_mode="multiple")
-    context.on(context["deselect"].click, Session.deselect, everything=True, trigger_mode="once")
-    _wire_final(context)
+        context.live(parts[name].click, change, **every)
+    context.live(parts["deselect"].click, Session.deselect, everything=True, trigger_mode="once")
+    for name, spp in (("final", SETTINGS.final_spp), ("draft", SETTINGS.draft_spp)):
+        context.long(parts[name].click, partial(_render, context, spp=spp))
+    context.long(parts["stop"].click, partial(_stop, context))
 
 
-def _turned_to(context: PageContext, session: Session) -> dict[Any, Any]:
+def _pick(session: Session, data: Any, sam: bool, kelvin: float, power: float, before: float) -> None:
+    wanted = read_pick(data)
+    if wanted["tool"] == "lamp":
+        tab_light.place_lamp(session, *wanted["at"], kelvin, power, before)
+    elif wanted["tool"] == "place":
+        objects.place(session, *wanted["at"])
+    else:
+        session.pick(wanted, "sam2" if sam else "network")
+
+
+def _act(session: Session, data: Any) -> Updates:
+    """One of the buttons of the list; an edit that is chosen shows its tab."""
+    session.act(str(data.get("what")), int(data.get("index", -1)))
     tabs = {"edit": "material", "relight": "light", "insert": "object", "drop": "object", "glass": "object"}
-    tab = tabs.get(session.current_kind or "")
-    found = {context["tabs"]: gr.Tabs(selected=tab)} if tab else {}
-    return found | ({context["glass_part"]: gr.update(open=True)} if session.current_kind == "glass" else {})
+    kind = session.current_kind or ""
+    if data["what"] != "choose" or kind not in tabs:
+        return {}
+    return {"tabs": gr.Tabs(selected=tabs[kind])} | ({"glass_part": gr.update(open=True)} if kind == "glass" else {})
 
 
-def _wire_final(context: PageContext) -> None:
-    """Path-traced pictures, and the button that stops whatever this page asked for."""
+def _stop(context: PageContext, session: Session) -> Iterator[Updates]:
+    """Stop whatever this page asked for; whoever follows it says so."""
+    session.stop(context.studio.jobs)
+    yield {}
 
-    def render(spp: int) -> Any:
-        @context.handler
-        def run(request: gr.Request) -> Any:
-            session = context.session(request)
-            _ = session.scene
-            if not session.edits.active:
-                raise InputError("There is no edit to render yet: change something first.")
-            if (yield from context.traced(session, spp)) is not None:
-                yield {context["stage"]: stage(session), context["steps"]: steps(session)}
 
-        return run
-
-    @context.handler
-    def stop(request: gr.Request) -> None:
-        context.session(request).stop(context.studio.jobs)
-
-    outputs = [*context.picture_parts, *context.job_parts]
-    context["final"].click(render(SETTINGS.final_spp), None, outputs, **LONG)
-    context["draft"].click(render(SETTINGS.draft_spp), None, outputs, **LONG)
-    context["stop"].click(stop, None, None, queue=False, show_progress="hidden", api_visibility="private")
+def _render(context: PageContext, session: Session, spp: int) -> Iterator[Updates]:
+    """A path-traced picture."""
+    _ = session.scene
+    if not session.edits.active:
+        raise InputError("There is no edit to render yet: change something first.")
+    if (yield from context.traced(session, spp)) is not None:
+        yield {"stage": stage(session), "steps": steps(session)}

@@ -75,11 +75,16 @@ class Session:
         return self.live.scene
 
     @property
-    def workspace(self) -> Path:
-        """Where this person's edits of the open photo lie."""
+    def opened(self) -> Project:
+        """The open photo. Raises InputError where there is none."""
         if self.project is None:
             raise InputError("Open a photo first.")
-        return self.project.workspace(self.person)
+        return self.project
+
+    @property
+    def workspace(self) -> Path:
+        """Where this person's edits of the open photo lie."""
+        return self.opened.workspace(self.person)
 
     def note_job(self, job: Job) -> None:
         """Note a job that this page asked for, to stop it by a button, or when the page is closed."""

@@ -2,6 +2,7 @@
 
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import gradio as gr
 import numpy as np
@@ -11,7 +12,7 @@ from materialist.errors import InputError
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.controls import SUN, number_text, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import LIVE, PageContext
+from materialist.studio.widgets import PageContext
 from materialist.studio.workspace import store
 from materialist.types import Array
 
@@ -50,23 +51,20 @@ def layout(context: PageContext) -> None:
 
 def wire(context: PageContext) -> None:
     parts = context.parts
-
-    @context.handler
-    def choose(event: gr.SelectData, request: gr.Request) -> dict:
-        session = context.session(request)
-        if event.index == 0:
-            session.light(envmap=None, gain=None)
-        else:
-            session.light(envmap=_written(session, list(presets.LIGHTS)[int(event.index) - 1]), gain="auto")
-        return context.picture(session)
-
-    parts["lights"].select(choose, None, context.picture_parts, **LIVE)
-    context.on_upload("own_map", _uploaded)
+    context.live(parts["lights"].select, _choose, data=True)
+    context.upload("own_map", _uploaded)
     context.bind("rotate", "ambient", coarse=True)
-    sunny = [parts[name] for name in ("sun_on", "azimuth", "elevation", "sun_power")]
-    for part in sunny:
-        context.on(part.input, _sun, sunny, coarse=True)
-    context.on(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
+    sunny = ("sun_on", "azimuth", "elevation", "sun_power")
+    for name in sunny:
+        context.live(parts[name].input, _sun, *sunny, coarse=True)
+    context.live(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
+
+
+def _choose(session: Session, data: Any) -> None:
+    if data["index"] == 0:
+        session.light(envmap=None, gain=None)
+    else:
+        session.light(envmap=_written(session, [*presets.LIGHTS][int(data["index"]) - 1]), gain="auto")
 
 
 def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: float) -> None:

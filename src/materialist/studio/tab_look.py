@@ -1,12 +1,13 @@
 """The tab to look: every map, the light, the mesh, and the report in plain words."""
 
-from typing import Any
+from collections.abc import Iterator
 
 import gradio as gr
 
 from materialist.studio import tasks
+from materialist.studio.session import Session
 from materialist.studio.stage import maps, report
-from materialist.studio.widgets import LONG, PageContext
+from materialist.studio.widgets import PageContext, Updates
 
 MESH = "mesh.glb"
 
@@ -30,31 +31,19 @@ def layout(context: PageContext) -> None:
 def wire(context: PageContext) -> None:
     parts, studio = context.parts, context.studio
 
-    @context.handler
-    def look(request: gr.Request) -> dict[Any, Any]:
-        session = context.session(request)
-        if session.live is None:
-            return {}
-        return {parts["report"]: session.shown(report(session.scene)), parts["maps"]: maps(session.scene)}
+    def look(session: Session) -> Iterator[Updates]:
+        if session.live is not None:
+            yield {"report": session.shown(report(session.scene)), "maps": maps(session.scene)}
 
-    @context.handler
-    def make_mesh(request: gr.Request) -> Any:
-        session = context.session(request)
-        _ = session.scene
-        assert session.project is not None
+    def make_mesh(session: Session) -> Iterator[Updates]:
         file = session.workspace / MESH
-        if file.is_file():
-            return
-        scene = str(session.project.scene)
-        job = studio.submit(session, tasks.mesh, session.workspace, scene=scene, output=str(file))
-        yield from context.following(job)
+        if not file.is_file():
+            yield from context.work(session, tasks.mesh, file)
 
-    @context.handler
-    def show_mesh(request: gr.Request) -> Any:
-        file = context.session(request).workspace / MESH
-        return studio.public_copy(file) if file.is_file() else None
+    def show_mesh(session: Session) -> Updates:
+        file = session.workspace / MESH
+        return {"mesh": studio.public_copy(file) if file.is_file() else None}
 
-    parts["look"].select(look, None, [parts["report"], parts["maps"]], **LONG)
+    context.long(parts["look"].select, look)
     # Two steps: the viewer loads nothing when its value is sent twice, as the end of a generator does.
-    made = parts["mesh_button"].click(make_mesh, None, context.job_parts, **LONG)
-    made.then(show_mesh, None, parts["mesh"], **LONG)
+    context.live(context.long(parts["mesh_button"].click, make_mesh).then, show_mesh, more=("mesh",))

@@ -1,5 +1,6 @@
 """The tab that changes materials: colour, roughness, metal, a texture."""
 
+from functools import partial
 from pathlib import Path
 
 import gradio as gr
@@ -36,12 +37,11 @@ def layout(context: PageContext) -> None:
 def wire(context: PageContext) -> None:
     parts = context.parts
     context.bind("hue", "saturation", "value", "roughness", "metallic", "texture_scale", "grow", "feather")
-    context.on(parts["colour"].input, _coloured, parts["colour"])
-    colours = dict.fromkeys(("albedo", "texture", "hue", "saturation", "value"))
-    context.on(parts["own"].click, lambda session: session.set("edit", **colours), everything=True)
-    found = dict.fromkeys(("roughness", "metallic"))
-    context.on(parts["as_fitted"].click, lambda session: session.set("edit", **found), everything=True)
-    context.on_upload("texture", _textured, everything=True)
+    context.live(parts["colour"].input, _coloured, "colour")
+    cleared = {"own": ("albedo", "texture", "hue", "saturation", "value"), "as_fitted": ("roughness", "metallic")}
+    for button, names in cleared.items():
+        context.live(parts[button].click, partial(Session.set, kind="edit", **dict.fromkeys(names)), everything=True)
+    context.upload("texture", _textured, everything=True)
 
 
 def _coloured(session: Session, value: str) -> None:

@@ -1,19 +1,19 @@
 """The tab for objects that are put into the photo, let fall, turned to glass, or taken away."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import gradio as gr
 
 from materialist.studio import objects, uploads
-from materialist.studio.controls import hex_colour, option_text, slider
+from materialist.studio.controls import hex_colour, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import LONG, PageContext, box
+from materialist.studio.widgets import PageContext, Updates, box
 from materialist.studio.workspace import store
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
-_GLASS = ("ior", "transmission", "roughness", "tint", "hollow")
 
 
 def layout(context: PageContext) -> None:
@@ -55,36 +55,31 @@ def _layout_glass(parts: dict[str, Any]) -> None:
 
 def wire(context: PageContext) -> None:
     parts = context.parts
-
-    def choose(session: Session, name: str | None) -> dict[Any, Any]:
-        if name in objects.LIBRARY:
-            objects.set_option(session, "mesh", objects.library_file(session, str(name)))
-        return {parts["tool"]: "place", parts["own_mesh"]: None}
-
-    def uploaded(session: Session, file: Path) -> dict[Any, Any]:
-        _take_mesh(session, file)
-        return {parts["tool"]: "place", parts["thing"]: None}
-
-    context.on(parts["thing"].input, choose, parts["thing"], more=(parts["tool"], parts["own_mesh"]))
-    context.on_upload("own_mesh", uploaded, more=(parts["tool"], parts["thing"]))
-    context.bind("scale", "turn", *(f"glass_{name}" for name in _GLASS))
-    for part in (parts["made_of"], parts["thing_colour"]):
-        context.on(part.input, _made_of, [parts["made_of"], parts["thing_colour"]])
+    context.live(parts["thing"].input, _choose, "thing", more=("tool", "own_mesh"))
+    context.upload("own_mesh", _uploaded, more=("tool", "thing"))
+    context.bind("scale", "turn", *(f"glass_{name}" for name in ("ior", "transmission", "roughness", "tint", "hollow")))
+    for name in ("made_of", "thing_colour"):
+        context.live(parts[name].input, _made_of, "made_of", "thing_colour")
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
-    context.on(parts["remove"].click, _remove, parts["shadow"], **slow)
-    # Sliders of glass change the current glass; without one they are for the next.
-    values = [parts[f"glass_{name}"] for name in _GLASS]
-    context.on(parts["glass"].click, _make_glass, values, everything=True)
-    _wire_following(context)
-    _wire_fall(context)
+    context.live(parts["remove"].click, _remove, "shadow", **slow)
+    context.live(parts["glass"].click, partial(Session.set, kind="glass"), everything=True)
+    context.long(parts["stage"].follow, partial(_follow, context), trigger_mode="always_last")
+    context.long(parts["rest"].click, partial(_fall, context), "height")
 
 
-def _take_mesh(session: Session, file: Path) -> None:
+def _choose(session: Session, name: str | None) -> Updates:
+    if name in objects.LIBRARY:
+        objects.set_option(session, "mesh", objects.library_file(session, str(name)))
+    return {"tool": "place", "own_mesh": None}
+
+
+def _uploaded(session: Session, file: Path) -> Updates:
     from materialist.edits.insert.meshes import read_model
 
     suffix = uploads.checked_mesh(file, file.name)
     read_model(file)
     objects.set_option(session, "mesh", store(session.workspace, file, "mesh", suffix))
+    return {"tool": "place", "thing": None}
 
 
 def _made_of(session: Session, kind: str, colour: str) -> None:
@@ -95,41 +90,24 @@ def _remove(session: Session, shadow: bool) -> None:
     session.set("remove", shadow=None if shadow else "0")
 
 
-def _make_glass(session: Session, *values: Any) -> None:
-    session.set("glass", **{name: option_text(f"glass_{name}", value) for name, value in zip(_GLASS, values)})
+def _follow(context: PageContext, session: Session) -> Iterator[Updates]:
+    """Tell of the glass that the stage waits for, until it is there."""
+    said, client = "", session.glass
+    while client is not None and client is session.glass:
+        state = client.state
+        if not state.waiting:
+            yield context.picture(session) | {
+                "progress": box(session.shown(state.words), bad=True) if state.bad else ""
+            }
+            return
+        if state.words != said:
+            said = state.words
+            yield {"progress": box(said)}
+        with client.changed:
+            client.changed.wait(0.5)
 
 
-def _wire_following(context: PageContext) -> None:
-    """The stage asks to be told when the glass that it waits for is there."""
-
-    @context.handler
-    def follow(request: gr.Request) -> Iterator[dict[Any, Any]]:
-        session, said = context.session(request), ""
-        client = session.glass
-        while client is not None and client is session.glass:
-            state = client.state
-            if not state.waiting:
-                end = box(session.shown(state.words), bad=True) if state.bad else ""
-                yield {**context.picture(session), context["progress"]: end}
-                return
-            if state.words != said:
-                said = state.words
-                yield {context["progress"]: box(said)}
-            with client.changed:
-                client.changed.wait(0.5)
-
-    outputs = [*context.picture_parts, *context.job_parts]
-    context["stage"].follow(follow, None, outputs, trigger_mode="always_last", **LONG)
-
-
-def _wire_fall(context: PageContext) -> None:
-    parts = context.parts
-
-    @context.handler
-    def rest(height: float, request: gr.Request) -> Any:
-        session = context.session(request)
-        yield {parts["progress"]: box("It falls …")}
-        notes = session.shown(" ".join(objects.let_fall(session, float(height))))
-        yield {**context.everything(session), parts["progress"]: box(notes) if notes else ""}
-
-    parts["rest"].click(rest, parts["height"], [*context.all_parts, *context.job_parts], **LONG)
+def _fall(context: PageContext, session: Session, height: float) -> Iterator[Updates]:
+    yield {"progress": box("It falls …")}
+    notes = session.shown(" ".join(objects.let_fall(session, float(height))))
+    yield context.everything(session) | {"progress": box(notes) if notes else ""}

@@ -16,7 +16,7 @@ from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
-from materialist.studio.widgets import LONG, PREDICTORS, PageContext, box
+from materialist.studio.widgets import LONG, PREDICTORS, PageContext, Updates, box
 from materialist.studio.workspace import Project
 from materialist.types import Array
 
@@ -56,26 +56,22 @@ def layout(context: PageContext) -> None:
 def wire(context: PageContext, page: gr.Blocks) -> None:
     parts, studio = context.parts, context.studio
 
-    @context.handler
-    def uploaded(file: str | None) -> str:
-        if file is None:
-            return ""
-        name = Path(file).name
+    def uploaded(session: Session, file: str | None) -> Iterator[Updates]:
+        name = Path(file or "").name
         if name.lower().endswith(".zip"):
-            return box(f"{name} will be opened as a scene.")
-        uploads.checked_picture(Path(file), name)
-        return box(f"{name} is ready.")
+            yield {"facts": box(f"{name} will be opened as a scene.")}
+            return
+        if file is not None:
+            uploads.checked_picture(Path(file), name)
+        yield {"facts": box(f"{name} is ready.") if file else ""}
 
-    @context.handler
-    def choose_example(event: gr.SelectData) -> str:
-        name = [*EXAMPLES][int(event.index)]
+    def choose_example(session: Session, data: Any) -> Iterator[Updates]:
+        name = [*EXAMPLES][int(data["index"])]
         gr.Info(EXAMPLES[name][1], title="Example photo")
         file = example_path(name)
-        return studio.public_copy(file, f"{name}{file.suffix}")
+        yield {"file": studio.public_copy(file, f"{name}{file.suffix}")}
 
-    @context.handler
-    def start(file: str | None, predictor: str, size: int, fov: str, request: gr.Request):
-        session = context.session(request)
+    def start(session: Session, file: str | None, predictor: str, size: int, fov: str) -> Iterator[Updates]:
         if file is not None and Path(file).suffix.lower() == ".zip":
             project = _unpack(context, session, Path(file))
         else:
@@ -85,36 +81,27 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
                 return
         yield from _show_project(context, session, project)
 
-    @context.handler
-    def resume(name: str | None, request: gr.Request):
-        session = context.session(request)
+    def resume(session: Session, name: str | None) -> Iterator[Updates]:
         if not name:
             raise InputError("Choose one of your photos in the list first.")
         yield from _resume(context, session, name)
 
-    @context.handler
-    def arrive(last: str, request: gr.Request):
-        session = context.session(request)
+    def arrive(session: Session, last: str) -> Iterator[Updates]:
         known = _projects(context, session)
-        yield {parts["projects"]: gr.update(choices=known, value=known[0][1] if known else None)}
+        yield {"projects": gr.update(choices=known, value=known[0][1] if known else None)}
         if any(value == last for _, value in known):
             yield from _resume(context, session, last)
         elif isinstance(studio.start, Project):
             yield from _resume(context, session, studio.start.name)
         elif studio.start is not None:
-            yield {parts["file"]: studio.public_copy(studio.start)}
+            yield {"file": studio.public_copy(studio.start)}
 
-    opening = [
-        *context.all_parts, *context.job_parts,
-        *(parts[name] for name in ("found", "start", "last", "tabs", "projects")),
-    ]  # fmt: skip
-    wanted = [parts[name] for name in ("file", "predictor", "size", "fov")]
-    sent = parts["file"].change(uploaded, parts["file"], parts["facts"], **LONG)
+    sent = context.long(parts["file"].change, uploaded, "file")
     sent.failure(lambda: None, None, parts["file"], **LONG)  # what was refused is not there
-    parts["examples"].select(choose_example, None, parts["file"], **LONG)
-    parts["start"].click(start, wanted, opening, **LONG)
-    parts["continue"].click(resume, parts["projects"], opening, **LONG)
-    page.load(arrive, parts["last"], [parts["file"], *opening], **LONG)
+    context.long(parts["examples"].select, choose_example, data=True)
+    context.long(parts["start"].click, start, "file", "predictor", "size", "fov")
+    context.long(parts["continue"].click, resume, "projects")
+    context.long(page.load, arrive, "last")
 
 
 @cache
@@ -159,33 +146,32 @@ def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     return project
 
 
-def _follow_inversion(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[dict[Any, Any]]:
+def _follow_inversion(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[Updates]:
     """Progress and first pictures of an inversion until it is over."""
-    parts, studio = context.parts, context.studio
+    studio = context.studio
     session.note_job(job)
-    yield {parts["last"]: project.name, parts["start"]: gr.update(interactive=False)}
+    yield {"last": project.name, "start": gr.update(interactive=False)}
     shown = 0
     for update in context.following(job):
         if len(job.found) > shown:
             latest = {f["name"]: project.folder / f["file"] for f in job.found}
             photo = latest.pop(tasks.PHOTO)
             if not shown:
-                update[parts["stage"]] = waiting_photo(photo)
+                update["stage"] = waiting_photo(photo)
             shown = len(job.found)
             pictures = [(studio.public_copy(file), name) for name, file in latest.items()]
-            update[parts["found"]] = gr.update(value=pictures, visible=bool(pictures))
+            update["found"] = gr.update(value=pictures, visible=bool(pictures))
         yield update
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
-    before = {
-        parts["found"]: gr.update(visible=False, value=[]), parts["stage"]: stage(session),
-        parts["last"]: session.project.name if session.project else "",
-    }  # fmt: skip
-    yield {parts["start"]: gr.update(interactive=True), **(before if failed else {})}
+    yield {"start": gr.update(interactive=True)}
+    if failed:
+        last = session.project.name if session.project else ""
+        yield {"found": gr.update(visible=False, value=[]), "stage": stage(session), "last": last}
 
 
-def _resume(context: PageContext, session: Session, name: str) -> Iterator[dict[Any, Any]]:
+def _resume(context: PageContext, session: Session, name: str) -> Iterator[Updates]:
     """Open a project, or follow its inversion if that still runs."""
     studio = context.studio
     project = studio.project(name, session.person)
@@ -198,25 +184,22 @@ def _resume(context: PageContext, session: Session, name: str) -> Iterator[dict[
         raise InputError("That photo was not taken apart to the end; start again.")
 
 
-def _show_project(context: PageContext, session: Session, project: Project) -> Iterator[dict[Any, Any]]:
+def _show_project(context: PageContext, session: Session, project: Project) -> Iterator[Updates]:
     """Show a project: its photo at once, the edits when the preview is ready."""
-    parts = context.parts
-    yield {parts["progress"]: box("Opening …")}
+    yield {"progress": box("Opening …")}
     context.studio.open(session, project.name)
     live = session.live
     if live is None:
         return
     known = _projects(context, session)
-    yield {
-        **context.controls(session), parts["stage"]: stage(session, with_edits=False), **context.listed(session),
-        parts["last"]: project.name,
-        parts["tabs"]: gr.Tabs(selected="material"), parts["projects"]: gr.update(choices=known, value=project.name),
-        parts["found"]: gr.update(visible=False, value=[]),
-        parts["progress"]: box("Getting the live preview ready; select something meanwhile.", 0.6),
+    yield context.everything(session) | {
+        "stage": stage(session, with_edits=False), "last": project.name, "tabs": gr.Tabs(selected="material"),
+        "projects": gr.update(choices=known, value=project.name), "found": gr.update(visible=False, value=[]),
+        "progress": box("Getting the live preview ready; select something meanwhile.", 0.6),
     }  # fmt: skip
     live.wait()
     if session.live is live:
-        yield {**context.everything(session), parts["progress"]: box(_READY)}
+        yield context.everything(session) | {"progress": box(_READY)}
 
 
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:

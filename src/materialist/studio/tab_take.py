@@ -1,17 +1,16 @@
 """The tab to take things away: pictures, the scene, other programs' formats, a video, the recipe, the commands."""
 
 import shutil
-from typing import Any
+from collections.abc import Iterator
 
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.jobs.worker import DONE
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.archives import pack
 from materialist.studio.session import EDITS, Session
 from materialist.studio.stage import stage
-from materialist.studio.widgets import LONG, PageContext, box
+from materialist.studio.widgets import PageContext, Updates, box
 
 KINDS = {
     "png": ("Picture, PNG (path traced)", ".png"),
@@ -45,19 +44,11 @@ def layout(context: PageContext) -> None:
 
 
 def wire(context: PageContext) -> None:
-    parts = context.parts
-    outputs = [*context.job_parts, parts["download"], parts["stage"]]
-
-    @context.handler
-    def make(what: str, request: gr.Request) -> Any:
-        session = context.session(request)
+    def make(session: Session, what: str) -> Iterator[Updates]:
         if what not in KINDS:
             raise InputError("Choose one of the listed things.")
-        _ = session.scene
-        project = session.project
-        assert project is not None
-        yield {parts["download"]: gr.update(visible=False)}
         file = session.workspace / f"take-{what}{KINDS[what][1]}"
+        yield {"download": gr.update(visible=False)}
         if what == "edits":
             session.save()
             if not session.edits.active:
@@ -68,21 +59,12 @@ def wire(context: PageContext) -> None:
             if final is None:
                 return
             shutil.copyfile(final.path.with_suffix(file.suffix), file)
-        else:
-            job = context.studio.submit(
-                session, tasks.take, session.workspace, scene=str(project.scene), steps=session.edits.active,
-                output=str(file), what=what,
-            )  # fmt: skip
-            yield from context.following(job)
-            if job.state != DONE:
-                return
-        name = f"{project.stem}-{'edited' if what in ('png', 'exr') else what}{file.suffix}"
+        elif not (yield from context.work(session, tasks.take, file, steps=session.edits.active, what=what)):
+            return
+        name = f"{session.opened.stem}-{'edited' if what in ('png', 'exr') else what}{file.suffix}"
         label = f"Download {name} ({file.stat().st_size / 1e6:.1f} MB)"
-        yield {
-            parts["download"]: gr.update(value=context.studio.public_copy(file, name), label=label, visible=True),
-            parts["progress"]: box("The file is ready."),
-            parts["stage"]: stage(session),
-        }
+        made = gr.update(value=context.studio.public_copy(file, name), label=label, visible=True)
+        yield {"download": made, "progress": box("The file is ready."), "stage": stage(session)}
 
-    parts["make"].click(make, parts["what"], outputs, **LONG)
-    context.on_upload("recipe", Session.read_edits, everything=True, **{**LONG, "queue": True, "trigger_mode": "once"})
+    context.long(context.parts["make"].click, make, "what")
+    context.upload("recipe", Session.read_edits, everything=True, queue=True, trigger_mode="once")

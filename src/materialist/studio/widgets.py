@@ -1,7 +1,5 @@
 """Shared by the tabs of the page: components, events that change the session, and the values of the controls."""
 
-import functools
-import inspect
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterator
@@ -40,43 +38,70 @@ _WORDS = {
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
 
 
+Updates = dict[str, Any]
+"""Name of a component -> its new value, or an update of Gradio's."""
+PICTURE = ("stage", "steps", "commands")
+"""What a change of edits changes on the page."""
+
+
 @dataclass
 class PageContext:
-    """The studio, and the components of one page that more than one tab changes."""
+    """The studio, and the components of one page by name."""
 
     studio: Studio
     parts: dict[str, Any] = field(default_factory=dict)
 
-    def __getitem__(self, name: str) -> Any:
-        return self.parts[name]
+    def live(
+        self, event: Any, change: Callable[..., Any], *inputs: str, everything: bool = False, coarse: bool = False,
+        more: tuple[str, ...] = (), data: bool = False, **how: Any,
+    ) -> Any:  # fmt: skip
+        """Let an event call change(session, *values of inputs) at once, and show the (coarse) picture, or everything.
+
+        `change` may return further updates, of the components `more`. With `data` the event's own come before the
+        values. `how` are arguments of Gradio's event beside LIVE.
+        """
+
+        def run(request: gr.Request, told: gr.EventData, *values: Any) -> Any:
+            try:
+                session = self.session(request)
+                further = change(session, *([told._data] if data else []), *values) or {}
+                shown = self.everything(session) if everything else self.picture(session, coarse)
+                return self._outputs(shown | further)
+            except Exception as error:
+                raise self.message(error) from error
+
+        names = [*PICTURE, *(CONTROLS if everything else ()), *more]
+        given, outputs = ([self.parts[name] for name in group] for group in (inputs, names))
+        return event(run, given, outputs, **LIVE | how)
+
+    def long(
+        self, event: Any, change: Callable[..., Iterator[Updates]], *inputs: str, data: bool = False, **how: Any
+    ) -> Any:  # fmt: skip
+        """Let an event call change(session, *values of inputs), which yields updates of any components."""
+
+        def run(request: gr.Request, told: gr.EventData, *values: Any) -> Iterator[Any]:
+            try:
+                for updates in change(self.session(request), *([told._data] if data else []), *values):
+                    yield self._outputs(updates)
+            except Exception as error:
+                yield self._outputs({"progress": "", "stop": gr.update(visible=False)})
+                raise self.message(error) from error
+
+        return event(run, [self.parts[name] for name in inputs], [*self.parts.values()], **LONG | how)
+
+    def bind(self, *names: str, coarse: bool = False) -> None:
+        """Let controls set the options that they stand for."""
+        for name in names:
+            self.live(self.parts[name].input, partial(set_option, name), name, coarse=coarse)
+
+    def upload(self, name: str, change: Callable[[Session, Path], Any], **how: Any) -> None:
+        """Let an uploaded file call change(session, file); a file that is refused is taken off the page."""
+        part = self.parts[name]
+        sent = self.live(part.upload, lambda session, file: change(session, Path(file)), name, **how)
+        sent.failure(lambda: None, None, part, **LIVE)
 
     def session(self, request: Any) -> Session:
         return self.studio.session(request.session_hash, self.studio.person(dict(request.cookies).get(PERSON)))
-
-    def handler(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function (or generator) with its exceptions turned into messages on the page; the server goes on."""
-        if inspect.isgeneratorfunction(function):
-
-            @functools.wraps(function)
-            def steps(*args: Any, **kwargs: Any) -> Iterator[Any]:
-                try:
-                    yield from (outputs or gr.skip() for outputs in function(*args, **kwargs))
-                except Exception as error:
-                    yield {self["progress"]: "", self["stop"]: gr.update(visible=False)}
-                    raise self.message(error) from error
-
-            return steps
-
-        @functools.wraps(function)
-        def once(*args: Any, **kwargs: Any) -> Any:
-            try:
-                outputs = function(*args, **kwargs)
-            except Exception as error:
-                raise self.message(error) from error
-            # Gradio takes an empty dict for one value, not for "no component changes".
-            return gr.skip() if isinstance(outputs, dict) and not outputs else outputs
-
-        return once
 
     def message(self, error: Exception) -> Exception:
         """An exception as Gradio shows it; what was not foreseen goes to the terminal."""
@@ -84,82 +109,31 @@ class PageContext:
         text = f"Something went wrong inside ({type(error).__name__}); the terminal of the studio has the details."
         if known:  # its message may hold a name that a stranger chose
             text = escape(self.studio.shown(str(error)), quote=False)
-        elif not isinstance(error, gr.Error):
+        else:
             traceback.print_exception(error)
         title = "That did not work" if known else "Our mistake"
-        shown = gr.Error(text, duration=SETTINGS.message_seconds, title=title, print_exception=False)
-        return error if isinstance(error, gr.Error) else shown
+        return gr.Error(text, duration=SETTINGS.message_seconds, title=title, print_exception=False)
 
-    def picture(self, session: Session, coarse: bool = False) -> dict[Any, Any]:
-        """Updates after a change of edits."""
-        return {self["stage"]: stage(session, coarse=coarse), **self.listed(session)}
+    def _outputs(self, updates: Updates) -> Any:
+        # Gradio takes an empty dict for one value, not for "no component changes".
+        return {self.parts[name]: value for name, value in updates.items()} or gr.skip()
 
-    def listed(self, session: Session) -> dict[Any, Any]:
-        """The list of edits, and the commands that do the same."""
-        return {self["steps"]: steps(session), self["commands"]: commands(session)}
+    def picture(self, session: Session, coarse: bool = False) -> Updates:
+        """The picture with a new list of edits, and the commands that do the same."""
+        return {"stage": stage(session, coarse=coarse), "steps": steps(session), "commands": commands(session)}
 
-    def everything(self, session: Session) -> dict[Any, Any]:
-        """Updates after a change of the selection, of the current step, or of the scene."""
-        return {**self.picture(session), **self.controls(session)}
+    def everything(self, session: Session) -> Updates:
+        """The picture, and sliders as the current step, or the selected object, has them."""
+        return self.picture(session) | (control_values(session) if session.live is not None else {})
 
-    def controls(self, session: Session) -> dict[Any, Any]:
-        """Sliders as the current step, or the selected object, has them; as they are where a step is not valid."""
-        if session.live is None:
-            return {}
-        return {self[name]: value for name, value in control_values(session).items()}
-
-    @property
-    def picture_parts(self) -> list[Any]:
-        return [self["stage"], self["steps"], self["commands"]]
-
-    @property
-    def all_parts(self) -> list[Any]:
-        return [*self.picture_parts, *(self[name] for name in CONTROLS)]
-
-    @property
-    def job_parts(self) -> list[Any]:
-        """Outputs of every handler that is a generator."""
-        return [self["progress"], self["stop"]]
-
-    def on(
-        self, event: Any, change: Callable[..., Any], inputs: Any = None, *, everything: bool = False,
-        coarse: bool = False, more: tuple[Any, ...] = (), **how: Any,
-    ) -> Any:  # fmt: skip
-        """Let an event call change(session, *values of inputs), and show the (coarse) picture, or everything.
-
-        `change` returns further updates, of the components `more`, or False where nothing has changed. `how` are
-        arguments of Gradio's event beside LIVE.
-        """
-
-        @self.handler
-        def run(request: gr.Request, *values: Any) -> dict[Any, Any]:
-            session = self.session(request)
-            updates = change(session, *values)
-            if updates is False:
-                return {}
-            return {**(self.everything(session) if everything else self.picture(session, coarse)), **(updates or {})}
-
-        outputs = [*(self.all_parts if everything else self.picture_parts), *more]
-        return event(run, inputs, outputs, **{**LIVE, **how})
-
-    def bind(self, *names: str, coarse: bool = False) -> None:
-        """Let controls set the options that they stand for."""
-        for name in names:
-            self.on(self[name].input, partial(set_option, name), self[name], coarse=coarse)
-
-    def on_upload(self, name: str, change: Callable[[Session, Path], Any], **how: Any) -> None:
-        """Let an uploaded file call change(session, file); a file that is refused is taken off the page."""
-        sent = self.on(self[name].upload, lambda session, file: change(session, Path(file)), self[name], **how)
-        sent.failure(lambda: None, None, self[name], **LIVE)
-
-    def following(self, job: Job) -> Iterator[dict[Any, Any]]:
+    def following(self, job: Job) -> Iterator[Updates]:
         """Updates of the progress and its button whenever a job has moved on; the last one says how it ended."""
         last = None
         while not job.over:
             if (state := self.state(job)) != last:
-                yield {self["progress"]: (last := state), self["stop"]: gr.update(visible=True)}
+                yield {"progress": (last := state), "stop": gr.update(visible=True)}
             time.sleep(SETTINGS.poll_seconds)
-        yield {self["progress"]: self.state(job), self["stop"]: gr.update(visible=False)}
+        yield {"progress": self.state(job), "stop": gr.update(visible=False)}
 
     def state(self, job: Job) -> str:
         """The state of a job as HTML."""
@@ -174,20 +148,25 @@ class PageContext:
         part = min(1.0, job.done / job.total) if job.total else 0.0
         return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
-    def traced(self, session: Session, spp: int) -> Generator[Any, Any, FinalPicture | None]:
+    def work(
+        self, session: Session, task: tasks.Task, output: Path, **arguments: Any
+    ) -> Generator[Updates, Any, bool]:  # fmt: skip
+        """Let a task make OUTPUT of the open scene, with the updates of `following`; returns whether it did."""
+        scene = str(session.opened.scene)
+        job = self.studio.submit(session, task, output.parent, scene=scene, output=str(output), **arguments)
+        yield from self.following(job)
+        return job.state == DONE
+
+    def traced(self, session: Session, spp: int) -> Generator[Updates, Any, FinalPicture | None]:
         """Path-trace the edits of a page, if that is not done yet, with the updates of `following`.
 
         Returns the picture, which the session keeps; None where the job failed or was stopped.
         """
-        steps, known, project = session.edits.active, session.final, session.project
+        steps, known = session.edits.active, session.final
         if known is not None and known.of(steps) and known.spp >= spp:
             return known
-        assert project is not None
         target = self.studio.final_file(session)
-        given = {"scene": str(project.scene), "steps": steps, "output": str(target), "spp": spp}
-        job = self.studio.submit(session, tasks.final, target.parent, **given)
-        yield from self.following(job)
-        if job.state != DONE:
+        if not (yield from self.work(session, tasks.final, target, steps=steps, spp=spp)):
             return None
         session.final = FinalPicture(steps, target, spp)
         return session.final
