@@ -23,5 +23,4 @@ def trace(report, request):
         raise InputError("The camera sees nothing of the object; mark another one.")
     time.sleep(0.2)
     report("trace", 0, 1)
-    share = np.array([[1, 0.2]], np.float32)
-    return Pane((4, 5, 8, 10), np.full((1, 2, 3), ior, np.float32), share, np.array([[False, True]]))
+    return Pane(np.full((1, 2, 3), ior, np.float32), np.float32([[1, 0.2]]), np.array([[False, True]]))

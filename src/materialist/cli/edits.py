@@ -8,6 +8,7 @@ import typer
 import materialist as mt
 from materialist.cli.options import (
     FramesPerSecond,
+    MovingLight,
     PictureOutput,
     Place,
     Region,
@@ -44,7 +45,7 @@ def select(
         raise InputError(f"The mask {output} must end in .png.")
     ensure_image_writable(output, force=run.force)
     loaded = mt.load_scene(scene)
-    found = chosen_region(loaded, region, run)
+    found = chosen_region(loaded, region, run.device)
     shown = matte(found, loaded.photo.original) if native else found.astype(np.float32)
     # Written as display values: half a pixel inside must be half of white, whatever the curve.
     write_image(output, np.repeat(srgb_to_linear(shown)[..., None], 3, -1), force=run.force)
@@ -55,39 +56,33 @@ def select(
     )  # fmt: skip
 
 
-def edit(
-    scene: SceneArgument, output: PictureOutput, region: Region, options: MaterialEdit, rendering: Rendering, run: Run
-) -> None:
+def edit(scene: SceneArgument, output: PictureOutput, region: Region, options: MaterialEdit, how: Rendering) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
     if options == MaterialEdit():
         raise InputError("Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like.")
-    loaded, found = opened(scene, output, region, rendering, run)
+    loaded, found = opened(scene, output, region, how)
     lines = [f"{int(found.sum())} pixels edited, {float(found.mean()):.0%} of the photo."]
-    write_result("edit", loaded, mt.edit(loaded, found, options), output, rendering, run, lines=lines)
+    write_result("edit", loaded, mt.edit(loaded, found, options), output, how, lines=lines)
 
 
-def glass(
-    scene: SceneArgument, output: PictureOutput, region: Region, options: Glass, rendering: Rendering, run: Run
-) -> None:
+def glass(scene: SceneArgument, output: PictureOutput, region: Region, options: Glass, how: Rendering) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
 
-    if options.model == "two-interface" and rendering.full_render:
+    if options.model == "two-interface" and how.full_render:
         raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")
-    loaded, found = opened(scene, output, region, rendering, run)
+    loaded, found = opened(scene, output, region, how)
     edited = mt.glass(loaded, found, options)
     source = edited.provenance["edits"][-1]["thickness"]
     lines = [f"{int(found.sum())} pixels are glass; thickness: {source}."]
-    write_result("glass", loaded, edited, output, rendering, run, lines=lines)
+    write_result("glass", loaded, edited, output, how, lines=lines)
 
 
-def remove(
-    scene: SceneArgument, output: PictureOutput, region: Region, options: Removal, rendering: Rendering, run: Run
-) -> None:
+def remove(scene: SceneArgument, output: PictureOutput, region: Region, options: Removal, how: Rendering) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
-    loaded, found = opened(scene, output, region, rendering, run)
+    loaded, found = opened(scene, output, region, how)
     lines = [f"{int(found.sum())} pixels taken away."]
-    write_result("remove", loaded, mt.remove(loaded, found, options), output, rendering, run, lines=lines)
+    write_result("remove", loaded, mt.remove(loaded, found, options), output, how, lines=lines)
 
 
 def insert(
@@ -98,13 +93,12 @@ def insert(
         list[str], typer.Option("--at", metavar="X,Y", help="Where it stands, at working size; several: one each.")
     ],
     options: Insertion,
-    rendering: Rendering,
-    run: Run,
+    how: Rendering,
 ) -> None:
     """Put a mesh into the photo: it stands on what is there, casts its shadow and is reflected."""
     from materialist.edits.insert.meshes import read_model
 
-    check_before(output, rendering, run)
+    check_before(output, how)
     places = [numbers(text, 2, "--at") for text in at]
     model = read_model(mesh, up=options.up)
     loaded = edited = mt.load_scene(scene)
@@ -112,41 +106,35 @@ def insert(
         edited = mt.insert(edited, model, (x, y), options)
     longest = edited.provenance["edits"][-1]["size"]
     lines = [f"{model.name}: longest side {longest:.3g} scene units."]
-    write_result("insert", loaded, edited, output, rendering, run, lines=lines)
+    write_result("insert", loaded, edited, output, how, lines=lines)
 
 
 def apply(
     scene: SceneArgument,
     edits: Annotated[Path, typer.Argument(metavar="EDITS", help="A YAML list of edits.")],
     output: PictureOutput,
-    rendering: Rendering,
-    run: Run,
+    how: Rendering,
 ) -> None:
     """Replay a list of edits on a scene: materials and light, in one picture."""
     from materialist.edits.recipe import apply as replay
     from materialist.edits.recipe import read_recipe
 
-    check_before(output, rendering, run)
+    check_before(output, how)
     steps = read_recipe(edits)
     loaded = mt.load_scene(scene)
-    edited = replay(loaded, steps, seed=run.seed, device=run.device)
+    edited = replay(loaded, steps, seed=how.seed, device=how.device)
     skipped = sum(step.skipped for step in steps)
     done = len(steps) - skipped
     told = f"{done} edit{'s' * (done != 1)} applied" + f", {skipped} skipped" * bool(skipped)
-    write_result("apply", loaded, edited, output, rendering, run, lines=[f"{told}."])
+    write_result("apply", loaded, edited, output, how, lines=[f"{told}."])
 
 
 def relight(
     scene: SceneArgument,
     output: Annotated[Path, output_option("OUT", "A .png or .exr; with --frames .mp4 or a folder.")],
-    options: Relight,
+    options: MovingLight,
     lights: Place,
-    rendering: Rendering,
-    run: Run,
-    sun: Annotated[
-        list[str] | None, typer.Option(metavar="AZ,EL", help="A sun: degrees right of ahead, and above the horizon.")
-    ] = None,
-    sun_power: Annotated[float, typer.Option(help="Its light, relative to the mean light of the photo.")] = 1.0,
+    how: Rendering,
     frames: Annotated[
         int | None,
         typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
@@ -154,36 +142,32 @@ def relight(
     fps: FramesPerSecond = FPS,
 ) -> None:
     """Show the photo under other light."""
-    suns = [(azimuth, elevation) for azimuth, elevation in (numbers(text, 2, "--sun") for text in sun or ())]
-    if options == Relight() and not suns and frames is None:
+    suns = options.sun
+    if options == MovingLight() and frames is None:
         raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
-    alone = [("--sun-power", "--sun")] if sun_power != 1.0 and not suns else []
-    alone += [("--fps", "--frames")] if fps != FPS and frames is None else []
+    alone = [("--fps", "--frames")] if fps != FPS and frames is None else []
     alone += [(flag, "--dim") for flag in lights.named if options.dim is None]
     if alone:
         flag, needed = alone[0]
         raise InputError(f"{flag} says nothing without {needed}; give that, too, or leave {flag} out.")
-    if frames is None:
-        if output.suffix.lower() == ".mp4":
-            raise InputError(f"{output} is a video; say of how many frames with --frames, for example --frames 48.")
-        check_before(output, rendering, run)
-        if len(suns) > 1:
-            raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
-    else:
-        if rendering.save is not None:
-            raise InputError("--save writes one scene; leave out --frames.")
-        check_before(output, rendering, run, video=True)
+    if frames is None and output.suffix.lower() == ".mp4":
+        raise InputError(f"{output} is a video; say of how many frames with --frames, for example --frames 48.")
+    if frames is None and len(suns) > 1:
+        raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
+    if frames is not None and how.save is not None:
+        raise InputError("--save writes one scene; leave out --frames.")
+    check_before(output, how, video=frames is not None)
     loaded = mt.load_scene(scene)
-    marked = chosen_region(loaded, lights, run) if lights.named else None
-    wanted = Relight.given(options, sun_power=sun_power, lights=marked)
+    marked = chosen_region(loaded, lights, how.device) if lights.named else None
+    wanted = Relight(**{**vars(options), "sun": None, "lights": marked})
     if frames is not None:
         from materialist.edits.light.relight import moving_light
 
-        film = moving_light(loaded, frames, wanted, suns=tuple(suns))
-        write_film("relight", loaded, film, output, rendering, run, frames=frames, fps=fps)
+        film = moving_light(loaded, frames, wanted, suns=suns)
+        write_film("relight", loaded, film, output, how, frames=frames, fps=fps)
         return
     edited = mt.relight(loaded, wanted, sun=suns[0] if suns else None)
-    write_result("relight", loaded, edited, output, rendering, run)
+    write_result("relight", loaded, edited, output, how)
 
 
 def drop(
@@ -194,23 +178,22 @@ def drop(
         list[str], typer.Option("--at", metavar="X,Y", help="Over which pixel of the working size; one, or one each.")
     ],
     options: Drop,
-    run: Run,
     frames: Annotated[int, typer.Option(metavar="N", help="Length of the film.")] = 48,
     fps: FramesPerSecond = FPS,
     rotate: Annotated[
         str | None, typer.Option(metavar="DEG|A..B", help="Meanwhile the light turns to the right, from A to B.")
     ] = None,
-    rendering: Rendering = Rendering(spp=32),  # noqa: B008
+    how: Rendering = Rendering(spp=32),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
     from materialist.edits.insert.meshes import read_model
     from materialist.edits.light.relight import moving_light
 
     light = Relight.read({} if rotate is None else {"rotate": rotate})
-    check_before(output, rendering, run, video=True)
+    check_before(output, how, video=True)
     places: Any = [numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = mt.load_scene(scene)
     film: Any = mt.drop(loaded, models, places, options, frames=frames, fps=fps)
     film = film if rotate is None else moving_light(film, frames, light)
-    write_film("drop", loaded, film, output, rendering, run, frames=frames, fps=fps)
+    write_film("drop", loaded, film, output, how, frames=frames, fps=fps)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from materialist.option_kinds import OperationOptions, option
+from materialist.options import Relight
 
 
 def output_option(metavar: str, help: str) -> Any:
@@ -67,8 +68,8 @@ class Region(Place):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rendering(OperationOptions):
-    """How an edited scene becomes a picture."""
+class Rendering(Run):
+    """How an edited scene becomes a picture or a film."""
 
     spp: int | None = option(
         None, "Paths per pixel, of both renderings; else 128 for new glass, 64 for the rest.",
@@ -80,6 +81,15 @@ class Rendering(OperationOptions):
         None, "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.", kind="function",
         needs="full_render", metavar="FILE.py:FUNCTION")
     save: Path | None = option(None, "Write the edited scene as well.", kind="file", metavar="SCENE2")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingLight(Relight):
+    """Other light, which goes from one sun to the next in a film."""
+
+    sun: tuple[tuple[float, float], ...] = option(  # type: ignore[assignment]
+        (), "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, many=True,
+        metavar="AZ,EL")
 
 
 @dataclass(frozen=True, kw_only=True)

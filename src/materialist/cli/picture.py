@@ -6,27 +6,27 @@ from pathlib import Path
 from typing import Any
 
 import materialist as mt
-from materialist.cli.options import Place, Region, Rendering, Run
+from materialist.cli.options import Place, Region, Rendering
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
 from materialist.errors import InputError
 
 
-def chosen_region(scene: Any, region: Place, run: Run) -> Any:
+def chosen_region(scene: Any, region: Place, device: str) -> Any:
     """[H, W] bool from the flags of the command line."""
     method = region.method if isinstance(region, Region) else "network"
     click = list(region.click) or None
-    return mt.select(scene, click=click, box=region.box, mask=region.mask, method=method, device=run.device)
+    return mt.select(scene, click=click, box=region.box, mask=region.mask, method=method, device=device)
 
 
-def opened(scene: Path, output: Path, region: Place, rendering: Rendering, run: Run) -> tuple[Any, Any]:
+def opened(scene: Path, output: Path, region: Place, how: Rendering) -> tuple[Any, Any]:
     """(the scene, [H, W] bool region that is edited), once the output is known to be writable."""
-    check_before(output, rendering, run)
+    check_before(output, how)
     loaded = mt.load_scene(scene)
-    return loaded, chosen_region(loaded, region, run)
+    return loaded, chosen_region(loaded, region, how.device)
 
 
-def check_before(output: Path, rendering: Rendering, run: Run, *, video: bool = False) -> None:
+def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
     """Everything about the output that can be wrong, before the work starts.
 
     All renderings of the command are then done on its device, also those that ask for `auto`.
@@ -35,42 +35,42 @@ def check_before(output: Path, rendering: Rendering, run: Run, *, video: bool = 
     from materialist.io.image import ensure_image_writable
     from materialist.io.video import ensure_video_writable
 
-    save = rendering.save
+    save = how.save
     if save is not None:
-        if rendering.full_render:
+        if how.full_render:
             raise InputError(
                 "--save keeps the photograph with the edit in it, and --full-render writes the rendering alone; leave "
                 "one of them out."
             )
         if output.resolve().is_relative_to(save.resolve()):
             raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
-        ensure_writable(save, run.force)
-    (ensure_video_writable if video else ensure_image_writable)(output, force=run.force)
-    if run.device != "auto":
+        ensure_writable(save, how.force)
+    (ensure_video_writable if video else ensure_image_writable)(output, force=how.force)
+    if how.device != "auto":
         from materialist.render.variant import setup
 
-        setup(run.device)
+        setup(how.device)
 
 
 def write_result(
-    command: str, scene: Any, edited: Any, output: Path, rendering: Rendering, run: Run, *, lines: Sequence[str] = ()
+    command: str, scene: Any, edited: Any, output: Path, how: Rendering, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
     from materialist.edits.composite.composite import write_composite
     from materialist.edits.core.renderer import paths_for
 
-    start, spp = time.monotonic(), rendering.spp or paths_for(scene, edited)
-    with stage_progress(quiet=run.as_json) as progress:
+    start, spp = time.monotonic(), how.spp or paths_for(scene, edited)
+    with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
-            scene, edited, spp=spp, seed=run.seed, full_render=rendering.full_render,
-            upscale=rendering.upscale, denoise=rendering.denoise, device=run.device, progress=progress,
+            scene, edited, spp=spp, seed=how.seed, full_render=how.full_render,
+            upscale=how.upscale, denoise=how.denoise, device=how.device, progress=progress,
         )  # fmt: skip
-    write_composite(output, picture, scene.photo, force=run.force)
+    write_composite(output, picture, scene.photo, force=how.force)
     told = {"image": str(output), "spp": spp, "seconds": time.monotonic() - start}
-    finish(command, scene, edited, picture, rendering, run, [*lines, f"Look at {output}"], told)
+    finish(command, scene, edited, picture, how, [*lines, f"Look at {output}"], told)
 
 
 def write_film(
-    command: str, scene: Any, film: Iterable[Any], output: Path, rendering: Rendering, run: Run, *, frames: int,
+    command: str, scene: Any, film: Iterable[Any], output: Path, how: Rendering, *, frames: int,
     fps: int,
 ) -> None:  # fmt: skip
     """Render and write a film, one scene in memory at a time; report."""
@@ -84,34 +84,34 @@ def write_film(
         nonlocal change
         for item in items:
             last[name] = item
-            if name == "picture" and not rendering.full_render:
+            if name == "picture" and not how.full_render:
                 change = max(change, mean_change(scene, item))
             yield item
 
-    with stage_progress(quiet=run.as_json) as progress:
+    with stage_progress(quiet=how.as_json) as progress:
         made = pictures(
-            scene, kept("scene", film), spp=rendering.spp, seed=run.seed, denoise=rendering.denoise, device=run.device,
-            full_render=rendering.full_render, upscale=rendering.upscale, progress=progress, count=frames,
+            scene, kept("scene", film), spp=how.spp, seed=how.seed, denoise=how.denoise, device=how.device,
+            full_render=how.full_render, upscale=how.upscale, progress=progress, count=frames,
         )  # fmt: skip
-        write_frames(output, kept("picture", made), fps=fps, force=run.force)
+        write_frames(output, kept("picture", made), fps=fps, force=how.force)
     told = {"video": str(output), "frames": frames, "fps": fps, "seconds": time.monotonic() - start}
-    finish(command, scene, last["scene"], last["picture"], rendering, run, [f"Look at {output}"], told, change)
+    finish(command, scene, last["scene"], last["picture"], how, [f"Look at {output}"], told, change)
 
 
 def finish(
-    command: str, scene: Any, edited: Any, picture: Any, rendering: Rendering, run: Run, lines: list[str],
+    command: str, scene: Any, edited: Any, picture: Any, how: Rendering, lines: list[str],
     told: dict[str, Any], change: float | None = None,
 ) -> None:  # fmt: skip
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
     from materialist.edits.core.notes import effect_notes, mean_change, warnings_since
 
-    save, warnings = rendering.save, warnings_since(scene, edited)
-    if not rendering.full_render:
+    save, warnings = how.save, warnings_since(scene, edited)
+    if not how.full_render:
         warnings += effect_notes(scene, edited, mean_change(scene, picture) if change is None else change)
     lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
-        mt.save_scene(developed(scene, edited, picture, seed=run.seed, device=run.device), save, force=run.force)
+        mt.save_scene(developed(scene, edited, picture, seed=how.seed, device=how.device), save, force=how.force)
         lines.append(f"The edited scene is {save}")
     told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
-    report_success(command, run.as_json, lines, **told)
+    report_success(command, how.as_json, lines, **told)

@@ -96,20 +96,14 @@ def _members(
 
 
 def _extract(given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder: Path, shown: str) -> None:
-    """Write members, checked names all, into a folder; never more than their headers promise, and not too much."""
+    """Write members under their names here into a folder; `zipfile` reads no more of one than its header promises."""
     total = sum(entry.file_size for entry in members.values())
     if total > SETTINGS.unpacked_bytes:
         most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
         raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
     for name, entry in members.items():
-        left = entry.file_size
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        with given.open(entry) as source, (folder / name).open("wb") as out:
-            while block := source.read(1 << 20):
-                left -= len(block)
-                if left < 0:
-                    raise InputError(f"{shown} is not what its index says; zip it again.")
-                out.write(block)
+        entry.filename = name
+        given.extract(entry, folder)
 
 
 def _named(steps: Iterable[Step]) -> set[str]:

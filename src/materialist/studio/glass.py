@@ -10,8 +10,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import materialist as mt
 from materialist.edits.recipe import REGION, Step, apply, options_of, region_of
 from materialist.errors import InputError
@@ -29,16 +27,14 @@ _WORDS = {"build": "Building the glass body â€¦", "trace": "Tracing the glass â€
 
 @dataclass(frozen=True)
 class Pane:
-    """A traced piece of glass, and the ground around it that the object had hidden."""
+    """A traced piece of glass, and the ground around it that the object had hidden; at working size."""
 
-    box: tuple[int, int, int, int]
-    """Rows and columns (top, bottom, left, right) of the working picture, the ends excluded."""
     picture: Array
-    """[h, w, 3] float32 linear."""
+    """[H, W, 3] float32 linear."""
     share: Array
-    """[h, w] float32 in [0, 1] of the glass."""
+    """[H, W] float32 in [0, 1] of the glass."""
     filled: Array
-    """[h, w] bool where the photo is filled in."""
+    """[H, W] bool where the photo is filled in."""
 
 
 @dataclass(frozen=True)
@@ -217,9 +213,4 @@ def trace(report: Reporter, request: Request) -> Pane | None:
         return None
     report("trace", 0, 1)
     picture = preview.picture(**{name: getattr(options, name) for name in VALUES})
-    shown = (preview.share > 0) | preview.filled
-    rows, columns = np.flatnonzero(shown.any(1)), np.flatnonzero(shown.any(0))
-    top, bottom, left, right = int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
-    cut = (slice(top, bottom), slice(left, right))
-    share = np.ascontiguousarray(preview.share[cut], np.float32)
-    return Pane((top, bottom, left, right), np.ascontiguousarray(picture[cut]), share, preview.filled[cut].copy())
+    return Pane(picture, preview.share, preview.filled)

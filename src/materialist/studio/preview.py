@@ -108,12 +108,12 @@ class LivePreview:
             if pane is None:
                 picture = sketch_glass(picture, *self._glass(step))
             else:
-                picture = lay_over(picture, pane.box, pane.picture, pane.filled)
+                picture = lay_over(picture, pane.picture, pane.filled)
         if edited.bodies:
             picture = draw_bodies(picture, edited)
         for _, pane in known:
             if pane is not None:
-                picture = lay_over(picture, pane.box, pane.picture, pane.share)
+                picture = lay_over(picture, pane.picture, pane.share)
         return picture
 
     def close(self) -> None:
@@ -174,13 +174,9 @@ def sketch_glass(picture: Array, region: Array, tint: glass.Tint) -> Array:
     return np.where(region[..., None], blurred * np.asarray(tint, np.float32), picture)
 
 
-def lay_over(picture: Array, box: tuple[int, int, int, int], piece: Array, share: Array) -> Array:
-    """[H, W, 3] with a piece [h, w, 3] laid over the rows and columns of a box, by its share [h, w]."""
-    top, bottom, left, right = box
-    out = picture.copy()
-    under = out[top:bottom, left:right]
-    out[top:bottom, left:right] = under + share[..., None] * (piece - under)
-    return out
+def lay_over(picture: Array, piece: Array, share: Array) -> Array:
+    """[H, W, 3] with another picture laid over it, by its share [H, W]."""
+    return picture + share[..., None] * (piece - picture)
 
 
 def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:

@@ -126,8 +126,8 @@ class Session:
             if self.glass is not None:
                 self.glass.stop()
             if self.final is not None:
-                for suffix in (".png", ".exr", ".jpg"):
-                    self.final.path.with_suffix(suffix).unlink(missing_ok=True)
+                for file in self.final.path.parent.glob(f"{self.final.path.name}*"):
+                    file.unlink()
             self.project = self.live = self.glass = self.final = None
             self.edits, self._past, self._future = EditList(), [], []
             self.selection = Selection()
