@@ -6,7 +6,6 @@ from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, arc, lines, turned, vie
 
 from materialist.bench.glass_scenes import is_closed
 from materialist.solids.outline import surface_of_revolution
-from materialist.solids.revolution import vessel
 
 
 def revolved(profile):
@@ -60,8 +59,8 @@ def test_its_axis_and_front_are_those_of_the_object(pot):
 
 def test_a_cylinder_becomes_an_open_pot(pot, ball):
     body, wall = pot[0], 0.05
-    shell = body.body(CAMERA, wall=wall, open_top=True)
-    assert body.opens(wall) and is_closed(shell)
+    shell = body.vessel(CAMERA, wall)
+    assert is_closed(shell)
     place = body.axis.of(shell.vertices.astype(float)) - [0, body.profile.floor]
     high = place[:, 1].max()
     glass = np.pi * (0.3**2 - 0.25**2) * (high - wall) + np.pi * 0.3**2 * wall
@@ -74,7 +73,7 @@ def test_a_cylinder_becomes_an_open_pot(pot, ball):
     facing = (shell.normals * out).sum(1) / np.maximum(np.linalg.norm(out, axis=1), 1e-9)
     side = (place[:, 1] > 0.2) & (place[:, 1] < 0.5)
     assert (facing[side & (place[:, 0] > 0.28)] > 0.9).all() and (facing[side & (place[:, 0] < 0.27)] < -0.9).all()
-    assert vessel(body.profile, 0.4) is None  # no room inside
+    assert body.vessel(CAMERA, 0.4) is None  # no room inside
 
 
 def test_rings_and_half_balls_are_none(ball):

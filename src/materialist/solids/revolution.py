@@ -54,22 +54,19 @@ class Revolution:
     axis: Axis
     profile: Profile
 
-    def body(self, camera: Camera, *, wall: float | None = None, open_top: bool = False) -> Shell:
+    def body(self, camera: Camera, *, wall: float | None = None) -> Shell:
         """The closed body; with `wall` (scene units) a second surface is added inside.
 
-        With `open_top`, too, both are one: a vessel without a lid, where the profile allows it (`opens`). Every edge
-        has two faces that run through it in opposite directions.
+        Every edge has two faces that run through it in opposite directions.
         """
-        line = vessel(self.profile, wall) if wall and open_top else None
-        if line is not None:
-            return _swept(*line, self.axis, camera)
         outer = [_swept(*line, self.axis, camera) for line in self.profile.lines()]
         inner = [_swept(*line, self.axis, camera) for line in self.profile.lines(wall)] if wall else []
         return joined([*outer, *map(inside_out, inner)])
 
-    def opens(self, wall: float) -> bool:
-        """Whether it can be a vessel that is open at the top."""
-        return vessel(self.profile, wall) is not None
+    def vessel(self, camera: Camera, wall: float) -> Shell | None:
+        """The body as one surface around a wall (scene units), open at the top; None where the profile has no room."""
+        line = _vessel_line(self.profile, wall)
+        return None if line is None else _swept(*line, self.axis, camera)
 
     def thickness(self, depth: Array, inside: Array, rays: Array) -> Array:
         """[H, W] float32 scene units along rays: from the front [H, W] planar depth to the last surface of the body."""
@@ -144,7 +141,7 @@ def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     )  # fmt: skip
 
 
-def vessel(profile: Profile, wall: float) -> tuple[Array, Array] | None:
+def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
     """The line around the wall of an open vessel: up its outside, over a round rim, down its inside.
 
     Places [K, 2] (distance, height) of the line and their unit outward normals [K, 2], glass to its left, from the

@@ -1,5 +1,6 @@
 """Closed surfaces of triangles, made of two sheets over one region of the picture and the wall between them."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ class Shell(NamedTuple):
     """Whether one of its parts bounds a cavity."""
 
 
-def joined(shells: list[Shell]) -> Shell:
+def joined(shells: Sequence[Shell]) -> Shell:
     """Several surfaces as one; none of them shares a vertex with another."""
     first = np.cumsum([0] + [len(shell.vertices) for shell in shells])
     faces = np.concatenate([shell.faces + start for shell, start in zip(shells, first)]).astype(np.int32)

@@ -1,6 +1,7 @@
 """An object of the photo turned to glass (paper, Material Transparency Editing)."""
 
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,13 @@ from materialist.camera import pixel_rays
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_region
 from materialist.edits.core.surfaces import PHOTO_GLASS
-from materialist.edits.glass.thickness import ObjectThickness, object_thickness, objects_in
+from materialist.edits.glass.thickness import object_thickness, objects_in, wall_of
 from materialist.edits.remove.patches import resized
 from materialist.edits.remove.remove import remove
 from materialist.geometry.membrane import nearest
 from materialist.geometry.slopes import blurred_normals
 from materialist.options import Glass
+from materialist.predict.refraction.thickness import Thickness
 from materialist.solids.closed import closed_proxy
 from materialist.solids.shell import Shell, joined
 from materialist.types import Array, Body, Scene, Surface
@@ -48,11 +50,10 @@ def glass(
         edited = _two_interface(scene, removed, each, options, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if options.hollow else edited
     else:
-        shells = [_shell(scene, removed, part, found, options.hollow) for part, found in each]
+        shells, notes = zip(*(_shell(scene, removed, part, found, options.hollow) for part, found in each), strict=True)
         shell = joined(shells)
         body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, glass_surface(scene, options), PHOTO_GLASS)
-        notes = _unlike(each, shells, options.hollow)
-        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *notes)
+        edited = warned(replace(removed, bodies=(*removed.bodies, body)), *chain(*notes))
     what = {
         "ior": options.ior, "transmission": options.transmission, "tint": list(options.tint),
         "roughness": options.roughness, "hollow": options.hollow, "model": options.model, "back": options.back,
@@ -61,23 +62,22 @@ def glass(
     return noted(edited, "glass", what)
 
 
-def _shell(scene: Scene, removed: Scene, part: Array, found: ObjectThickness, hollow: bool | str) -> Shell:
-    wall = found.wall if hollow else None
-    if found.revolution is not None:
-        return found.revolution.body(scene.camera, wall=wall, open_top=hollow == "open")
-    return closed_proxy(
-        scene.depth, scene.normal, part, found.solid, scene.camera, wall=wall, behind=removed.depth, back=found.back
-    )  # fmt: skip
-
-
-def _unlike(each: list[tuple[Array, ObjectThickness]], shells: list[Shell], hollow: bool | str) -> list[str]:
-    """What of a hollow could not be made, in words."""
-    notes = []
-    for (_, found), shell in zip(each, shells, strict=True):
-        opened = hollow == "open" and found.revolution is not None and found.revolution.opens(found.wall)
-        notes += [LID] * (hollow == "open" and not opened)
-        notes += [NO_ROOM] * (bool(hollow) and not opened and not shell.hollow)
-    return list(dict.fromkeys(notes))
+def _shell(
+    scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: bool | str
+) -> tuple[Shell, list[str]]:  # fmt: skip
+    """(the body of one object, what of a hollow could not be made, in words)."""
+    camera, whole = scene.camera, found.revolution
+    wall = wall_of(scene, part, found) if hollow else None
+    if whole is None:
+        shell = closed_proxy(
+            scene.depth, scene.normal, part, found.solid, camera, wall=wall, behind=removed.depth, back=found.back
+        )  # fmt: skip
+    else:
+        opened = whole.vessel(camera, wall) if hollow == "open" else None
+        if opened is not None:
+            return opened, []
+        shell = whole.body(camera, wall=wall)
+    return shell, [LID] * (hollow == "open") + [NO_ROOM] * (bool(hollow) and not shell.hollow)
 
 
 def glass_surface(scene: Scene, options: Glass) -> Surface:
@@ -92,7 +92,7 @@ def glass_surface(scene: Scene, options: Glass) -> Surface:
 
 
 def _two_interface(
-    scene: Scene, removed: Scene, each: list[tuple[Array, ObjectThickness]], options: Glass, envmap: Array
+    scene: Scene, removed: Scene, each: list[tuple[Array, Thickness]], options: Glass, envmap: Array
 ) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
     from materialist.edits.glass.two_interface import Backdrop, back_of, two_interface
@@ -118,7 +118,7 @@ def _two_interface(
     return replace(removed, photo=replace(photo, linear=linear, original=original))
 
 
-def _front(scene: Scene, own: Array, found: ObjectThickness) -> tuple[Array, Array, Array]:
+def _front(scene: Scene, own: Array, found: Thickness) -> tuple[Array, Array, Array]:
     """Where glass is seen, [H, W] bool, and its front's depth and normals: of a surface of revolution, or the maps.
 
     Normals of the maps are blurred as for the closed proxy.

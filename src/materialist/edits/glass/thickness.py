@@ -11,8 +11,7 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.planes import upright
 from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
-from materialist.predict.refraction.thickness import best_thickness, thickness
-from materialist.solids.revolution import Revolution
+from materialist.predict.refraction.thickness import Thickness, best_thickness, thickness
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
 
@@ -33,22 +32,6 @@ class WallSettings:
 WALL = WallSettings()
 
 
-@dataclass(frozen=True)
-class ObjectThickness:
-    """Thickness of one object along the camera rays, scene units."""
-
-    solid: Array
-    """[H, W] float32 from the first to the last point; 0 outside the mask."""
-    wall: float
-    """Of the object, were it hollow."""
-    method: str
-    """Which method it comes from: `revolution`, `network`, `symmetry` or `given`."""
-    back: Array | None = None
-    """[H, W, 3] unit outward normals of the back, where RefractionNet tells them."""
-    revolution: Revolution | None = None
-    """The whole object, where it is a surface of revolution."""
-
-
 def objects_in(mask: Array) -> list[Array]:
     """[H, W] bool masks of the connected objects under a mask [H, W] bool; together they are the mask.
 
@@ -66,7 +49,7 @@ def objects_in(mask: Array) -> list[Array]:
 
 def object_thickness(
     scene: Scene, mask: Array, method: str | Array | Path = "auto", *, behind: Array | None = None
-) -> ObjectThickness:
+) -> Thickness:
     """The thickness of the object under a mask [H, W] bool (paper, Thickness Prior Prediction).
 
     Args:
@@ -79,25 +62,28 @@ def object_thickness(
     WeightsError where the weights of RefractionNet are missing.
     """
     inside = surface_in(mask, scene.depth, scene.camera)
-    rays, photo, maps = pixel_rays(scene.camera), scene.photo.linear, (scene.normal, scene.depth, scene.camera)
-    size = object_size(inside, scene.depth, rays)
+    maps = (scene.photo.linear, inside, scene.normal, scene.depth, scene.camera)
     if not (isinstance(method, str) and method in METHODS):
-        given = _given(method, inside)
-        return ObjectThickness(np.where(inside, given, 0).astype(np.float32), WALL.usual * size, "given")
+        return Thickness(np.where(inside, _given(method, inside), 0).astype(np.float32), method="given")
     if method == "symmetry":
-        mirrored = symmetric_thickness(scene.depth, scene.normal, inside, scene.camera)
-        return ObjectThickness(mirrored, WALL.usual * size, "symmetry")
+        return Thickness(symmetric_thickness(scene.depth, scene.normal, inside, scene.camera), method=method)
     if method == "network":
-        found = thickness(photo, inside, *maps)
-    else:
-        up = upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
-        found = best_thickness(photo, inside, *maps, up=up, behind=behind)
+        return thickness(*maps)
+    up = upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
+    return best_thickness(*maps, up=up, behind=behind)
+
+
+def wall_of(scene: Scene, mask: Array, found: Thickness) -> float:
+    """Thickness of the wall of the object under a mask [H, W] bool, were it hollow; scene units."""
+    inside, rays = surface_in(mask, scene.depth, scene.camera), pixel_rays(scene.camera)
+    size = object_size(inside, scene.depth, rays)
+    if found.hollow is None:
+        return WALL.usual * size
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
     across = inside & (found.hollow > 0) & (found.hollow < 0.8 * found.solid)
     wall = float(np.median((found.hollow * facing / 2)[across])) if across.any() else WALL.usual * size
-    wall = float(np.clip(wall, WALL.least * size, WALL.most * size))
-    return ObjectThickness(found.solid, wall, found.method, found.back, found.revolution)
+    return float(np.clip(wall, WALL.least * size, WALL.most * size))
 
 
 def _given(method: str | Array | Path, inside: Array) -> Array:

@@ -26,17 +26,14 @@ class Thickness:
 
     solid: Array
     """[H, W] float32 scene units: from the first to the last point of its outer surface; 0 outside the mask."""
-    hollow: Array
-    """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`."""
+    hollow: Array | None = None
+    """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`. None: unknown."""
     back: Array | None = None
     """[H, W, 3] float32 unit, camera frame: outward normals of its last surface, 0 outside the mask; None: unknown."""
     revolution: Revolution | None = None
     """The whole object, where it is a surface of revolution."""
-
-    @property
-    def method(self) -> str:
-        """`revolution` or `network`."""
-        return "network" if self.revolution is None else "revolution"
+    method: str = "network"
+    """Where it comes from."""
 
 
 def thickness(
@@ -83,7 +80,7 @@ def best_thickness(
     if found is None:
         return guess
     body, solid = found
-    return Thickness(solid, np.minimum(guess.hollow, solid), revolution=body)
+    return Thickness(solid, np.minimum(guess.hollow, solid), revolution=body, method="revolution")
 
 
 def _answer(
