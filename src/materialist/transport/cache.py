@@ -157,11 +157,10 @@ class TransportCache:
             # Diffuse lobes are sampled alike in every tile: what falls between their few directions would be missing
             # from the whole picture, or be in all of it twice.
             env = pyramid.level(4 * np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
-            args = (
+            sums = _gather_loop(
                 hits, slots, env, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
-                dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha),
+                dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha), diffuse=k == 0,
             )  # fmt: skip
-            sums = _gather_diffuse(*args) if k == 0 else _gather_specular(*args)
             dr.eval(*sums)
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
         return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous())
@@ -205,10 +204,13 @@ def spawn(position, geometric_normal, direction):
     return mi.Ray3f(dr.fma(magnitude * sign, geometric_normal, position), direction)
 
 
-def _direction(diffuse: bool, wo, alpha, sample):
+def _drawn(diffuse: bool, wo, alpha, sample):
+    """A direction drawn from a lobe, and the half vector between it and `wo`."""
     if diffuse:
-        return mi.warp.square_to_cosine_hemisphere(sample)
-    return mi.reflect(wo, visible_normal(wo, alpha, sample))
+        wi = mi.warp.square_to_cosine_hemisphere(sample)
+        return wi, dr.normalize(wi + wo)
+    h = visible_normal(wo, alpha, sample)
+    return mi.reflect(wo, h), h
 
 
 @dr.syntax
@@ -218,7 +220,7 @@ def _trace_loop(
     i = dr.zeros(mi.UInt32, dr.width(lane))
     width = dr.opaque(mi.UInt32, dr.width(lane))
     while i < count:
-        wi = _direction(diffuse, wo, alpha, point(i, count, shift))
+        wi, _ = _drawn(diffuse, wo, alpha, point(i, count, shift))
         above = wi.z > 0
         ray = spawn(position, geometric_normal, lifted(frame.to_world(wi), face))
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=above)
@@ -235,38 +237,27 @@ def _incoming(hits, slots, env, index, direction, above):
     return dr.select(above, dr.select(miss, sky, surface), mi.Color3f(0))
 
 
-@dr.syntax
-def _gather_diffuse(hits, slots, env, lane, face, frame, wo, shift, count, alpha):
-    width = dr.opaque(mi.UInt32, dr.width(lane))
-    i = dr.zeros(mi.UInt32, dr.width(lane))
-    d0, d1, d2 = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
-    while i < count:
-        wi = _direction(True, wo, alpha, point(i, count, shift))
-        h = dr.normalize(wi + wo)
-        light = _incoming(hits, slots, env, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
-        c0, c1, c2 = diffuse_coefficients(wi.z, wo.z, dr.dot(h, wi))
-        d0 += c0 * light
-        d1 += c1 * light
-        d2 += c2 * light
-        i += 1
-    return d0, d1, d2
+def _added(sums, diffuse: bool, wi, wo, h, alpha, light):
+    """The sums of a lobe with one more sample: those of D0, D1, D2, or of S0, S1."""
+    if diffuse:
+        terms = [c * light for c in diffuse_coefficients(wi.z, wo.z, dr.dot(h, wi))]
+    else:
+        fresnel, weighted = schlick(dr.dot(h, wo)), light * smith_g1(wi.z, alpha)
+        terms = [(1 - fresnel) * weighted, fresnel * weighted]
+    return [total + term for total, term in zip(sums, terms, strict=True)]
 
 
 @dr.syntax
-def _gather_specular(hits, slots, env, lane, face, frame, wo, shift, count, alpha):
+def _gather_loop(hits, slots, env, lane, face, frame, wo, shift, count, alpha, diffuse: bool):
     width = dr.opaque(mi.UInt32, dr.width(lane))
     i = dr.zeros(mi.UInt32, dr.width(lane))
-    s0, s1 = mi.Color3f(0), mi.Color3f(0)
+    sums = [mi.Color3f(0)] * (3 if diffuse else 2)
     while i < count:
-        h = visible_normal(wo, alpha, point(i, count, shift))
-        wi = mi.reflect(wo, h)
+        wi, h = _drawn(diffuse, wo, alpha, point(i, count, shift))
         light = _incoming(hits, slots, env, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
-        fresnel = schlick(dr.dot(h, wo))
-        weighted = light * smith_g1(wi.z, alpha)
-        s0 += (1 - fresnel) * weighted
-        s1 += fresnel * weighted
+        sums = _added(sums, diffuse, wi, wo, h, alpha, light)
         i += 1
-    return s0, s1
+    return sums
 
 
 def pixel_shift(height: int, width: int, seed: int) -> Array:
