@@ -6,7 +6,7 @@ from transport_scenes import furnished_room, windowed_sky
 
 from materialist.fit.engine import TransportEngine
 from materialist.transport.cache import ROUGHNESS_LEVELS, CacheSettings, Tables
-from materialist.transport.filter import Guide, filter_tables, joint_filter, taps
+from materialist.transport.filter import Guide, filter_tables, joint_filter
 
 H, W = 12, 10
 
@@ -29,7 +29,7 @@ def test_plane_gets_the_plain_box_average():
     for i in range(2, H - 2):
         for j in range(2, W - 2):
             expected[i, j] = (values[i - 2 : i + 3, j - 2 : j + 3, 0].numpy() * np.outer(tap, tap)).sum()
-    filtered = joint_filter(values, taps(flat_guide()))[..., 0].numpy()
+    filtered = joint_filter(values, flat_guide())[..., 0].numpy()
     np.testing.assert_allclose(filtered[2:-2, 2:-2], expected[2:-2, 2:-2], rtol=1e-5)
 
 
@@ -38,7 +38,7 @@ def test_nothing_crosses_a_step_in_depth():
     guide.position[:, 5:, 2] -= 40
     values = torch.zeros(H, W, 1)
     values[:, 5:] = 1
-    torch.testing.assert_close(joint_filter(values, taps(guide)), values)
+    torch.testing.assert_close(joint_filter(values, guide), values)
 
 
 def test_sharp_levels_are_left_alone_and_noise_falls():

@@ -24,8 +24,6 @@ from materialist.io.atomic import whole_file
 from materialist.types import Array, Materials, Scene
 
 if TYPE_CHECKING:
-    import torch
-
     from materialist.transport.cache import Tables
 
 RAYS = (48, 12)
@@ -84,12 +82,6 @@ class Preview:
 
         return TransportCache(self.scene.geometry, self.scene.camera, CacheSettings(8, 1))
 
-    @cached_property
-    def _taps(self):
-        from materialist.transport.filter import taps
-
-        return list(taps(self._engine.guide))
-
     def prepare(self) -> bool:
         """Trace the next part of what another light will need, a second or so; False where all is there."""
         return self._quick.trace_next() or self._engine.cache.trace_next()
@@ -104,8 +96,8 @@ class Preview:
             raise InputError("The preview was built for another geometry; build one for this scene.")
         edited = self._seen(edited)
         fitted = np.array_equal(edited.envmap, self.scene.envmap)
-        shaded = self._shaded(edited.materials, self._tables) if fitted else self._relit(edited, coarse)
-        return self._image(shaded, self._sky(edited.envmap))
+        tables = self._tables if fitted else self._tables_under(edited, coarse)
+        return self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
 
     def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""
@@ -126,58 +118,30 @@ class Preview:
         light = edited.envmap / ambient if ambient > LEAST_AMBIENT else self.scene.envmap
         return replace(edited, envmap=(light * brought).astype(np.float32))
 
-    def _relit(self, edited: Scene, coarse: bool) -> torch.Tensor:
-        """[P, 3] under another light, which surfaces pass on once; its tables are kept until there is a third light."""
-        from materialist.bsdf.disney import combine
+    def _tables_under(self, edited: Scene, coarse: bool) -> Tables:
+        """The tables of another light, which surfaces pass on once; kept until there is a third light."""
+        from materialist.transport.filter import filter_tables
 
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
-            tables = self._other[1]
-        else:
-            tables = self._quick.gather(edited.envmap, self._passed_on if coarse else None)
-            self._passed_on = self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
-            if not coarse:
-                tables = self._engine.cache.gather(edited.envmap, self._passed_on)
-                self._other = (edited.envmap, tables)
-        albedo, roughness, metallic = self._maps(edited.materials)
-        return combine(albedo, metallic[:, None], *self._filtered(tables, roughness).split(3, -1))
+            return self._other[1]
+        guide = self._engine.guide
+        tables = self._quick.gather(edited.envmap, self._passed_on if coarse else None)
+        tables = filter_tables(self._quick, tables, guide)
+        self._passed_on = self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
+        if not coarse:
+            tables = filter_tables(self._engine.cache, self._engine.cache.gather(edited.envmap, self._passed_on), guide)
+            self._other = (edited.envmap, tables)
+        return tables
 
-    def _filtered(self, tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
-        """[P, 9]: D(R), S0(R) and S1(R) (see `transport.shading`) of each pixel's roughness [P], filtered.
-
-        Filtering these nine numbers takes an eighth of the time of filtering the tables of all roughness levels.
-        """
-        import torch
-
-        from materialist.transport.cache import ROUGHNESS_LEVELS
-        from materialist.transport.filter import first_filtered, joint_filter
-        from materialist.transport.shading import specular_at
-
-        r = roughness[:, None]
-        d0, d1, d2 = tables.diffuse.split(3, -1)
-        lobes = torch.cat([d0 + r * (d1 + r * d2), specular_at(tables, roughness)], -1)
-        guide, pixels = self._engine.guide, torch.from_numpy(self._pixels)
-        grid = lobes.new_zeros(guide.scale.numel(), 9)
-        grid[pixels] = lobes
-        smooth = joint_filter(grid.view(*guide.scale.shape, 9), self._taps).view(-1, 9)[pixels]
-        # Levels below the first filtered one stay sharp; the one before it is where that begins.
-        first = first_filtered()
-        low, high = ROUGHNESS_LEVELS[first - 1], ROUGHNESS_LEVELS[first]
-        share = ((r - low) / (high - low)).clamp(0, 1)
-        return torch.cat([smooth[:, :3], lobes[:, 3:] + share * (smooth - lobes)[:, 3:]], -1)
-
-    def _shaded(self, materials: Materials, tables):
+    def _shaded(self, materials: Materials, tables: Tables):
         """[P, 3] torch radiance of the surface pixels."""
         import torch
 
         from materialist.transport.shading import shade
 
-        with torch.no_grad():
-            return shade(tables, *self._maps(materials))
-
-    def _maps(self, materials: Materials):
-        """Albedo [P, 3], roughness and metallic [P] of the surface pixels; torch."""
         maps = (materials.albedo.reshape(-1, 3), materials.roughness.ravel(), materials.metallic.ravel())
-        return [placed(values[self._pixels]) for values in maps]
+        with torch.no_grad():
+            return shade(tables, *(placed(values[self._pixels]) for values in maps))
 
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""

@@ -5,8 +5,8 @@ same surface by normal and plane distance, has all of it. Radius and normal tole
 levels keep their detail.
 """
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 
@@ -16,8 +16,8 @@ _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
 _SHARPNESS = 32.0
 """Power of the cosine between normals (by eye)."""
-Tap = tuple[int, int, torch.Tensor]
-"""(rows, columns) to a neighbour, and the weight [H, W] that it has for each pixel."""
+_SMOOTHED = 0.2
+"""Least roughness of a level that is filtered (by eye)."""
 
 
 @dataclass(frozen=True)
@@ -31,26 +31,24 @@ class Guide:
     scale: torch.Tensor
     """[H, W] size of a pixel on the surface, scene units."""
 
+    def alike(self, dy: int, dx: int) -> torch.Tensor:
+        """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
+        normal, position = _shifted(self.normal, dy, dx), _shifted(self.position, dy, dx)
+        cosine = (self.normal * normal).sum(-1).clamp(0, 1)
+        away = (self.normal * (position - self.position)).sum(-1).abs() / (self.scale * (1 + dy * dy + dx * dx) ** 0.5)
+        return cosine.pow(_SHARPNESS) * torch.exp(-0.5 * away * away)
 
-def guide_weights(guide: Guide, dy: int, dx: int) -> torch.Tensor:
-    """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
-    normal, position = _shifted(guide.normal, dy, dx), _shifted(guide.position, dy, dx)
-    cosine = (guide.normal * normal).sum(-1).clamp(0, 1)
-    away = (guide.normal * (position - guide.position)).sum(-1).abs() / (guide.scale * (1 + dy * dy + dx * dx) ** 0.5)
-    return cosine.pow(_SHARPNESS) * torch.exp(-0.5 * away * away)
-
-
-def taps(guide: Guide) -> Iterator[Tap]:
-    """5 x 5 neighbours and their weights; `list` them to filter more than once."""
-    for dy, wy in enumerate(_TAPS, -2):
-        for dx, wx in enumerate(_TAPS, -2):
-            yield dy, dx, wy * wx * guide_weights(guide, dy, dx)
+    @cached_property
+    def taps(self) -> list[tuple[int, int, torch.Tensor]]:
+        """(rows, columns) to the 5 x 5 neighbours, and the weight [H, W] that each has for each pixel."""
+        offsets = list(enumerate(_TAPS, -2))
+        return [(dy, dx, wy * wx * self.alike(dy, dx)) for dy, wy in offsets for dx, wx in offsets]
 
 
-def joint_filter(values: torch.Tensor, neighbours: Iterable[Tap]) -> torch.Tensor:
-    """Average `values` [H, W, C] over neighbours that lie on the same surface, as `taps` gives them."""
+def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
+    """Average `values` [H, W, C] over neighbours that lie on the same surface."""
     total, norm = torch.zeros_like(values), values.new_zeros(values.shape[:2])
-    for dy, dx, weight in neighbours:
+    for dy, dx, weight in guide.taps:
         total.addcmul_(_shifted(values, dy, dx), weight[..., None])
         norm += weight
     return total / norm.clamp_min(1e-6)[..., None]
@@ -70,16 +68,12 @@ def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
 
 def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:
     """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
-    kept = first_filtered()
+    # Sharper levels are nearly noise-free and carry reflected detail.
+    kept = next(k for k, roughness in enumerate(ROUGHNESS_LEVELS) if roughness >= _SMOOTHED)
     stack = torch.cat([tables.diffuse, *tables.specular[kept:]], -1)
     grid = stack.new_zeros(guide.scale.numel(), stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
-    smooth = joint_filter(grid.view(*guide.scale.shape, -1), taps(guide)).view(len(grid), -1)[pixels]
+    smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
     levels = [*tables.specular[:kept], *smooth[:, 9:].split(6, -1)]
     return Tables(smooth[:, :9].contiguous(), torch.stack(list(levels)))
-
-
-def first_filtered() -> int:
-    """Index of the first roughness level to filter: sharper ones are nearly noise-free and carry reflected detail."""
-    return next(i for i, r in enumerate(ROUGHNESS_LEVELS) if r >= 0.2)
