@@ -119,27 +119,17 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
     import yaml
 
-    entries = [{step.kind: _plain(step.options)} for step in steps]
-    text = yaml.safe_dump(entries, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
+    class Texts(yaml.SafeDumper):
+        """Texts stay without quotes, also those that spell numbers: `read_recipe` takes all for texts."""
+
+        yaml_implicit_resolvers = {}
+
+    for kind in (bool, int, float):
+        Texts.add_representer(kind, lambda dumper, value: dumper.represent_str(str(value).lower()))
+    entries = [{step.kind: step.options} for step in steps]
+    text = yaml.dump(entries, Dumper=Texts, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
     with whole_file(path, force=True) as file:
         file.write_text(text, "utf-8")
-
-
-def _plain(value: Any) -> Any:
-    """Texts that spell a number as that number, so that the file reads well; a shift such as +0.5 stays a text."""
-    if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if not isinstance(value, str) or value.startswith("+"):
-        return value
-    if value in ("true", "false"):
-        return value == "true"
-    try:
-        number = float(value)
-    except ValueError:
-        return value
-    return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def apply(
@@ -166,7 +156,7 @@ def region_of(scene: Scene, step: Step) -> Array:
     where: dict[str, Any] = {
         "click": [numbers(c, 2, "click") for c in several(given["click"])] if "click" in given else None,
         "box": numbers(given["box"], 4, "box") if "box" in given else None,
-        "mask": _file(step, "mask") if "mask" in given else None,
+        "mask": beside(step.folder, "mask", given["mask"]) if "mask" in given else None,
     }
     return select(scene, method=given.get("with", "network"), **where)
 
@@ -200,28 +190,17 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     return relight(edited, wanted, lights=region_of(scene, step) if region else None, fitted=scene)
 
 
-def _insert(scene: Scene, edited: Scene, step: Step) -> Scene:
-    _needs(step, "insert: {mesh: mug.glb, at: [310, 220]}")
-    wanted = options_of(step)
-    for place in _places(step):
-        edited = insert(edited, _file(step, "mesh"), place, wanted)
-    return edited
-
-
-def _drop(scene: Scene, edited: Scene, step: Step) -> Scene:
-    _needs(step, "drop: {mesh: [mug.glb, ball.ply], at: [310, 220]}")
-    meshes = [beside(step.folder, "mesh", one) for one in _listed(step.options["mesh"])]
-    return settle(edited, meshes, _places(step), options_of(step))
-
-
-def _needs(step: Step, example: str) -> None:
+def _put(scene: Scene, edited: Scene, step: Step) -> Scene:
     for name in PLACE:
         if name not in step.options:
-            raise InputError(f"The {step.kind} needs its {name}, as in {example}.")
-
-
-def _places(step: Step) -> list[Any]:
-    return [numbers(one, 2, "at") for one in several(step.options["at"])]
+            raise InputError(f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}.")
+    wanted, mesh = options_of(step), step.options["mesh"]
+    places = [numbers(one, 2, "at") for one in several(step.options["at"])]
+    if step.kind == "drop":
+        return settle(edited, [beside(step.folder, "mesh", one) for one in _listed(mesh)], places, wanted)
+    for place in places:
+        edited = insert(edited, beside(step.folder, "mesh", mesh), place, wanted)
+    return edited
 
 
 def _in_region(scene: Scene, edited: Scene, step: Step) -> Scene:
@@ -231,12 +210,8 @@ def _in_region(scene: Scene, edited: Scene, step: Step) -> Scene:
     return (glass if step.kind == "glass" else remove)(edited, region, options, fitted=scene)
 
 
-_MAKERS = {"relight": _relight, "insert": _insert, "drop": _drop}
+_MAKERS = {"relight": _relight, "insert": _put, "drop": _put}
 """Kind of step -> (original scene, scene so far, step) -> scene; `_in_region` for the others."""
-
-
-def _file(step: Step, name: str) -> Path:
-    return beside(step.folder, name, step.options[name])
 
 
 def _listed(value: Any) -> list[Any]:
