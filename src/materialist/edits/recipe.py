@@ -119,15 +119,15 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
     import yaml
 
-    class Texts(yaml.SafeDumper):
+    class Unquoted(yaml.SafeDumper):
         """Texts stay without quotes, also those that spell numbers: `read_recipe` takes all for texts."""
 
         yaml_implicit_resolvers = {}
 
     for kind in (bool, int, float):
-        Texts.add_representer(kind, lambda dumper, value: dumper.represent_str(str(value).lower()))
+        Unquoted.add_representer(kind, lambda dumper, value: dumper.represent_str(str(value).lower()))
     entries = [{step.kind: step.options} for step in steps]
-    text = yaml.dump(entries, Dumper=Texts, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
+    text = yaml.dump(entries, Dumper=Unquoted, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
     with whole_file(path, force=True) as file:
         file.write_text(text, "utf-8")
 
