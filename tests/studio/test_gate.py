@@ -156,11 +156,15 @@ def test_a_page_is_forgotten_with_its_heartbeat_and_one_that_has_none_after_a_wh
     assert studio.session("one", person) is not one and studio.session("two", person) is not two
 
 
-def test_uploads_leave_room_on_the_disk(studio, monkeypatch):
-    send = lambda: client(studio).post("/gradio_api/upload", content=b"x" * 600)  # noqa: E731
-    assert send().status_code == 200
+def test_uploads_have_a_quota(studio, monkeypatch):
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(upload_quota=1000))
+    page = client(studio)
+    page.get("/")
+    send = lambda size: page.post("/gradio_api/upload", content=b"x" * size)  # noqa: E731
+    assert send(600).status_code == 200 and send(300).status_code == 200
+    assert send(200).status_code == 403 and "within an hour" in send(200).text
     monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(disk_left=10**18))
-    assert send().status_code == 403 and "full" in send().text
+    assert "full" in send(10).text
 
 
 def test_the_password_need_not_be_an_argument(tmp_path, run):

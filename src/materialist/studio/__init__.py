@@ -15,6 +15,7 @@ class StudioSettings:
 
     upload_megabytes: float = 60  # largest upload
     upload_pixels: int = 60_000_000  # largest picture, from its header
+    upload_quota: int = 1_000_000_000  # bytes that a person may upload in an hour
     disk_left: int = 2_000_000_000  # bytes that uploads leave free
     unpacked_bytes: int = 1_500_000_000  # largest zip once unpacked
     decoded_bytes: int = 1_000_000_000  # largest zipped scene in memory, from the headers of its files

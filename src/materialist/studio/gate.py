@@ -132,7 +132,7 @@ class Gate:
             for page in filter(None, (_beating(request), request.query_params.get("session_hash"))):
                 self.studio.session(page, person)
             if request.url.path.rstrip("/") == _UPLOAD:
-                self.studio.check_disk(request.headers.get("content-length", ""))
+                self.studio.note_upload(person, request.headers.get("content-length", ""))
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 403)
         return self.app

@@ -5,6 +5,7 @@ import secrets
 import shutil
 import threading
 import time
+from collections import deque
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -38,6 +39,8 @@ class Studio:
     seed: int = 0
     device: str = "auto"
     _sessions: dict[str, Session] = field(default_factory=dict)
+    _uploads: dict[str, deque[tuple[float, int]]] = field(default_factory=dict)
+    """Person -> when, and how many bytes."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _swept: float = float("-inf")
 
@@ -64,12 +67,20 @@ class Studio:
             text = text.replace(f"{root}/", "/")
         return _FOLDERS.sub("", text)
 
-    def check_disk(self, size: str) -> None:
-        """Raises InputError where an upload of this Content-Length would fill the disk."""
+    def note_upload(self, person: str, size: str) -> None:
+        """Count an upload by its Content-Length. Raises InputError above the quota, and where the disk is full."""
         if not size.isdigit():
             raise InputError("An upload must say how long it is.")
-        if shutil.disk_usage(self.work.cache).free - int(size) < SETTINGS.disk_left:
-            raise InputError("The disk of the studio is full; it takes no more uploads.")
+        now = time.monotonic()
+        with self._lock:
+            mine = self._uploads.setdefault(person, deque())
+            while mine and now - mine[0][0] > 3600:
+                mine.popleft()
+            if sum(bytes_ for _, bytes_ in mine) + int(size) > SETTINGS.upload_quota:
+                raise InputError(f"You have uploaded {SETTINGS.upload_quota / 1e9:g} GB within an hour; go on later.")
+            if shutil.disk_usage(self.work.cache).free - int(size) < SETTINGS.disk_left:
+                raise InputError("The disk of the studio is full; it takes no more uploads.")
+            mine.append((now, int(size)))
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
