@@ -29,7 +29,7 @@ def test_a_map_of_few_texels_is_what_is_fitted(rows, asked):
         torch.arange(2), HEIGHT, lambda envmap: (taken.append(envmap), envmap[:1, :2].flatten(0, 1))[1]
     )
     settings = LightSettings(field="mlp", height=rows, schedule=Schedule(max_steps=2))
-    fit_light(problem, torch.ones(2, 3), Recorded(), settings)
+    fit_light(problem, torch.ones(2, 3), Recorded(), settings, LightStart(torch.ones(8, 16, 3), None))
     assert heights == {asked} and all(envmap.shape == (HEIGHT, 2 * HEIGHT, 3) for envmap in taken)
 
 
@@ -61,8 +61,8 @@ def test_what_the_photo_tells_nothing_about_stays_as_predicted():
     predicted[8:, :, :3] = [0.7, 0.5, 0.3]
     target = 2 * problem.render(torch.from_numpy(predicted[..., :3].copy())) / 10
     start = LightStart(torch.from_numpy(predicted[..., :3] / 10), torch.full((16, 32, 1), 0.5))
-    field = envmap_field(settings, start=start.radiance)
-    fit_light(problem, target, field, settings, start=start)
+    field = envmap_field(settings, start.radiance)
+    fit_light(problem, target, field, settings, start)
     found = field(16).detach()
     torch.testing.assert_close(problem.render(found), target, rtol=0.05, atol=0.0)
     colour = found[12:].mean((0, 1))

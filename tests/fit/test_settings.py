@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+import torch
 
 from materialist.errors import InputError
 from materialist.fit.light import envmap_field
@@ -52,7 +53,7 @@ def test_unknown_names_are_told():
     with pytest.raises(InputError, match="quick"):
         preset("quick")
     with pytest.raises(InputError, match="cube"):
-        envmap_field(replace(DEFAULT.light, field="cube"))
+        envmap_field(replace(DEFAULT.light, field="cube"), torch.ones(4, 8, 3))
 
 
 @pytest.mark.parametrize(("name", "encodings"), [("paper", ("log1p", "log1p")), ("default", ("srgb", "srgb"))])

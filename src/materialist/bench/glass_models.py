@@ -14,17 +14,17 @@ from scipy.ndimage import binary_dilation
 
 from materialist.bench.glass_scenes import PROTOCOL, GlassScene, painted
 from materialist.buffers import tensor
+from materialist.edits.core.renderer import denoised
 from materialist.edits.glass import two_interface as interfaces
 from materialist.edits.remove.behind import behind as continued_behind
 from materialist.edits.remove.patches import patched
 from materialist.edits.remove.remove import carried
-from materialist.errors import SetupError, WeightsError
+from materialist.errors import WeightsError
 from materialist.geometry.build import build_geometry, part
 from materialist.geometry.planes import find_planes, upright
 from materialist.geometry.silhouette import window
 from materialist.options import Glass
 from materialist.predict.refraction.thickness import Thickness, best_thickness, thickness
-from materialist.render.denoise import denoise
 from materialist.render.scene import shape
 from materialist.solids.closed import closed_proxy
 from materialist.solids.symmetry import symmetric_thickness
@@ -103,8 +103,7 @@ def _albedo(
     for _ in range(PROTOCOL.albedo_rounds if depth.any() else 0):
         surfaces = Background(picture, depth, normal, albedo)
         seen = lit(scene, surfaces, envmap, things, length=PROTOCOL.diffuse_length, spp=PROTOCOL.albedo_spp)
-        with suppress(SetupError):
-            seen = denoise(seen, albedo=albedo, normal=normal)
+        seen = denoised(seen, albedo, normal)
         albedo = np.clip(albedo * picture / np.maximum(seen, 1e-6), 0, PROTOCOL.brightest_albedo).astype(np.float32)
     return albedo
 
@@ -155,9 +154,8 @@ def before(case: Case, body: Any, behind: Background) -> Array:
     length = PROTOCOL.glass_length
     picture = lit(scene, behind, case.envmap, things, length=length, spp=case.spp, cropped=True)
     box = window(scene.mask)
-    with suppress(SetupError):
-        part, normal = np.ascontiguousarray(picture[box]), np.ascontiguousarray(scene.front.normal[box])
-        picture[box] = denoise(part, albedo=np.ones_like(part), normal=normal)
+    seen, normal = np.ascontiguousarray(picture[box]), np.ascontiguousarray(scene.front.normal[box])
+    picture[box] = denoised(seen, np.ones_like(seen), normal)
     return np.where(scene.mask[..., None], picture, 0)
 
 

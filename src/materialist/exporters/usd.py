@@ -1,6 +1,5 @@
 """USD: UsdPreviewSurface materials, the photo's camera and a dome light; one .usdz file, or a folder."""
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,6 @@ from materialist.io.display import encoded, to_bytes
 from materialist.io.exr import write_exr
 from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Camera, Lamp, Scene
-
-_APERTURE = 36.0
-"""Width of the film, millimetres; only its ratio to the focal length counts."""
 
 
 def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
@@ -100,12 +96,10 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
 
 def _camera(stage: Any, photo: Camera, parts: list[Part]) -> None:
     """The photo's pinhole at the origin, which looks down -Z in USD too."""
-    reach = farthest(parts)
-    camera = UsdGeom.Camera.Define(stage, "/Scene/Photo")
-    camera.CreateHorizontalApertureAttr(_APERTURE)
-    camera.CreateVerticalApertureAttr(_APERTURE * photo.height / photo.width)
-    camera.CreateFocalLengthAttr(_APERTURE / 2 / math.tan(math.radians(photo.fov) / 2))
-    camera.CreateClippingRangeAttr(Gf.Vec2f(reach * 1e-5, reach * 4))
+    reach, camera = farthest(parts), Gf.Camera()
+    camera.SetPerspectiveFromAspectRatioAndFieldOfView(photo.width / photo.height, photo.fov, camera.FOVHorizontal)
+    camera.clippingRange = Gf.Range1f(reach * 1e-5, reach * 4)
+    UsdGeom.Camera.Define(stage, "/Scene/Photo").SetFromCamera(camera, Usd.TimeCode.Default())
 
 
 def _light(stage: Any, folder: Path, scene: Scene) -> None:

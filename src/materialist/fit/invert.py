@@ -91,8 +91,8 @@ class Fit:
         start, setup, photo = time.perf_counter(), self.setup, self._photo()
         settings, problem = setup.settings.light, self.engine.light_problem(materials)
         begin = start_light(photo, settings, setup.prior.light, problem)
-        light = envmap_field(settings, seed=setup.seed, start=begin.radiance)
-        result = fit_light(problem, photo, light, settings, start=begin, seed=setup.seed, progress=self.progress)
+        light = envmap_field(settings, begin.radiance, seed=setup.seed)
+        result = fit_light(problem, photo, light, settings, begin, seed=setup.seed, progress=self.progress)
         state.envmap = self.prepared_light(light(max(settings.height, 16)))
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 

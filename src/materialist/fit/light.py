@@ -49,11 +49,9 @@ def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | Non
     return LightStart(radiance * exposure, resize_envmap(scale.expand(-1, -1, 3), settings.height)[..., :1])
 
 
-def envmap_field(settings: LightSettings, *, seed: int = 0, start: torch.Tensor | None = None) -> nn.Module:
+def envmap_field(settings: LightSettings, start: torch.Tensor, *, seed: int = 0) -> nn.Module:
     """A fresh field of the kind the settings name; texels begin at `start`, a map [h, 2h, 3]."""
     torch.manual_seed(seed)
-    if start is None:
-        start = torch.full((settings.height, 2 * settings.height, 3), settings.start)
     fresh: dict[str, Callable[[], nn.Module]] = {
         "mlp": EnvmapMLP, "mlp-uv": lambda: EnvmapMLP(coordinates="uv"),
         "texels": lambda: EnvmapTexels(resize_envmap(start, settings.height)), "sh": EnvmapSH,
@@ -64,17 +62,16 @@ def envmap_field(settings: LightSettings, *, seed: int = 0, start: torch.Tensor 
 
 
 def fit_light(
-    problem: LightProblem, photo: torch.Tensor, field: nn.Module, settings: LightSettings, *,
-    start: LightStart | None = None, seed: int = 0, progress: Progress | None = None,
+    problem: LightProblem, photo: torch.Tensor, field: nn.Module, settings: LightSettings, start: LightStart, *,
+    seed: int = 0, progress: Progress | None = None,
 ) -> StageResult:  # fmt: skip
     """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
 
     Beyond the paper, what the light differs from `start` by is kept smooth, white and small. photo: [H * W, 3] linear.
     """
     target = photo[problem.pixels]
-    before = 0.0 if start is None else resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log()
-    trust = None
-    if start is not None and start.scale is not None:
+    before, trust = resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log(), None
+    if start.scale is not None:
         angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
         trust = angle / angle.mean() / resize_envmap(start.scale.expand(-1, -1, 3), problem.height)
     jitter = torch.Generator().manual_seed(seed)

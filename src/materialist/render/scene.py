@@ -136,13 +136,10 @@ class RenderScene:
         return run(albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch))
 
     def _assign(self, albedo, roughness, metallic) -> None:
-        p = self.params
-        p["surface.bsdf.base_color.data"] = albedo
-        p["surface.bsdf.roughness.data"] = roughness
-        p["surface.bsdf.metallic.data"] = metallic
-        for k, members in self._members.items():
-            for name, maps in (("base_color", albedo), ("roughness", roughness), ("metallic", metallic)):
-                p[f"plane{k}.bsdf.{name}.data"] = self._mean(maps, members)
+        for name, maps in (("base_color", albedo), ("roughness", roughness), ("metallic", metallic)):
+            self.params[f"surface.bsdf.{name}.data"] = maps
+            for k, members in self._members.items():
+                self.params[f"plane{k}.bsdf.{name}.data"] = self._mean(maps, members)
 
     def _mean(self, maps, members: Array):
         """[2, 2, C] of the mean of a tensor [H, W, C] over the pixels `members`; differentiable."""
