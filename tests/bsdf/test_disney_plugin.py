@@ -42,27 +42,11 @@ def test_sample_and_eval_pdf_agree(roughness, metallic):
     assert np.isfinite(np.array(weight)).all() and np.array(weight).max() < 12
 
 
-@pytest.mark.parametrize(
-    ("roughness", "metallic", "degrees", "side"),
-    [(0.3, 0, 5, 1), (0.3, 1, 40, -1), (0.45, 0.5, 60, 1), (0.6, 0, 80, -1), (0.6, 1, 80, 1), (1, 0.5, 40, -1)],
-)
-def test_chi_squared(roughness, metallic, degrees, side, capsys, tmp_path, monkeypatch):
-    """Mitsuba's own test that directions are drawn with the density that `pdf` states."""
-    from mitsuba.chi2 import BSDFAdapter, ChiSquareTest, SphericalDomain
-
-    monkeypatch.chdir(tmp_path)  # the test leaves its histogram in the current folder when it fails
-    parameters = (
-        f'<rgb name="base_color" value="0.6, 0.4, 0.2"/><float name="roughness" value="{roughness}"/>'
-        f'<float name="metallic" value="{metallic}"/>'
-    )
-    draw, density = BSDFAdapter("materialist_disney", parameters, wi=tilted(degrees, side).tolist())
-    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
-    assert test.run(significance_level=0.001), capsys.readouterr().out
-
-
-def _leaning(wi, count=1):
-    """Interactions with a face that leans away by 30 degrees from the shading normal."""
+def _leaning(wi, count=1, leans=True):
+    """Interactions with a face that leans away by 30 degrees from the shading normal, or does not."""
     si = interaction(np.tile(wi, (count, 1)))
+    if not leans:
+        return si
     si.sh_frame = mi.Frame3f(mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0), mi.Vector3f(0, 0, 1))
     si.n = mi.Normal3f(0, float(np.sin(np.pi / 6)), float(np.cos(np.pi / 6)))
     return si
@@ -88,22 +72,29 @@ def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness,
     assert (without * (wi @ face) < 0).mean() > 0.01  # which would pass
 
 
-@pytest.mark.parametrize(("roughness", "metallic", "degrees", "side"), [(0.5, 0.5, 30, 1), (1, 0.2, 60, -1)])
-def test_chi_squared_on_a_face_that_leans(roughness, metallic, degrees, side, capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("roughness", "metallic", "degrees", "side", "leans"),
+    [
+        *((0.3, 0, 5, 1, False), (0.3, 1, 40, -1, False), (0.45, 0.5, 60, 1, False), (0.6, 0, 80, -1, False)),
+        *((0.6, 1, 80, 1, False), (1, 0.5, 40, -1, False), (0.5, 0.5, 30, 1, True), (1, 0.2, 60, -1, True)),
+    ],
+)
+def test_chi_squared(roughness, metallic, degrees, side, leans, capsys, tmp_path, monkeypatch):
+    """Mitsuba's own test that directions are drawn with the density that `pdf` states."""
     from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
-    monkeypatch.chdir(tmp_path)
-    surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
-    wi = tilted(degrees, side)
+    monkeypatch.chdir(tmp_path)  # the test leaves its histogram in the current folder when it fails
+    surface, ctx, wi = make(roughness=roughness, metallic=metallic), mi.BSDFContext(), tilted(degrees, side)
+    at = lambda directions: _leaning(wi, len(np.array(directions)), leans)  # noqa: E731
 
     def draw(u):
-        sample, _ = surface.sample(ctx, _leaning(wi, len(np.array(u[0]))), u[0], mi.Point2f(u[1], u[2]))
+        sample, _ = surface.sample(ctx, at(u[0]), u[0], mi.Point2f(u[1], u[2]))
         return sample.wo, mi.Float(np.array(sample.pdf) > 0)
 
-    def density(wo):
-        return surface.pdf(ctx, _leaning(wi, len(np.array(wo[0]))), wo)
-
-    test = ChiSquareTest(SphericalDomain(), draw, density, sample_dim=3, sample_count=100_000, res=101, ires=16)
+    test = ChiSquareTest(
+        SphericalDomain(), draw, lambda wo: surface.pdf(ctx, at(wo[0]), wo), sample_dim=3, sample_count=100_000,
+        res=101, ires=16,
+    )  # fmt: skip
     assert test.run(significance_level=0.001), capsys.readouterr().out
 
 

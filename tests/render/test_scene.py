@@ -6,7 +6,8 @@ import pytest
 from render_scenes import empty, random_maps, uniform, wall, with_floor
 
 from materialist.buffers import floats
-from materialist.camera import pixel_rays
+from materialist.camera import pixel_rays, unit
+from materialist.envmap import environment
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
@@ -37,18 +38,6 @@ def inside_pixels(camera, seed=0):
     rng = np.random.default_rng(seed)
     row, col = np.indices((camera.height, camera.width)).reshape(2, -1)
     return col + rng.uniform(0.05, 0.95, row.size), row + rng.uniform(0.05, 0.95, row.size)
-
-
-def bilinear(envmap, direction):
-    """Slow twin of the light's lookup: [N, 3] radiance of an [h, 2h, 3] map from directions [N, 3]."""
-    h, w = envmap.shape[:2]
-    x, y, z = (direction / np.linalg.norm(direction, axis=-1, keepdims=True)).T
-    column = (np.arctan2(x, -z) / (2 * np.pi) + 0.5) * w - 0.5
-    row = np.clip(np.arccos(np.clip(y, -1, 1)) / np.pi * h - 0.5, 0, h - 1)
-    c0, r0 = np.floor(column).astype(int), np.minimum(np.floor(row).astype(int), h - 2)
-    fc, fr = (column - c0)[:, None], (row - r0)[:, None]
-    top = envmap[r0, c0 % w] * (1 - fc) + envmap[r0, (c0 + 1) % w] * fc
-    return top * (1 - fr) + (envmap[r0 + 1, c0 % w] * (1 - fc) + envmap[r0 + 1, (c0 + 1) % w] * fc) * fr
 
 
 @pytest.mark.parametrize("camera", [CAMERA, Camera(6, 17, 35.0)])
@@ -101,7 +90,7 @@ def test_light_is_the_bilinear_lookup_between_texel_centres(height):
     si = dr.zeros(scene.mi.SurfaceInteraction3f, len(direction))
     si.wi = -scene.mi.Vector3f(direction.T.astype(np.float32))
     seen = np.array(scene.mi_scene.environment().eval(si)).T
-    np.testing.assert_allclose(seen, bilinear(envmap, direction.astype(np.float32)), atol=1e-4)
+    np.testing.assert_allclose(seen, environment(direction, envmap), atol=1e-4)
 
 
 def test_sky_pixels_see_the_light():
@@ -112,7 +101,7 @@ def test_sky_pixels_see_the_light():
     image = scene.render(spp=400, seed=1)
     offsets = (np.stack(np.meshgrid(np.arange(16), np.arange(16)), -1).reshape(-1, 2) + 0.5) / 16 - 0.5
     within = [pixel_rays(CAMERA) + np.float32([u, -v, 0]) / CAMERA.focal for u, v in offsets]
-    expected = np.mean([bilinear(envmap, rays.reshape(-1, 3)) for rays in within], axis=0).reshape(*SIZE, 3)
+    expected = np.mean([environment(unit(rays).reshape(-1, 3), envmap) for rays in within], axis=0).reshape(*SIZE, 3)
     np.testing.assert_allclose(image[holes], expected[holes], atol=0.01)
 
 
