@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from materialist.types import Array
+from materialist.camera import pixel_rays, project, unit
+from materialist.types import Array, Camera
 
 
 def row_solid_angle(height: int) -> Array:
@@ -54,3 +55,31 @@ def bilinear(picture: Array, place: Array) -> Array:
     fx, fy = (x - x0)[:, None], (y - y0)[:, None]
     top = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
     return top * (1 - fy) + (picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx) * fy
+
+
+def paste_visible_sky(envmap: Array, photo: Array, surface: Array, camera: Camera, *, white: float) -> Array:
+    """The map with what the photo itself shows of it: texels seen past every surface take the photo's radiance.
+
+    That is the mean of the pixels in a texel, or the pixel at its centre where texels are smaller. Photo pixels from
+    `white` on, which are clipped, only raise a texel. surface: [H, W] bool.
+    """
+    if surface.all():
+        return envmap
+    h, w = envmap.shape[:2]
+    place, ahead = project(texel_directions(h, w), camera)
+    inside = (ahead > 1e-3) & ((place >= 0) & (place < [camera.width, camera.height])).all(-1)
+    c, r = np.moveaxis(np.where(inside[..., None], place, 0).astype(int), -1, 0)
+    seen = (inside & ~surface[r, c])[..., None]
+
+    def raised(pixels: Array, texels: Array) -> Array:
+        return np.where(pixels >= white, np.maximum(pixels, texels), pixels)
+
+    # The pixels of the sky, each in the texel that it looks through.
+    rays = unit(pixel_rays(camera)[~surface].astype(np.float64))
+    column = ((np.arctan2(rays[:, 0], -rays[:, 2]) / (2 * np.pi) + 0.5) * w).astype(int) % w
+    texel = np.minimum((np.arccos(np.clip(rays[:, 1], -1, 1)) / np.pi * h).astype(int), h - 1) * w + column
+    count = np.bincount(texel, minlength=h * w).reshape(h, w, 1)
+    pixels = raised(photo[~surface], envmap.reshape(-1, 3)[texel])
+    total = np.stack([np.bincount(texel, pixels[:, k], h * w) for k in range(3)], -1).reshape(h, w, 3)
+    value = np.where(count > 0, total / np.maximum(count, 1), raised(photo[r, c], envmap))
+    return np.where(seen, value, envmap).astype(np.float32)

@@ -8,10 +8,10 @@ import torch
 from transport_scenes import furnished_room, windowed_sky
 
 from materialist import metrics
-from materialist.envmap import texel_directions
+from materialist.envmap import paste_visible_sky, texel_directions
 from materialist.fit.engine import PathEngine, TransportEngine
 from materialist.fit.invert import Fit, FitSetup, invert
-from materialist.fit.light import paste_visible_sky
+from materialist.fit.losses import CLIPPED
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
 from materialist.render.scene import RenderScene
 from materialist.transport.cache import CacheSettings
@@ -96,12 +96,6 @@ def test_true_materials_and_light_stay(room):
     np.testing.assert_array_equal(materials.metallic, room.truth.metallic)
 
 
-def test_equal_seeds_give_equal_results(room):
-    first, again = (room.fit(DEFAULT.at_most(15), seed=3).run() for _ in range(2))
-    assert first.maps.equal(again.maps)
-    np.testing.assert_array_equal(first.envmap, again.envmap)
-
-
 def test_mask_unifies_roughness_and_metallic(room):
     mask = room.truth.metallic == 1
     fit = room.fit(DEFAULT.at_most(15), mask=mask)
@@ -110,8 +104,6 @@ def test_mask_unifies_roughness_and_metallic(room):
         assert float(np.ptp(values[mask])) < 1e-6
         assert float(np.ptp(values[~mask])) > 0.05
     assert float(materials.albedo[mask].std(0).max()) > 1e-3
-    first = room.fit(DEFAULT.at_most(2), mask=mask, strategy="white-light-first").run()
-    assert [s["name"] for s in first.stages] == ["roughness+metallic", "light", "albedo"]
 
 
 @pytest.mark.parametrize("settings", [PAPER, DEFAULT], ids=["paper", "default"])
@@ -134,15 +126,6 @@ def test_papers_first_stage_leaves_albedo_alone(room):
     torch.testing.assert_close(state.maps[:, :3], prior[:, :3])
     expected = 0.7 * prior[:, 3:] + 0.2
     assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
-
-
-def test_the_unet_starts_from_the_same_maps(room):
-    """The ablation of the network type compares like with like: all start from the remapped prior."""
-    settings = replace(PAPER, materials=replace(PAPER.materials, field="unet")).at_most(1)
-    fit = room.fit(settings)
-    state = fit.run()
-    expected = 0.7 * fit.start().maps[:, 3:] + 0.2
-    assert float((state.maps[:, 3:] - expected).abs().max()) < 0.05
 
 
 @pytest.mark.parametrize("field", ["mlp-uv", "sh"])
@@ -176,17 +159,17 @@ def test_visible_sky_is_pasted_where_it_is_seen():
     surface = np.zeros((32, 32), bool)
     surface[16:] = True
     envmap = np.full((64, 128, 3), 3.0, np.float32)
-    pasted = paste_visible_sky(envmap, photo, surface, camera)
+    pasted = paste_visible_sky(envmap, photo, surface, camera, white=CLIPPED)
     d = texel_directions(64, 128)
     ahead = (d[..., 2] < -0.95) & (d[..., 1] > 0.03)
     np.testing.assert_allclose(pasted[ahead & (d[..., 0] < -0.03)], 0.4)
     np.testing.assert_allclose(pasted[ahead & (d[..., 0] > 0.03)], 3.0)  # clipped: at least 1, and 3 is more
     np.testing.assert_allclose(pasted[(d[..., 1] < -0.03) | (d[..., 2] > 0)], 3.0)
-    assert paste_visible_sky(envmap, photo, np.ones_like(surface), camera) is envmap
+    assert paste_visible_sky(envmap, photo, np.ones_like(surface), camera, white=CLIPPED) is envmap
     # What a texel shows is the mean of its pixels, not one of them.
     fine = Camera(320, 320, 60.0)
     noisy = np.random.default_rng(0).uniform(0.2, 0.6, (320, 320, 3)).astype(np.float32)
-    mean = paste_visible_sky(envmap, noisy, np.kron(surface, np.ones((10, 10))) > 0, fine)
+    mean = paste_visible_sky(envmap, noisy, np.kron(surface, np.ones((10, 10))) > 0, fine, white=CLIPPED)
     assert np.abs(mean[ahead] - 0.4).max() < 0.08
     # An HDR photo measures up to its own white.
     measured = paste_visible_sky(envmap, 1.5 * photo, surface, camera, white=10.0)

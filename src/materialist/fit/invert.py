@@ -9,8 +9,9 @@ import numpy as np
 import torch
 
 from materialist.buffers import placed
+from materialist.envmap import paste_visible_sky
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
-from materialist.fit.light import envmap_field, fit_light, paste_visible_sky, start_light
+from materialist.fit.light import envmap_field, fit_light, start_light
 from materialist.fit.losses import CLIPPED
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Progress

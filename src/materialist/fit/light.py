@@ -8,15 +8,14 @@ import torch
 from torch import nn
 
 from materialist.buffers import placed, torch_device
-from materialist.camera import pixel_rays
-from materialist.envmap import row_solid_angle, texel_directions
+from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
 from materialist.fit.losses import CLIPPED, log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.optimise import Progress, StageResult, optimise
 from materialist.fit.settings import LightSettings
-from materialist.types import Array, Camera
+from materialist.types import Array
 
 
 @dataclass(frozen=True)
@@ -96,37 +95,3 @@ def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: t
     if settings.height <= height:
         return resize_envmap(field(settings.height), height)
     return field(height, None if settings.field == "texels" else jitter)
-
-
-def paste_visible_sky(
-    envmap: Array, photo: Array, surface: Array, camera: Camera, *, white: float = CLIPPED
-) -> Array:  # fmt: skip
-    """The map with what the photo itself shows of it: texels seen past every surface take the photo's radiance.
-
-    That is the mean of the pixels in a texel, or the pixel at its centre where texels are smaller. Photo pixels from
-    `white` on, which are clipped, only raise a texel. surface: [H, W] bool.
-    """
-    if surface.all():
-        return envmap
-    h, w = envmap.shape[:2]
-    d = texel_directions(h, w)
-    depth = np.where(d[..., 2] < -1e-3, -d[..., 2], np.inf)
-    col = np.floor(d[..., 0] / depth * camera.focal + camera.width / 2)
-    row = np.floor(-d[..., 1] / depth * camera.focal + camera.height / 2)
-    inside = np.isfinite(depth) & (col >= 0) & (col < camera.width) & (row >= 0) & (row < camera.height)
-    r, c = np.where(inside, row, 0).astype(int), np.where(inside, col, 0).astype(int)
-    seen = (inside & ~surface[r, c])[..., None]
-
-    def raised(pixels: Array, texels: Array) -> Array:
-        return np.where(pixels >= white, np.maximum(pixels, texels), pixels)
-
-    # The pixels of the sky, each in the texel that it looks through.
-    rays = pixel_rays(camera)[~surface].astype(np.float64)
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    column = ((np.arctan2(rays[:, 0], -rays[:, 2]) / (2 * np.pi) + 0.5) * w).astype(int) % w
-    texel = np.minimum((np.arccos(np.clip(rays[:, 1], -1, 1)) / np.pi * h).astype(int), h - 1) * w + column
-    count = np.bincount(texel, minlength=h * w).reshape(h, w, 1)
-    pixels = raised(photo[~surface], envmap.reshape(-1, 3)[texel])
-    total = np.stack([np.bincount(texel, pixels[:, k], h * w) for k in range(3)], -1).reshape(h, w, 3)
-    value = np.where(count > 0, total / np.maximum(count, 1), raised(photo[r, c], envmap))
-    return np.where(seen, value, envmap).astype(np.float32)

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from materialist.camera import project
 from materialist.edits.core.surfaces import PHOTO_LIGHT
-from materialist.envmap import environment, texel_directions
+from materialist.envmap import environment, paste_visible_sky, texel_directions
 from materialist.errors import SetupError
 from materialist.geometry.silhouette import window
 from materialist.render.bodies import is_glowing, is_transparent
@@ -142,16 +141,9 @@ def photo_sky(scene: Scene) -> Array:
     if (scene.depth > 0).all():
         return scene.envmap
     rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), max(SKY_ROWS, len(scene.envmap))))
-    directions = texel_directions(rows, 2 * rows).reshape(-1, 3)
-    sky = environment(directions, scene.envmap).astype(np.float32)
-    place, ahead = project(directions, camera)
-    column, row = np.floor(place).astype(int).T
-    seen = (ahead > 0) & (column >= 0) & (column < camera.width) & (row >= 0) & (row < camera.height)
-    seen[seen] = scene.depth[row[seen], column[seen]] == 0
-    photo = scene.photo.linear[row[seen], column[seen]]
-    bound = (photo >= CLIPPED) & (not scene.photo.hdr)
-    sky[seen] = np.where(bound, np.maximum(photo, sky[seen]), photo)
-    return sky.reshape(rows, 2 * rows, 3)
+    sky = environment(texel_directions(rows, 2 * rows).reshape(-1, 3), scene.envmap).reshape(rows, 2 * rows, 3)
+    white = np.inf if scene.photo.hdr else CLIPPED
+    return paste_visible_sky(sky.astype(np.float32), scene.photo.linear, scene.depth > 0, camera, white=white)
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:
