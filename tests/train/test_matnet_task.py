@@ -1,19 +1,19 @@
 """The paper's recipe on a MatNet of a few thousand parameters."""
 
 import json
-from dataclasses import replace
 
 import made_samples
 import numpy as np
 import pytest
 import torch
 from made_matnet import TINY, made_network
+from numpy.lib.stride_tricks import sliding_window_view
 
 from materialist.errors import WeightsError
 from materialist.io.samples import SampleFolder
 from materialist.predict.matnet.network import MatNet
 from materialist.predict.weights import metadata
-from materialist.train.matnet import PaperTask, freeze, load_start, resized
+from materialist.train.matnet import MAPS, PaperTask, enlarged, freeze, load_start
 from materialist.train.stream import epoch
 
 
@@ -35,7 +35,7 @@ def task(source):
 def test_a_step_moves_what_learns_and_nothing_else(network, task):
     freeze(network)
     before = {k: v.clone() for k, v in network.state_dict().items()}
-    batch = next(iter(epoch(task.examples, number=1, side=32, batch=2, seed=0)))
+    batch = next(iter(epoch(task, number=1, side=32, batch=2, seed=0)))
     optimizer = torch.optim.AdamW([p for p in network.parameters() if p.requires_grad], lr=1e-3)
     terms = task.losses(network, batch)
     assert set(terms) == {"albedo", "roughness", "metallic", "normal", "depth"}
@@ -49,34 +49,35 @@ def test_a_step_moves_what_learns_and_nothing_else(network, task):
 
 
 def test_only_flips_upside_down_and_crops(task, source):
-    """The samples show the plane n . p = -1.2, or its mirror image; each pixel keeps its ray."""
+    """Whatever is drawn is a square of the sample or of its mirror image, whose normals have the other y."""
+    maps = {name: np.moveaxis(np.atleast_3d(getattr(source.read(0), name)), -1, 0) for name in MAPS}
+    maps["image"] = maps["image"].clip(0, 1)
+    flipped = {name: values[:, ::-1] for name, values in maps.items()}
+    flipped["normal"] = flipped["normal"] * [[[1]], [[-1]], [[1]]]
+    windows = [{n: sliding_window_view(v, (32, 32), (1, 2)) for n, v in whole.items()} for whole in (maps, flipped)]
     seen = set()
     for seed in range(8):
-        sample = task.prepare(source.read(0), 32, np.random.default_rng(seed))
-        assert sample.image.shape == (32, 32, 3) and sample.image.max() <= 1
-        surface = sample.mask > 0
-        upright = sample.normal[surface][0, 1] > 0
-        seen.add(bool(upright))
-        normal = made_samples.NORMAL * [1, 1 if upright else -1, 1]
-        points = np.dstack([sample.rays, -np.ones(surface.shape)]) * sample.depth[..., None]
-        np.testing.assert_allclose((points @ normal)[surface], -1.2, rtol=2e-3)
-        np.testing.assert_allclose(sample.normal[surface] @ normal, 1, atol=1e-3)
-    assert seen == {True, False}
+        drawn = task.draw(0, 32, np.random.default_rng(seed))
+        for upside_down, parts in enumerate(windows):
+            same = [(v == drawn[n][:, None, None]).all((0, 3, 4)) for n, v in parts.items()]
+            if np.all(same, axis=0).any():
+                seen.add(upside_down)
+                break
+        else:
+            pytest.fail(f"what is drawn by seed {seed} is no part of the sample")
+    assert seen == {0, 1}
 
 
-@pytest.mark.parametrize("size", [22, 96])
-def test_colours_at_the_sky_are_those_of_the_surface(source, size):
+def test_colours_at_the_sky_are_those_of_the_surface():
     """Next to the sky, which has no albedo, a surface of one paint keeps it; the picture itself is mixed."""
-    sample = source.read(0)
-    surface = sample.mask[..., None] > 0
-    painted = replace(sample, albedo=np.where(surface, np.float32([0.6, 0.4, 0.2]), 0),
-                      metallic=sample.mask * np.float32(0.8))  # fmt: skip
-    scaled = resized(painted, size, size)
-    here = scaled.mask > 0
-    assert 0.2 < here.mean() < 0.95
-    np.testing.assert_allclose(scaled.albedo[here], np.broadcast_to([0.6, 0.4, 0.2], (here.sum(), 3)), atol=1e-5)
-    np.testing.assert_allclose(scaled.roughness[here], 0.4, atol=1e-5)
-    np.testing.assert_allclose(scaled.metallic[here], 0.8, atol=1e-5)
+    mask = torch.zeros(1, 24, 24)
+    mask[:, 10:] = 1
+    small = {name: mask.expand(3 if name in ("image", "albedo", "normal") else 1, -1, -1) * 0.6 for name in MAPS}
+    large = enlarged(small | {"mask": mask}, [80, 96])
+    here = large["mask"][0] > 0
+    assert 0.2 < here.float().mean() < 0.95 and large["image"][0][here].min() < 0.5
+    for name in ("albedo", "roughness", "metallic"):
+        np.testing.assert_allclose(large[name][:, here], 0.6, atol=1e-5)
 
 
 def test_starting_from_other_checkpoints(network, tmp_path):

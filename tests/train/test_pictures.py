@@ -3,22 +3,28 @@
 import made_samples
 import numpy as np
 import torch
+from torch.utils.data import default_collate
 
 from materialist.io.samples import SampleFolder
 from materialist.train import pictures
-from materialist.train.pictures import AugmentSettings, DevicePictures
+from materialist.train.pictures import AugmentSettings
 
 SIZE = 64
 
 
-def made(tmp_path, count=3, settings=None, **options):
-    source = SampleFolder(made_samples.write_set(tmp_path, count, height=SIZE, width=SIZE, **options))
-    return DevicePictures(source, torch.device("cpu"), settings)
+def stored(folder, count):
+    """A batch of that many samples of a set, each as often as the next."""
+    source = SampleFolder(folder)
+    return default_collate([pictures.stored(source.read(k % len(source))) for k in range(count)])
+
+
+def varied(folder, count, seed):
+    return pictures.varied(stored(folder, count), 32, AugmentSettings(), torch.Generator().manual_seed(seed))
 
 
 def test_crops_and_mirrors_keep_the_plane(tmp_path):
     """The samples show the plane n . p = -1.2; mirrored ones show its mirror image."""
-    batch = made(tmp_path).drawn(32, 16, torch.Generator().manual_seed(0))
+    batch = varied(made_samples.write_set(tmp_path, 3, height=SIZE, width=SIZE), 16, seed=0)
     normals = set()
     for k in range(16):
         surface = batch["mask"][k, 0] > 0
@@ -41,7 +47,7 @@ def test_light_is_mirrored_and_exposed_with_its_picture(tmp_path):
     arrays |= {"image": np.broadcast_to(ramp[None, :, None], (SIZE, SIZE, 3)), "light": light}
     del arrays["shading"]
     np.savez(folder / "samples" / "0000000.npz", **arrays)
-    batch = DevicePictures(SampleFolder(folder), torch.device("cpu")).drawn(32, 32, torch.Generator().manual_seed(2))
+    batch = varied(folder, 32, seed=2)
     mirrored = batch["image"][..., :8].mean((1, 2, 3)) > batch["image"][..., -8:].mean((1, 2, 3))
     assert mirrored.any() and not mirrored.all()
     right, left = batch["light"][:, 1, 8, 20], batch["light"][:, 1, 8, 4]
@@ -52,7 +58,7 @@ def test_light_is_mirrored_and_exposed_with_its_picture(tmp_path):
 
 
 def test_recolouring_is_the_render_of_the_new_albedo(tmp_path):
-    row = {n: t[None].float() for n, t in made(tmp_path)._read(0).items()}
+    row = {n: t.float() for n, t in stored(made_samples.write_set(tmp_path, 1, height=SIZE, width=SIZE), 1).items()}
     settings = AugmentSettings(recoloured=1.0, repainted=1.0)
     new = pictures.recolour(row, settings, torch.Generator().manual_seed(0))
     dielectric, surface = 1 - row["metallic"], row["mask"] > 0
@@ -68,16 +74,3 @@ def test_recolouring_is_the_render_of_the_new_albedo(tmp_path):
     new = pictures.recolour(row, settings, torch.Generator().manual_seed(0))
     torch.testing.assert_close(new["albedo"], row["albedo"])
     torch.testing.assert_close(new["image"], row["image"])
-
-
-def test_the_pool_of_a_card_holds_what_the_files_hold(tmp_path):
-    """The pool is filled here in main memory."""
-    source = made(tmp_path, 5)
-    row = source._read(0)
-    source._pool = {n: torch.empty((4, *t.shape), dtype=t.dtype) for n, t in row.items()}
-    source.settings = AugmentSettings(capacity=4, readers=1)
-    source._fill(source._places)
-    assert source._kept == 4  # no more than there is room for
-    for k in range(4):
-        for name, tensor in source._read(k).items():
-            torch.testing.assert_close(source._pool[name][k], tensor, equal_nan=True)

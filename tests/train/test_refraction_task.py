@@ -11,12 +11,11 @@ from torch.utils.data import default_collate
 
 from materialist.cli import app
 from materialist.cli.outcome import run_to_exit_code
-from materialist.predict.refraction.crop import BACK_X, NORMAL_X, SIDE
+from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
 from materialist.procedural.thickness import dataset
 from materialist.procedural.thickness.errors import mean_errors
 from materialist.train import checkpoint
-from materialist.train.refraction import ViewExamples
 from materialist.train.trainer import Trainer
 
 
@@ -25,11 +24,6 @@ def views(tmp_path_factory):
     folder = tmp_path_factory.mktemp("views")
     dataset.produce(folder, dataset.ViewPlan(shapes=2, views=3))
     return folder
-
-
-def batch(views, side, seed=0):
-    examples = ViewExamples(dataset.load(views))
-    return default_collate([examples.draw(k, side, np.random.default_rng([seed, k])) for k in range(6)])
 
 
 def test_ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on(tmp_path, monkeypatch):
@@ -62,9 +56,17 @@ def test_bad_weights_to_begin_with_are_said_before_views_are_made(tmp_path):
 
 def test_a_mirrored_view_is_a_view_of_the_mirrored_shape(views):
     """Mirrored views keep what the mirror image of a shape would have: x turns around, in front and behind."""
-    full = dataset.load(views)
-    seed = next(s for s in range(20) if np.random.default_rng(s).random() < 0.5)
-    flipped = ViewExamples(full).draw(0, SIDE, np.random.default_rng(seed))
-    for name, channel, sign in (("maps", NORMAL_X, -1), ("maps", NORMAL_X + 1, 1), ("target", BACK_X, -1),
-                                ("target", BACK_X + 1, 1), ("target", 0, 1)):  # fmt: skip
-        np.testing.assert_array_equal(flipped[name][channel], sign * full[name][0, channel, :, ::-1])
+    task, seen = made_runs.refraction(views), set()
+    whole = default_collate([task.draw(k, SIDE, np.random.default_rng(k)) for k in range(6)])
+    varied = task.vary(whole, SIDE, torch.Generator().manual_seed(0))
+    for k in range(6):
+        turned = not torch.equal(varied["target"][k], whole["target"][k].float())
+        seen.add(turned)
+        for name, channel, sign in (("maps", NORMAL_X, -1), ("maps", NORMAL_X + 1, 1), ("target", BACK_X, -1),
+                                    ("target", BACK_X + 1, 1), ("target", 0, 1)):  # fmt: skip
+            before = whole[name][k, channel].float()
+            assert torch.equal(varied[name][k, channel], sign * before.flip(-1) if turned else before)
+    assert seen == {True, False}
+    small = task.vary(whole, SIDE // 2, torch.Generator().manual_seed(0))
+    assert small["maps"].shape[2:] == small["target"].shape[2:] == (SIDE // 2, SIDE // 2)
+    assert set(small["maps"][:, MASK].unique().tolist()) == {0, 1}

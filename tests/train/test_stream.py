@@ -1,5 +1,7 @@
 """The stream of batches: files that cannot be read, samples that are held out."""
 
+import multiprocessing
+
 import made_runs
 import made_samples
 import pytest
@@ -19,27 +21,27 @@ def spoil(folder, *names):
 
 
 def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
-    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
+    task = made_runs.bundled(made_samples.write_set(tmp_path, 4))
     spoil(tmp_path, "0000002.npz")
-    assert len(list(epoch(examples, batch=4, **ARGS))) == 1
+    assert len(list(epoch(task, batch=4, **ARGS))) == 1
     assert "0000002.npz" in caplog.text
 
 
-def test_a_set_of_bad_files_ends_a_run(tmp_path):
-    examples = made_runs.bundled(made_samples.write_set(tmp_path, 4)).examples
-    spoil(tmp_path)
-    with pytest.raises(InputError, match="cannot be read"):
-        list(epoch(examples, batch=2, **ARGS))
+def test_sets_of_pictures_of_different_sizes_are_refused(tmp_path):
+    sets = [made_samples.write_set(tmp_path / str(edge), 1, height=edge, width=edge) for edge in (32, 64)]
+    task = made_runs.bundled(sets[0])
+    task.source.folders = sets
+    with pytest.raises(InputError, match="use sets of one size"):
+        list(epoch(task, batch=2, **ARGS))
 
 
-def test_the_error_of_a_loading_worker_is_one_sentence_and_ends_them(tmp_path):
-    """Not the worker's traceback; and no process is left that could keep the command from ending."""
-    import multiprocessing
-
-    examples = maps.Pictures(SampleFolder(made_samples.write_set(tmp_path, 4)), lambda sample, *_: sample)
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_set_of_bad_files_ends_a_run_by_one_sentence(tmp_path, workers):
+    """Not by a worker's traceback; and no process is left that could keep the command from ending."""
+    task = made_runs.bundled(made_samples.write_set(tmp_path, 4))
     spoil(tmp_path)
     with pytest.raises(InputError, match="cannot be read") as caught:
-        list(epoch(examples, workers=1, batch=2, **ARGS))
+        list(epoch(task, workers=workers, batch=2, **ARGS))
     assert "Traceback" not in str(caught.value)
     del caught
     assert not multiprocessing.active_children()

@@ -80,7 +80,7 @@ def matnet(
     learning: MapsLearning,
     training: Training = Training(every=300),  # noqa: B008
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
-    workers: Annotated[int, typer.Option(help="Processes that load data, for --config paper.")] = 1,
+    workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,
 ) -> None:
     """Train a network of all maps; RUN/weights.safetensors holds it, ready to use."""
     from materialist.io.datasets import open_sources

@@ -3,19 +3,18 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from materialist.io.samples import Sample, Source
 from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
-from materialist.predict.network import shared_tensors
-from materialist.predict.weights import load_weights, read_state
 from materialist.train import losses
 from materialist.train.maps import MapsTask
-from materialist.train.pictures import DevicePictures
+from materialist.train.pictures import AugmentSettings, stored, varied
 from materialist.train.task import Batch, Recipe
-from materialist.types import Prediction
+from materialist.types import Array, Prediction
 
 RECIPE = Recipe(
     side=256, batch=8, rate=1e-3, warm_up=300, last_rate=0.02, ema=0.999, bfloat16=True,
@@ -60,24 +59,19 @@ class BundledTask(MapsTask):
         self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
         architecture: BundledArchitecture = ARCHITECTURE,
     ):  # fmt: skip
-        pictures = DevicePictures(source, torch.device("cpu"))
-        super().__init__(source, pictures, recipe, init=init, score_samples=score_samples)
+        super().__init__(source, recipe, init=init, score_samples=score_samples)
         self.architecture = architecture
 
     def make(self) -> BundledNetwork:
         network = BundledNetwork(self.architecture)
         return network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
 
-    def network(self) -> BundledNetwork:
-        """A network to begin from; weights that know no light begin with a fresh head for it."""
-        network = self.make()
-        if self.init is not None:
-            own = {k: v for k, v in network.state_dict().items() if k.startswith("light.")}
-            load_weights(network, own | read_state(self.init) | shared_tensors(network), self.init)
-        return network
+    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+        """The sample as it is; `vary` changes it."""
+        return stored(self.read(index))
 
-    def to(self, device: torch.device) -> None:
-        self.examples = DevicePictures(self.source, device)
+    def vary(self, batch: Batch, side: int, random: torch.Generator) -> Batch:
+        return varied(batch, side, AugmentSettings(), random)
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Losses of all maps; see `BundledLoss`."""

@@ -21,7 +21,7 @@ from materialist.predict.clicks.network import ClickNet
 from materialist.predict.network import UNetArchitecture
 from materialist.procedural.dataset import identity
 from materialist.procedural.photographic import photographic
-from materialist.train.task import Batch, Examples, Recipe, Task
+from materialist.train.task import Batch, Recipe, Task
 from materialist.types import Array, Camera, Photo
 
 DESCRIPTION = "views.json"
@@ -166,24 +166,6 @@ def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
     return int(rng.choice(numbers, p=weight / weight.sum()))
 
 
-class ClickExamples(Examples):
-    """Random parts of views with a click in them."""
-
-    def __init__(self, views: list[View]):
-        self.views = views
-
-    def __len__(self) -> int:
-        return len(self.views)
-
-    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
-        """maps [C, side, side] and mask [side, side] of a click in that view, or in another one if it shows nothing."""
-        for _ in range(DRAWS):
-            if (found := draw_click(self.views[index], side, rng)) is not None:
-                return {"maps": found[0], "mask": found[1].astype(np.float32)}
-            index = int(rng.integers(len(self.views)))
-        raise InputError("The views show nothing to click on; make them of a larger data set.")
-
-
 class ClickTask(Task):
     """The network that finds the object at a click."""
 
@@ -198,8 +180,20 @@ class ClickTask(Task):
         if not found:
             raise InputError(f"{views} holds no views to learn from.")
         aside = HELD_OUT if len(found) >= 10 * HELD_OUT else 0
-        super().__init__(ClickExamples(found[: len(found) - aside]), recipe, init)
-        self.held_out, self.architecture = found[len(found) - aside :], architecture
+        super().__init__(recipe, init)
+        self.views, self.held_out = found[: len(found) - aside], found[len(found) - aside :]
+        self.architecture = architecture
+
+    def count(self) -> int:
+        return len(self.views)
+
+    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+        """maps [C, side, side] and mask [side, side] of a click in that view, or in another one if it shows nothing."""
+        for _ in range(DRAWS):
+            if (found := draw_click(self.views[index], side, rng)) is not None:
+                return {"maps": found[0], "mask": found[1].astype(np.float32)}
+            index = int(rng.integers(len(self.views)))
+        raise InputError("The views show nothing to click on; make them of a larger data set.")
 
     def make(self) -> ClickNet:
         return ClickNet(self.architecture)

@@ -1,8 +1,6 @@
 """What the networks that predict all maps have in common: pictures with true maps, scores and a sheet."""
 
 from abc import abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,8 +12,8 @@ from materialist.io.display import strip, write_sheet
 from materialist.io.samples import Sample, Source
 from materialist.metrics.maps import score, summary
 from materialist.procedural.photographic import as_photo
-from materialist.train.task import Examples, Recipe, Task
-from materialist.types import Array, Prediction
+from materialist.train.task import Recipe, Task
+from materialist.types import Prediction
 
 HELD_OUT_EVERY = 40
 """Of every so many samples the last one is never trained on, but scored."""
@@ -23,44 +21,30 @@ SHEET_ROWS = 6
 HELD_OUT, TRAINED_ON = "samples kept aside", "samples trained on"
 
 
-@dataclass
-class Pictures(Examples):
-    """The samples of a set that are trained on, changed at random by `prepare`."""
+class MapsTask(Task):
+    """A network from a picture to all maps, on procedural samples or on InteriorVerse."""
 
-    source: Source
-    prepare: Callable[[Sample, int, np.random.Generator], Sample]
+    kind: ClassVar[str] = "matnet"
 
-    def __post_init__(self) -> None:
-        self._places = trained_on(self.source)
+    def __init__(self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12):
+        """`init`: weights to begin from. `score_samples`: how many held-out samples are scored; 0 for none."""
+        if score_samples < 0:
+            raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
+        super().__init__(recipe, init)
+        self.source, self.score_samples = source, score_samples
+        self._places = trained_on(source)
+        self.notes = (*self.notes, *source.notes())
 
-    def __len__(self) -> int:
+    def count(self) -> int:
         return len(self._places)
 
     def refresh(self) -> None:
         self.source.refresh()
         self._places = trained_on(self.source)
 
-    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
-        """The arrays of a variant as [C, side, side] float32; see `arrays_of`."""
-        return arrays_of(self.prepare(self.source.read(self._places[index]), side, rng))
-
-
-class MapsTask(Task):
-    """A network from a picture to all maps, on procedural samples or on InteriorVerse."""
-
-    kind: ClassVar[str] = "matnet"
-
-    def __init__(
-        self, source: Source, examples: Examples, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12
-    ):
-        """`examples`: what is learned from, of the source. `init`: weights to begin from. `score_samples`: how many
-        held-out samples are scored; 0 for none.
-        """
-        if score_samples < 0:
-            raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
-        super().__init__(examples, recipe, init)
-        self.source, self.score_samples = source, score_samples
-        self.notes = (*self.notes, *source.notes())
+    def read(self, index: int) -> Sample:
+        """Example number `index` of those that are trained on. Raises InputError where it is damaged."""
+        return self.source.read(self._places[index])
 
     @abstractmethod
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
@@ -89,15 +73,6 @@ class MapsTask(Task):
         found = summary([row for row in rows if row])
         shown = {name: value for name, value in found.items() if not name.endswith(("_mse", "_raw", "_scale"))}
         return {"of": what, **shown}
-
-
-def arrays_of(sample: Sample) -> dict[str, Array]:
-    """[C, H, W] float32: image, rays, albedo (linear), roughness, metallic, normal, depth, mask."""
-    arrays = {name: getattr(sample, name) for name in sample.__dataclass_fields__ if name not in ("shading", "light")}
-    return {
-        name: np.ascontiguousarray(np.moveaxis(a, -1, 0) if a.ndim == 3 else a[None], np.float32)
-        for name, a in arrays.items()
-    }
 
 
 def trained_on(source: Source) -> list[int]:

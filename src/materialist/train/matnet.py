@@ -1,16 +1,13 @@
 """MatNet trained as the paper says (sections "Material Prediction Network" and "Implementation Details")."""
 
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from materialist.camera import rays_at, unit
+from materialist.camera import unit
 from materialist.errors import WeightsError
 from materialist.io.samples import Sample, Source
 from materialist.metrics.lpips import backbone
@@ -19,7 +16,7 @@ from materialist.predict.matnet.network import PATCH, MatNet, Size
 from materialist.predict.matnet.predictor import infer
 from materialist.predict.weights import read_state
 from materialist.train import losses
-from materialist.train.maps import MapsTask, Pictures
+from materialist.train.maps import MapsTask
 from materialist.train.task import Batch, Recipe
 from materialist.types import Array, Materials, Prediction
 
@@ -28,6 +25,8 @@ RECIPE = Recipe(
 )
 """Paper, Implementation Details: AdamW, learning rate 1e-5, 512 x 512 crops. Where the paper says nothing (batch,
 decay of weights and of the rate), torch's default or a constant."""
+MAPS = ("image", "albedo", "roughness", "metallic", "normal", "depth", "mask")
+"""What is learned from."""
 DEPTH_DECODER_LEARNS = ("refinenet1", "refinenet2", "refinenet3", "refinenet4")
 """Parts of the depth decoder that learn (paper: "the last four layers of the RefineNet"); its rest is frozen."""
 
@@ -50,7 +49,7 @@ class PaperTask(MapsTask):
             else "Albedo: L1 and gradients at four scales in place of LPIPS, which is not installed."
         )  # fmt: skip
         self.notes = (perceptual, start)
-        super().__init__(source, Pictures(source, self.prepare), recipe, init=init, score_samples=score_samples)
+        super().__init__(source, recipe, init=init, score_samples=score_samples)
 
     def make(self) -> MatNet:
         """MatNet, its encoder frozen and of its depth decoder all but the RefineNet layers."""
@@ -65,19 +64,19 @@ class PaperTask(MapsTask):
             load_start(network, self.init)
         return network
 
-    def prepare(self, sample: Sample, side: int, rng: np.random.Generator) -> Sample:
-        """The paper's augmentation and no other: a random vertical flip and a random side x side crop."""
-        height, width = sample.depth.shape
-        if min(height, width) < side:
-            factor = side / min(height, width)
-            sample = resized(sample, max(side, round(height * factor)), max(side, round(width * factor)))
-            height, width = sample.depth.shape
+    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+        """The paper's augmentation and no other: a random vertical flip and a random side x side crop; [C, H, W]."""
+        sample = self.read(index)
+        maps = {name: torch.from_numpy(np.atleast_3d(getattr(sample, name))).permute(2, 0, 1) for name in MAPS}
+        if (factor := side / min(sample.depth.shape)) > 1:
+            maps = enlarged(maps, [max(side, round(edge * factor)) for edge in sample.depth.shape])
+        height, width = maps["depth"].shape[1:]
         top, left = int(rng.integers(0, height - side + 1)), int(rng.integers(0, width - side + 1))
-        part = np.s_[top : top + side, left : left + side]
-        sample = each_map(sample, lambda array, _: np.ascontiguousarray(array[part]))
+        maps = {name: values[:, top : top + side, left : left + side] for name, values in maps.items()}
         if rng.random() < 0.5:
-            sample = upside_down(sample)
-        return replace(sample, image=np.clip(sample.image, 0, 1), shading=None)
+            maps = {name: values.flip(1) for name, values in maps.items()}
+            maps["normal"][1] *= -1
+        return {name: values.numpy() for name, values in (maps | {"image": maps["image"].clamp(0, 1)}).items()}
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         image, mask = batch["image"], batch["mask"]
@@ -110,39 +109,17 @@ class PaperTask(MapsTask):
         return Prediction(materials, unit(maps["normal"]), np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
 
 
-def each_map(sample: Sample, work: Callable[[Array, str], Array]) -> Sample:
-    """The sample with `work(array, name)` applied to every map it has, without its light."""
-    arrays = {name: array for name, array in vars(sample).items() if name != "light" and array is not None}
-    return replace(sample, light=None, **{name: work(array, name) for name, array in arrays.items()})
+def enlarged(maps: dict[str, Tensor], size: list[int]) -> dict[str, Tensor]:
+    """The maps [C, h, w] at that (height, width): colours are interpolated, geometry is taken from the nearest pixel.
 
-
-def resized(sample: Sample, height: int, width: int) -> Sample:
-    """The sample at height x width pixels: colours are averaged, geometry is taken from the nearest pixel.
-
-    Albedo, roughness and metallic are averaged over what has a surface: the sky has none to mix in.
+    Albedo, roughness and metallic are means over what has a surface: the sky has none to mix in.
     """
-    smooth = cv2.INTER_AREA if height < sample.depth.shape[0] else cv2.INTER_LINEAR
-    scaled = lambda array, method: np.asarray(cv2.resize(array, (width, height), interpolation=method))  # noqa: E731
-    share = scaled(sample.mask, smooth)
-
-    def work(array: Array, name: str) -> Array:
-        if name == "rays":
-            return rays_at(array, height, width)
-        if name in ("normal", "depth", "mask"):
-            return scaled(array, cv2.INTER_NEAREST_EXACT)
-        if name in ("albedo", "roughness", "metallic"):
-            deep = (..., None) if array.ndim == 3 else ...
-            return scaled(array * sample.mask[deep], smooth) / np.maximum(share, 1e-6)[deep]
-        return scaled(array, smooth)
-
-    return each_map(sample, work)
-
-
-def upside_down(sample: Sample) -> Sample:
-    """The mirror image in a level plane: rows reversed, y of normals and rays negated."""
-    mirror = np.array([1, -1, 1], np.float32)
-    turned = each_map(sample, lambda array, _: np.ascontiguousarray(array[::-1]))
-    return replace(turned, normal=turned.normal * mirror, rays=turned.rays * mirror[:2])
+    smooth = lambda values: F.interpolate(values[None], size, mode="bilinear")[0]  # noqa: E731
+    nearest = lambda values: F.interpolate(values[None], size, mode="nearest-exact")[0]  # noqa: E731
+    mask, share = maps["mask"], smooth(maps["mask"]).clamp(min=1e-6)
+    found = {name: nearest(maps[name]) for name in ("normal", "depth", "mask")}
+    found |= {name: smooth(maps[name] * mask) / share for name in ("albedo", "roughness", "metallic")}
+    return found | {"image": smooth(maps["image"])}
 
 
 def freeze(network: MatNet) -> None:

@@ -1,26 +1,19 @@
-"""Batches of the bundled network, made where it is trained: pictures in memory, changed at random by whole batches.
+"""Pictures of the bundled network as they are stored, and how a whole batch of them is changed at random.
 
-All on [B, C, H, W] tensors of the training's device: a card that waits for processors learns nothing.
+The latter on [B, C, H, W] tensors of the training's device: a card that waits for processors learns nothing.
 """
 
-import logging
-import os
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
-from torch.utils.data import DataLoader
 
-from materialist.errors import InputError
-from materialist.io.samples import LIGHT_ROWS, Source
+from materialist.io.samples import LIGHT_ROWS, Sample
 from materialist.procedural.photographic import developed
-from materialist.train.maps import Pictures
-from materialist.train.stream import readable
 from materialist.train.task import Batch
+from materialist.types import Array
 
 _PLANES = ("image", "shading", "albedo", "roughness", "metallic", "normal", "depth", "mask")
 
@@ -29,9 +22,6 @@ _PLANES = ("image", "shading", "albedo", "roughness", "metallic", "normal", "dep
 class AugmentSettings:
     """How much pictures are changed; all by eye."""
 
-    capacity: int = 12000  # most pictures in a card's memory, 2 MB each at 256 pixels
-    refill: int = 256  # new samples from which on a card reads them
-    readers: int = 6  # processes that read them
     least_crop: float = 0.55  # smallest crop, as a part of the picture's shorter side
     whole: float = 0.3  # share of batches' pictures that are not cropped
     recoloured: float = 0.75  # share of pictures whose surfaces get other colours
@@ -41,146 +31,66 @@ class AugmentSettings:
     exposure: float = 0.35  # deviation, in stops
 
 
-class DevicePictures(Pictures):
-    """The samples of a set for training on one device: kept in a card's memory, or read when they are drawn.
+def stored(sample: Sample) -> dict[str, Array]:
+    """A sample as float16: [C, H, W], light [4, h, 2h], and reach [], the largest x of the camera rays at z = -1.
 
-    All have the size of the first.
+    A light that is not known is 0, a shading NaN.
     """
+    light = np.zeros((LIGHT_ROWS, 2 * LIGHT_ROWS, 4)) if sample.light is None else sample.light
+    shading = np.full_like(sample.image, np.nan) if sample.shading is None else sample.shading
+    arrays = {name: getattr(sample, name) for name in _PLANES} | {"light": light, "shading": shading}
+    arrays = {name: np.moveaxis(a, -1, 0) if a.ndim == 3 else a[None] for name, a in arrays.items()}
+    width = sample.depth.shape[1]
+    arrays["reach"] = -sample.rays[0, 0, 0] * width / (width - 1)
+    return {name: np.clip(a, -6e4, 6e4).astype(np.float16) for name, a in arrays.items()}
 
-    def __init__(self, source: Source, device: torch.device, settings: AugmentSettings | None = None):
-        self.settings, self.device = settings or AugmentSettings(), device
-        self._pool: dict[str, Tensor] = {}
-        self._kept, self._known = 0, set[int]()
-        self.size: tuple[int, ...] = ()
-        super().__init__(source, lambda sample, *_: sample)
-        if device.type == "cuda":
-            row, shape = self._read(0), (self.settings.capacity,)
-            self._pool = {n: torch.empty((*shape, *t.shape), dtype=t.dtype, device=device) for n, t in row.items()}
-            self._fill(self._places)
 
-    def refresh(self) -> None:
-        """Look for new samples; a card takes many at once."""
-        super().refresh()
-        if self._pool:
-            new = [p for p in self._places if self.source.number(p) not in self._known]
-            if len(new) >= self.settings.refill:
-                self._fill(new)
+def varied(batch: Batch, side: int, s: AugmentSettings, random: torch.Generator) -> Batch:
+    """A batch of `stored` samples cropped, recoloured and developed: maps and rays [B, C, side, side], and light."""
+    maps = cropped({name: values.float() for name, values in batch.items()}, side, s, random)
+    maps |= recolour(maps, s, random)
+    image, light = maps["image"], maps["light"]
+    exposure = torch.exp2(torch.randn(len(image), 1, 1, 1, generator=random, device=image.device) * s.exposure)
+    maps["image"], gains = developed(image * exposure, random)
+    maps["light"] = torch.cat([light[:, :3] * (exposure * gains), light[:, 3:]], 1)
+    del maps["shading"]
+    return maps
 
-    def _fill(self, places: Sequence[int]) -> None:
-        """Put samples into the pool, while there is room."""
-        room = self.settings.capacity - self._kept
-        workers = min(self.settings.readers, os.cpu_count() or 1)
-        chosen: Any = places[:room]
-        read: Any = self._read_or_message
-        for row in DataLoader(chosen, batch_size=None, collate_fn=read, num_workers=workers):
-            if isinstance(row, str):
-                logging.getLogger(__name__).warning("%s It is left out.", row)
-                continue
-            for name, tensor in row.items():
-                self._pool[name][self._kept] = tensor.to(self.device)
-            self._kept += 1
-        self._known.update(self.source.number(p) for p in places)
 
-    @torch.no_grad()
-    def batches(self, *, side: int, batch: int, seed: Sequence[int], skip: int) -> Iterator[Batch]:
-        """As many random batches of side x side pixels as the set has; arrays as `maps.arrays_of`, and light."""
-        random = torch.Generator(self.device)
-        for k in range(skip, max(1, len(self) // batch)):
-            random.manual_seed(int(np.random.SeedSequence((*seed, k)).generate_state(1)[0]))
-            yield self.drawn(side, batch, random)
+def cropped(maps: dict[str, Tensor], side: int, s: AugmentSettings, random: torch.Generator) -> dict[str, Tensor]:
+    """Random squares of the pictures, half of them mirrored, as side x side pixels, with rays in place of `reach`."""
+    (batch, _, height, width), device = maps["depth"].shape, maps["depth"].device
+    u = torch.rand(5, batch, generator=random, device=device)
+    size = torch.where(u[0] < s.whole, 1.0, s.least_crop + (1 - s.least_crop) * u[4]) * min(height, width)
+    left, top = u[1] * (width - size), u[2] * (height - size)
+    mirror = torch.where(u[3] < 0.5, -1.0, 1.0)
+    none = torch.zeros_like(mirror)
+    across = torch.stack([mirror * size / width, none, (2 * left + size) / width - 1], -1)
+    down = torch.stack([none, size / height, (2 * top + size) / height - 1], -1)
+    place = torch.stack([across, down], 1)  # of a square's corners in [-1, 1], in the picture
 
-    def drawn(self, side: int, batch: int, random: torch.Generator) -> dict[str, Tensor]:
-        """One random batch."""
-        count = self._kept if self._pool else len(self)
-        chosen = torch.randint(count, (batch,), generator=random, device=self.device)
-        if self._pool:
-            found = {name: plane[chosen] for name, plane in self._pool.items()}
-        else:
-            another = lambda: int(torch.randint(count, (), generator=random, device=self.device))  # noqa: E731
-            rows = [readable(lambda k: self._read(self._places[k]), k, another) for k in chosen.tolist()]
-            found = {name: torch.stack([row[name] for row in rows]) for name in rows[0]}
-        maps = {name: plane.float() for name, plane in found.items()}
-        reach, light = maps.pop("reach"), maps.pop("light")
-        maps, light = self._cropped(maps, light, reach, side, random)
-        maps |= recolour(maps, self.settings, random)
-        exposure = torch.exp2(
-            torch.randn(batch, 1, 1, 1, generator=random, device=self.device) * self.settings.exposure
-        )
-        maps["image"], gains = developed(maps["image"] * exposure, random)
-        maps["light"] = torch.cat([light[:, :3] * (exposure * gains), light[:, 3:]], 1)
-        del maps["shading"]
-        return maps
+    def sampled(values: Tensor, edge: int, mode: str) -> Tensor:
+        grid = F.affine_grid(place, [batch, 1, edge, edge], align_corners=False)
+        return F.grid_sample(values, grid, mode, "border", align_corners=False)
 
-    def _read_or_message(self, place: int) -> dict[str, Tensor] | str:
-        """A sample as `_read` has it, or the message why it cannot be read."""
-        try:
-            return self._read(place)
-        except InputError as error:
-            return str(error)
-
-    def _read(self, place: int) -> dict[str, Tensor]:
-        """A sample as float16: [C, H, W], light [4, h, 2h], and reach [], the largest x of the camera rays at z = -1.
-
-        Raises InputError where it cannot be read or has another size.
-        """
-        sample = self.source.read(place)
-        self.size = self.size or sample.depth.shape
-        if sample.depth.shape != self.size:
-            raise InputError(f"Sample {place} has {sample.depth.shape} pixels, not {self.size}; use sets of one size.")
-        light = np.zeros((LIGHT_ROWS, 2 * LIGHT_ROWS, 4)) if sample.light is None else sample.light
-        shading = np.full_like(sample.image, np.nan) if sample.shading is None else sample.shading
-        arrays = {name: getattr(sample, name) for name in _PLANES} | {"light": light, "shading": shading}
-        arrays = {n: np.moveaxis(a, -1, 0) if a.ndim == 3 else a[None] for n, a in arrays.items()}
-        width = self.size[1]
-        arrays["reach"] = np.float32(-sample.rays[0, 0, 0] * width / (width - 1))
-        return {n: torch.from_numpy(np.asarray(np.clip(a, -6e4, 6e4), np.float16)) for n, a in arrays.items()}
-
-    def _cropped(
-        self, maps: dict[str, Tensor], light: Tensor, reach: Tensor, side: int, random: torch.Generator
-    ) -> tuple[dict[str, Tensor], Tensor]:
-        """Random squares of the pictures, half of them mirrored, as side x side pixels, with their rays."""
-        s, batch = self.settings, len(reach)
-        u = torch.rand(4, batch, generator=random, device=self.device)
-        part = torch.where(u[0] < s.whole, 1.0, s.least_crop + (1 - s.least_crop) * torch.rand(
-            batch, generator=random, device=self.device))  # fmt: skip
-        height, width = self.size
-        size = part * min(height, width)
-        left, top = u[1] * (width - size), u[2] * (height - size)
-        mirror = torch.where(u[3] < 0.5, -1.0, 1.0)
-
-        def grid(n: int) -> Tensor:
-            place = (torch.arange(n, device=self.device) + 0.5) / n
-            across = torch.where(mirror[:, None] < 0, 1 - place, place) * size[:, None] + left[:, None]
-            down = place * size[:, None] + top[:, None]
-            x, y = 2 * across / width - 1, 2 * down / height - 1
-            return torch.stack([x[:, None].expand(-1, n, -1), y[:, :, None].expand(-1, -1, n)], -1)
-
-        fine = grid(2 * side) if side < height else grid(side)
-        sample = lambda t, g, mode: F.grid_sample(t, g, mode, "border", align_corners=False)  # noqa: E731
-
-        def smooth(t: Tensor) -> Tensor:
-            found = sample(t, fine, "bilinear")
-            return F.avg_pool2d(found, 2) if fine.shape[1] > side else found
-
-        coarse = grid(side)
-        out = {name: sample(maps[name], coarse, "nearest") for name in ("normal", "depth", "mask")}
-        surface = maps["mask"]
-        colours = torch.cat([maps[n] * surface for n in ("albedo", "roughness", "metallic")], 1)
-        both = smooth(torch.cat([maps["image"], maps["shading"], colours, surface], 1))
-        share = both[:, 11:].clamp(min=1e-6)
-        out["image"], out["shading"] = both[:, :3], both[:, 3:6]
-        out["albedo"], out["roughness"], out["metallic"] = (
-            p / share for p in (both[:, 6:9], both[:, 9:10], both[:, 10:11])
-        )
-        turn = torch.stack([mirror, torch.ones_like(mirror), torch.ones_like(mirror)], 1).view(-1, 3, 1, 1)
-        normal = out["normal"] / out["normal"].norm(dim=1, keepdim=True).clamp(min=1)
-        out["normal"] = normal * turn * out["mask"]
-        out["depth"] = out["depth"] * out["mask"]
-        x = coarse[..., 0] * (reach * mirror).view(-1, 1, 1)
-        y = -coarse[..., 1] * reach.view(-1, 1, 1) * height / width
-        out["rays"] = torch.stack([x, y], 1)
-        light = torch.where(mirror.view(-1, 1, 1, 1) < 0, light.flip(-1), light)
-        return out, light
+    surface = maps["mask"]
+    colours = torch.cat([maps[n] * surface for n in ("albedo", "roughness", "metallic")], 1)
+    smooth = torch.cat([maps["image"], maps["shading"], colours, surface], 1)
+    finer = 2 if side < height else 1
+    smooth = F.avg_pool2d(sampled(smooth, finer * side, "bilinear"), finer)
+    image, shading, albedo, roughness, metallic, share = smooth.split([3, 3, 3, 1, 1, 1], 1)
+    share = share.clamp(min=1e-6)
+    out = {name: sampled(maps[name], side, "nearest") for name in ("normal", "depth", "mask")}
+    out |= {"image": image, "shading": shading}
+    out |= {"albedo": albedo / share, "roughness": roughness / share, "metallic": metallic / share}
+    turn = torch.stack([mirror, torch.ones_like(mirror), torch.ones_like(mirror)], 1).view(-1, 3, 1, 1)
+    normal = out["normal"] / out["normal"].norm(dim=1, keepdim=True).clamp(min=1)
+    out["normal"] = normal * turn * out["mask"]
+    out["depth"] = out["depth"] * out["mask"]
+    centres = F.affine_grid(place, [batch, 1, side, side], align_corners=False) * maps["reach"].view(-1, 1, 1, 1)
+    out["rays"] = torch.stack([centres[..., 0] * mirror.view(-1, 1, 1), -centres[..., 1] * height / width], 1)
+    out["light"] = torch.where(mirror.view(-1, 1, 1, 1) < 0, maps["light"].flip(-1), maps["light"])
+    return out
 
 
 def recolour(maps: dict[str, Tensor], s: AugmentSettings, random: torch.Generator) -> dict[str, Tensor]:

@@ -15,7 +15,7 @@ from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
 from materialist.procedural.thickness.dataset import load
 from materialist.procedural.thickness.errors import mean_errors
-from materialist.train.task import Batch, Examples, Recipe, Task
+from materialist.train.task import Batch, Recipe, Task
 from materialist.types import Array
 
 RECIPE = Recipe(side=SIDE, batch=32, rate=2e-3, growth=((0.6, 32),))
@@ -33,32 +33,6 @@ class ThicknessLoss:
     """Added to solid and hollow thickness before logarithms, in object sizes: thinner parts count little."""
 
 
-class ViewExamples(Examples):
-    """Views of shapes in memory; `draw` mirrors and recolours them."""
-
-    def __init__(self, views: dict[str, Array]):
-        self.views = views
-        self._at = {views["maps"].shape[-1]: views}
-
-    def __len__(self) -> int:
-        return len(self.views["maps"])
-
-    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
-        """maps [C, S, S], target [5, S, S] and hollow [] of one view; S is `side`."""
-        if side not in self._at:
-            self._at[side] = smaller(self.views, side)
-        views = self._at[side]
-        maps, target = views["maps"][index].astype(np.float32), views["target"][index].astype(np.float32)
-        if rng.random() < 0.5:
-            maps, target = maps[..., ::-1].copy(), target[..., ::-1].copy()
-            maps[NORMAL_X] *= -1
-            target[BACK_X] *= -1
-        gain, order = rng.uniform(0.7, 1.2, (3, 1, 1)), rng.permutation(3)
-        inside = maps[MASK]
-        maps[:3] = (np.clip((maps[:3] + 0.5 * inside)[order] * gain, 0, 1) - 0.5) * inside
-        return {"maps": maps, "target": target, "hollow": np.float32(views["hollow"][index])}
-
-
 class RefractionTask(Task):
     """The network that predicts how thick an object is, and the normals of its back."""
 
@@ -71,8 +45,30 @@ class RefractionTask(Task):
         """
         if recipe.side > SIDE:
             raise InputError(f"The size of training pictures is {recipe.side}; views have {SIDE} pixels.")
-        super().__init__(ViewExamples(load(views)), recipe, init)
+        super().__init__(recipe, init)
+        self.views = load(views)
         self.held_out = None if held_out is None else load(held_out)
+
+    def count(self) -> int:
+        return len(self.views["maps"])
+
+    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+        """maps [C, S, S], target [5, S, S] and hollow [] of one view as it is; `vary` changes it."""
+        return {name: values[index] for name, values in self.views.items()}
+
+    def vary(self, batch: Batch, side: int, random: torch.Generator) -> Batch:
+        """The views at side x side pixels, half of them mirrored, all in other colours."""
+        maps, target = batch["maps"].float(), batch["target"].float()
+        if side < SIDE:
+            maps, target = smaller(maps, maps[:, MASK, None], side), smaller(target, (target[:, :1] > 0).float(), side)
+        rand = lambda *shape: torch.rand(*shape, generator=random, device=maps.device)  # noqa: E731
+        turned = rand(len(maps), 1, 1, 1) < 0.5
+        maps, target = mirrored(maps, NORMAL_X, turned), mirrored(target, BACK_X, turned)
+        order, gain = rand(len(maps), 3).argsort(1)[..., None, None], 0.7 + 0.5 * rand(len(maps), 3, 1, 1)
+        inside = maps[:, MASK, None]
+        colours = (maps[:, :3] + 0.5 * inside).take_along_dim(order, 1)
+        colours = ((colours * gain).clamp(0, 1) - 0.5) * inside
+        return {"maps": torch.cat([colours, maps[:, 3:]], 1), "target": target, "hollow": batch["hollow"].float()}
 
     def make(self) -> RefractionNet:
         """RefractionNet, which begins as the symmetry prior."""
@@ -104,17 +100,14 @@ class RefractionTask(Task):
         return {} if self.held_out is None else mean_errors(copy.deepcopy(network).cpu(), self.held_out)
 
 
-def smaller(views: dict[str, Array], side: int, at_a_time: int = 256) -> dict[str, Array]:
-    """Views at side x side pixels: means over what is known; a pixel is inside where half of it is."""
-    count = len(views["maps"])
-    result = {name: np.empty((*views[name].shape[:2], side, side), np.float16) for name in ("maps", "target")}
-    shrink = lambda x: F.interpolate(torch.from_numpy(x), (side, side), mode="area").numpy()  # noqa: E731
-    for k in range(0, count, at_a_time):
-        part = slice(k, k + at_a_time)
-        maps, target = views["maps"][part].astype(np.float32), views["target"][part].astype(np.float32)
-        for name, values, weight in (
-            ("maps", maps, maps[:, MASK : MASK + 1]), ("target", target, (target[:, :1] > 0).astype(np.float32))
-        ):  # fmt: skip
-            share = shrink(np.ascontiguousarray(weight))
-            result[name][part] = np.where(share > 0.5, shrink(values) / np.maximum(share, 1e-6), 0)
-    return {**result, "hollow": views["hollow"]}
+def smaller(values: Tensor, known: Tensor, side: int) -> Tensor:
+    """Maps [B, C, S, S] at side x side pixels: means over what is known [B, 1, S, S]; 0 where half of it is not."""
+    share, total = (F.interpolate(map_, (side, side), mode="area") for map_ in (known, values))
+    return torch.where(share > 0.5, total / share.clamp(min=1e-6), 0)
+
+
+def mirrored(values: Tensor, x: int, chosen: Tensor) -> Tensor:
+    """Maps [B, C, S, S] turned around where chosen [B, 1, 1, 1]; channel `x` is that of normals."""
+    turned = values.flip(-1)
+    turned[:, x] *= -1
+    return torch.where(chosen, turned, values)

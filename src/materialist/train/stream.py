@@ -2,9 +2,9 @@
 
 import logging
 import signal
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,80 +12,75 @@ import torch
 from torch.utils.data import DataLoader, default_collate
 
 from materialist.errors import InputError
-from materialist.train.task import Batch, Examples
+from materialist.train.task import Batch, Task
+from materialist.types import Array
 
 ATTEMPTS = 4
 """Examples tried in place of one that cannot be read, before the run ends with its error."""
 GRACE = 20
 """Seconds for which a loading process goes on after SIGTERM: the trainer may be waiting for its batch."""
 
-
-T = TypeVar("T")
 Key = tuple[int, tuple[int, ...]]
 """Number of an example, and the seed of its variant."""
 
 
-def readable(read: Callable[[int], T], index: int, another: Callable[[], Any]) -> T:
-    """What `read` makes of a number, or of `another()` in place of one that cannot be read.
-
-    Raises InputError after ATTEMPTS.
-    """
-    for _ in range(ATTEMPTS - 1):
-        try:
-            return read(index)
-        except InputError as error:
-            logging.getLogger(__name__).warning("%s Another sample is used.", error)
-            index = another()
-    return read(index)
-
-
 def epoch(
-    examples: Examples, *, number: int, side: int, batch: int, seed: int, skip: int = 0, workers: int = 0,
+    task: Task, *, number: int, side: int, batch: int, seed: int, skip: int = 0, workers: int = 0, device: Any = "cpu",
 ) -> Generator[Batch, None, None]:  # fmt: skip
-    """Batches of one pass over all examples in a random order, without the first `skip` of them.
+    """Batches of one pass over all examples in a random order, on the device, without the first `skip` of them.
 
     Order and variants depend on (seed, number) alone, for any number of workers. A small set is repeated so that a
     pass has at least one batch.
     Raises InputError where ATTEMPTS examples in a row cannot be read.
     """
-    examples.refresh()
-    if (own := examples.batches(side=side, batch=batch, seed=(seed, number), skip=skip)) is not None:
-        yield from own
-        return
-    order = np.random.default_rng((seed, number)).permutation(len(examples))
+    task.refresh()
+    order = np.random.default_rng((seed, number)).permutation(task.count())
     order = np.tile(order, -(-batch // len(order)))
     order = order[: len(order) // batch * batch]
     keys = [(int(index), (seed, number, k)) for k, index in enumerate(order)]
+    random = torch.Generator(device)
     loader: DataLoader[Any] = DataLoader(
         keys[skip * batch :],  # type: ignore[arg-type]
         batch_size=batch,
         num_workers=workers,
         worker_init_fn=_init_worker,
         prefetch_factor=4 if workers else None,
-        collate_fn=partial(_drawn, examples, side),
-        pin_memory=torch.cuda.is_available(),
+        collate_fn=partial(_drawn, task, side),
+        pin_memory=random.device.type == "cuda",
     )
     batches = iter(loader)
     try:
-        for found in batches:
+        for k, found in enumerate(batches, skip):
             if isinstance(found, str):
                 raise InputError(found)
-            yield found
+            random.manual_seed(int(np.random.SeedSequence((seed, number, k)).generate_state(1)[0]))
+            with torch.no_grad():
+                varied = task.vary({n: t.to(device, non_blocking=True) for n, t in found.items()}, side, random)
+            yield varied
     finally:
         del batches  # ends the workers
 
 
-def _drawn(examples: Examples, side: int, keys: list[Key]) -> Any:
+def _drawn(task: Task, side: int, keys: list[Key]) -> Any:
     """A batch, or the message why there is none: an exception of a worker would arrive as its traceback."""
-    items = []
-    for index, seed in keys:
-        rng = np.random.default_rng(seed)
-        draw, another = partial(examples.draw, side=side, rng=rng), partial(rng.integers, len(examples))
-        try:
-            items.append(readable(draw, index, another))
-        except InputError as error:
-            return str(error)
+    try:
+        items = [_readable(task, index, side, np.random.default_rng(seed)) for index, seed in keys]
+    except InputError as error:
+        return str(error)
+    if len({tuple(np.shape(array) for array in item.values()) for item in items}) > 1:
+        return "The samples have different numbers of pixels; use sets of one size."
     return default_collate(items)
+
+
+def _readable(task: Task, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+    """A variant of that example, or of others in place of one that cannot be read."""
+    for _ in range(ATTEMPTS - 1):
+        try:
+            return task.draw(index, side, rng)
+        except InputError as error:
+            logging.getLogger(__name__).warning("%s Another sample is used.", error)
+            index = int(rng.integers(task.count()))
+    return task.draw(index, side, rng)
 
 
 def _init_worker(_: int) -> None:

@@ -1,13 +1,14 @@
-"""What a run trains: a network, what it learns from, its losses and its scores."""
+"""What a run trains: a network, the examples that it learns from, its losses and its scores."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -17,7 +18,7 @@ from materialist.predict.weights import load_weights, read_state
 from materialist.types import Array
 
 Batch = Mapping[str, Tensor]
-"""Names of an example's arrays -> [B, ...] float32."""
+"""Names of an example's arrays -> [B, ...]."""
 
 MULTIPLE = 32
 """Sides of training pictures are multiples of this: the networks halve them five times."""
@@ -62,25 +63,6 @@ class Recipe:
         return replace(self, **(({"growth": ()} if "side" in given else {}) | given))
 
 
-class Examples(ABC):
-    """What a network learns from."""
-
-    @abstractmethod
-    def __len__(self) -> int:
-        """How many there are at present."""
-
-    @abstractmethod
-    def draw(self, index: int, side: int, rng: Any) -> dict[str, Array]:
-        """A random variant of example `index` at side x side pixels, float32; raises InputError when it is damaged."""
-
-    def batches(self, *, side: int, batch: int, seed: Sequence[int], skip: int) -> Iterator[Batch] | None:
-        """One pass without its first `skip` batches [B, ...], of examples that make batches themselves; else None."""
-        return None
-
-    def refresh(self) -> None:  # noqa: B027 (examples in memory do not change)
-        """Look again: a set on disk may grow while it is used."""
-
-
 class Task(ABC):
     """One of the networks, and everything that its training needs."""
 
@@ -89,9 +71,27 @@ class Task(ABC):
     notes: tuple[str, ...] = ()
     """What the log must say at the start."""
 
-    def __init__(self, examples: Examples, recipe: Recipe, init: Path | None = None):
+    def __init__(self, recipe: Recipe, init: Path | None = None):
         """`init`: weights to begin from."""
-        self.examples, self.recipe, self.init = examples, recipe, init
+        self.recipe, self.init = recipe, init
+
+    @abstractmethod
+    def count(self) -> int:
+        """How many examples there are at present."""
+
+    @abstractmethod
+    def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
+        """A random variant of example `index`, at side x side pixels unless `vary` sees to that.
+
+        Raises InputError when it is damaged.
+        """
+
+    def vary(self, batch: Batch, side: int, random: torch.Generator) -> Batch:
+        """The batch with what is changed at random in all its examples together, where the network is trained."""
+        return batch
+
+    def refresh(self) -> None:  # noqa: B027 (examples in memory do not change)
+        """Look again: a set on disk may grow while it is used."""
 
     @abstractmethod
     def make(self) -> StoredNetwork:
@@ -105,9 +105,6 @@ class Task(ABC):
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
 
-    def to(self, device: torch.device) -> None:  # noqa: B027 (examples that come one by one know no device)
-        """Make ready what is learned from on the device of the training."""
-
     def network(self) -> StoredNetwork:
         """A network to begin from. Raises WeightsError for weights that are damaged or of another architecture."""
         network = self.make()
@@ -117,4 +114,4 @@ class Task(ABC):
 
     def data(self) -> dict[str, Any]:
         """Plain values about the data, stored with the weights."""
-        return {"views": len(self.examples)}
+        return {"views": self.count()}

@@ -57,7 +57,6 @@ class Trainer:
         state = checkpoint.resumed(folder, task.kind, resume=resume, device=self.device)
         torch.manual_seed(self.options.seed)
         torch.backends.cudnn.benchmark = self.device.type == "cuda"
-        task.to(self.device)
         self.network = task.network().to(self.device)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False).eval()
         self._learnt = [p for p in self.network.parameters() if p.requires_grad]
@@ -143,8 +142,8 @@ class Trainer:
         while True:
             side = self.recipe.side_at(self.schedule.progress)
             batches = stream.epoch(
-                self.task.examples, number=self.epoch, side=side, batch=self.recipe.batch, seed=self.options.seed,
-                skip=self.batch, workers=self.options.workers,
+                self.task, number=self.epoch, side=side, batch=self.recipe.batch, seed=self.options.seed,
+                skip=self.batch, workers=self.options.workers, device=self.device,
             )  # fmt: skip
             for batch in batches:
                 self.batch += 1
@@ -160,7 +159,6 @@ class Trainer:
         rate = self.recipe.rate * self.schedule.rate(self.recipe.warm_up, self.recipe.last_rate)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
-        batch = {name: t.to(self.device, non_blocking=True) for name, t in batch.items()}
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.recipe.bfloat16):
             terms = self.task.losses(self.network, batch)
         total: Tensor = sum(terms.values(), torch.zeros((), device=self.device))
