@@ -37,24 +37,17 @@ def textured_obj(folder: Path, *, mtl: str = "quad.mtl", texture: str = "quad.pn
 
 def gltf_file(folder: Path, uri: str, image: str | None = None) -> Path:
     """A .gltf triangle whose buffer (and picture) have these addresses; `tri.bin` lies beside it."""
-    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
-    uv = np.array([[0, 0], [1, 0], [0, 1]], "<f4")
-    (folder / "tri.bin").write_bytes(points.tobytes() + uv.tobytes())
+    uv = trimesh.visual.TextureVisuals(uv=[[0, 1], [1, 1], [0, 0]], material=trimesh.visual.material.PBRMaterial())
+    triangle = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], visual=uv, process=False)
+    made = trimesh.exchange.gltf.export_gltf(triangle.scene(), merge_buffers=True)
+    content = json.loads(made.pop("model.gltf"))
+    content["buffers"][0]["uri"] = uri
     material = {"pbrMetallicRoughness": {"baseColorFactor": [0.2, 0.4, 0.6, 1], "roughnessFactor": 0.3}}
-    content = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}],
-        "materials": [material],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]},
-            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
-        ],
-        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 24}],
-        "buffers": [{"byteLength": 60, "uri": uri}],
-    }  # fmt: skip
+    content["materials"] = [material]
     if image is not None:
         material["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
         content |= {"images": [{"uri": image}], "textures": [{"source": 0}]}
+    (folder / "tri.bin").write_bytes(*made.values())
     (folder / "tri.gltf").write_text(json.dumps(content))
     return folder / "tri.gltf"
 
@@ -74,33 +67,15 @@ def floor_scene(width: int = 48, height: int = 36, *, tilt: float = 30.0, native
     return scene_of(camera, depth, normals, albedo, roughness=0.9, original=original)
 
 
-TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4")
+def tetrahedron_glb(path: Path, material: dict | None = None, required: tuple[str, ...] = ()) -> Path:
+    """A .glb of a tetrahedron with a material that requires these extensions."""
 
+    def told(tree: dict) -> None:
+        tree["extensionsRequired"] = list(required)
+        if material is not None:
+            tree["materials"], tree["meshes"][0]["primitives"][0]["material"] = [material], 0
 
-def tetrahedron_glb(path: Path, material: dict | None = None, required: tuple[str, ...] = (), **attributes) -> Path:
-    """A .glb of a tetrahedron; `attributes` are further ones, name -> (array [4, n], componentType, normalized)."""
-    import struct
-
-    faces = np.array([0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2], "<u2")
-    attributes = {"POSITION": (TETRAHEDRON, 5126, False), **attributes}
-    arrays = [*attributes.values(), (faces[:, None], 5123, False)]
-    data, views, accessors = b"", [], []
-    for array, kind, whole in arrays:
-        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
-        data += array.tobytes() + b"\0" * (-array.nbytes % 4)
-        what = {"bufferView": len(views) - 1, "componentType": kind, "count": len(array), "normalized": whole}
-        accessors.append({**what, "type": {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}[array.shape[1]]})
-    accessors[0] |= {"min": [0, 0, 0], "max": [1, 1, 1]}
-    primitive = {"attributes": {n: k for k, n in enumerate(attributes)}, "indices": len(attributes)}
-    content = {
-        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [primitive]}], "accessors": accessors, "bufferViews": views,
-        "buffers": [{"byteLength": len(data)}], "extensionsRequired": list(required),
-    }  # fmt: skip
-    if material is not None:
-        content["materials"], primitive["material"] = [material], 0
-    text = json.dumps(content).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(data), 0x004E4942) + data
-    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    corners, faces = np.eye(4, 3, -1), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+    solid = trimesh.Trimesh(corners, faces, process=False)
+    path.write_bytes(trimesh.exchange.gltf.export_glb(solid.scene(), tree_postprocessor=told))
     return path
