@@ -9,10 +9,9 @@ OPTIONS = {"size": 64}
 
 
 def write(runs, *entries, **how):
-    ledger = open_ledger(runs, OPTIONS, **how)
-    for kind, id in entries:
-        ledger.append(kind, id=id, name=id[0])
-    ledger.close()
+    with open_ledger(runs, OPTIONS, **how) as ledger:
+        for kind, id in entries:
+            ledger.append(kind, id=id, name=id[0])
     return ledger
 
 
@@ -28,7 +27,7 @@ def test_a_line_that_was_cut_off_is_passed_over_and_spoils_no_other(tmp_path):
 def test_a_folder_that_holds_something_is_refused_or_gone_on_with_or_begun_anew(tmp_path):
     write(tmp_path, ("done", "a.png"))
     with pytest.raises(InputError, match="--resume to go on"):
-        open_ledger(tmp_path, OPTIONS)
+        write(tmp_path)
     for how in ({"force": True}, {"resume": True}):  # begun anew, also after the next stop
         assert write(tmp_path, **how).last["a.png"]["key"] is None
     mine = tmp_path / "mine"
@@ -36,22 +35,19 @@ def test_a_folder_that_holds_something_is_refused_or_gone_on_with_or_begun_anew(
     (mine / "thesis.txt").touch()
     for how in ({}, {"resume": True}, {"force": True}):
         with pytest.raises(InputError, match="holds no batch"):
-            open_ledger(mine, OPTIONS, **how)
+            write(mine, **how)
     assert [file.name for file in mine.iterdir()] == ["thesis.txt"]
 
 
 def test_other_options_are_refused_by_name(tmp_path):
     write(tmp_path, ("done", "a.png"))
-    with pytest.raises(InputError, match="size 64, not 96"):
-        open_ledger(tmp_path, {"size": 96}, resume=True)
-    ledger = open_ledger(tmp_path, {"size": 96}, resume=True, force=True)
-    assert ledger.last["a.png"]["key"] != ledger.key
-    ledger.close()
+    with pytest.raises(InputError, match="size 64, not 96"), open_ledger(tmp_path, {"size": 96}, resume=True):
+        pass
+    with open_ledger(tmp_path, {"size": 96}, resume=True, force=True) as ledger:
+        assert ledger.last["a.png"]["key"] != ledger.key
 
 
 def test_two_batches_do_not_share_a_folder(tmp_path):
-    first = open_ledger(tmp_path, OPTIONS)
-    with pytest.raises(OutputError, match="Another batch is at work"):
-        open_ledger(tmp_path, OPTIONS, resume=True)
-    first.close()
-    open_ledger(tmp_path, OPTIONS, resume=True).close()
+    with open_ledger(tmp_path, OPTIONS), pytest.raises(OutputError, match="Another batch is at work"):
+        write(tmp_path, resume=True)
+    write(tmp_path, resume=True)

@@ -1,74 +1,62 @@
 """RUNS/batch.jsonl: the events of a batch, one line each, only ever appended.
 
 A line is flushed to the disk before the next photo begins, so a batch that is killed at any moment can be resumed; a
-last line that was cut off is skipped. A lock that vanishes with its process keeps a second batch out of the folder.
+last line that was cut off is skipped. A lock on it that vanishes with its process keeps a second batch out.
 """
 
 import fcntl
 import hashlib
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from materialist.errors import InputError, OutputError
-from materialist.io.atomic import make_folder
+from materialist.io.atomic import make_folder, writing
 
 LEDGER = "batch.jsonl"
-LOCK = ".batch.lock"
 FORMAT = 1
 
 
 class Ledger:
     """The events of a batch. Open it with `open_ledger`."""
 
-    def __init__(self, path: Path, events: list[dict[str, Any]], options: dict[str, Any], lock: int) -> None:
-        self._file = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o666)
-        self._lock = lock
+    def __init__(self, file: BinaryIO, events: list[dict[str, Any]], options: dict[str, Any]) -> None:
+        self._file = file
         self.key = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
         """Stands for the options of this batch; results of other options do not count as done."""
         self.last: dict[str, dict[str, Any]] = {}
-        """Photo id -> its last event: begin, done or failed."""
-        self.names: dict[str, str] = {}
-        """Photo id -> name, of all photos that were ever begun here."""
+        """Photo id -> its last event (begin, done or failed), of all photos that were ever begun here."""
         self.owned: set[str] = set()
         """File names of results that this batch may replace: their places were free when their photos were begun."""
         for event in events:
             self._note(event)
 
-    def append(self, event: str, **facts: Any) -> dict[str, Any]:
+    def append(self, event: str, **facts: Any) -> None:
         """Write one event. Raises OutputError when the disk is full or read-only."""
         entry = {"event": event, "key": self.key, **facts}
         line = (json.dumps(entry, ensure_ascii=True) + "\n").encode()
         self._note(entry)  # first, so that a Ctrl-C during the write finds the summary no older than the file
-        try:
-            if os.write(self._file, line) < len(line):
+        with writing(LEDGER):
+            if self._file.write(line) < len(line):
                 raise OSError("the disk is full")
-            os.fsync(self._file)
-        except OSError as error:
-            raise OutputError(f"{LEDGER} cannot be written: {error.strerror or error}.") from error
-        return entry
-
-    def end_line(self) -> None:
-        """End a line that was cut off; the reader skips an empty one."""
-        os.write(self._file, b"\n")
-
-    def close(self) -> None:
-        """Let another batch into the folder."""
-        os.close(self._file)
-        os.close(self._lock)
+            os.fsync(self._file.fileno())
 
     def _note(self, entry: dict[str, Any]) -> None:
         if entry.get("anew"):  # all photos are to be done again
             self.last = {id: {**last, "key": None} for id, last in self.last.items()}
         if "id" in entry:
             self.last[entry["id"]] = entry
-            self.names[entry["id"]] = entry["name"]
             self.owned.update(entry.get("owned", ()))
 
 
-def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = False, force: bool = False) -> Ledger:
-    """The ledger of RUNS, which is made where it is missing.
+@contextmanager
+def open_ledger(
+    runs: str | Path, options: dict[str, Any], *, resume: bool = False, force: bool = False
+) -> Iterator[Ledger]:  # fmt: skip
+    """The ledger of RUNS, which is made where it is missing; it is closed, and unlocked, when the block ends.
 
     Without `resume`, RUNS must be empty or, with `force`, hold an earlier batch, which is begun anew. With `resume` it
     must be empty or hold a batch with the same `options`; `force` goes on with others. Nothing but a batch is touched.
@@ -78,30 +66,29 @@ def open_ledger(runs: str | Path, options: dict[str, Any], *, resume: bool = Fal
     folder = Path(runs)
     path = folder / LEDGER
     options = json.loads(json.dumps(options))  # as they will be read again: tuples are lists
-    try:
+    with writing(folder):
         make_folder(folder)
-        held = [name for name in os.listdir(folder) if name != LOCK]
-        if held and not path.is_file():
+        held = path.is_file()
+        if not held and any(folder.iterdir()):
             raise InputError(f"{folder} is not empty and holds no batch; name another folder.")
         if held and not (resume or force):
             raise InputError(
                 f"{folder} holds a batch; add --resume to go on with it, --force to begin anew, or name another folder."
             )
-        lock = _locked(folder)
-    except OSError as error:
-        raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
-    try:
-        events = read_events(path) if held else []
+        file = path.open("ab", buffering=0)
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # it ends with the process
+        except BlockingIOError as error:
+            raise OutputError(f"Another batch is at work in {folder}; wait for it, or name another folder.") from error
+        events = read_events(path)
         if resume and not force:
             _require_same(events, options, folder)
-        ledger = Ledger(path, events, options, lock)
+        ledger = Ledger(file, events, options)
         if held:
-            ledger.end_line()
+            file.write(b"\n")  # ends a line that was cut off; the reader skips an empty one
         ledger.append("start", format=FORMAT, options=options, anew=not resume)
-    except BaseException:
-        os.close(lock)
-        raise
-    return ledger
+        yield ledger
 
 
 def read_events(path: str | Path) -> list[dict[str, Any]]:
@@ -128,13 +115,3 @@ def _require_same(events: list[dict[str, Any]], options: dict[str, Any], folder:
                 f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
                 "name another folder, or add --force to redo what differs."
             )
-
-
-def _locked(folder: Path) -> int:
-    lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        os.close(lock)
-        raise OutputError(f"Another batch is at work in {folder}; wait for it, or name another folder.") from error
-    return lock

@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from materialist.batches.results import replace_file
+from materialist.io.atomic import write_whole
 
 COLUMNS = (
     "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
@@ -19,11 +19,8 @@ COLUMNS = (
 """Columns of the summary; a photo that failed has only the reason."""
 
 
-class Row(dict[str, Any]):
-    """One photo of a batch: values by COLUMNS. `status` is `done`, `failed` or `open` (not reached)."""
-
-    def __missing__(self, key: str) -> None:
-        return None
+Row = dict[str, Any]
+"""One photo of a batch: values by COLUMNS, None where there is none. `status` is done, failed or open (not reached)."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +50,7 @@ class Outcome:
         """0 when every photo is done, 1 when one met a bug of ours, else 2."""
         if self.count("done") == len(self.rows):
             return 0
-        return 1 if any(row["bug"] for row in self.rows) else 2
+        return 1 if any(row.get("bug") for row in self.rows) else 2
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ def write_summary(outcome: Outcome) -> None:
     table = csv.writer(text)
     table.writerow(COLUMNS)
     table.writerows([_cell(row[key]) for key in COLUMNS] for row in outcome.rows)
-    replace_file(outcome.runs / "summary.csv", text.getvalue().encode("utf-8"))
+    write_whole(outcome.runs / "summary.csv", text.getvalue().encode("utf-8"))
     summary = {
         "photos": len(outcome.rows),
         **{status: outcome.count(status) for status in ("done", "failed", "open")},
@@ -85,7 +82,7 @@ def write_summary(outcome: Outcome) -> None:
         "options": outcome.options,
         "rows": [{key: row[key] for key in COLUMNS} for row in outcome.rows],
     }
-    replace_file(outcome.runs / "summary.json", (json.dumps(summary, indent=1) + "\n").encode())
+    write_whole(outcome.runs / "summary.json", (json.dumps(summary, indent=1) + "\n").encode())
 
 
 def _cell(value: Any) -> Any:
@@ -109,37 +106,6 @@ def write_page(outcome: Outcome) -> None:
     order = {"failed": 0, "done": 1, "open": 2}
     rows = sorted(outcome.rows, key=lambda row: order[row["status"]])  # what needs a look comes first
     page = template.render(
-        title=outcome.runs.resolve().name, style=(assets / "page.css").read_text("utf-8"), facts=_facts(outcome),
-        edited=any(row["picture_hash"] for row in outcome.rows), cards=[_card(row) for row in rows],
+        title=outcome.runs.resolve().name, style=(assets / "page.css").read_text("utf-8"), outcome=outcome, rows=rows,
     )  # fmt: skip
-    replace_file(outcome.runs / "index.html", page.encode("utf-8"))
-
-
-def _facts(outcome: Outcome) -> list[tuple[str, str]]:
-    done = outcome.of("done")
-    facts = [("photos", str(len(outcome.rows))), ("done", str(len(done))), ("failed", str(outcome.count("failed")))]
-    if outcome.count("open"):
-        facts.append(("not reached", str(outcome.count("open"))))
-    quality = [row["psnr"] for row in done if row["psnr"] is not None]
-    if quality:
-        facts.append(("mean PSNR", f"{sum(quality) / len(quality):.1f} dB"))
-    if done:
-        facts.append(("a photo", f"{sum(row['seconds'] or 0 for row in done) / len(done):.1f} s"))
-    return facts
-
-
-def _card(row: Row) -> dict[str, Any]:
-    """Values of the template for one photo; links are relative to the page."""
-    if row["status"] != "done":
-        return {"row": row}
-    figures: list[tuple[Any, str]] = [
-        (row["psnr"], "{:.1f} dB"), (row["ssim"], "SSIM {:.3f}"), (row["seconds"], "{:.1f} s"),
-    ]  # fmt: skip
-    shown = [form.format(value) for value, form in figures if value is not None]
-    shown += [f"{row['width']} × {row['height']}"] if row["width"] else []
-    shown += [f"{row['attempts']} attempts"] if (row["attempts"] or 1) > 1 else []
-    name = row["name"]
-    links = [("all maps", f"{name}.scene/overview.png"), ("scene", f"{name}.scene/")]
-    if row["picture_hash"]:
-        links.insert(0, ("edited photo", f"{name}.png"))
-    return {"row": row, "figures": " · ".join(shown), "links": links, "thumbnail": f"thumbs/{name}.jpg"}
+    write_whole(outcome.runs / "index.html", page.encode("utf-8"))

@@ -1,7 +1,6 @@
 """The plan of a batch: which photos are finished, and which tasks are left."""
 
 import json
-from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -11,7 +10,7 @@ from materialist.batches.ledger import Ledger
 from materialist.batches.photos import Listed, unique_names
 from materialist.batches.remote import fingerprint
 from materialist.batches.results import file_hash, package_size
-from materialist.batches.task import PhotoTask
+from materialist.batches.task import OF_THE_SCENE, PhotoTask
 from materialist.errors import InputError
 from materialist.options import InvertOptions
 from materialist.predict.protocol import MAPS
@@ -32,25 +31,24 @@ def check_options(options: dict[str, Any]) -> None:
         ) from error
 
 
-def plan(photos: Iterable[Listed], ledger: Ledger, template: PhotoTask) -> tuple[list[PhotoTask], list[str]]:
-    """Tasks for the unfinished photos, and ids of the finished ones; `template` holds the common fields of all tasks.
+def plan(photos: list[Listed], ledger: Ledger, template: PhotoTask) -> list[PhotoTask]:
+    """Tasks for the unfinished photos; `template` holds the common fields of all tasks.
 
     A photo is finished when the ledger says so with the same options, the photo (by hash) and the edits are what they
     were, and the results are whole. Where only the edit is missing or another, the task keeps the scene.
     """
-    photos = list(photos)
-    names = unique_names([photo.id for photo in photos], ledger.names)
+    known = {id: entry["name"] for id, entry in ledger.last.items()}
+    names = unique_names([photo.id for photo in photos], known)
 
-    def look(photo: Listed) -> tuple[PhotoTask, bool]:
+    def left(photo: Listed) -> PhotoTask | None:
         task = replace(template, id=photo.id, name=names[photo.id], location=photo.location)
         entry = ledger.last.get(photo.id, {})
         if entry.get("key") != ledger.key or not _inverted(entry, task):
-            return task, False
-        return replace(task, inverted=True), _edited(entry, task)
+            return task
+        return None if _edited(entry, task) else replace(task, kept={k: entry[k] for k in OF_THE_SCENE if k in entry})
 
     with ThreadPoolExecutor(8) as threads:  # reading and hashing: the disk's time, not the interpreter's
-        found = list(threads.map(look, photos))
-    return [task for task, finished in found if not finished], [task.id for task, finished in found if finished]
+        return [task for task in threads.map(left, photos) if task is not None]
 
 
 def _inverted(entry: dict[str, Any], task: PhotoTask) -> bool:

@@ -5,16 +5,10 @@ import json
 from pathlib import Path
 
 from materialist.errors import SceneError
-from materialist.io.atomic import MARKER, whole_file
+from materialist.io.atomic import MARKER
 
 RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
 """Files that the hash covers beside the camera. Times, memory, paths and pictures with figures are left out."""
-
-
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a file whole or not at all. Raises OutputError."""
-    with whole_file(path, force=True) as temporary:
-        temporary.write_bytes(content)
 
 
 def package_hash(path: str | Path) -> str:

@@ -2,9 +2,9 @@
 
 import os
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from materialist import __version__, errors
 from materialist.batches.edits import missing_files
 from materialist.batches.ledger import Ledger, open_ledger
 from materialist.batches.options import BatchOptions
-from materialist.batches.outcome import Outcome, Row, Status, write_page, write_summary
+from materialist.batches.outcome import COLUMNS, Outcome, Row, Status, write_page, write_summary
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
 from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
@@ -58,22 +58,21 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     if how.recipe is not None:
         read_recipe(how.recipe)
     photos, folder = list_photos(source, runs=runs), Path(runs)
-    ledger = open_ledger(folder, {**asked, "tool_version": __version__}, resume=how.resume, force=how.force)
-    run = None
-    try:
+    told = {**asked, "tool_version": __version__}
+    with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
         template = PhotoTask("", "", "", folder.resolve(), asked, how.recipe, how.spp, function=how.function)
-        tasks, finished = plan(photos, ledger, template)
-        run = _Run(folder, photos, ledger, tasks, len(finished), asked, progress or (lambda _: None))
-        run.start = start
-        if how.recipe is not None and (notice := _lacking(how.recipe, tasks)):
-            run.tell(notice)
-        if tasks:
-            run.work(_pool(how, len(tasks), asked["device"], asked["size"]))
-        return run.outcome()
-    finally:
-        if run is not None:
+        tasks = plan(photos, ledger, template)
+        run = _Run(
+            folder, photos, ledger, {task.id: task for task in tasks}, asked, progress or (lambda _: None), start
+        )
+        try:
+            if how.recipe is not None and (notice := _lacking(how.recipe, tasks)):
+                run.tell(notice)
+            if tasks:
+                run.work(_pool(how, len(tasks), asked["device"], asked["size"]))
+        finally:
             run.write()
-        ledger.close()
+    return run.outcome()
 
 
 def _pool(how: BatchOptions, tasks: int, device: str, size: int) -> LocalPool | RayPool:
@@ -128,77 +127,79 @@ def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
             "they get a scene, but no edited photo unless it is there by then.")  # fmt: skip
 
 
+@dataclass
 class _Run:
-    def __init__(
-        self, runs: Path, photos: list[Listed], ledger: Ledger, tasks: list[PhotoTask], kept: int,
-        options: dict[str, Any], watch: Watch,
-    ) -> None:  # fmt: skip
-        self._runs, self._photos, self._ledger, self._watch = runs, photos, ledger, watch
-        self._options, self._kept = options, kept
-        self._waiting = deque(tasks)
-        self._tasks = {task.id: task for task in tasks}
-        self._stages: dict[str, str] = {}
-        self._tries: dict[str, int] = {}
-        self._ended: dict[str, str] = {}
-        self.start = self._written = time.monotonic()
+    runs: Path
+    photos: list[Listed]
+    ledger: Ledger
+    tasks: dict[str, PhotoTask]
+    """Photo id -> its task, of the photos that are not finished."""
+    options: dict[str, Any]
+    watch: Watch
+    start: float
+    stages: dict[str, str] = field(default_factory=dict)
+    """Photo id -> stage, of the photos at work."""
+    tries: Counter[str] = field(default_factory=Counter)
+    ended: dict[str, str] = field(default_factory=dict)
+    """Photo id -> done or failed, of the photos that ended in this call."""
 
     def work(self, pool: LocalPool | RayPool) -> None:
         """Run until every photo is over, or an error occurs that would fail all of them."""
+        waiting, written = deque(self.tasks.values()), time.monotonic()
         try:
-            while self._waiting or self._stages:
-                while self._waiting and pool.free() > 0:
-                    self._begin(pool, self._waiting.popleft())
+            while waiting or self.stages:
+                while waiting and pool.free() > 0:
+                    self._begin(pool, waiting.popleft())
                 self.tell(None)
-                for key, message in pool.wait(1.0) if self._stages else ():
-                    self._hear(self._tasks[key], message)
-                if time.monotonic() - self._written > SETTINGS.refresh:
+                for key, message in pool.wait(1.0) if self.stages else ():
+                    if self._hear(self.tasks[key], message):
+                        waiting.appendleft(self.tasks[key])
+                if time.monotonic() - written > SETTINGS.refresh:
                     self.write()
+                    written = time.monotonic()
         finally:
             pool.close()
 
     def outcome(self) -> Outcome:
-        rows = tuple(self._row(photo) for photo in self._photos)
-        return Outcome(self._runs, rows, self._kept, time.monotonic() - self.start, self._options)
+        rows, kept = tuple(self._row(photo) for photo in self.photos), len(self.photos) - len(self.tasks)
+        return Outcome(self.runs, rows, kept, time.monotonic() - self.start, self.options)
 
     def write(self) -> None:
         outcome = self.outcome()
         write_summary(outcome)
         write_page(outcome)
-        self._written = time.monotonic()
 
     def _begin(self, pool: LocalPool | RayPool, task: PhotoTask) -> None:
-        places = ([] if task.inverted else [task.scene]) + ([] if task.edits is None else [task.picture])
+        places = ([] if task.kept else [task.scene]) + ([] if task.edits is None else [task.picture])
         for place in places:
-            if place.exists() and place.name not in self._ledger.owned:
+            if place.exists() and place.name not in self.ledger.owned:
                 reason = f"{place} exists and is not of this batch; move it away."
                 self._end(task, FAILED, {"error": "OutputError", "reason": reason, "bug": False, "stage": "begin"})
                 return
-        self._tries[task.id] = self._tries.get(task.id, 0) + 1
-        self._stages[task.id] = "begin"
-        self._ledger.append(
-            "begin", id=task.id, name=task.name, owned=[place.name for place in places], **self._known(task)
-        )
+        self.tries[task.id] += 1
+        self.stages[task.id] = "begin"
+        self.ledger.append("begin", id=task.id, name=task.name, owned=[place.name for place in places], **task.kept)
         pool.begin(task.id, process, {"task": task})
 
-    def _hear(self, task: PhotoTask, message: Message) -> None:
+    def _hear(self, task: PhotoTask, message: Message) -> bool:
+        """Take note of a message; returns whether the task is to be begun again."""
         if message.kind in (PROGRESS, FOUND):
-            self._stages[task.id] = str(message.facts.get("stage", self._stages[task.id]))
-            return
-        facts, stage = message.facts, self._stages.pop(task.id)
-        if message.kind == LOST and self._tries[task.id] < SETTINGS.tries:
-            self._waiting.appendleft(task)
+            self.stages[task.id] = str(message.facts.get("stage", self.stages[task.id]))
+            return False
+        facts, stage = message.facts, self.stages.pop(task.id)
+        if message.kind == LOST and self.tries[task.id] < SETTINGS.tries:
             self.tell(f"{task.id}: {facts['reason']} It is begun again.")
-            return
+            return True
         if message.kind == FAILED:
             _stop_if_for_all(facts)
         if message.kind == LOST:
             facts = {**facts, "reason": f"{facts['reason']} It was begun {SETTINGS.tries} times.", "stage": stage}
         self._end(task, DONE if message.kind == DONE else FAILED, facts)
+        return False
 
     def _end(self, task: PhotoTask, event: str, facts: dict[str, Any]) -> None:
-        tries = self._tries.get(task.id, 0)
-        self._ended[task.id] = event  # first, as in the ledger: Ctrl-C may come while the entry goes to the disk
-        self._ledger.append(event, id=task.id, name=task.name, attempts=tries, **{**self._known(task), **facts})
+        self.ended[task.id] = event  # first, as in the ledger: Ctrl-C may come while the entry goes to the disk
+        self.ledger.append(event, id=task.id, name=task.name, attempts=self.tries[task.id], **{**task.kept, **facts})
         if event == FAILED:
             line = f"failed: {facts['reason']}"
         else:
@@ -206,25 +207,17 @@ class _Run:
             line = f"done in {facts['seconds']:.1f} s{quality}"
         self.tell(f"{task.id}: {line}")
 
-    def _known(self, task: PhotoTask) -> dict[str, Any]:
-        """Facts of a scene that is kept while its edit is made again; the ledger's last entry has them always."""
-        before = self._ledger.last.get(task.id, {}) if task.inverted else {}
-        return {key: before[key] for key in _OF_THE_SCENE if key in before}
-
     def tell(self, news: str | None) -> None:
-        total, failed = len(self._photos), list(self._ended.values()).count(FAILED)
-        over = self._kept + len(self._ended)
-        running = {self._tasks[id].name: stage for id, stage in self._stages.items()}
-        self._watch(Status(total, over - failed, failed, running, news))
+        total, failed = len(self.photos), list(self.ended.values()).count(FAILED)
+        over = total - len(self.tasks) + len(self.ended)
+        running = {self.tasks[id].name: stage for id, stage in self.stages.items()}
+        self.watch(Status(total, over - failed, failed, running, news))
 
     def _row(self, photo: Listed) -> Row:
-        entry, task = self._ledger.last.get(photo.id, {}), self._tasks.get(photo.id)
+        entry, task = self.ledger.last.get(photo.id, {}), self.tasks.get(photo.id)
         name = task.name if task else entry.get("name", "")
-        status = "done" if task is None else self._ended.get(photo.id, "open")
-        return Row({**entry, "id": photo.id, "name": name, "status": status})
-
-
-_OF_THE_SCENE = ("invert_seconds", "photo_version", "scene_bytes", "photo_hash")
+        status = "done" if task is None else self.ended.get(photo.id, "open")
+        return {**dict.fromkeys(COLUMNS), **entry, "id": photo.id, "name": name, "status": status}
 
 
 def _stop_if_for_all(facts: dict[str, Any]) -> None:

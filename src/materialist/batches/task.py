@@ -15,10 +15,10 @@ import materialist as mt
 from materialist.batches.edits import edits_for, edits_key
 from materialist.batches.options import INVERSION
 from materialist.batches.remote import fingerprint, is_url, local_copy
-from materialist.batches.results import file_hash, package_hash, package_size, replace_file
+from materialist.batches.results import file_hash, package_hash, package_size
 from materialist.color import srgb_levels
 from materialist.errors import InputError
-from materialist.io.atomic import ensure_writable
+from materialist.io.atomic import ensure_writable, write_whole
 from materialist.io.display import encoded
 from materialist.io.samples import Progress
 from materialist.types import Array, Scene
@@ -30,7 +30,10 @@ SINGLE_THREAD = {
 """Environment of every worker. Sums over several threads are rounded in another order, which a fit amplifies: with one
 thread a photo's result does not depend on how many workers there are, and several workers use a processor better."""
 
+OF_THE_SCENE = ("invert_seconds", "photo_version", "scene_bytes", "photo_hash")
+"""Facts of the ledger that stay while a scene stays."""
 THUMBNAIL = (240, 150)
+"""Most width and height of a picture, pixels."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,8 @@ class PhotoTask:
     edits: Path | None = None
     spp: int | None = None
     """Paths per pixel of each rendering of the edit; None: those of `composite`."""
-    inverted: bool = False
-    """The package is there, whole and of this photo and these options: only the edit is missing."""
+    kept: dict[str, Any] = field(default_factory=dict)
+    """OF_THE_SCENE, where the package is there, whole and of this photo and these options: only the edit is missing."""
     function: str = INVERSION
 
     @property
@@ -67,7 +70,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     start, processor = time.perf_counter(), time.process_time()
     scene, facts = _scene(task, report)
     pictures = [scene.photo.linear, scene.rerender]
-    warnings = [*scene.photo.warnings, *scene.prior.warnings, *scene.report.warnings]
+    warnings = scene.warnings
     if task.edits is not None:
         begun = time.perf_counter()
         try:
@@ -80,7 +83,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
         warnings += notes
         facts |= {"edit_seconds": time.perf_counter() - begun, "picture_hash": file_hash(task.picture)}
         facts["edits"] = edits_key(task.edits, task.name, task.spp)
-    _write_strip(task.runs / "thumbs" / f"{task.name}.jpg", pictures)
+    write_whole(task.runs / "thumbs" / f"{task.name}.jpg", _thumbnails(pictures))
     metrics = scene.report.metrics
     facts |= {
         "scene_hash": package_hash(task.scene), "scene_bytes": package_size(task.scene),
@@ -96,9 +99,9 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
 
 
 def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
-    """The inverted photo, and facts for the ledger where it was inverted now."""
-    if task.inverted:
-        return mt.load_scene(task.scene), {}
+    """The inverted photo, and what of OF_THE_SCENE is known."""
+    if task.kept:
+        return mt.load_scene(task.scene), dict(task.kept)
     ensure_writable(task.scene, force=True)
     options = task.named_options()
     size, fov = options.pop("size", 512), options.pop("fov", "auto")
@@ -136,16 +139,15 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
     return picture, [*warnings_since(scene, edited), *effect_notes(scene, edited, mean_change(scene, picture))]
 
 
-def _write_strip(path: Path, pictures: list[Array]) -> None:
-    """Small pictures of linear [H, W, 3] side by side, as a JPEG."""
-    from PIL import Image
+def _thumbnails(pictures: list[Array]) -> bytes:
+    """A JPEG of pictures, linear [H, W, 3] of about one shape, small and side by side."""
+    import cv2
 
-    small = [Image.fromarray(srgb_levels(np.clip(picture, 0, 1))) for picture in pictures]
-    for one in small:
-        one.thumbnail(THUMBNAIL, Image.Resampling.BOX)
-    strip = Image.new("RGB", (sum(one.width + 4 for one in small) - 4, max(one.height for one in small)), "white")
-    left = 0
-    for one in small:
-        strip.paste(one, (left, 0))
-        left += one.width + 4
-    replace_file(path, encoded(np.asarray(strip), "JPEG", quality=85))
+    height, width = pictures[0].shape[:2]
+    scale = min(1, THUMBNAIL[0] / width, THUMBNAIL[1] / height)
+    size = (max(1, round(width * scale)), max(1, round(height * scale)))
+    gap = np.full((size[1], 4, 3), 255, np.uint8)
+    strip = [gap]
+    for picture in pictures:
+        strip += [cv2.resize(srgb_levels(np.clip(picture, 0, 1)), size, interpolation=cv2.INTER_AREA), gap]
+    return encoded(np.concatenate(strip[1:-1], 1), "JPEG", quality=85)

@@ -94,7 +94,7 @@ class MaterialsBench(Benchmark):
             return
         source = open_sources([data], split=self.split)
         if isinstance(source, InteriorVerse):
-            report.settings["left out"] = " ".join(source.notes()) or None
+            report.settings["left out"] = " ".join(source.notes) or None
         for index in _spread(list(range(len(source))), self.limit):
             sample = source.read(index)
             spoilt = self.photographic and isinstance(source, SampleFolder)

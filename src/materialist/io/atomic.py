@@ -141,6 +141,12 @@ def whole_file(path: str | Path, force: bool = False) -> Iterator[Path]:
         yield temporary
 
 
+def write_whole(path: str | Path, content: bytes, force: bool = True) -> None:
+    """Write a file whole or not at all; with `force` in place of one that is there. Raises OutputError."""
+    with whole_file(path, force) as temporary:
+        temporary.write_bytes(content)
+
+
 @contextmanager
 def whole_folder(path: str | Path, force: bool = False, kind: FolderKind = SCENE) -> Iterator[Path]:
     """Yield an empty temporary folder that becomes PATH when the block ends well, and vanishes when it does not."""

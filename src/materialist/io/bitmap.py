@@ -1,7 +1,6 @@
 """Pictures of integers and float TIFFs, by Pillow and OpenCV, to linear Rec.709."""
 
 import io
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -63,12 +62,11 @@ def check_size(width: int, height: int, name: object) -> None:
         raise InputError(f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to what matters.")
 
 
-def light_and_alpha(light: Array, alpha: Array, warnings: list[str]) -> Decoded:
+def light_and_alpha(light: Array, alpha: Array | None) -> Decoded:
     """A scene-linear file of [H, W, 3] light with [H, W, 1] alpha, which is dropped where it is opaque."""
-    alpha = np.clip(alpha.astype(np.float32), 0, 1)
-    if bool(np.all(alpha >= 1)):
-        return Decoded(light, True, warnings=warnings)
-    return Decoded(light, True, warnings=[*warnings, OVER_WHITE], alpha=alpha)
+    if alpha is None or bool(np.all(alpha >= 1)):
+        return Decoded(light, True)
+    return Decoded(light, True, warnings=[OVER_WHITE], alpha=np.clip(alpha.astype(np.float32), 0, 1))
 
 
 def read_bitmap(path: Path) -> Decoded:
@@ -90,17 +88,11 @@ def read_bitmap(path: Path) -> Decoded:
 
 def _is_deep(image: Image.Image, path: Path) -> bool:
     """Whether the file has more than 8 bits a channel (Pillow cuts those to 8 when they are RGB)."""
-    with path.open("rb") as file:
-        head = file.read(4096)
     if image.format == "PNG":
-        return head[24] == 16
+        with path.open("rb") as file:
+            return file.read(25)[24] == 16
     if image.format == "TIFF":
         return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
-    if image.format == "PPM" and head[:2] in (b"P2", b"P3", b"P5", b"P6"):
-        _, _, _, top, *_ = re.sub(rb"#[^\n]*", b" ", head).split(maxsplit=4)
-        if int(top) <= 255:
-            return False
-        raise InputError(f"{path} has more than 8 bits a channel, which is read from PNG and TIFF alone.")
     return image.mode in ("I", "F") or image.mode.startswith("I;16")
 
 
@@ -143,7 +135,7 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     _require_interleaved(tags.get(_PLANAR, 1), path)
     if tags.get(_PHOTOMETRIC) == 0 or _PREMULTIPLIED in np.atleast_1d(tags.get(_EXTRA, 2)):
         raise InputError(f"{path} has inverted values or premultiplied alpha; save it as plain 16-bit RGB.")
-    colour, alpha = _opencv(path)
+    colour, alpha = _rgb(path)
     if colour.dtype.kind == "f":
         return np.ascontiguousarray(colour, np.float32), True
     profile = image.info.get("icc_profile")
@@ -156,16 +148,31 @@ def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, b
     return linear, False
 
 
-def _opencv(path: Path) -> tuple[Array, Array | None]:
-    """RGB [H, W, 3] and alpha [H, W, 1] of a picture of 8- or 16-bit integers or 32- or 64-bit floats."""
+def stored_pixels(path: Path) -> tuple[Array, Array | None]:
+    """RGB [H, W, 3] or grey [H, W, 1], and alpha [H, W, 1], as they are in a file that OpenCV reads.
+
+    They are uint8, uint16, float32 or float64. Raises InputError for other pixels, and for none.
+    """
     import cv2
 
-    decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    pixels = np.atleast_3d(np.asarray(decoded)) if decoded is not None else np.zeros((1, 1, 1), bool)
-    if pixels.dtype.kind not in "uf" or (pixels.dtype.itemsize > 2 and pixels.dtype.kind == "u"):
-        raise InputError(f"{path} has an unusual pixel layout, or is damaged; save it as 8- or 16-bit RGB.")
-    colour = np.repeat(pixels[..., :1], 3, -1) if pixels.shape[2] <= 2 else pixels[..., 2::-1]
+    try:
+        decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:  # an empty file, or a header that promises more pixels than any picture has
+        decoded = None
+    if decoded is None or decoded.dtype not in (np.uint8, np.uint16, np.float32, np.float64):
+        raise InputError(
+            f"{path} is no readable picture: damaged or truncated, too large, or of an unusual layout; export it again "
+            "as EXR, or as PNG or TIFF of 8 or 16 bits."
+        )
+    pixels = np.atleast_3d(decoded)
+    colour = pixels[..., :1] if pixels.shape[2] <= 2 else pixels[..., 2::-1]
     return colour, pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
+
+
+def _rgb(path: Path) -> tuple[Array, Array | None]:
+    """`stored_pixels` with grey as RGB."""
+    colour, alpha = stored_pixels(path)
+    return np.broadcast_to(colour, (*colour.shape[:2], 3)), alpha
 
 
 def _require_interleaved(planar: int, path: Path) -> None:
@@ -191,11 +198,11 @@ def read_float_tiff(path: Path) -> Decoded:
         page: Any = file.pages[0]
         _require_interleaved(page.tags.valueof(_PLANAR, 1), path)
         extra = np.atleast_1d(page.tags.valueof(_EXTRA, 2))
-    colour, alpha = _opencv(path)
+    colour, alpha = _rgb(path)
     light = np.ascontiguousarray(colour, np.float32)
-    if alpha is None:
-        return Decoded(light, True)
-    return light_and_alpha(light if extra[0] == _PREMULTIPLIED else light * alpha.astype(np.float32), alpha, [])
+    if alpha is not None and extra[0] != _PREMULTIPLIED:
+        light = light * alpha.astype(np.float32)
+    return light_and_alpha(light, alpha)
 
 
 def _by_matrix(pixels: Array, matrix: MatrixProfile | None) -> Array:

@@ -12,13 +12,14 @@ InteriorVerse in its published layout:
         SCENE/NNN_mask.exr            1 where the maps hold
 
 Copies named scenes_85 and scenes_120 are the same. The published splits lost meaning in 2026, when part of the data was
-lost: scenes that a list names and the folder lacks are passed over, and told in `missing`.
+lost: scenes that a list names and the folder lacks are passed over, and told in `notes`.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -65,39 +66,21 @@ class InteriorVerse(Source):
         """Open FOLDER, or its dataset_85 and dataset_120. Raises InputError for an unknown split or another layout."""
         if split not in SPLITS:
             raise InputError(f"InteriorVerse has no split '{split}'; choose one of {', '.join(SPLITS)}.")
-        self.folder, self.split = Path(folder), split
-        self.pictures: list[Path] = []
-        self.missing: list[str] = []
-        self.bare = 0
-        """Pictures of scenes that are there, without one of their maps."""
-        self.refresh()
-        if not self.pictures:
-            raise InputError(f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path.")
-
-    def __len__(self) -> int:
-        return len(self.pictures)
-
-    def refresh(self) -> None:
-        self.pictures, self.missing, self.bare = [], [], 0
+        self.folder, self.split, scenes = Path(folder), split, {}
         for part in parts(self.folder):
-            listed = part / f"{self.split}.txt"
+            listed = part / f"{split}.txt"
             for scene in listed.read_text("utf-8").split() if listed.is_file() else ():
-                found = sorted((part / scene).glob("*_im.exr"))
-                whole = [path for path in found if all(_sibling(path, name).is_file() for name in MAPS)]
-                self.pictures += whole
-                self.bare += len(found) - len(whole)
-                if not found:
-                    self.missing.append(f"{part.name}/{scene}")
-
-    def notes(self) -> list[str]:
-        """What of the split is not there, in words."""
-        found = []
-        if self.missing:
-            names = ", ".join(self.missing[:3])
-            found.append(f"{len(self.missing)} scenes of the split '{self.split}' are not there ({names} ...).")
-        if self.bare:
-            found.append(f"{self.bare} pictures of the split '{self.split}' lack a map, and are left out.")
-        return found
+                scenes[f"{part.name}/{scene}"] = sorted((part / scene).glob("*_im.exr"))
+        pictures = list(chain.from_iterable(scenes.values()))
+        self.paths = [path for path in pictures if all(_sibling(path, name).is_file() for name in MAPS)]
+        if not self.paths:
+            raise InputError(f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path.")
+        lost, bare = [name for name, found in scenes.items() if not found], len(pictures) - len(self.paths)
+        if lost:
+            names = ", ".join(lost[:3])
+            self.notes += (f"{len(lost)} scenes of the split '{split}' are not there ({names} ...).",)
+        if bare:
+            self.notes += (f"{bare} pictures of the split '{split}' lack a map, and are left out.",)
 
     def validation(self) -> InteriorVerse | None:
         """The split that scores are taken on while this one is trained on; None where it holds no pictures."""
@@ -108,13 +91,13 @@ class InteriorVerse(Source):
 
     def read(self, index: int) -> Sample:
         """Picture number `index`; depth in metres. Raises InputError naming a file that is missing or misshapen."""
-        path = self.pictures[index]
-        maps = {name: _map(path, name) for name in MAPS}
+        path = self.paths[index]
+        maps = {name: _map(path, name) for name in (*MAPS, "mask") if name in MAPS or _sibling(path, name).is_file()}
         height, width = maps["im"].shape[:2]
         for name, values in maps.items():
             if values.shape[:2] != (height, width):
                 raise InputError(f"{_sibling(path, name)} is {values.shape[:2]}, but its picture is {(height, width)}.")
-        return _sample(maps, _mask(path, (height, width)), Camera(width, height, field_of_view(path)))
+        return _sample(maps, Camera(width, height, field_of_view(path)))
 
 
 def parts(folder: Path) -> list[Path]:
@@ -132,11 +115,13 @@ def field_of_view(path: Path) -> float:
     return 85.0
 
 
-def _sample(maps: dict[str, Array], valid: Array, camera: Camera) -> Sample:
+def _sample(maps: dict[str, Array], camera: Camera) -> Sample:
     """The maps in our conventions; a pixel counts when its mask, depth and normal say so."""
     depth = maps["depth"][..., 0] * MILLIMETRES
     length = np.linalg.norm(maps["normal"][..., :3], axis=-1)
-    surface = valid & np.isfinite(depth) & (depth > 0) & np.isfinite(length) & (length > 0.5)
+    surface = np.isfinite(depth) & (depth > 0) & np.isfinite(length) & (length > 0.5)
+    if "mask" in maps:
+        surface &= maps["mask"][..., 0] > 0.5
     normal = np.where(surface[..., None], maps["normal"][..., :3] / np.maximum(length, 1e-6)[..., None], 0)
     rays = pixel_rays(camera)
     # Sheets that are modelled without a back show some normals from behind.
@@ -155,23 +140,11 @@ def _sample(maps: dict[str, Array], valid: Array, camera: Camera) -> Sample:
 def _map(path: Path, name: str) -> Array:
     """[H, W, C] float32 values of the picture's map; raises InputError when it is missing or lacks channels."""
     file = _sibling(path, name)
-    if not file.is_file():
-        raise InputError(f"{file} is missing; every InteriorVerse picture needs {', '.join(MAPS)}.")
     values = np.atleast_3d(read_exr(file))
-    needed = {"depth": 1, "material": 2}.get(name, 3)
+    needed = {"depth": 1, "mask": 1, "material": 2}.get(name, 3)
     if values.shape[2] < needed:
         raise InputError(f"{file} has {values.shape[2]} channels, but {needed} are needed.")
     return values
-
-
-def _mask(path: Path, size: tuple[int, int]) -> Array:
-    """[H, W] bool; all true when there is no mask file."""
-    if not (file := _sibling(path, "mask")).is_file():
-        return np.ones(size, bool)
-    values = np.atleast_3d(read_exr(file))[..., 0]
-    if values.shape != size:
-        raise InputError(f"{file} is {values.shape}, but its picture is {size}.")
-    return values > 0.5
 
 
 def _sibling(path: Path, name: str) -> Path:

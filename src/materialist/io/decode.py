@@ -18,6 +18,7 @@ from materialist.io.bitmap import (
     pixel_limit_lifted,
     read_bitmap,
     read_float_tiff,
+    stored_pixels,
 )  # fmt: skip
 from materialist.io.exif import file_tags
 from materialist.io.exr import exr_headers, exr_size, read_exr
@@ -99,30 +100,15 @@ def decode(path: Path) -> Decoded:
 
 def _exr(path: Path) -> Decoded:
     """OpenEXR; alpha is premultiplied there."""
-    warnings: list[str] = []
-    header = exr_headers(path)[0]
-    low, high = (np.asarray(corner) for corner in header["dataWindow"])
-    first, last = (np.asarray(corner) for corner in header.get("displayWindow", (low, high)))
-    if (low != first).any() or (high != last).any():
-        warnings.append("The file holds a part of its frame, taken for the whole photo; give --fov for that part.")
-    if abs(float(header.get("pixelAspectRatio", 1)) - 1) > 1e-3:
-        warnings.append("The file says that its pixels are not square; they are taken as square.")
     pixels = read_exr(path, photo=True)
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, -1)
-    if pixels.shape[-1] == 4:
-        return light_and_alpha(np.ascontiguousarray(pixels[..., :3]), pixels[..., 3:], warnings)
-    return Decoded(pixels, True, warnings=warnings)
+    return light_and_alpha(np.ascontiguousarray(pixels[..., :3]), pixels[..., 3:] if pixels.shape[-1] == 4 else None)
 
 
 def _hdr(path: Path) -> Decoded:
     """Radiance RGBE."""
-    import cv2
-
-    pixels = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
-    if pixels is None or pixels.dtype != np.float32:
-        raise InputError(f"{path} is damaged or truncated; export it again.")
-    return Decoded(np.ascontiguousarray(pixels[..., ::-1]), True)
+    return Decoded(np.ascontiguousarray(stored_pixels(path)[0]), True)
 
 
 def _raw(path: Path) -> Decoded:

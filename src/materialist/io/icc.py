@@ -80,8 +80,7 @@ def _curve(data: bytes) -> Array:
     number = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}[kind]
     g, a, b, c, d, e, f = [v / 65536 for v in struct.unpack_from(f">{number}i", data, 12)] + [0.0] * (7 - number)
     if kind == 0:
-        return x**g
-    if kind in (1, 2):  # c is the offset of kind 2, absent in kind 1
-        offset = c if kind == 2 else 0.0
-        return np.where(x >= -b / a, np.maximum(a * x + b, 0) ** g, 0) + offset
+        a = 1.0
+    elif kind < 3:  # without a line below the curve, and c is added to it
+        c, d, e, f = 0.0, -b / a, c, c
     return np.where(x >= d, np.maximum(a * x + b, 0) ** g + e, c * x + f)

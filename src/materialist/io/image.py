@@ -7,6 +7,7 @@ import numpy as np
 from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable, whole_file, writing
+from materialist.io.bitmap import stored_pixels
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
@@ -65,22 +66,12 @@ def _with_alpha(path: str | Path) -> tuple[Array, Array | None]:
         array = read_exr(path)
         alpha = array[..., 3] if array.ndim == 3 and array.shape[-1] == 4 else None
         return (array[..., :3] if array.ndim == 3 else array), alpha
-    import cv2
-
     if not path.is_file():
         raise InputError(f"There is no map at {path}.")
-    try:
-        decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED) if path.stat().st_size else None
-    except cv2.error as error:  # a header that promises more pixels than any map has
-        raise InputError(f"{path} is too large an image, or damaged; use one of the photo's size.") from error
-    if decoded is None:
-        raise InputError(f"{path} is not a readable image (use EXR, or 8- or 16-bit PNG).")
-    array = np.asarray(decoded)
-    scale = np.float32({"uint8": 255, "uint16": 65535}.get(array.dtype.name, 1))
-    alpha = array[..., -1] / scale if array.ndim == 3 and array.shape[2] in (2, 4) else None
-    if array.ndim == 3:
-        array = array[..., 2::-1] if array.shape[2] >= 3 else array[..., 0]
-    return np.ascontiguousarray(array, np.float32) / scale, alpha
+    colour, alpha = stored_pixels(path)
+    scale = np.float32({"uint8": 255, "uint16": 65535}.get(colour.dtype.name, 1))
+    array = np.ascontiguousarray(colour if colour.shape[2] == 3 else colour[..., 0], np.float32) / scale
+    return array, None if alpha is None else alpha[..., 0] / scale
 
 
 def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError, MaterialistError, SceneError
+from materialist.io.bitmap import stored_pixels
 from materialist.io.decode import RAW_SUFFIXES, image_size
 from materialist.io.exr import exr_headers, exr_size, read_exr
 from materialist.types import Array
@@ -44,7 +45,7 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
 def read_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
     """A map of a known shape, or of any. Raises SceneError for another one, and for NaN."""
     try:
-        array = read_exr(path)
+        array = read_exr(path) if path.suffix == ".exr" else stored_pixels(path)[0][..., 0]
     except MaterialistError as error:
         raise SceneError(f"The scene package is damaged: {error}") from error
     if shape is not None and array.shape != shape:

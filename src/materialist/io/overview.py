@@ -4,7 +4,7 @@ import textwrap
 from typing import NamedTuple
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from materialist.color import srgb_levels
 from materialist.io import display
@@ -15,7 +15,8 @@ _WIDTH = 1600
 """Width of the sheet, pixels; its height follows from the photo's shape."""
 _MARGIN, _GAP, _CAPTION, _HEADER, _LINE = 40, 14, 30, 74, 24
 _INK, _DIM, _PAPER, _FRAME, _AMBER = (236, 236, 238), (150, 152, 158), (24, 25, 28), (36, 38, 42), (232, 178, 92)
-_MOST_WARNINGS = 6
+_MOST_WARNINGS, _NAME = 6, 44
+"""How many are shown, and letters of the file's name."""
 
 
 class _Tile(NamedTuple):
@@ -35,10 +36,14 @@ def overview(scene: Scene) -> Array:
     height = 2 * _MARGIN + _HEADER + sum(h + _CAPTION + _GAP for h in heights) + _LINE * len(footer) + 20
     sheet = Image.new("RGB", (_WIDTH, height), _PAPER)
     draw = ImageDraw.Draw(sheet)
-    _draw_header(draw, scene)
+    _header(draw, scene)
     y = _MARGIN + _HEADER
     for row, tile_height in zip(rows, heights, strict=True):
-        _draw_row(sheet, draw, row, y, tile_height)
+        x = float(_MARGIN)
+        for tile in row:
+            right = x + tile_height * tile.aspect
+            sheet.paste(_drawn(tile, min(round(right), _WIDTH - _MARGIN) - round(x), tile_height), (round(x), y))
+            x = right + _GAP
         y += tile_height + _CAPTION + _GAP
     draw.line([(_MARGIN, y + 2), (_WIDTH - _MARGIN, y + 2)], fill=_FRAME, width=2)
     for index, (text, colour) in enumerate(footer):
@@ -98,9 +103,9 @@ def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
     return lines
 
 
-def _draw_header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
+def _header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
     camera, photo = scene.camera, scene.photo
-    draw.text((_MARGIN, _MARGIN - 10), _shortened(photo.name, 34, _WIDTH // 2), font=_font(34), fill=_INK)
+    draw.text((_MARGIN, _MARGIN - 10), photo.name[:_NAME], font=_font(34), fill=_INK)
     note = (
         f"{photo.original.shape[1]} x {photo.original.shape[0]} photo  ·  worked at {camera.width} x {camera.height}"
         f"  ·  {camera.fov:.1f}° wide ({photo.fov_source})"
@@ -108,41 +113,22 @@ def _draw_header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
     draw.text((_WIDTH - _MARGIN, _MARGIN + 6), note, font=_font(18), fill=_DIM, anchor="ra")
 
 
-def _draw_row(sheet: Image.Image, draw: ImageDraw.ImageDraw, row: list[_Tile], y: int, height: int) -> None:
-    """One row of tiles, left to right over the full width, captions below."""
-    x = float(_MARGIN)
-    for tile in row:
-        left, right = round(x), min(round(x + height * tile.aspect), _WIDTH - _MARGIN)
-        draw.rectangle([left, y, right - 1, y + height - 1], fill=_FRAME)
-        picture = _fitted(tile.pixels, right - left, height)
-        sheet.paste(picture, (left + (right - left - picture.width) // 2, y + (height - picture.height) // 2))
-        draw.text((left, y + height + 8), tile.title, font=_font(17), fill=_INK)
-        used = draw.textlength(tile.title + "   ", font=_font(17))
-        note = _shortened(tile.note, 15, right - left - used)
-        draw.text((left + used, y + height + 10), note, font=_font(15), fill=_DIM)
-        x += height * tile.aspect + _GAP
-
-
-def _fitted(pixels: Array, width: int, height: int) -> Image.Image:
-    """The picture scaled to fit a frame, keeping its shape; the texels of a coarse envmap stay to be seen."""
-    image = Image.fromarray(pixels)
-    scale = min(width / image.width, height / image.height)
-    size = (max(1, round(image.width * scale)), max(1, round(image.height * scale)))
-    return image.resize(size, Image.Resampling.NEAREST if scale > 6 else Image.Resampling.LANCZOS)
+def _drawn(tile: _Tile, width: int, height: int) -> Image.Image:
+    """A tile in a frame of this size, its caption below; the texels of a coarse envmap stay to be seen."""
+    picture = Image.fromarray(tile.pixels)
+    coarse = min(width / picture.width, height / picture.height) > 6
+    how = Image.Resampling.NEAREST if coarse else Image.Resampling.LANCZOS
+    image = Image.new("RGB", (width, height + _CAPTION), _PAPER)
+    image.paste(ImageOps.pad(picture, (width, height), how, _FRAME))
+    draw = ImageDraw.Draw(image)
+    draw.text((0, height + 8), tile.title, font=_font(17), fill=_INK)
+    left = draw.textlength(tile.title + "   ", font=_font(17))
+    draw.text((left, height + 10), tile.note, font=_font(15), fill=_DIM)
+    return image
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont:
     return ImageFont.load_default(size)  # type: ignore[return-value]
-
-
-def _shortened(text: str, size: int, width: float) -> str:
-    """The text, cut with an ellipsis where it would run over its space."""
-    font = _font(size)
-    if font.getlength(text) <= width:
-        return text
-    while text and font.getlength(text + "…") > width:
-        text = text[:-1]
-    return text + "…" if text else ""
 
 
 def _labels(label: Array, linear: Array) -> Array:

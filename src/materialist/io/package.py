@@ -18,7 +18,7 @@ from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
 from materialist.metrics.residual import shading_residual
-from materialist.plain import is_utf8, plain
+from materialist.plain import plain
 from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
 
 FORMAT = "materialist-scene"
@@ -48,7 +48,7 @@ def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
         check_files(folder, Path(meta["photo"]["original"]).name, len(meta.get("bodies", ())), most)
         shape = (camera.height, camera.width)
         before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
-        label = _read_labels(folder / "plane_label.png", shape)
+        label = (read_map(folder / "plane_label.png", shape).astype(np.int16) - 1).astype(np.int8)
         return Scene(
             camera=camera,
             photo=_read_photo(folder, meta["photo"], shape),
@@ -155,19 +155,6 @@ def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, 
     return Materials(*maps[:3]), maps[3], maps[4]
 
 
-def _read_labels(path: Path, shape: tuple[int, int]) -> Array:
-    from PIL import Image
-
-    try:
-        with Image.open(path) as image:
-            label = (np.asarray(image).astype(np.int16) - 1).astype(np.int8)
-    except (OSError, SyntaxError) as error:
-        raise SceneError(f"{path} cannot be read; the scene package is damaged.") from error
-    if label.shape != shape:
-        raise SceneError(f"{path} is {list(label.shape)}, the scene needs {list(shape)}; the package is damaged.")
-    return label
-
-
 def _read_meta(folder: Path) -> dict[str, Any]:
     """scene.json, checked for kind and version."""
     try:
@@ -211,10 +198,8 @@ def _finite(text: str) -> float:
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
-    text = json.dumps(plain(content), indent=1, ensure_ascii=False)
-    if not is_utf8(text):  # a file name of another encoding
-        text = json.dumps(plain(content), indent=1)
-    path.write_text(text + "\n", "utf-8")
+    text = json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n"
+    path.write_text(text, "utf-8", "backslashreplace")  # bytes of a name that are no UTF-8 become JSON's own escapes
 
 
 def _read_report(path: Path) -> FitReport:

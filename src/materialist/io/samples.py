@@ -8,6 +8,7 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -64,16 +65,19 @@ _DECODED = srgb_to_linear(np.arange(256, dtype=np.float32) / 255)
 class Source(ABC):
     """A set of samples."""
 
-    @abstractmethod
+    paths: Sequence[Path]
+    """The file of each sample, or its picture's."""
+    notes: tuple[str, ...] = ()
+    """What of the set is not there, in words."""
+
     def __len__(self) -> int:
-        """How many there are at present."""
+        return len(self.paths)
 
     @abstractmethod
     def read(self, index: int) -> Sample:
         """Sample number `index`."""
 
-    @abstractmethod
-    def refresh(self) -> None:
+    def refresh(self) -> None:  # noqa: B027 - most sets stay as they are
         """Look again: a set may grow while it is used."""
 
     def number(self, index: int) -> int:
@@ -88,10 +92,6 @@ class Source(ABC):
         """The set that scores are taken on while this one is trained on, where it has one."""
         return None
 
-    def notes(self) -> list[str]:
-        """What of the set is not there, in words."""
-        return []
-
 
 class SampleFolder(Source):
     """Sets of `materialist train data` as one: DIR/dataset.json and DIR/samples/NNNNNNN.npz of each folder DIR.
@@ -101,11 +101,7 @@ class SampleFolder(Source):
 
     def __init__(self, *folders: str | Path):
         self.folders = [Path(folder) for folder in folders]
-        self.paths: list[Path] = []
         self.refresh()
-
-    def __len__(self) -> int:
-        return len(self.paths)
 
     def read(self, index: int) -> Sample:
         return read_sample(self.paths[index])
@@ -115,12 +111,11 @@ class SampleFolder(Source):
         return int(self.paths[index].stem)
 
     def refresh(self) -> None:
-        self.paths = []
-        for folder in self.folders:
-            found = sorted((folder / "samples").glob("[0-9]*.npz"))
-            if not found:
+        found = [sorted((folder / "samples").glob("[0-9]*.npz")) for folder in self.folders]
+        for folder, paths in zip(self.folders, found, strict=True):
+            if not paths:
                 raise InputError(f"{folder} holds no samples yet; make some with: materialist train data.")
-            self.paths += found
+        self.paths = list(chain.from_iterable(found))
 
     def seed(self) -> list[int | None]:
         """The seeds that the sets were made with; None where dataset.json does not tell."""
@@ -130,48 +125,39 @@ class SampleFolder(Source):
 
 def read_sample(path: Path) -> Sample:
     """The sample in an .npz file; raises InputError naming the file when it is damaged or lacks an array."""
-    arrays = read_arrays(path)
+    arrays = read_arrays(path, "image", "albedo", "roughness", "metallic", "normal", "depth", "mask", "fov")
+    as_light = lambda values: np.nan_to_num(values.astype(np.float32), posinf=6e4)  # noqa: E731
     try:
-        return _decode(arrays)
+        surface = (arrays["mask"] > 0) & (arrays["depth"] > 0)
+        height, width = arrays["image"].shape[:2]
+        normal = arrays["normal"].astype(np.float32)
+        length = np.sqrt(np.einsum("hwc,hwc->hw", normal, normal))[..., None]
+        return Sample(
+            image=as_light(arrays["image"]),
+            albedo=_DECODED[arrays["albedo"]],
+            roughness=arrays["roughness"].astype(np.float32) / 255,
+            metallic=arrays["metallic"].astype(np.float32) / 255,
+            normal=normal * (surface[..., None] / np.maximum(length, 1)).astype(np.float32),
+            depth=np.where(surface, arrays["depth"].astype(np.float32), 0),
+            mask=surface.astype(np.float32),
+            rays=pixel_rays(Camera(width, height, float(arrays["fov"])))[..., :2].copy(),
+            **{name: as_light(arrays[name]) for name in ("shading", "light") if name in arrays},
+        )
     except (IndexError, ValueError) as error:
         raise InputError(f"The arrays of {path} do not fit together ({error}); make it again.") from error
-    except KeyError as error:
-        raise InputError(f"{path} has no array {error}; make the data set again.") from error
 
 
-def read_arrays(path: Path, *names: str) -> dict[str, Array]:
-    """The named arrays of an .npz, or all; raises InputError naming the file when it is damaged or lacks one."""
+def read_arrays(path: Path, *needed: str) -> dict[str, Array]:
+    """The arrays of an .npz; raises InputError naming the file when it is damaged or lacks one of the needed."""
     try:
         with np.load(path, allow_pickle=False) as stored:
-            absent = [name for name in names if name not in stored.files]
-            arrays = {name: stored[name] for name in names or stored.files if name not in absent}
+            arrays = dict(stored)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise InputError(f"{path} cannot be read ({error}); delete it and make it again.") from error
-    if absent:
-        raise InputError(f"{path} has no array {absent[0]!r}; delete it and make it again.")
+    for name in needed:
+        if name not in arrays:
+            raise InputError(f"{path} has no array {name!r}; delete it and make it again.")
     return arrays
-
-
-def _decode(arrays: dict[str, Array]) -> Sample:
-    """The stored arrays, each in its compact type, as float32 maps."""
-    surface = (arrays["mask"] > 0) & (arrays["depth"] > 0)
-    image = arrays["image"].astype(np.float32)
-    height, width = image.shape[:2]
-    normal = arrays["normal"].astype(np.float32)
-    length = np.sqrt(np.einsum("hwc,hwc->hw", normal, normal))[..., None]
-    shading, light = arrays.get("shading"), arrays.get("light")
-    return Sample(
-        image=np.nan_to_num(image, posinf=6e4),
-        albedo=_DECODED[arrays["albedo"]],
-        roughness=arrays["roughness"].astype(np.float32) / 255,
-        metallic=arrays["metallic"].astype(np.float32) / 255,
-        normal=normal * (surface[..., None] / np.maximum(length, 1)).astype(np.float32),
-        depth=np.where(surface, arrays["depth"].astype(np.float32), 0),
-        mask=surface.astype(np.float32),
-        rays=pixel_rays(Camera(width, height, float(arrays["fov"])))[..., :2].copy(),
-        shading=None if shading is None else np.nan_to_num(shading.astype(np.float32), posinf=6e4),
-        light=None if light is None else np.nan_to_num(light.astype(np.float32), posinf=6e4),
-    )
 
 
 def write_arrays(path: Path, arrays: dict[str, Array]) -> None:

@@ -2,9 +2,8 @@
 
 import sys
 from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
-
-import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError, SetupError
@@ -25,8 +24,11 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
     path = Path(path)
     if path.suffix.lower() not in (".mp4", ""):
         raise InputError(f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames.")
-    if path.suffix:
-        _ffmpeg()
+    if path.suffix and find_spec("imageio_ffmpeg") is None:
+        raise SetupError(
+            f"Video needs one more package: {sys.executable} -m pip install imageio-ffmpeg; or give -o a name without "
+            "an ending to get PNG frames in a folder."
+        )
     ensure_writable(path, force, None if path.suffix else FRAMES)
 
 
@@ -48,32 +50,13 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
 
 
 def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
-    writer, count = None, 0
-    try:
+    from imageio.v2 import get_writer
+
+    how = {"codec": "libx264", "quality": 8, "macro_block_size": 2, "output_params": list(BT709)}
+    count = 0
+    with get_writer(path, "FFMPEG", fps=fps, **how) as writer:
         for picture in pictures:
-            pixels = srgb_levels(picture)
-            height, width = (n - n % 2 for n in pixels.shape[:2])
-            if writer is None:
-                writer = _ffmpeg().write_frames(
-                    str(path), (width, height), fps=fps, codec="libx264", quality=8, macro_block_size=2,
-                    output_params=list(BT709),
-                )  # fmt: skip
-                writer.send(None)
-            writer.send(np.ascontiguousarray(pixels[:height, :width]))
+            height, width = (n - n % 2 for n in picture.shape[:2])
+            writer.append_data(srgb_levels(picture[:height, :width]))
             count += 1
-    finally:
-        if writer is not None:
-            writer.close()
     return count
-
-
-def _ffmpeg():
-    """The encoder's module. Raises SetupError with the command that installs it."""
-    try:
-        import imageio_ffmpeg
-    except ImportError as error:
-        raise SetupError(
-            f"Video needs one more package: {sys.executable} -m pip install imageio-ffmpeg; or give -o a name without "
-            "an ending to get PNG frames in a folder."
-        ) from error
-    return imageio_ffmpeg

@@ -1,5 +1,6 @@
 """Pools of workers, each with one task at a time: processes of this machine, or tasks of a Ray cluster."""
 
+import pickle
 import socket
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -102,7 +103,7 @@ class RayPool:
 
     def begin(self, key: Hashable, task: Callable[..., Any], arguments: dict[str, Any]) -> None:
         """Start a task."""
-        self._running[self._task.remote(task, arguments)] = key
+        self._running[self._task.remote(pickle.dumps((task, arguments)))] = key
 
     def wait(self, seconds: float) -> list[tuple[Any, Message]]:
         """Results of tasks that have ended."""
@@ -128,9 +129,9 @@ class RayPool:
         self._ray.shutdown()
 
 
-def _run(task: Callable[..., Any], arguments: dict[str, Any]) -> tuple[str, Any]:
+def _run(task: bytes) -> tuple[str, Any]:
     """The Ray task. It raises nothing, because the exception's class might not be known elsewhere."""
-    return run(task, Reporter(lambda kind, facts: None), arguments)
+    return run(task, Reporter(lambda kind, facts: None))
 
 
 def _check_reachable(address: str) -> None:

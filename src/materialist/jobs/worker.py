@@ -77,25 +77,16 @@ def main(descriptor: int, niceness: int, idle: float) -> None:
             os._exit(0)
         while not tasks.empty():
             content = tasks.get()
-        _do(content, send, lambda: not tasks.empty())
+        number, task = pickle.loads(content)
+        report = Reporter(lambda *message, number=number: send((*message, number)), lambda: not tasks.empty())
+        send((*run(task, report), number))
 
 
-def _do(content: bytes, send: Callable[[Any], None], waiting: Callable[[], bool]) -> None:
-    number = 0
-    report = Reporter(lambda kind, facts: send((kind, facts, number)), waiting)
+def run(task: bytes, report: Reporter) -> tuple[str, Any]:
+    """(DONE, what a task returned) or (FAILED, why), of a pickled function and its keywords."""
     try:
-        number, load = pickle.loads(content)
-        task, arguments = pickle.loads(load)
-        kind, facts = run(task, report, arguments)
-    except Exception as error:  # the task cannot be imported here
-        kind, facts = FAILED, failure(error, report.stage)
-    send((kind, facts, number))
-
-
-def run(task: Callable[..., Any], report: Reporter, arguments: dict[str, Any]) -> tuple[str, Any]:
-    """(DONE, what the task returned) or (FAILED, why)."""
-    try:
-        return DONE, task(report, **arguments)
+        function, arguments = pickle.loads(task)
+        return DONE, function(report, **arguments)
     except Exception as error:
         return FAILED, failure(error, report.stage)
 

@@ -33,7 +33,7 @@ class MapsTask(Task):
         super().__init__(recipe, init)
         self.source, self.score_samples = source, score_samples
         self._places = trained_on(source)
-        self.notes = (*self.notes, *source.notes())
+        self.notes = (*self.notes, *source.notes)
 
     def count(self) -> int:
         return len(self._places)
