@@ -1,9 +1,7 @@
-"""Stand-ins for the inversion, as workers load them by name; photos to give them; batches to watch from outside."""
+"""Stand-ins for the inversion, as workers load them by name; and photos to give them."""
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -76,13 +74,6 @@ def photos(folder: Path, *names: str) -> Path:
         pixels = np.random.default_rng(k).integers(0, 256, (16, 24, 3)).astype(np.uint8)
         Image.fromarray(pixels).save(file)
     return folder
-
-
-def driver(source: Path, runs: Path, *, function: str = "made_batch:moody", workers: int = 2, **options):
-    """A batch in a process of its own, that can be killed."""
-    call = f"import materialist as b; b.batch({str(source)!r}, {str(runs)!r}, function={function!r}, "
-    call += f"workers={workers}, device='cpu', **{options!r})"
-    return subprocess.Popen([sys.executable, "-c", call], stderr=subprocess.PIPE, env=environment())
 
 
 def environment(**more: str) -> dict[str, str]:

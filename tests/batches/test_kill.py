@@ -8,7 +8,7 @@ import sys
 
 import psutil
 import pytest
-from made_batch import driver, environment, photos
+from made_batch import environment, photos
 from made_tasks import until
 
 from materialist.batches.ledger import LEDGER, read_events
@@ -17,11 +17,12 @@ from materialist.batches.run import batch
 NAMES = ("slow1", "slow2", "slow3", "slow4", "quick")
 
 COMMAND = """
-import functools, signal, sys
+import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job starts with it ignored
 import materialist as mt
 from materialist.cli import main
-mt.batch = functools.partial(mt.batch, function="made_batch:moody")
+real = mt.batch
+mt.batch = lambda *given, **how: real(*given, **how | {{"function": "made_batch:moody"}})
 sys.argv = ["materialist", *{arguments!r}]
 main()
 """
@@ -40,18 +41,18 @@ def undisturbed(source, runs):
     return batch(source, runs, function="made_batch:moody", workers=2, device="cpu")
 
 
-def command(*arguments):
-    code = COMMAND.format(arguments=[str(a) for a in arguments])
+def command(source, runs):
+    arguments = ["batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json"]
     return subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment(),
-        start_new_session=True, text=True,
+        [sys.executable, "-c", COMMAND.format(arguments=[str(a) for a in arguments])], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, env=environment(), start_new_session=True, text=True,
     )  # fmt: skip
 
 
 def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_result(tmp_path, monkeypatch):
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
     monkeypatch.setenv("MADE_SLOW", "30")  # the second batch of photos is at work when it is killed
-    process = driver(source, runs, workers=2)
+    process = command(source, runs)
     until(lambda: len(done(runs)) >= 1, 60)
     workers = until(lambda: workers_of(process), 60)
     process.kill()
@@ -70,10 +71,10 @@ def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_res
 def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
     monkeypatch.setenv("MADE_SLOW", "1")
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
-    process = driver(source, runs, workers=2)
+    process = command(source, runs)
     until(lambda: len(done(runs)) >= 1, 60)
     until(lambda: workers_of(process), 60)[0].kill()
-    assert process.wait(60) == 0, process.stderr.read().decode()
+    assert process.wait(60) == 0, process.stderr.read()
     attempts = [entry["attempts"] for entry in done(runs)]
     assert sorted(attempts) in ([1, 1, 1, 1, 2], [1] * 5)  # killed between two photos, it costs nothing
     monkeypatch.setenv("MADE_SLOW", "0")
@@ -84,7 +85,7 @@ def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
 def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(tmp_path, monkeypatch, whole_group):
     monkeypatch.setenv("MADE_SLOW", "30")
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
-    process = command("batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json")
+    process = command(source, runs)
     until(lambda: len(done(runs)) >= 1, 60)
     workers = until(lambda: workers_of(process), 60)
     (os.killpg if whole_group else os.kill)(process.pid, signal.SIGINT)

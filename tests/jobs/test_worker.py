@@ -1,25 +1,9 @@
-"""Worker processes and pools: results, failures, death, and the end of the coordinator."""
+"""Worker processes: results, failures, death. Their pool, and the end of who started them: batches/test_kill.py."""
 
-import subprocess
-import sys
-
-import psutil
 from made_tasks import answer, until
 
-from materialist.jobs.pool import LocalPool
 from materialist.jobs.process import LOST, Worker
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
-
-COORDINATOR = """
-import sys, time
-from made_tasks import answer, until
-from materialist.jobs.process import Worker
-worker = Worker()
-worker.begin(answer, {"how": "wait"})
-next(worker.messages())
-print(worker.pid, flush=True)
-time.sleep(60)
-"""
 
 
 def told(worker, how, **more):
@@ -70,29 +54,3 @@ def test_an_idle_process_ends_by_itself():
     assert told(worker, "fine")[0].kind == DONE
     until(lambda: not worker.running)
     worker.close()
-
-
-def test_a_dead_coordinator_leaves_no_process():
-    process = subprocess.Popen([sys.executable, "-c", COORDINATOR], stdout=subprocess.PIPE, text=True)
-    worker = psutil.Process(int(process.stdout.readline()))
-    process.kill()
-    process.communicate()
-    assert not psutil.wait_procs([worker], timeout=15)[1]
-
-
-def test_a_pool_replaces_dead_workers_and_keeps_the_others():
-    pool = LocalPool([{}, {}])
-    for key, how in (("a", "wait"), ("b", "die")):
-        pool.begin(key, answer, {"how": how})
-    assert pool.free() == 0
-    kinds = {}
-    while pool.free() == 0:
-        for key, message in pool.wait(5):
-            kinds[key] = message.kind
-    assert kinds.pop("b") == LOST and set(kinds.values()) <= {PROGRESS}  # the other works on
-    pool.begin("c", answer, {})
-    while kinds.get("c") != DONE:
-        for key, message in pool.wait(5):
-            kinds[key] = message.kind
-    pool.close()
-    assert pool.free() == 2 and pool.wait(0) == []

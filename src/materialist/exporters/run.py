@@ -10,7 +10,7 @@ from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part, body_parts, scene_parts
-from materialist.io.atomic import whole_file, whole_files
+from materialist.io.atomic import whole_file
 from materialist.options import ExportOptions
 from materialist.types import Scene
 
@@ -100,7 +100,7 @@ def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.exporters.glb import glb_bytes, write_hdr
 
     light = path.with_suffix(".light.hdr")
-    with whole_files([path, light], force) as (mesh_file, light_file):
+    with whole_file(path, force) as mesh_file, whole_file(light, force) as light_file:
         mesh_file.write_bytes(glb_bytes(scene, parts))
         write_hdr(light_file, scene.envmap)
     note = f"glTF holds no environment light: {light.name} is it, its centre column along the camera's -Z."

@@ -119,26 +119,16 @@ def _require_replaceable(path: str | Path, target: Path, force: bool, kind: Fold
 
 
 @contextmanager
-def whole_files(paths: list[Path], force: bool = False) -> Iterator[list[Path]]:
-    """Yield a temporary for every path; they get their names when the block ends well, and vanish when it does not."""
-    for path in paths:
-        ensure_writable(path, force, None)
-    temporaries = [partial(path) for path in paths]
-    try:
-        with writing(paths[0], temporaries[0]):
-            yield temporaries
-            for temporary, path in zip(temporaries, paths, strict=True):
-                os.replace(temporary, path)
-    finally:
-        for temporary in temporaries:
-            temporary.unlink(missing_ok=True)
-
-
-@contextmanager
 def whole_file(path: str | Path, force: bool = False) -> Iterator[Path]:
     """Yield a temporary that becomes PATH when the block ends well, and vanishes when it does not."""
-    with whole_files([Path(path)], force) as (temporary,):
-        yield temporary
+    ensure_writable(path, force, None)
+    temporary = partial(Path(path))
+    try:
+        with writing(path, temporary):
+            yield temporary
+            os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def write_whole(path: str | Path, content: bytes, force: bool = True) -> None:

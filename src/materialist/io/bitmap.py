@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image, ImageCms, UnidentifiedImageError
+from PIL import Image, ImageCms
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.exif import image_tags
+from materialist.io.exif import file_tags, image_tags
 from materialist.io.icc import MatrixProfile, matrix_profile
 from materialist.types import Array
 
@@ -24,10 +24,9 @@ MIN_SIDE = 8
 """Shortest side accepted, pixels."""
 MAX_ASPECT = 8
 """Longest shape accepted, long side over short side."""
-_PHOTOMETRIC, _PLANAR, _EXTRA = 262, 284, 338
-"""Tags of TIFF: what values mean, whether channels lie apart, and what the channel beyond colour is."""
-_PREMULTIPLIED = 1
-"""Value of `_EXTRA`: alpha that colours are multiplied by."""
+_LAYOUT = {"BitsPerSample": 8, "PlanarConfiguration": 1, "PhotometricInterpretation": 2, "ExtraSamples": 2}
+"""Tags of TIFF, and what they are by themselves: a channel's bits, whether channels lie apart (2), what values mean (0:
+white is zero), and what the channel beyond colour is (1: alpha that colours are multiplied by)."""
 
 
 @dataclass
@@ -70,30 +69,47 @@ def light_and_alpha(light: Array, alpha: Array | None) -> Decoded:
 
 
 def read_bitmap(path: Path) -> Decoded:
-    """Everything Pillow opens: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
+    """Everything Pillow opens but deep TIFF: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
     with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
         image.load()  # finds truncation, also for files whose pixels OpenCV reads below
-        warnings = []
-        frames = getattr(image, "n_frames", 1)
-        if frames > 1 and image.format not in ("MPO", "HEIF", "JPEG"):
-            warnings.append(f"The file holds {frames} pictures; the first is used.")
+        warnings = _first_of(1 if image.format in ("MPO", "HEIF", "JPEG") else getattr(image, "n_frames", 1))
         tags = image_tags(image)
-        if _is_deep(image, path):
-            linear, scene_linear = _deep(image, path, warnings)
+        file.seek(24)  # where a PNG has its bits a channel; Pillow cuts those of RGB to 8
+        if image.mode[0] in "IF" or (image.format == "PNG" and file.read(1) == b"\x10"):
+            linear = _deep(*_rgb(path), image.info.get("icc_profile"), warnings)
         else:
-            linear, scene_linear = _shallow(image, warnings), False
-    return Decoded(_upright(linear, int(tags.get("Orientation", 1) or 1)), scene_linear, tags, warnings)
+            linear = _shallow(image, warnings)
+    return Decoded(_upright(linear, int(tags.get("Orientation", 1) or 1)), False, tags, warnings)
 
 
-def _is_deep(image: Image.Image, path: Path) -> bool:
-    """Whether the file has more than 8 bits a channel (Pillow cuts those to 8 when they are RGB)."""
-    if image.format == "PNG":
-        with path.open("rb") as file:
-            return file.read(25)[24] == 16
-    if image.format == "TIFF":
-        return max(image.tag_v2.get(258, (8,))) > 8  # type: ignore[attr-defined]
-    return image.mode in ("I", "F") or image.mode.startswith("I;16")
+def read_tiff(path: Path) -> Decoded:
+    """A TIFF: scene-linear where it holds floats. What is deeper than 8 bits OpenCV reads, and turns upright itself."""
+    from tifffile import TiffFile
+
+    with TiffFile(path) as file:
+        page: Any = file.pages[0]
+        bits, planar, meaning, extra = (page.tags.valueof(name, usual) for name, usual in _LAYOUT.items())
+        profile, warnings = page.tags.valueof("InterColorProfile"), _first_of(len(file.pages))
+    if np.max(bits) <= 8:
+        return read_bitmap(path)
+    if planar == 2:  # OpenCV would read them as if they lay together
+        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
+    colour, alpha = _rgb(path)
+    floats, premultiplied = colour.dtype.kind == "f", 1 in np.atleast_1d(extra)
+    if meaning == 0 or (premultiplied and not floats):
+        raise InputError(f"{path} has inverted values or premultiplied alpha; save it as plain 16-bit RGB.")
+    if not floats:
+        return Decoded(_deep(colour, alpha, profile, warnings), False, file_tags(path), warnings)
+    light = np.ascontiguousarray(colour, np.float32)
+    if alpha is not None and not premultiplied:
+        light = light * alpha.astype(np.float32)
+    return light_and_alpha(light, alpha)
+
+
+def _first_of(frames: int) -> list[str]:
+    """The warning of a file of several pictures."""
+    return [f"The file holds {frames} pictures; the first is used."] if frames > 1 else []
 
 
 def _shallow(image: Image.Image, warnings: list[str]) -> Array:
@@ -129,23 +145,15 @@ def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]
     return image.convert("RGB")
 
 
-def _deep(image: Image.Image, path: Path, warnings: list[str]) -> tuple[Array, bool]:
-    """16-bit integers and floats, which Pillow would cut to 8 bits, through OpenCV; (linear, scene_linear)."""
-    tags = getattr(image, "tag_v2", {})
-    _require_interleaved(tags.get(_PLANAR, 1), path)
-    if tags.get(_PHOTOMETRIC) == 0 or _PREMULTIPLIED in np.atleast_1d(tags.get(_EXTRA, 2)):
-        raise InputError(f"{path} has inverted values or premultiplied alpha; save it as plain 16-bit RGB.")
-    colour, alpha = _rgb(path)
-    if colour.dtype.kind == "f":
-        return np.ascontiguousarray(colour, np.float32), True
-    profile = image.info.get("icc_profile")
+def _deep(colour: Array, alpha: Array | None, profile: bytes | None, warnings: list[str]) -> Array:
+    """Integers of 16 bits a channel (or 8) to [H, W, 3] float32 linear."""
     matrix = matrix_profile(profile) if profile else None
     if profile and matrix is None:
         warnings.append("The colour profile of a 16-bit photo is used only where it is a matrix: taken as sRGB.")
     linear = _by_matrix(colour, matrix)
-    if alpha is not None:
-        linear = _over_white(linear, alpha / np.float32(np.iinfo(alpha.dtype).max), warnings)
-    return linear, False
+    if alpha is None:
+        return linear
+    return _over_white(linear, alpha / np.float32(np.iinfo(alpha.dtype).max), warnings)
 
 
 def stored_pixels(path: Path) -> tuple[Array, Array | None]:
@@ -173,36 +181,6 @@ def _rgb(path: Path) -> tuple[Array, Array | None]:
     """`stored_pixels` with grey as RGB."""
     colour, alpha = stored_pixels(path)
     return np.broadcast_to(colour, (*colour.shape[:2], 3)), alpha
-
-
-def _require_interleaved(planar: int, path: Path) -> None:
-    """OpenCV reads deep TIFFs whose channels lie apart as if they did not. Raises InputError for those."""
-    if planar == 2:
-        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
-
-
-def is_float_tiff(path: Path) -> bool:
-    """Whether a TIFF holds colour in a layout that Pillow does not know: float channels."""
-    try:
-        with pixel_limit_lifted(), Image.open(path):
-            return False
-    except UnidentifiedImageError:
-        return True
-
-
-def read_float_tiff(path: Path) -> Decoded:
-    """Float RGB TIFF, scene-linear, of 32 or 64 bits; OpenCV applies the orientation itself."""
-    from tifffile import TiffFile
-
-    with TiffFile(path) as file:
-        page: Any = file.pages[0]
-        _require_interleaved(page.tags.valueof(_PLANAR, 1), path)
-        extra = np.atleast_1d(page.tags.valueof(_EXTRA, 2))
-    colour, alpha = _rgb(path)
-    light = np.ascontiguousarray(colour, np.float32)
-    if alpha is not None and extra[0] != _PREMULTIPLIED:
-        light = light * alpha.astype(np.float32)
-    return light_and_alpha(light, alpha)
 
 
 def _by_matrix(pixels: Array, matrix: MatrixProfile | None) -> Array:

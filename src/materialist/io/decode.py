@@ -13,11 +13,10 @@ from materialist.io.bitmap import (
     FORMATS,
     Decoded,
     check_size,
-    is_float_tiff,
     light_and_alpha,
     pixel_limit_lifted,
     read_bitmap,
-    read_float_tiff,
+    read_tiff,
     stored_pixels,
 )  # fmt: skip
 from materialist.io.exif import file_tags
@@ -89,8 +88,8 @@ def decode(path: Path) -> Decoded:
             return _exr(path)
         if head.startswith(_RADIANCE):
             return _hdr(path)
-        if head.startswith(_TIFF) and is_float_tiff(path):
-            return read_float_tiff(path)
+        if head.startswith(_TIFF):
+            return read_tiff(path)
         return read_bitmap(path)
     except (MaterialistError, MemoryError):
         raise
