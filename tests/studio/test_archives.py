@@ -15,7 +15,6 @@ from materialist.studio.archives import pack, unpack
 from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
 from materialist.studio.session import Session
-from materialist.studio.workspace import store
 
 
 @pytest.fixture
@@ -24,8 +23,8 @@ def packed(session, tmp_path):
     write_png_bytes(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
     write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
     click(session)
-    session.set("edit", texture=store(session.workspace, tmp_path / "wood.png", "texture", ".png"), roughness="0.3")
-    session.light(envmap=store(session.workspace, tmp_path / "sky.exr", "light", ".exr"), gain="auto")
+    session.set("edit", texture=uploads.stored(session.workspace, tmp_path / "wood.png", "texture"), roughness="0.3")
+    session.light(envmap=uploads.stored(session.workspace, tmp_path / "sky.exr", "envmap"), gain="auto")
     objects.set_option(session, "mesh", library_file(session, "Cube"))
     objects.place(session, 50, 40)
     session.edits = session.edits.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))

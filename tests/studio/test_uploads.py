@@ -31,7 +31,7 @@ def test_pictures_are_refused_by_their_header(tmp_path, name, content, message):
     file = tmp_path / name
     file.write_bytes(content)
     with pytest.raises(InputError, match=message):
-        uploads.checked_picture(file, name)
+        uploads.checked_picture(file)
 
 
 def test_sizes_of_other_headers(tmp_path):
@@ -42,10 +42,10 @@ def test_sizes_of_other_headers(tmp_path):
 
     cv2.imwrite(str(tmp_path / "a.tif"), np.full((20, 30, 3), 0.5, np.float32))
     assert image_size(tmp_path / "a.tif") == (30, 20)
-    assert uploads.checked_picture(tmp_path / "a.tif", "a.tif") == ".tif"
+    assert uploads.checked_picture(tmp_path / "a.tif") == ".tif"
     (tmp_path / "b.tif").write_bytes((tmp_path / "a.tif").read_bytes()[:6])
     with pytest.raises(InputError, match="not an image"):
-        uploads.checked_picture(tmp_path / "b.tif", "b.tif")
+        uploads.checked_picture(tmp_path / "b.tif")
 
 
 @pytest.mark.parametrize("root", ["", "room.scene/"])
@@ -57,7 +57,7 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
         pack.writestr(f"{root}../evil.txt", "x")
         pack.writestr("/abs.txt", "x")
         pack.writestr(f"{root}maps/extra.py", "x")
-    archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
+    archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target")
     assert load_scene(tmp_path / "target").camera.width == 64
     assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
 
@@ -77,28 +77,28 @@ def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_p
 def test_zips_that_are_none(tmp_path, monkeypatch):
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
     with pytest.raises(InputError, match="not a readable zip"):
-        archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", "a.zip")
+        archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target")
     with zipfile.ZipFile(tmp_path / "b.zip", "w") as pack:
         pack.writestr("readme.txt", "x")
     with pytest.raises(InputError, match="no scene package"):
-        archives.unpack_scene(tmp_path / "b.zip", tmp_path / "target", "b.zip")
+        archives.unpack_scene(tmp_path / "b.zip", tmp_path / "target")
     with zipfile.ZipFile(tmp_path / "c.zip", "w", zipfile.ZIP_DEFLATED) as pack:
         pack.writestr("scene.json", "{}")
         pack.writestr("mesh.ply", b"\0" * 5_000_000)
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(unpacked_bytes=1_000_000))
     with pytest.raises(InputError, match="unpacks to"):
-        archives.unpack_scene(tmp_path / "c.zip", tmp_path / "target", "c.zip")
+        archives.unpack_scene(tmp_path / "c.zip", tmp_path / "target")
     assert not (tmp_path / "target").exists()
 
 
 def test_meshes_name_no_other_files(tmp_path):
     obj = tmp_path / "a.obj"
     obj.write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
-    assert uploads.checked_mesh(obj, "a.obj") == ".obj"
+    assert uploads.checked_mesh(obj) == ".obj"
     assert "secret" not in obj.read_text() and "f 1 2 3" in obj.read_text()
     glb = tmp_path / "a.glb"
     glb.write_bytes(b'glTF....{"images":[{"uri":"../../secret.png"}]}')
     with pytest.raises(InputError, match="other files"):
-        uploads.checked_mesh(glb, "a.glb")
+        uploads.checked_mesh(glb)
     with pytest.raises(InputError, match="not a mesh"):
-        uploads.checked_mesh(glb, "a.gltf")
+        uploads.checked_mesh(glb.with_suffix(".gltf"))

@@ -16,7 +16,7 @@ from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.workspace import store, with_plain_files
+from materialist.studio.workspace import with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
@@ -35,7 +35,7 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
 
     Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
     """
-    shown = uploads.shown_name(archive.name)
+    shown = uploads.shown_name(archive)
     advice = "give the zip that 'edits.yaml with its masks' makes"
     with tempfile.TemporaryDirectory(dir=workspace, prefix=".load-") as place:
         folder = Path(place)
@@ -50,20 +50,19 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
 
         def moved(option: str, name: str) -> str:
             file = folder / name
-            suffix = (uploads.checked_mesh if option == "mesh" else uploads.checked_picture)(file, name)
             if (workspace / name).is_file() and filecmp.cmp(workspace / name, file, shallow=False):
                 return name
-            return store(workspace, file, option, suffix)
+            return uploads.stored(workspace, file, option)
 
         return tuple(replace(with_plain_files(step, moved), folder=workspace) for step in steps)
 
 
-def unpack_scene(archive: Path, target: Path, name: str) -> None:
+def unpack_scene(archive: Path, target: Path) -> None:
     """Unpack a zipped scene package into `target`: known members only.
 
     Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
     """
-    shown = uploads.shown_name(name)
+    shown = uploads.shown_name(archive)
     missing = "no scene package (no scene.json); zip the folder that invert wrote"
     try:
         with _members(archive, shown, r"scene\.json", missing) as (given, members):

@@ -78,36 +78,28 @@ class GlassClient:
         """The last request."""
         self._number = 0
         """Its number at the worker."""
-        self._state = GlassState()
+        self.state = GlassState()
         self._panes: dict[str, tuple[str, Pane]] = {}
         """Object -> (request, its answer)."""
 
-    def ask(self, others: tuple[Step, ...], step: Step) -> None:
-        """Request the picture of a glass step, the other steps of the list being these; once for equal requests."""
-        key = self._request(others, step)
+    def ask(self, steps: tuple[Step, ...], step: Step) -> None:
+        """Request the picture of a glass step of this list; once for equal requests."""
+        key = self._request(steps, step)
         with self.changed:
             if key == self._key:
                 return
-            self._key, self._state = key, GlassState()
-            if not self.fresh(others, step):
+            self._key, self.state = key, GlassState()
+            if not self.fresh(steps, step):
                 self._send(key)
             self.changed.notify_all()
 
     def pane(self, step: Step) -> Pane | None:
         """The last picture of a glass step, perhaps with earlier values."""
-        with self.changed:
-            found = self._panes.get(_place(step))
-        return found[1] if found else None
+        return self._panes.get(_place(step), ("", None))[1]
 
-    def fresh(self, others: tuple[Step, ...], step: Step) -> bool:
-        """Whether `pane` shows exactly this step among these others."""
-        with self.changed:
-            return self._panes.get(_place(step), ("",))[0] == self._request(others, step)
-
-    @property
-    def state(self) -> GlassState:
-        with self.changed:
-            return self._state
+    def fresh(self, steps: tuple[Step, ...], step: Step) -> bool:
+        """Whether `pane` shows exactly this step of this list."""
+        return self._panes.get(_place(step), ("", None))[0] == self._request(steps, step)
 
     def keep(self, steps: tuple[Step, ...]) -> None:
         """Forget panes of other steps than these, and end the process when there is no glass any more."""
@@ -122,15 +114,15 @@ class GlassClient:
         with self.changed:
             worker, self._worker = self._worker, None
             self._panes.clear()
-            self._key, self._state = "", GlassState()
+            self._key, self.state = "", GlassState()
             self.changed.notify_all()
         if worker is not None:
             worker.kill()
 
-    def _request(self, others: tuple[Step, ...], step: Step) -> str:
+    def _request(self, steps: tuple[Step, ...], step: Step) -> str:
         request: Request = {
             "scene": self._scene, "folder": str(step.folder.resolve()),
-            "others": [[one.kind, one.options] for one in others],
+            "others": [[one.kind, one.options] for one in steps if one is not step],
             "glass": {name: step.options[name] for name in sorted(step.options) if name != "skip"},
         }  # fmt: skip
         return json.dumps(request, default=str)
@@ -149,9 +141,9 @@ class GlassClient:
                 self._worker = Worker(niceness=SETTINGS.glass_niceness, idle=SETTINGS.glass_idle)
                 threading.Thread(target=self._listen, args=(self._worker,), name="glass", daemon=True).start()
         except (OSError, InputError) as error:
-            self._state = GlassState(False, str(error), True)
+            self.state = GlassState(False, str(error), True)
             return
-        self._state = GlassState(True, "Getting the glass ready …")
+        self.state = GlassState(True, "Getting the glass ready …")
         self._number = self._worker.begin(trace, {"request": json.loads(key)})
 
     def _listen(self, worker: Worker) -> None:
@@ -165,20 +157,20 @@ class GlassClient:
     def _take(self, message: Message) -> None:
         if message.kind == LOST:
             self._worker = None
-            if self._state.waiting:
+            if self.state.waiting:
                 self._key = ""
-                self._state = GlassState(
+                self.state = GlassState(
                     False, "The tracing of glass ended by itself; move a slider to start it again.", True
                 )
-        elif not self._state.waiting or message.number != self._number:
+        elif not self.state.waiting or message.number != self._number:
             return  # a newer request is under way
         elif message.kind == PROGRESS:
-            self._state = GlassState(True, _WORDS.get(message.facts["stage"], self._state.words))
+            self.state = GlassState(True, _WORDS.get(message.facts["stage"], self.state.words))
         elif message.kind == DONE and message.facts is not None:
             self._panes[_place(Step("glass", json.loads(self._key)["glass"]))] = (self._key, message.facts)
-            self._state = GlassState()
+            self.state = GlassState()
         elif message.kind == FAILED:
-            self._state = GlassState(False, sentence(message.facts), True)
+            self.state = GlassState(False, sentence(message.facts), True)
 
 
 def _place(step: Step) -> str:

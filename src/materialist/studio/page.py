@@ -94,7 +94,8 @@ def _wire(context: PageContext) -> None:
     for name in ("tool", "mode", "brush"):
         script = f"(v) => {{ document.body.dataset.{name} = v; }}"
         parts[name].change(None, parts[name], None, js=script, api_visibility="private")
-    every = {"everything": True, "trigger_mode": "multiple"}  # no click is lost; the session takes them one by one
+    # No click is lost; the session takes them one by one.
+    every: dict[str, Any] = {"everything": True, "trigger_mode": "multiple"}
     context.live(parts["stage"].pick, _pick, "sam", "kelvin", "power", "before", data=True, **every)
     context.live(parts["steps"].act, _act, data=True, more=("tabs", "glass_part"), **every)
     for name, change in (("undo", Session.undo), ("redo", partial(Session.undo, again=True))):
@@ -108,7 +109,8 @@ def _wire(context: PageContext) -> None:
 def _pick(session: Session, data: Any, sam: bool, kelvin: float, power: float, before: float) -> None:
     wanted = read_pick(data)
     if wanted["tool"] == "lamp":
-        tab_light.place_lamp(session, *wanted["at"], kelvin, power, before)
+        x, y = wanted["at"]
+        tab_light.place_lamp(session, x, y, kelvin, power, before)
     elif wanted["tool"] == "place":
         objects.place(session, *wanted["at"])
     else:

@@ -79,7 +79,7 @@ def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
     photo = example_path(target) if target.startswith(PREFIX) else path
     if not photo.is_file():
         raise InputError(f"There is no photo and no scene package at {target}.")
-    uploads.checked_picture(photo, photo.name)
+    uploads.checked_picture(photo)
     return photo
 
 

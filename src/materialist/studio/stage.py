@@ -46,7 +46,7 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
         picture, before = (jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path)))
         return {**shown, "picture": picture, "before": before, "badge": badge}
     if current is not None and client is not None and current in steps and glass.is_traced(current):
-        client.ask(_others(steps, current), current)
+        client.ask(steps, current)
     waiting = client is not None and with_edits and client.state.waiting
     if steps and not live.ready:
         del shown["picture"]
@@ -68,10 +68,6 @@ def waiting_photo(file: Path) -> dict[str, Any]:
     return {**shown, **Selection().pictures, "picture": jpeg_file(file), "badge": "Your photo, being taken apart"}
 
 
-def _others(steps: tuple[Step, ...], step: Step) -> tuple[Step, ...]:
-    return tuple(one for one in steps if one is not step)
-
-
 def _lamps(edits: EditList) -> list[list[float]]:
     """(x, y) of the lamps, for their marks; none where they are not readable, which the picture tells."""
     place = edits.light
@@ -91,7 +87,7 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
     if waiting:
         return "Glass: tracing …" + sketched
     if panes and client and all(client.pane(step) for step in panes):
-        if all(client.fresh(_others(steps, step), step) for step in panes):
+        if all(client.fresh(steps, step) for step in panes):
             return f"Glass traced; shadow and caustics in the final picture{sketched}"
         return f"Live preview; click the glass in the list to trace it anew{sketched}"
     if panes or sketched:

@@ -11,7 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError
+from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.preview import free_memory
@@ -153,8 +154,6 @@ class Studio:
         `name` is another name for the file.
         """
         folder = self.work.cache / secrets.token_hex(16)
-        try:
+        with writing(file.name):
             folder.mkdir()
             return str(shutil.copyfile(file, folder / (name or file.name)))
-        except OSError as error:
-            raise OutputError(f"The file {file.name} cannot be handed over: {error.strerror or error}.") from error

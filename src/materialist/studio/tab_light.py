@@ -13,7 +13,6 @@ from materialist.studio import SETTINGS, uploads
 from materialist.studio.controls import SUN, number_text, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
-from materialist.studio.workspace import store
 from materialist.types import Array
 
 OWN = "The photo's own"
@@ -73,8 +72,7 @@ def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: fl
 
 
 def _uploaded(session: Session, file: Path) -> None:
-    suffix = uploads.checked_picture(file, file.name)
-    session.light(envmap=store(session.workspace, file, "light", suffix), gain="auto")
+    session.light(envmap=uploads.stored(session.workspace, file, "envmap"), gain="auto")
 
 
 def place_lamp(

@@ -9,7 +9,6 @@ from materialist.studio import uploads
 from materialist.studio.controls import hex_colour, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
-from materialist.studio.workspace import store
 
 
 def layout(context: PageContext) -> None:
@@ -40,8 +39,12 @@ def wire(context: PageContext) -> None:
     context.live(parts["colour"].input, _coloured, "colour")
     cleared = {"own": ("albedo", "texture", "hue", "saturation", "value"), "as_fitted": ("roughness", "metallic")}
     for button, names in cleared.items():
-        context.live(parts[button].click, partial(Session.set, kind="edit", **dict.fromkeys(names)), everything=True)
+        context.live(parts[button].click, partial(_clear, names), everything=True)
     context.upload("texture", _textured, everything=True)
+
+
+def _clear(names: tuple[str, ...], session: Session) -> None:
+    session.set("edit", **dict.fromkeys(names))
 
 
 def _coloured(session: Session, value: str) -> None:
@@ -49,5 +52,4 @@ def _coloured(session: Session, value: str) -> None:
 
 
 def _textured(session: Session, file: Path) -> None:
-    suffix = uploads.checked_picture(file, file.name)
-    session.set("edit", albedo=None, texture=store(session.workspace, file, "texture", suffix))
+    session.set("edit", albedo=None, texture=uploads.stored(session.workspace, file, "texture"))

@@ -11,7 +11,6 @@ from materialist.studio import objects, uploads
 from materialist.studio.controls import hex_colour, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext, Updates, box
-from materialist.studio.workspace import store
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
 
@@ -76,9 +75,9 @@ def _choose(session: Session, name: str | None) -> Updates:
 def _uploaded(session: Session, file: Path) -> Updates:
     from materialist.edits.insert.meshes import read_model
 
-    suffix = uploads.checked_mesh(file, file.name)
-    read_model(file)
-    objects.set_option(session, "mesh", store(session.workspace, file, "mesh", suffix))
+    stored = uploads.stored(session.workspace, file, "mesh")
+    read_model(session.workspace / stored)
+    objects.set_option(session, "mesh", stored)
     return {"tool": "place", "thing": None}
 
 

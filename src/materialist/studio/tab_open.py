@@ -62,7 +62,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield {"facts": box(f"{name} will be opened as a scene.")}
             return
         if file is not None:
-            uploads.checked_picture(Path(file), name)
+            uploads.checked_picture(Path(file))
         yield {"facts": box(f"{name} is ready.") if file else ""}
 
     def choose_example(session: Session, data: Any) -> Iterator[Updates]:
@@ -124,7 +124,7 @@ def _start_inversion(
     if predictor not in {value for _, value in PREDICTORS}:
         raise InputError("Choose one of the listed ways to make the first guess.")
     source = Path(file)
-    suffix = uploads.checked_picture(source, source.name)
+    suffix = uploads.checked_picture(source)
     project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
     shutil.copyfile(source, photo)
@@ -138,7 +138,7 @@ def _start_inversion(
 def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     project = context.studio.work.new(file.stem, session.person)
     try:
-        archives.unpack_scene(file, project.scene, file.name)
+        archives.unpack_scene(file, project.scene)
         mt.load_scene(project.scene, most=SETTINGS.decoded_bytes)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)

@@ -1,7 +1,9 @@
 """The long tasks of the studio, each a call of the public API on files, run in a process of its own."""
 
 import os
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -96,14 +98,22 @@ def mesh(report: Reporter, scene: str, output: str) -> None:
 
 
 def take(report: Reporter, scene: str, steps: Steps, output: str, what: str) -> None:
-    """One thing to take away, as a single file at `output` (its suffix included)."""
-    loaded, edited = _edited(report, scene, steps)
-    if what == "scene":
-        _package(report, loaded, edited, Path(output))
-    elif what == "turn":
-        _turntable(report, loaded, edited, Path(output))
+    """One thing to take away, as a single file at `output` (its suffix included); several files come as a zip."""
+    from materialist.exporters.run import FOLDERS
+
+    (loaded, edited), file = _edited(report, scene, steps), Path(output)
+    if what == "turn":
+        _turntable(report, loaded, edited, file)
+    elif what == "scene":
+        with _zipped(file) as folder:
+            _package(report, loaded, edited, folder)
     else:
-        _exported(report, edited, Path(output), what)
+        report("export", 0, 1)
+        if file.suffix != ".zip":
+            mt.export(edited, file, to=what, force=True)
+            return
+        with _zipped(file) as folder:
+            mt.export(edited, folder / ("scene" if what in FOLDERS else f"scene.{what}"), to=what)
 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
@@ -114,32 +124,14 @@ def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     return loaded, apply(loaded, list(steps)) if steps else loaded
 
 
-def _package(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> None:
-    """The edited scene as a zipped package, its photo the composite."""
+def _package(report: Reporter, loaded: Scene, edited: Scene, folder: Path) -> None:
+    """The edited scene as a package, its photo the composite."""
     from materialist.edits.composite.composite import developed
 
-    result = loaded
     if edited is not loaded:
-        result = developed(loaded, edited, mt.composite(loaded, edited, spp=SETTINGS.final_spp, progress=report))
-    folder = partial(output, "") / output.with_suffix("").name
-    folder.parent.mkdir()
+        edited = developed(loaded, edited, mt.composite(loaded, edited, spp=SETTINGS.final_spp, progress=report))
     report("save", 0, 1)
-    mt.save_scene(result, folder)
-    _zip(folder, output)
-
-
-def _exported(report: Reporter, edited: Scene, output: Path, what: str) -> None:
-    """Another program's format; several files come as a zip."""
-    from materialist.exporters.run import FOLDERS
-
-    report("export", 0, 1)
-    if output.suffix != ".zip":
-        mt.export(edited, output, to=what, force=True)
-        return
-    folder = partial(output, "") / output.with_suffix("").name
-    folder.mkdir(parents=True)
-    mt.export(edited, folder / "scene" if what in FOLDERS else folder / f"scene.{what}", to=what)
-    _zip(folder, output)
+    mt.save_scene(edited, folder, force=True)
 
 
 def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> None:
@@ -154,13 +146,17 @@ def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> 
     write_frames(output, film, fps=12, force=True)
 
 
-def _zip(folder: Path, output: Path) -> None:
-    """A folder as a zip file, whole; the folder goes."""
-    import shutil
-
-    made = shutil.make_archive(str(folder), "zip", folder.parent, folder.name)
-    os.replace(made, output)
-    shutil.rmtree(folder.parent, ignore_errors=True)
+@contextmanager
+def _zipped(output: Path) -> Iterator[Path]:
+    """Yield an empty folder that becomes the zip file OUTPUT, whole, when the block ends well."""
+    place = partial(output, "")
+    folder = place / output.stem
+    folder.mkdir(parents=True)
+    try:
+        yield folder
+        os.replace(shutil.make_archive(str(folder), "zip", place, folder.name), output)
+    finally:
+        shutil.rmtree(place, ignore_errors=True)
 
 
 def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:

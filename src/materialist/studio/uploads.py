@@ -7,19 +7,22 @@ from materialist.errors import InputError
 from materialist.io.bitmap import check_size
 from materialist.io.decode import RAW_SUFFIXES, image_size
 from materialist.studio import SETTINGS
+from materialist.studio.workspace import store
 
 PHOTOS = frozenset(
     (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr")
 )
 
 
-def checked_picture(path: Path, name: str) -> str:
-    """The suffix to store an uploaded picture under. Raises InputError for what is no picture, or too large.
+def stored(workspace: Path, file: Path, option: str) -> str:
+    """Check an uploaded file and copy it to a workspace, for an option of an edit; returns its name there."""
+    suffix = (checked_mesh if option == "mesh" else checked_picture)(file)
+    return store(workspace, option, file.read_bytes(), suffix)
 
-    `name` is the user's name of the file: shown in the message; only its suffix is used.
-    """
-    suffix = Path(name).suffix.lower()
-    shown = shown_name(name)
+
+def checked_picture(path: Path) -> str:
+    """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large."""
+    suffix, shown = path.suffix.lower(), shown_name(path)
     if suffix not in PHOTOS and suffix not in RAW_SUFFIXES:
         raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
     check_bytes(path, shown)
@@ -41,13 +44,12 @@ def checked_picture(path: Path, name: str) -> str:
     return suffix
 
 
-def checked_mesh(path: Path, name: str) -> str:
-    """The suffix to store an uploaded mesh under. Raises InputError for a kind that could name other files.
+def checked_mesh(path: Path) -> str:
+    """The suffix of an uploaded mesh. Raises InputError for a kind that could name other files.
 
     PLY, STL and binary glTF hold everything in one file; OBJ is taken without its material library.
     """
-    suffix = Path(name).suffix.lower()
-    shown = shown_name(name)
+    suffix, shown = path.suffix.lower(), shown_name(path)
     if suffix not in (".ply", ".obj", ".stl", ".glb"):
         raise InputError(f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file.")
     check_bytes(path, shown)
@@ -55,14 +57,13 @@ def checked_mesh(path: Path, name: str) -> str:
     if suffix == ".glb" and re.search(rb'"uri"\s*:\s*"(?!data:)', content):
         raise InputError(f"{shown} refers to other files; export it with everything embedded.")
     if suffix == ".obj" and re.search(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b", content):
-        stripped = re.sub(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b.*$", b"", content)
-        path.write_bytes(stripped)
+        path.write_bytes(re.sub(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b.*$", b"", content))
     return suffix
 
 
-def shown_name(name: str) -> str:
+def shown_name(path: Path) -> str:
     """The user's name of a file, on one line for a message."""
-    return " ".join(Path(name).name.split())[:60] or "The file"
+    return " ".join(path.name.split())[:60] or "The file"
 
 
 def check_bytes(path: Path, shown: str) -> None:

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from materialist.edits.recipe import Step, read_recipe, with_files
-from materialist.errors import InputError, OutputError
-from materialist.io.atomic import whole_file
+from materialist.errors import InputError
+from materialist.io.atomic import make_folder, whole_file, writing
 from materialist.io.display import encoded
 from materialist.studio import SETTINGS
 from materialist.types import Array
@@ -60,7 +60,8 @@ class Project:
         if not _PERSON.fullmatch(person):
             raise InputError(f"{person!r} is not a valid name for a workspace.")
         folder = self.folder / f"edits-{person}"
-        _make(folder)
+        with writing(folder):
+            make_folder(folder)
         return folder
 
 
@@ -68,14 +69,11 @@ class WorkFolder:
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         self._lock = threading.Lock()
-        _make(self.root)
+        with writing(root):
+            make_folder(self.root)
+            tempfile.TemporaryFile(dir=self.root).close()
         self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
         """Uploads and results that are handed over; they go when the studio ends."""
-        try:
-            with tempfile.TemporaryFile(dir=self.root):
-                pass
-        except OSError as error:
-            raise OutputError(f"The work folder {root} cannot be written: {error.strerror or error}.") from error
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
@@ -88,14 +86,13 @@ class WorkFolder:
         with self._lock:  # two people may ask at once
             taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
             folder = self.root / f"photo-{max(taken, default=0) + 1:03d}"
-            _make(folder)
+            with writing(folder):
+                make_folder(folder)
         project = Project(folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE)
         place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
         content = {"title": project.title, "owner": project.owner, "scene": place}
-        try:
+        with writing(folder):
             (folder / CARD).write_text(json.dumps(content, indent=1), "utf-8")
-        except OSError as error:
-            raise OutputError(f"{folder} cannot be written: {error.strerror or error}.") from error
         return project
 
     def sweep(self, busy: Set[Path]) -> None:
@@ -122,25 +119,13 @@ def _shown(title: str) -> str:
     return line[:60] or "Photo"
 
 
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"The folder {folder} cannot be made: {error.strerror or error}.") from error
-
-
-def store(workspace: Path, file: Path, stem: str, suffix: str) -> str:
-    """Copy an uploaded file (checked before) to the workspace; returns its name there, which holds its hash."""
-    return _written(workspace, stem, file.read_bytes(), suffix)
-
-
 def write_mask(workspace: Path, mask: Array) -> str:
-    """Write a mask [H, W] bool; returns its name, which holds its hash: no other photo has one of that name."""
-    return _written(workspace, "mask", encoded(mask.astype(np.uint8) * 255), ".png")
+    """Write a mask [H, W] bool; returns its name: no other photo has one of that name."""
+    return store(workspace, "mask", encoded(mask.astype(np.uint8) * 255), ".png")
 
 
-def _written(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
-    """Write a file whole unless it exists; returns its name."""
+def store(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
+    """Write a file whole unless it exists; returns its name, which holds its hash."""
     file = workspace / f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
     if not file.is_file():
         with whole_file(file, force=True) as temporary:
