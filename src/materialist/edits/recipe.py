@@ -122,7 +122,7 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     class Unquoted(yaml.SafeDumper):
         """Texts stay without quotes, also those that spell numbers: `read_recipe` takes all for texts."""
 
-        yaml_implicit_resolvers = {}
+        yaml_implicit_resolvers: dict[Any, Any] = {}
 
     for kind in (bool, int, float):
         Unquoted.add_representer(kind, lambda dumper, value: dumper.represent_str(str(value).lower()))
@@ -195,7 +195,7 @@ def _put(scene: Scene, edited: Scene, step: Step) -> Scene:
         if name not in step.options:
             raise InputError(f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}.")
     wanted, mesh = options_of(step), step.options["mesh"]
-    places = [numbers(one, 2, "at") for one in several(step.options["at"])]
+    places: list[Any] = [numbers(one, 2, "at") for one in several(step.options["at"])]
     if step.kind == "drop":
         return settle(edited, [beside(step.folder, "mesh", one) for one in _listed(mesh)], places, wanted)
     for place in places:

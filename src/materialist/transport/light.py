@@ -13,7 +13,7 @@ import torch
 
 from materialist.buffers import placed
 from materialist.transport.cache import MISS, TransportCache
-from materialist.transport.rays import rays
+from materialist.transport.rays import LobeRays
 from materialist.types import Array, Materials
 
 
@@ -88,7 +88,7 @@ def light_matrix(
     scene: Any = cache.scene
     parts = torch.zeros(2, len(rows), height * 2 * height)
     hits = []
-    for some in rays(cache, rows, rough, metallic, shape, per_texel, specular_samples):
+    for some in LobeRays(cache, rows, rough, metallic, shape, per_texel, specular_samples).parts():
         pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
         slots_met = dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid())
         slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] uint32 radiance slot that each ray meets

@@ -37,64 +37,58 @@ class Rays:
     """Each [N]: what the albedo multiplies, and the rest."""
 
 
-def rays(
-    cache: TransportCache, rows: Array, rough: Array, metallic: Array, shape: tuple[int, int], per_texel: int,
-    specular: int,
-) -> Iterator[Rays]:  # fmt: skip
-    """All rays of the surface pixels `cache.pixels[rows]`, in parts.
+class LobeRays:
+    """The rays of the surface pixels `cache.pixels[rows]`, Q of them.
 
     rows: [Q]. rough, metallic: [Q]; perceptual roughness. shape: (h, 2h) of the envmap. per_texel: rays of a row
     through each texel. specular: rays of a row along the visible normals of its specular lobe.
     """
-    texels = shape[0] * shape[1] * per_texel
-    at_once = max(1, LANES // max(texels, specular))
-    for start in range(0, len(rows), at_once):
-        these = slice(start, start + at_once)
-        lobe = _Lobes(cache, rows[these], rough[these], metallic[these], shape, per_texel, specular)
-        yield lobe.through_texels(start)
-        if specular:
-            yield lobe.along_normals(start)
-
-
-class _Lobes:
-    """What a set of rows sends out."""
 
     def __init__(
         self, cache: TransportCache, rows: Array, rough: Array, metallic: Array, shape: tuple[int, int],
         per_texel: int, specular: int,
     ):  # fmt: skip
         self.cache, self.shape, self.per_texel, self.specular = cache, shape, per_texel, specular
-        self.count = len(rows)
         self._rows = integers(mi, rows)
         self._rough, self._metallic = floats(mi, rough), floats(mi, metallic)
         self._alpha = floats(mi, alpha_of(rough))
 
-    def through_texels(self, first: int) -> Rays:
+    def parts(self) -> Iterator[Rays]:
+        """All rays, some rows at a time."""
+        total = dr.width(self._rows)
+        at_once = max(1, LANES // max(self.shape[0] * self.shape[1] * self.per_texel, self.specular))
+        for first in range(0, total, at_once):
+            rows = dr.opaque(mi.UInt32, first), min(at_once, total - first)
+            yield self._through_texels(*rows)
+            if self.specular:
+                yield self._along_normals(*rows)
+
+    def _through_texels(self, first: Any, count: int) -> Rays:
         """A ray of every row through some place of every part of every texel; uniform in solid angle there."""
-        lane = dr.arange(mi.UInt32, self.count * self.shape[0] * self.shape[1] * self.per_texel)
-        normal = self._take(self.cache.normal, lane % self.count)
-        lane = mi.UInt32(dr.compress(dr.dot(self._texel(lane), normal) > 0))
-        world, row = self._texel(lane), lane % self.count
+        lane = dr.arange(mi.UInt32, count * self.shape[0] * self.shape[1] * self.per_texel)
+        normal = self._take(self.cache.normal, first + lane % count)
+        lane = mi.UInt32(dr.compress(dr.dot(self._texel(lane // count, first + lane % count), normal) > 0))
+        row = first + lane % count
+        world = self._texel(lane // count, row)
         wi = mi.Frame3f(self._take(self.cache.normal, row)).to_local(world)
         wo = self._take(self.cache.wo, row)
         rough, cos_d = dr.gather(mi.Float, self._rough, row), half_vector(wi, wo)[2]
         diffuse = quadratic(diffuse_coefficients(wi.z, wo.z, cos_d), rough) * wi.z * dr.inv_pi / self._density(world)
-        return self._rays(world, row, first, diffuse, self._reflected(world, wi, wo, row))
+        return self._rays(world, row, diffuse, self._reflected(world, wi, wo, row))
 
-    def along_normals(self, first: int) -> Rays:
+    def _along_normals(self, first: Any, count: int) -> Rays:
         """`specular` rays of every row, mirrored at its visible normals."""
-        lane = dr.arange(mi.UInt32, self.count * self.specular)
-        row = lane % self.count
+        lane = dr.arange(mi.UInt32, count * self.specular)
+        row = first + lane % count
         wo, shift = self._take(self.cache.wo, row), self._take(self.cache.shift, row)
-        sample = point(lane // self.count, dr.opaque(mi.UInt32, self.specular), shift)
+        sample = point(lane // count, dr.opaque(mi.UInt32, self.specular), shift)
         wi = mi.reflect(wo, visible_normal(wo, dr.gather(mi.Float, self._alpha, row), sample))
         world = mi.Frame3f(self._take(self.cache.normal, row)).to_world(wi)
         base, grazing = (dr.select(wi.z > 0, w, 0) for w in self._reflected(world, wi, wo, row))
-        return self._rays(world, row, first, 0, (base, grazing))
+        return self._rays(world, row, 0, (base, grazing))
 
-    def _texel(self, lane: Any) -> Any:
-        """The direction of each lane: texel after texel, and in each all rows."""
-        number, row = lane // self.count, lane % self.count
+    def _texel(self, number: Any, row: Any) -> Any:
+        """The direction of each lane through a part of a texel, counted by `number`."""
         texel, part = number // self.per_texel, number % self.per_texel
         height, width = self.shape
         shift = self._take(self.cache.shift, row)
@@ -124,7 +118,7 @@ class _Lobes:
         fresnel = schlick(cos_d)
         return (1 - fresnel) * value, fresnel * value
 
-    def _rays(self, world: Any, row: Any, first: int, diffuse: Any, specular: tuple[Any, Any]) -> Rays:
+    def _rays(self, world: Any, row: Any, diffuse: Any, specular: tuple[Any, Any]) -> Rays:
         """A (1 - M) diffuse + C_0 base + grazing, with C_0 = R_0 (1 - M) + M A, as A times something and the rest."""
         cache, m = self.cache, dr.gather(mi.Float, self._metallic, row)
         base, grazing = specular
@@ -132,7 +126,7 @@ class _Lobes:
         origin = self._take(cache.position, row), self._take(cache.geometric_normal, row)
         ray = spawn(*origin, lifted(world, self._take(cache.face, row)))
         dr.eval(ray, row, *weights)
-        return Rays(ray, np.array(row).astype(np.int64) + first, (np.array(weights[0]), np.array(weights[1])))
+        return Rays(ray, np.array(row).astype(np.int64), (np.array(weights[0]), np.array(weights[1])))
 
     def _take(self, values: Any, row: Any) -> Any:
         return dr.gather(type(values), values, dr.gather(mi.UInt32, self._rows, row))

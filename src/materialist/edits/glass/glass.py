@@ -73,7 +73,7 @@ def _shell(
             scene.depth, scene.normal, part, found.solid, camera, wall=wall, behind=removed.depth, back=found.back
         )  # fmt: skip
     else:
-        opened = whole.vessel(camera, wall) if hollow == "open" else None
+        opened = whole.vessel(camera, wall) if wall and hollow == "open" else None
         if opened is not None:
             return opened, []
         shell = whole.body(camera, wall=wall)

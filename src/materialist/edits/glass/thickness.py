@@ -64,9 +64,11 @@ def object_thickness(
     inside = surface_in(mask, scene.depth, scene.camera)
     maps = (scene.photo.linear, inside, scene.normal, scene.depth, scene.camera)
     if not (isinstance(method, str) and method in METHODS):
-        return Thickness(np.where(inside, _given(method, inside), 0).astype(np.float32), method="given")
+        given = np.where(inside, _given(method, inside), 0).astype(np.float32)
+        return Thickness(given, np.zeros_like(given), method="given")
     if method == "symmetry":
-        return Thickness(symmetric_thickness(scene.depth, scene.normal, inside, scene.camera), method=method)
+        mirrored = symmetric_thickness(scene.depth, scene.normal, inside, scene.camera)
+        return Thickness(mirrored, np.zeros_like(mirrored), method=method)
     if method == "network":
         return thickness(*maps)
     up = upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
@@ -77,8 +79,6 @@ def wall_of(scene: Scene, mask: Array, found: Thickness) -> float:
     """Thickness of the wall of the object under a mask [H, W] bool, were it hollow; scene units."""
     inside, rays = surface_in(mask, scene.depth, scene.camera), pixel_rays(scene.camera)
     size = object_size(inside, scene.depth, rays)
-    if found.hollow is None:
-        return WALL.usual * size
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
     across = inside & (found.hollow > 0) & (found.hollow < 0.8 * found.solid)

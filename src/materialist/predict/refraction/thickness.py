@@ -26,8 +26,8 @@ class Thickness:
 
     solid: Array
     """[H, W] float32 scene units: from the first to the last point of its outer surface; 0 outside the mask."""
-    hollow: Array | None = None
-    """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`. None: unknown."""
+    hollow: Array
+    """[H, W] float32 scene units: through its walls alone, were it hollow; at most `solid`. 0: unknown."""
     back: Array | None = None
     """[H, W, 3] float32 unit, camera frame: outward normals of its last surface, 0 outside the mask; None: unknown."""
     revolution: Revolution | None = None
