@@ -1,12 +1,11 @@
 """`bench edit`: its truths are those of its edits, and its rows are what they say."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from materialist import bench, metrics
+from materialist import metrics
 from materialist.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
 from materialist.procedural.synthetic import make_sample
 
@@ -69,14 +68,14 @@ def test_a_cup_of_glass_is_where_the_blue_one_is(cases):
     assert body.surface.ior == 1.5 and clear.truth.items[-1].transparent
 
 
-def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(mitsuba, monkeypatch, tmp_path):
+def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(measured, monkeypatch):
     from materialist import pipeline
 
     sample = make_sample(0, 0, 0, size=32)
     monkeypatch.setattr(pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo))
     options = {"scenes": 1, "size": 32, "spp": 8, "truth_spp": 16, "kinds": "hue", "latency": 64, "large": 300}
-    out = bench.run("edit", output=tmp_path / "out", device="cpu", **options)
-    rows = json.loads((out / "report.json").read_text())["rows"]
+    report = measured("edit", device="cpu", **options)
+    rows = report.rows
     edited = ["hue: untouched", "ceiling hue", "ceiling hue, composite", "hue: edit"]
     waited = ["preview: built once", "preview: material", "preview: light", "final: material",
               "final: into a large photo"]  # fmt: skip
@@ -84,4 +83,4 @@ def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(mitsuba,
     assert all(row["seconds"] > 0 for row in rows[4:]) and rows[-1]["sample"] == "300 x 300"
     scored = [row["inside"] for row in rows[:4]]
     assert scored[0] < min(scored[1:]) and rows[3]["inside"] == pytest.approx(rows[2]["inside"])  # a fit without error
-    assert (out / "plot.png").stat().st_size > 1000 and (out / "sheet.png").stat().st_size > 1000
+    assert all((report.folder / name).stat().st_size > 1000 for name in ("plot.png", "sheet.png"))

@@ -1,17 +1,13 @@
-import json
-
 import pytest
 from export_scenes import room
 
-from materialist import bench
 from materialist.bench import export
 
 
-def test_what_was_written_looks_as_the_scene_does(tmp_path, monkeypatch):
+def test_what_was_written_looks_as_the_scene_does(measured, monkeypatch):
     pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
     monkeypatch.setattr(export.pipeline, "invert", lambda *_, **__: room())
     monkeypatch.setattr(export, "find_blender", lambda _: None)
-    bench.run("export", output=tmp_path, spp=64, device="cpu")
-    again, ours, principled, glb, usd, none = json.loads((tmp_path / "report.json").read_text())["rows"]
+    again, ours, principled, glb, usd, none = measured("export", spp=64, device="cpu").rows
     assert ours["ours"] > again["ours"] - 0.5 and none["method"].startswith("Blender: none found")
     assert min(glb["ours"], usd["ours"]) > principled["ours"] - 0.5 > 25.5  # 8 bits a map, a light of 8 bits

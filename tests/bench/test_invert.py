@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from materialist import bench
 from materialist.bench import invert
 from materialist.bench.benchmark import materialist
 from materialist.errors import MaterialistError
@@ -37,7 +36,7 @@ def data(tmp_path):
     return folder
 
 
-def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data, monkeypatch, tmp_path):
+def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data, monkeypatch, measured):
     seen = []
 
     def inverted(*command, **_):
@@ -51,18 +50,18 @@ def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data,
         (scene / "scene.json").write_text(json.dumps({"camera": camera}))
 
     monkeypatch.setattr(invert, "materialist", inverted)
-    out = bench.run("invert", data=data, output=tmp_path / "out", sizes="24,96", step_size=0, seed=3, device="cpu")
+    report = measured("invert", data=data, sizes="24,96", step_size=0, seed=3, device="cpu")
     commands, cameras = zip(*seen, strict=True)
     assert [(c.width, c.height) for c in cameras] == [(24, 16), (96, 64)]
     assert commands[0][1] == str(data / "photo.png") and commands[1][1] != commands[0][1]
     for command in commands:
         options = " ".join(command)
         assert f"--predictor maps:{data / 'maps'}" in options and "--seed 3" in options and "--device cpu" in options
-    rows = json.loads((out / "report.json").read_text())["rows"]
+    rows = report.rows
     assert [row["method"] for row in rows] == ["24 × 16", "96 × 64"]
     assert rows[1]["peak_mb"] == 700 and rows[1]["psnr"] == 33
     assert rows[1]["seconds_per_mpixel"] == pytest.approx(rows[1]["seconds"] / 96 / 64 * 1e6)
-    assert (out / "plot.png").read_bytes()[:4] == b"\x89PNG"
+    assert (report.folder / "plot.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_a_failed_command_is_told_in_its_own_words(tmp_path):
@@ -71,9 +70,8 @@ def test_a_failed_command_is_told_in_its_own_words(tmp_path):
 
 
 @pytest.mark.slow
-def test_an_inversion_for_real(tmp_path):
-    out = bench.run("invert", output=tmp_path / "out", sizes="48,64", step_size=48, device="cpu")
-    first, second, step = json.loads((out / "report.json").read_text())["rows"]
+def test_an_inversion_for_real(measured):
+    first, second, step = measured("invert", sizes="48,64", step_size=48, device="cpu").rows
     assert first["psnr"] > 25 and second["psnr"] > 25 and first["peak_mb"] > 200
     assert 0 < sum(first[f"{name}_s"] for name in invert.STAGES) < first["seconds"]
     assert step["prb_per_cached"] > 10

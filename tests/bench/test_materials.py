@@ -1,13 +1,10 @@
 """`bench materials` and `bench predictor` on predictors whose answers are known."""
 
-import json
-
 import cv2
 import made_samples
 import numpy as np
 import pytest
 
-from materialist import bench
 from materialist.bench import materials
 from materialist.bench.report import Report
 from materialist.color import linear_to_srgb
@@ -35,27 +32,25 @@ def folder(tmp_path):
     return tmp_path / "data"
 
 
-def test_a_perfect_predictor_scores_perfectly(folder, tmp_path):
+def test_a_perfect_predictor_scores_perfectly(folder, measured):
     maps = folder / "plane" / "maps"
-    bench.run("materials", data=folder, output=tmp_path / "report", predictor=f"maps:{maps},constant")
-    report = json.loads((tmp_path / "report" / "report.json").read_text())
-    best, guess = report["means"][f"maps:{maps}"], report["means"]["constant"]
+    report = measured("materials", data=folder, predictor=f"maps:{maps},constant")
+    best, guess = report.means[f"maps:{maps}"], report.means["constant"]
     assert best["albedo_psnr"] == best["roughness_psnr_pooled"] == 100
     assert best["depth_si_log_rmse"] == 0 and best["depth_order"] == 1 and best["normal_angle"] < 0.1
     assert guess["albedo_psnr"] < 60 and guess["roughness_psnr"] == pytest.approx(20, abs=0.1)
-    assert (tmp_path / "report" / "sheet.png").is_file()
+    assert (report.folder / "sheet.png").is_file()
 
 
-def test_maps_that_are_not_there_are_no_truth(folder, tmp_path):
+def test_maps_that_are_not_there_are_no_truth(folder, measured):
     """What stands in their place (0.5, 0.1, normals of the depth) is scored against by nobody."""
     for name in ("roughness", "metallic", "normal"):
         (folder / "plane" / "maps" / f"{name}.exr").unlink()
-    bench.run("materials", data=folder, output=tmp_path / "report", predictor="constant")
-    report = json.loads((tmp_path / "report" / "report.json").read_text())
-    (row,) = report["rows"]
+    report = measured("materials", data=folder, predictor="constant")
+    (row,) = report.rows
     assert {"albedo_psnr", "depth_order"} <= set(row)
     assert not [key for key in row if key.startswith(("roughness", "metallic", "normal"))]
-    assert report["settings"]["no true roughness"] is True
+    assert report.settings["no true roughness"] is True
 
 
 def test_samples_are_seen_by_their_own_camera(tmp_path):
@@ -66,7 +61,6 @@ def test_samples_are_seen_by_their_own_camera(tmp_path):
     assert found[0][1].camera.fov == pytest.approx(48.0, rel=1e-5)
 
 
-def test_the_benchmark_of_time(tmp_path):
-    bench.run("predictor", output=tmp_path / "report", predictor="constant", size=48, warmups=1, runs=2)
-    rows = json.loads((tmp_path / "report" / "report.json").read_text())["rows"]
+def test_the_benchmark_of_time(measured):
+    rows = measured("predictor", predictor="constant", size=48, warmups=1, runs=2).rows
     assert [row["method"] for row in rows] == ["constant predict"] and rows[0]["mean_ms"] >= rows[0]["fastest_ms"] > 0

@@ -1,12 +1,10 @@
 """`bench photo-alone`: its photos are of nothing that was trained on, and its rows are what they say."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from materialist import bench
 from materialist.bench.edits import true_scene
 from materialist.bench.photo_alone import SCENE_SEED, PhotoAloneBench, light_error, unseen_sample, with_truth
 from materialist.errors import InputError
@@ -65,19 +63,19 @@ def test_the_error_of_a_light_knows_no_brightness():
     assert 0.1 < light_error(np.roll(light, 16, 1) ** 4, light**4) <= 1
 
 
-def test_a_run_has_maps_and_edits(mitsuba, monkeypatch, tmp_path):
+def test_a_run_has_maps_and_edits(measured, monkeypatch):
     from materialist import pipeline
 
     sample, _ = unseen_sample(0, None, 32)
     monkeypatch.setattr(pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo))
-    out = bench.run("photo-alone", output=tmp_path / "out", scenes=1, size=32, kinds="relight,insert", spp=4,
-                    truth_spp=16)  # fmt: skip
-    rows = {row["method"]: row for row in json.loads((out / "report.json").read_text())["rows"]}
+    small = {"scenes": 1, "size": 32, "spp": 4, "truth_spp": 16}
+    report = measured("photo-alone", kinds="relight,insert", **small)
+    rows = {row["method"]: row for row in report.rows}
     assert list(rows)[:2] == ["maps: prior", "maps: fitted"]
     assert rows["maps: fitted"]["albedo"] == 100 and rows["maps: fitted"]["light"] < 1e-6
     assert rows["relight: fitted"]["inside"] > rows["relight: untouched"]["inside"] + 3
     inverted = []
     monkeypatch.setattr(pipeline, "invert", lambda *_, **how: inverted.append(how) or true_scene(sample))
-    bench.run("photo-alone", output=tmp_path / "p", scenes=1, size=32, kinds="relight", spp=4, truth_spp=16, paper=3)
+    measured("photo-alone", kinds="relight", paper=3, **small)
     assert inverted[1]["engine"] == "path" and inverted[1]["settings"] == PAPER.at_most(3)
-    assert (out / "sheet.png").exists() and PhotoAloneBench().scenes >= 24
+    assert (report.folder / "sheet.png").exists() and PhotoAloneBench().scenes >= 24

@@ -1,6 +1,5 @@
 """`bench plate` on the published pair of photos: its mask, and that both lie over each other."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -26,10 +25,9 @@ def test_the_mask_is_the_jug():
 
 
 @needs_photos
-def test_the_plate_lies_over_the_photo_where_nothing_was_removed(tmp_path, monkeypatch):
+def test_the_plate_lies_over_the_photo_where_nothing_was_removed(measured, monkeypatch):
     monkeypatch.setattr(PlateBench, "_removed", lambda self, photo, predictor, mask: photo.original)
-    out = bench.run("plate", output=tmp_path / "out", data=DATA, size=128, device="cpu")
-    rows = {row["method"]: row for row in json.loads((out / "report.json").read_text())["rows"]}
+    rows = {row["method"]: row for row in measured("plate", data=DATA, size=128, device="cpu").rows}
     assert rows["untouched"]["inside"] < 10 < rows["diffused"]["inside"]
     assert rows["untouched"]["around"] > 21.6  # 1.5 pixels of the file aside it is 21.5
     assert rows["remove, bundled"]["inside"] == pytest.approx(rows["untouched"]["inside"], abs=0.3)

@@ -1,16 +1,10 @@
 """The benchmark of clicks: every click has its rows, and they say how much of the object was found."""
 
-import json
-
 import numpy as np
 
-from materialist import bench
 
-
-def test_both_maps_are_scored(tmp_path, mitsuba):
-    bench.run("select", output=tmp_path / "report", scenes=1, size=96, seed=3)
-    report = json.loads((tmp_path / "report" / "report.json").read_text())
-    rows = report["rows"]
+def test_both_maps_are_scored(measured):
+    rows = measured("select", scenes=1, size=96, seed=3).rows
     assert {row["method"] for row in rows} == {
         f"{how}, {what}{maps} maps"
         for how in ("network", "grabcut")

@@ -1,12 +1,9 @@
 """The benchmark of RefractionNet: a ball is known by symmetry, and every view has its row."""
 
-import json
-
 import pytest
 import torch
 import trimesh
 
-from materialist import bench
 from materialist.predict.network import UNetArchitecture
 from materialist.predict.refraction.network import RefractionNet
 
@@ -19,18 +16,17 @@ def plain(tmp_path):
     return str(tmp_path / "plain.safetensors")
 
 
-def test_shapes_and_meshes_have_rows(tmp_path, plain, mitsuba):
+def test_shapes_and_meshes_have_rows(tmp_path, plain, measured):
     folder = tmp_path / "data" / "meshes" / "symmetric"
     folder.mkdir(parents=True)
     trimesh.creation.icosphere(3, 0.7).export(folder / "ball.ply")
     options = {"shapes": 2, "views": 2, "mesh_views": 1, "weights": plain}
-    bench.run("thickness", output=tmp_path / "report", data=tmp_path / "data", **options)
-    report = json.loads((tmp_path / "report" / "report.json").read_text())
-    assert len(report["rows"]) == 2 * (2 * 2 + 1)
-    ball = {row["method"]: row for row in report["rows"] if row["sample"].startswith("ball")}
+    report = measured("thickness", data=tmp_path / "data", **options)
+    assert len(report.rows) == 2 * (2 * 2 + 1)
+    ball = {row["method"]: row for row in report.rows if row["sample"].startswith("ball")}
     prior, network = ball["symmetric meshes: symmetry"], ball["symmetric meshes: RefractionNet"]
     assert prior["solid"] < 0.12 and "hollow" not in prior
     # Seen from near, rays to a ball's sides are not parallel, and its back is not quite its front in a mirror.
     assert network["back"] == pytest.approx(prior["back"], abs=0.01) and prior["back"] < 35
     assert prior["solid"] < network["solid"] < prior["solid"] + 0.2  # LEAST is added to it
-    assert (tmp_path / "report" / "plot.png").is_file()
+    assert (report.folder / "plot.png").is_file()

@@ -52,7 +52,7 @@ def test_known_answers(albedo, comparisons, expected):
     assert [whdr(albedo, apart, delta=delta)[0] for delta in (0.04, 0.06)] == [0, 1], "a relative threshold"
 
 
-def test_the_benchmark_from_a_folder(tmp_path):
+def test_the_benchmark_from_a_folder(tmp_path, measured):
     data = tmp_path / "iiw"
     data.mkdir()
     picture = np.zeros((40, 60, 3), np.uint8)
@@ -64,8 +64,7 @@ def test_the_benchmark_from_a_folder(tmp_path):
     }
     (data / "17.json").write_text(json.dumps(judged))
     (data / "18.json").write_text("{}")  # no picture: not part of the set
-    bench.run("whdr", data=data, output=tmp_path / "report", predictor="constant", size=60)
-    means = json.loads((tmp_path / "report" / "report.json").read_text())["means"]
+    means = measured("whdr", data=data, predictor="constant", size=60).means
     assert means["photo"]["whdr"] == 0 and means["constant"]["whdr"] == 0.5
 
 

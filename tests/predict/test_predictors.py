@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from made_matnet import made_photo
+from test_maps import good_maps, write
 
 from materialist.errors import InputError, WeightsError
 from materialist.io.exr import write_exr
@@ -24,18 +25,9 @@ def photo():
 @pytest.fixture
 def other(tmp_path):
     """maps:DIR with every map, all unlike those of `constant`."""
-    folder = tmp_path / "other"
+    folder, maps = tmp_path / "other", good_maps(H, W)
     folder.mkdir()
-    rng = np.random.default_rng(8)
-    normal = rng.normal(size=(H, W, 3)) * 0.2 + [0, 0, 1]
-    maps = {
-        "albedo": rng.random((H, W, 3)), "roughness": rng.random((H, W)), "metallic": rng.random((H, W)),
-        "normal": normal / np.linalg.norm(normal, axis=-1, keepdims=True), "depth": 2 + rng.random((H, W)),
-    }  # fmt: skip
-    maps = {name: values.astype(np.float32) for name, values in maps.items()}
-    for name, values in maps.items():
-        write_exr(folder / f"{name}.exr", values)
-    return f"maps:{folder}", maps
+    return write(folder, **maps), maps
 
 
 def write_moge(folder):
