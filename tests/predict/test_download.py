@@ -17,7 +17,7 @@ COMMIT = "1" * 40
 
 
 class Hub(BaseHTTPRequestHandler):
-    """As much of a model hub as a download needs; the server holds `files`, `claims` and `log`."""
+    """As much of a model hub as a download needs; the server holds `files`, `claims` and the `log` of fetched ones."""
 
     def do_HEAD(self):
         self.answer_file(body=False)
@@ -38,13 +38,9 @@ class Hub(BaseHTTPRequestHandler):
         name = self.path.rpartition("/resolve/")[2].partition("/")[2]
         if not self.path.startswith("/Lez/MatNet/") or name not in self.server.files:
             return self.answer(404, b"Entry not found", {"X-Error-Code": "RepoNotFound"})
-        content, start = self.server.files[name], 0
-        if body:
-            asked = self.headers.get("Range")
-            self.server.log.append((name, asked))
-            start = int(asked.removeprefix("bytes=").rstrip("-")) if asked else 0
+        self.server.log += [name] * body
         headers = {"X-Repo-Commit": COMMIT, "ETag": f'"{self.digest(name)}"'}
-        return self.answer(206 if start else 200, content[start:], headers, body=body)
+        return self.answer(200, self.server.files[name], headers, body=body)
 
     def answer(self, status, content, headers, body=True):
         self.send_response(status)
@@ -76,23 +72,18 @@ def hub(monkeypatch):
     server.server_close()
 
 
-def fetched(hub):
-    """The files asked for, in order."""
-    return [name for name, _ in hub.log]
-
-
 def test_a_download_is_whole_checked_listed_and_not_repeated(hub, folder):
     assert not is_complete(MODEL)
     assert download(MODEL) == folder == require(MODEL)
     assert (folder / "matnet_weights.pth").read_bytes() == CONTENT["matnet_weights.pth"]
-    assert fetched(hub) == ["config.json", "matnet_weights.pth"]
+    assert hub.log == ["config.json", "matnet_weights.pth"]
     assert weights_file(folder).name == "matnet_weights.pth" and len(verify_folder(folder)) == 64
     sums = (folder / "SHA256SUMS").read_text()
     assert f"{hashlib.sha256(CONTENT['matnet_weights.pth']).hexdigest()}  matnet_weights.pth\n" in sums
     hub.log.clear()
-    assert download(MODEL) == folder and fetched(hub) == []
+    assert download(MODEL) == folder and hub.log == []
     download(MODEL, force=True)
-    assert fetched(hub) == ["config.json", "matnet_weights.pth"]
+    assert hub.log == ["config.json", "matnet_weights.pth"]
 
 
 def test_a_file_that_came_damaged_is_not_kept(hub, folder):
