@@ -63,6 +63,13 @@ def specular_split(roughness: Array, n: Array, wi: Array, wo: Array) -> tuple[Ar
     return shape * (1 - fresnel), shape * fresnel
 
 
+def hemisphere(count: int) -> Array:
+    """[count, count, 3] directions about +Z, each of the solid angle 2 pi / count^2."""
+    z, phi = np.meshgrid((np.arange(count) + 0.5) / count, (np.arange(count) + 0.5) / count * 2 * np.pi)
+    sine = np.sqrt(1 - z**2)
+    return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], -1)
+
+
 def _cosines(n, wi, wo):
     """|n.wi|, |n.wo|, squared sine of h to n, and h.wo; each [...]."""
     n, wi, wo = (np.asarray(x, np.float64) for x in (n, wi, wo))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from disney_reference import hemisphere
 
 from materialist.bsdf.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
 
@@ -69,11 +70,10 @@ def test_facets_are_distributed_as_visible_normals():
     # The mean over visible facets of any f is the integral of f D G1 max(v.h, 0) / (v.n): try f = h.n.
     alpha, cosine = 0.4, 0.6
     v = np.array([np.sqrt(1 - cosine**2), 0, cosine])
-    theta, phi = np.meshgrid((np.arange(400) + 0.5) / 400 * np.pi / 2, (np.arange(400) + 0.5) / 400 * 2 * np.pi)
-    h = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
+    h = hemisphere(400)
     ggx = alpha**2 / (np.pi * (h[..., 2] ** 2 * (alpha**2 - 1) + 1) ** 2)
     density = ggx * masking(v, np.array([0, 0, 1.0]), alpha) * np.maximum(h @ v, 0) / cosine
-    area = np.sin(theta) * (np.pi / 800) * (2 * np.pi / 400)
+    area = 2 * np.pi / density.size
     assert (density * area).sum() == pytest.approx(1, abs=2e-3)
     expected = (density * area * h[..., 2]).sum()
     drawn = [

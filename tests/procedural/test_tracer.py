@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from disney_reference import diffuse_coefficients, specular_split
+from disney_reference import diffuse_coefficients, hemisphere, specular_split
 from made_worlds import X, Z, plain, reference, room, still
 
 from materialist.envmap import texel_directions
@@ -56,9 +56,7 @@ def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
     ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((0.5, 0.5, 0.5), 0.8))
     world = World([ground], np.full((16, 32, 3), 2.0, np.float32), look((0, 1, 1e-3), (0, 0, 0), 10))
     image, shading = traced(world, spp=100)
-    theta, phi = np.meshgrid(np.arccos((np.arange(200) + 0.5) / 200), (np.arange(64) + 0.5) / 64 * 2 * np.pi)
-    wi = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], -1)
-    up = np.array([0.0, 0.0, 1.0])
+    wi, up = hemisphere(200), np.array([0.0, 0.0, 1.0])
     c = diffuse_coefficients(up, wi, np.broadcast_to(up, wi.shape)) @ np.array([1, 0.8, 0.64])
     expected = 2.0 * (c * wi[..., 2]).mean() * 2 * np.pi / np.pi
     np.testing.assert_allclose(shading.mean((0, 1)), expected, rtol=0.01)

@@ -40,15 +40,14 @@ def test_gradients_under_constant_light_are_the_derivatives_of_the_formula():
     maps = leaves(uniform(CAMERA, ALBEDO, ROUGHNESS, METALLIC), np.ones((4, 8, 3)))
     image = scene.render_torch(*maps, spp=8192, seed=1, max_depth=2)
     image.sum().backward()
-    z, phi = np.meshgrid((np.arange(300) + 0.5) / 300, (np.arange(300) + 0.5) / 300 * 2 * np.pi)
-    wi = np.stack([np.sqrt(1 - z**2) * np.cos(phi), np.sqrt(1 - z**2) * np.sin(phi), z], -1)
+    wi = brdf.hemisphere(300)
 
     def radiance(row, col, albedo=ALBEDO, roughness=ROUGHNESS, metallic=METALLIC):
         ray = pixel_rays(CAMERA)[row, col].astype(float)
         value = brdf.evaluate(
             np.array(albedo), roughness, metallic, np.array([0.0, 0, 1]), wi, -ray / np.sqrt(ray @ ray)
         )
-        return 2 * np.pi * (value * z[..., None]).mean((0, 1))
+        return 2 * np.pi * (value * wi[..., 2:]).mean((0, 1))
 
     step = 1e-4
     for row, col in ((0, 0), (1, 2), (2, 3)):

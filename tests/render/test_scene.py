@@ -66,13 +66,11 @@ def test_direct_light_is_the_integral_of_the_reference(rough, metallic):
     albedo = np.float32([0.8, 0.4, 0.1])
     scene = scene_of(wall(CAMERA), uniform(CAMERA, albedo, rough, metallic))
     image = scene.render(spp=1024, seed=5, max_depth=2)
-    cosine, azimuth = np.meshgrid((np.arange(400) + 0.5) / 400, (np.arange(400) + 0.5) / 400 * 2 * np.pi)
-    sine = np.sqrt(1 - cosine**2)
-    wi = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
+    wi = brdf.hemisphere(400)
     for row, col in ((3, 6), (0, 0), (6, 2)):
         wo = -pixel_rays(CAMERA)[row, col] / np.linalg.norm(pixel_rays(CAMERA)[row, col])
         value = brdf.evaluate(albedo, rough, metallic, np.array([0.0, 0, 1]), wi, wo)
-        expected = 2 * np.pi * (value * cosine[..., None]).mean((0, 1))
+        expected = 2 * np.pi * (value * wi[..., 2:]).mean((0, 1))
         np.testing.assert_allclose(image[row, col], expected, rtol=0.03)
 
 
