@@ -113,12 +113,9 @@ def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
         if len(geometry.mesh.faces) <= most:
             m = scene.materials
             maps = Materials(m.albedo[pick], m.roughness[pick], m.metallic[pick])
-            return replace(geometry, mesh=_unsquashed(geometry.mesh, camera, coarse)), maps
+            # On the photo's frame: the coarse picture's sides are rounded, so its pixels are not quite square.
+            stretch = np.array([1, (camera.height / camera.width) / (height / width), 1], np.float32)
+            mesh = replace(geometry.mesh, vertices=geometry.mesh.vertices * stretch)
+            return replace(geometry, mesh=mesh), maps
         factor *= 0.95 * np.sqrt(min(1.0, most / len(geometry.mesh.faces)))
     raise InputError(f"The scene cannot be shown with {most} triangles; allow more.")
-
-
-def _unsquashed(mesh: Mesh, camera: Camera, coarse: Camera) -> Mesh:
-    """The mesh on the photo's frame: the coarse picture's sides are rounded, so its pixels are not quite square."""
-    stretch = (camera.height / camera.width) / (coarse.height / coarse.width)
-    return replace(mesh, vertices=mesh.vertices * np.array([1, stretch, 1], np.float32))

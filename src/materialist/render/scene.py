@@ -203,17 +203,13 @@ def sphere(lamp: Lamp) -> dict:
     }  # fmt: skip
 
 
-def beside_u(normals: Array) -> Array:
-    """[V, 3] unit normals, none of them exactly along X: u runs there on what faces the camera, and a shading frame
-    about a normal along u is not a number."""
-    along = np.abs(normals[:, :1]) > 1 - 1e-6
-    beside = (normals + np.array([0, 1e-3, 5e-4])) / np.sqrt(1 + 1.25e-6)
-    return np.where(along, beside, normals).astype(np.float32)
-
-
 def seen_shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -> Any:
-    """`shape` of a mesh whose normals no shading frame trips over."""
-    return shape(mi, replace(mesh, normals=beside_u(mesh.normals)), bsdf, emitter)
+    """`shape` of a mesh, without normals exactly along X: u runs there on what faces the camera, and a shading frame
+    about a normal along u is not a number."""
+    along = np.abs(mesh.normals[:, :1]) > 1 - 1e-6
+    beside = (mesh.normals + np.array([0, 1e-3, 5e-4])) / np.sqrt(1 + 1.25e-6)
+    normals = np.where(along, beside, mesh.normals).astype(np.float32)
+    return shape(mi, replace(mesh, normals=normals), bsdf, emitter)
 
 
 def shape(mi, mesh: Any, bsdf: dict | None = None, emitter: dict | None = None) -> Any:
