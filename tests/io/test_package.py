@@ -189,19 +189,6 @@ def test_leftovers_of_a_killed_run_are_swept_by_the_next_save(scene, tmp_path):
     assert load_scene(place).provenance == {"tool_version": __version__} and os.listdir(tmp_path) == ["a.scene"]
 
 
-def test_another_machines_neighbour_is_left_alone_for_a_day(scene, tmp_path, monkeypatch):
-    """Its number says nothing here: two containers that share a folder may both have process 7."""
-    monkeypatch.setattr(atomic.platform, "node", lambda: "another")
-    neighbour = atomic.partial(tmp_path / "a.scene", "")
-    monkeypatch.undo()
-    neighbour.mkdir()
-    save_scene(scene, tmp_path / "a.scene")
-    assert neighbour.is_dir()
-    monkeypatch.setattr(atomic, "_DAY", -1)
-    save_scene(scene, tmp_path / "a.scene", force=True)
-    assert os.listdir(tmp_path) == ["a.scene"]
-
-
 def test_missing_and_unknown_packages(scene, tmp_path):
     with pytest.raises(SceneError, match="no scene package at"):
         load_scene(tmp_path / "nothing")

@@ -25,7 +25,7 @@ from materialist.bench import benchmark_class
 from materialist.bench.benchmark import names, timed
 from materialist.bench.report import Column
 from materialist.errors import MaterialistError
-from materialist.io.atomic import make_folder, whole_file
+from materialist.io.atomic import make_folder, write_whole
 from materialist.option_kinds import OperationOptions, option
 from materialist.plain import plain
 
@@ -129,8 +129,7 @@ class PaperBench(OperationOptions):
         _, cost = timed(benchmark_class(measure.bench).given(**options).run, place, folder)
         report = json.loads((folder / "report.json").read_text("utf-8"))
         row = {**key, **cost, "machine": report["machine"], "means": report["means"]}
-        with whole_file(output / "rows" / f"{name}.json", force=True) as file:
-            file.write_text(json.dumps(row, indent=1), "utf-8")
+        write_whole(output / "rows" / f"{name}.json", json.dumps(row, indent=1))
         return row
 
 
@@ -165,8 +164,8 @@ def write_page(
     assets = files("materialist.bench") / "assets"
     for kind in ("html", "md"):
         page = Environment(autoescape=kind == "html", trim_blocks=True, lstrip_blocks=True)
-        with whole_file(output / f"report.{kind}", force=True) as file:
-            file.write_text(page.from_string((assets / f"paper.{kind}").read_text("utf-8")).render(told), "utf-8")
+        text = page.from_string((assets / f"paper.{kind}").read_text("utf-8")).render(told)
+        write_whole(output / f"report.{kind}", text)
 
 
 def _picture(path: Path, widest: int = 1400) -> str:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.atomic import make_folder, whole_file, writing
+from materialist.io.atomic import make_folder, whole_file, write_whole, writing
 from materialist.io.display import write_sheet
 from materialist.plain import plain
 from materialist.types import Array
@@ -77,10 +77,8 @@ def write(report: Report, folder: Path) -> None:
         "means": means(report),
         "rows": report.rows,
     }
-    with whole_file(folder / "report.json", force=True) as file:
-        file.write_text(json.dumps(plain(content), indent=1), "utf-8")
-    with whole_file(folder / "report.md", force=True) as file:
-        file.write_text(markdown(report), "utf-8")
+    write_whole(folder / "report.json", json.dumps(plain(content), indent=1))
+    write_whole(folder / "report.md", markdown(report))
     if report.rows and report.plotted:
         with whole_file(folder / "plot.png", force=True) as file:
             _plot(report, file)

@@ -13,7 +13,7 @@ from materialist.edits.material.material import edit
 from materialist.edits.remove.remove import remove
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.io.atomic import whole_file
+from materialist.io.atomic import write_whole
 from materialist.option_kinds import OFF, ON, OperationOptions, beside, declarations, numbers, several
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 from materialist.types import Array, Scene
@@ -128,8 +128,7 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
         Unquoted.add_representer(kind, lambda dumper, value: dumper.represent_str(str(value).lower()))
     entries = [{step.kind: step.options} for step in steps]
     text = yaml.dump(entries, Dumper=Unquoted, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
-    with whole_file(path, force=True) as file:
-        file.write_text(text, "utf-8")
+    write_whole(path, text)
 
 
 def apply(

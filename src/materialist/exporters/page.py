@@ -75,18 +75,16 @@ def _options(scene: Scene) -> Iterable[tuple[str, Any]]:
 def _maps(scene: Scene) -> list[tuple[str, str, str]]:
     """(id, caption, data URL) of each map."""
     m = scene.materials
-    return [
-        ("albedo", "Albedo", _image(srgb_levels(m.albedo))),
-        ("roughness", f"Roughness, mean {m.roughness.mean():.2f}", _image(display.grey(m.roughness))),
-        ("metallic", f"Metallic, mean {m.metallic.mean():.2f}", _image(display.grey(m.metallic))),
-        ("normal", "Normal, camera frame", _image(display.normals(scene.normal))),
-        ("depth", "Depth, near bright", _image(display.depths(scene.depth))),
-        (
-            "error",
-            f"Error of the re-rendering × {display.ERROR_GAIN}",
-            _image(display.error(scene.photo.linear, scene.rerender)),
-        ),
-    ]
+    captions = {
+        "albedo": "Albedo",
+        "roughness": f"Roughness, mean {m.roughness.mean():.2f}",
+        "metallic": f"Metallic, mean {m.metallic.mean():.2f}",
+        "normal": "Normal, camera frame",
+        "depth": "Depth, near bright",
+        "error": f"Error of the re-rendering × {display.ERROR_GAIN}",
+    }
+    shown = {**display.maps(scene), "error": display.error(scene.photo.linear, scene.rerender)}
+    return [(name, captions[name], _image(pixels)) for name, pixels in shown.items()]
 
 
 def _figure(key: str, value: Any) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part, body_parts, scene_parts
-from materialist.io.atomic import whole_file
+from materialist.io.atomic import whole_file, write_whole
 from materialist.options import ExportOptions
 from materialist.types import Scene
 
@@ -134,6 +134,5 @@ def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
 def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.exporters.page import page
 
-    with whole_file(path, force) as file:
-        file.write_text(page(scene, parts), "utf-8")
+    write_whole(path, page(scene, parts), force)
     return Exported(path)

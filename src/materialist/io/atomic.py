@@ -1,16 +1,15 @@
 """Files and folders that appear whole or not at all: written under a hidden name beside the target, then renamed.
 
-A killed run leaves only `.NAME.HASH.partial-PID-HOST` (unfinished) or `.NAME.HASH.replaced-PID-HOST` (the old folder,
+A killed run leaves only `.NAME.HASH.partial-PID-MARK` (unfinished) or `.NAME.HASH.replaced-PID-MARK` (the old folder,
 moved aside). The next write of a folder to the same target recognises both by name and removes them, unless their
-process still runs. A process of another machine cannot be asked, so its folders stay for a day.
+process still runs here.
 """
 
 import json
 import os
-import platform
 import re
+import secrets
 import shutil
-import time
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -31,7 +30,8 @@ SCENE_FILES = re.compile(
 """Files of a package, beside the photo as it was given."""
 _JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
 """What file managers leave in folders."""
-_DAY = 24 * 3600
+_MARK = secrets.token_hex(4)
+"""Tells this process from those of the same number on other machines that share a folder."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,9 @@ def make_folder(folder: Path) -> None:
 
 def partial(path: Path, suffix: str | None = None) -> Path:
     """Where PATH is written until it is whole; the suffix stays PATH's, in small letters, unless another is given."""
-    return path.with_name(f"{_stem(path)}partial-{_process()}{path.suffix.lower() if suffix is None else suffix}")
+    return path.with_name(
+        f"{_stem(path)}partial-{os.getpid()}-{_MARK}{path.suffix.lower() if suffix is None else suffix}"
+    )
 
 
 @contextmanager
@@ -131,10 +133,10 @@ def whole_file(path: str | Path, force: bool = False) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_whole(path: str | Path, content: bytes, force: bool = True) -> None:
+def write_whole(path: str | Path, content: str | bytes, force: bool = True) -> None:
     """Write a file whole or not at all; with `force` in place of one that is there. Raises OutputError."""
     with whole_file(path, force) as temporary:
-        temporary.write_bytes(content)
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 @contextmanager
@@ -174,7 +176,7 @@ def _put_in_place(temporary: Path, target: Path) -> None:
     if not target.exists():
         os.rename(temporary, target)
         return
-    aside = target.with_name(f"{_stem(target)}replaced-{_process()}")
+    aside = target.with_name(f"{_stem(target)}replaced-{os.getpid()}-{_MARK}")
     os.rename(target, aside)
     try:
         os.rename(temporary, target)
@@ -187,30 +189,13 @@ def _put_in_place(temporary: Path, target: Path) -> None:
 def _sweep(target: Path) -> None:
     """Remove what killed runs left; an old folder moved aside goes back when nothing has taken its place."""
     for leftover in sorted(target.parent.iterdir()):
-        kind, _, owner = leftover.name.removeprefix(_stem(target)).partition("-")
-        process, _, machine = owner.partition("-")
-        if not leftover.name.startswith(_stem(target)) or not process.isdigit() or _in_use(leftover, process, machine):
+        name = re.fullmatch(re.escape(_stem(target)) + r"(partial|replaced)-(\d+)\b.*", leftover.name)
+        if name is None or (psutil.pid_exists(int(name[2])) and int(name[2]) != os.getpid()):
             continue
-        if kind == "replaced" and not target.exists():
+        if name[1] == "replaced" and not target.exists():
             os.rename(leftover, target)
         else:
             shutil.rmtree(leftover, ignore_errors=True)
-
-
-def _in_use(leftover: Path, process: str, machine: str) -> bool:
-    if machine not in ("", _host()):
-        return time.time() - leftover.stat().st_ctime < _DAY
-    return psutil.pid_exists(int(process)) and int(process) != os.getpid()
-
-
-def _process() -> str:
-    """`PID-HOST`: this process among those of all machines (containers) that may share a folder."""
-    return f"{os.getpid()}-{_host()}"
-
-
-def _host() -> str:
-    """Eight hexadecimal digits for this machine's name."""
-    return f"{zlib.crc32(os.fsencode(platform.node())):08x}"
 
 
 def _stem(target: Path) -> str:

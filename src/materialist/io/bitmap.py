@@ -43,9 +43,10 @@ class Decoded:
     alpha: Array | None = None
     """[H, W, 1] in [0, 1] of a scene-linear file with transparent parts, whose `linear` is the light of the rest."""
 
-    def over(self, radiance: float) -> Array:
-        """[H, W, 3] with `radiance` behind what is transparent."""
-        return self.linear if self.alpha is None else self.linear + np.float32(radiance) * (1 - self.alpha)
+    def exposed(self, stops: int = 0) -> Array:
+        """[H, W, 3] times 2**stops, with white behind what is transparent."""
+        linear = self.linear * np.float32(2.0**stops) if stops else self.linear
+        return linear if self.alpha is None else linear + (1 - self.alpha)
 
 
 def check_size(width: int, height: int, name: object) -> None:

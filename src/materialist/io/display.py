@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from materialist.color import linear_to_srgb, luminance, srgb_levels
-from materialist.io.atomic import whole_file
-from materialist.io.image import write_png_bytes
-from materialist.types import Array, Prediction
+from materialist.io.atomic import write_whole
+from materialist.types import Array, Prediction, Scene
 
 ERROR_GAIN = 4
 """What errors are multiplied by to be seen."""
@@ -47,19 +46,14 @@ def light(envmap: Array) -> Array:
     return srgb_levels(envmap * (shown / np.maximum(power, 1e-8)))
 
 
-def nearness(depth: Array) -> Array:
-    """[H, W] inverse of planar depth [H, W], stretched to [0.1, 1] so that near is bright; 0 without a surface."""
+def depths(depth: Array) -> Array:
+    """The inverse of planar depth [H, W]: near bright, far dark, black where there is no surface."""
     known = depth > 0
     if not known.any():
-        return np.zeros_like(depth)
+        return ramp(np.zeros_like(depth))
     inverse = np.where(known, 1 / np.where(known, depth, 1), 0)
     low, high = np.percentile(inverse[known], [1, 99])
-    return np.where(known, 0.1 + 0.9 * np.clip((inverse - low) / max(high - low, 1e-9), 0, 1), 0)
-
-
-def depths(depth: Array) -> Array:
-    """Planar depth [H, W]: near bright, far dark, black where there is no surface."""
-    return ramp(nearness(depth))
+    return ramp(np.where(known, 0.1 + 0.9 * np.clip((inverse - low) / max(high - low, 1e-9), 0, 1), 0))
 
 
 def error(photo: Array, rerender: Array) -> Array:
@@ -72,20 +66,21 @@ def factor(values: Array) -> Array:
     return to_bytes(0.5 + np.log2(np.maximum(values, 1e-6)) / 4)
 
 
+def maps(of: Prediction | Scene) -> dict[str, Array]:
+    """Each map of a prediction or a scene by its name."""
+    m, geometry = of.materials, {"normal": normals(of.normal), "depth": depths(of.depth)}
+    return {"albedo": srgb_levels(m.albedo), "roughness": grey(m.roughness), "metallic": grey(m.metallic), **geometry}
+
+
 def strip(image: Array, *predictions: Prediction) -> Array:
     """The linear picture and, under each other, the maps of each prediction: one row of a sheet, uint8 RGB."""
     import cv2
 
-    joined = np.concatenate([np.concatenate([srgb_levels(image), *_maps(p)], 1) for p in predictions], 0)
+    rows = [np.concatenate([srgb_levels(image), *maps(p).values()], 1) for p in predictions]
+    joined = np.concatenate(rows, 0)
     factor = _SIDE / max(image.shape[:2])
     size = (max(1, round(joined.shape[1] * factor)), max(1, round(joined.shape[0] * factor)))
     return cv2.resize(joined, size, interpolation=cv2.INTER_AREA)
-
-
-def _maps(prediction: Prediction) -> list[Array]:
-    m = prediction.materials
-    rest = [grey(m.roughness), grey(m.metallic), normals(prediction.normal), grey(nearness(prediction.depth))]
-    return [srgb_levels(m.albedo), *rest]
 
 
 def write_sheet(strips: list[Array], path: Path) -> None:
@@ -94,8 +89,7 @@ def write_sheet(strips: list[Array], path: Path) -> None:
         return
     wide = max(s.shape[1] for s in strips)
     padded = [np.pad(s, ((0, 6), (0, wide - s.shape[1]), (0, 0))) for s in strips]
-    with whole_file(path, force=True) as file:
-        write_png_bytes(file, np.concatenate(padded, 0))
+    write_whole(path, encoded(np.concatenate(padded, 0)))
 
 
 def encoded(pixels: Array, kind: str = "PNG", **settings: int) -> bytes:

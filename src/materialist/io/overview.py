@@ -69,13 +69,9 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
         ("Shading residual", "photo / re-rendering, grey is 1", display.factor(residual)),
         ("Error", off, display.error(photo.linear, scene.rerender)),
     ]
-    maps = [
-        ("Albedo", f"mean {m.albedo.mean():.2f}", srgb_levels(m.albedo)),
-        ("Roughness", f"mean {m.roughness.mean():.2f}", display.grey(m.roughness)),
-        ("Metallic", f"mean {m.metallic.mean():.2f}", display.grey(m.metallic)),
-        ("Normal", "camera frame", display.normals(scene.normal)),
-        ("Depth", span, display.depths(scene.depth)),
-    ]
+    notes = {name: f"mean {values.mean():.2f}" for name, values in vars(m).items()}
+    notes |= {"normal": "camera frame", "depth": span}
+    maps = [(name.capitalize(), notes[name], pixels) for name, pixels in display.maps(scene).items()]
     planes = f"{continued or 'none'} continued, {len(geometry.mesh.faces):,} triangles"
     last = [
         _Tile("Environment map", f"brightest {scene.envmap.max():.3g}", display.light(scene.envmap), 2.0),

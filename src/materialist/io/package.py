@@ -137,11 +137,9 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     try:
         stops = int(meta.get("stops", 0))
         if meta["has_source"]:
-            original = decode_photo(file).over(2.0**-stops)
-            original = original * np.float32(2.0**stops) if stops else original
+            original, source = decode_photo(file).exposed(stops), file.read_bytes()
         else:
-            original = read_exr(file)
-        source = file.read_bytes() if meta["has_source"] else None
+            original, source = read_exr(file), None
     except (MaterialistError, OSError) as error:
         raise SceneError(f"The original photo in {folder} cannot be read: {error}") from error
     return Photo(

@@ -54,7 +54,7 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     decoded = decode_photo(file)
     hdr = decoded.scene_linear and not _is_clipped(decoded.linear)
     stops = _stops(_working(decoded.linear, size)) if hdr else 0
-    original = decoded.over(2.0**-stops)
+    original = decoded.exposed(stops)
     height, width = original.shape[:2]
     linear = _working(original, size)
     warnings = list(decoded.warnings)
@@ -63,7 +63,6 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
             "The picture is 2:1 like a 360-degree panorama; it is treated as an ordinary photo, so crop a view from it."
         )
     if stops:
-        original, linear = (picture * np.float32(2.0**stops) for picture in (original, linear))
         warnings.append(f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit.")
     _require_content(linear, name)
     if hdr and float(linear.max()) > HDR_CLIP:

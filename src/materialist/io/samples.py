@@ -17,7 +17,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.atomic import whole_file, writing
+from materialist.io.atomic import whole_file, write_whole, writing
 from materialist.types import Array, Camera, Materials, Prediction
 
 Progress = Callable[[str, int, int], None]
@@ -192,8 +192,7 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
                         f"{folder} was begun with {key} {old.get(key)}, not {description[key]}; go on with that or "
                         "name another folder."
                     )
-        with whole_file(folder / name, force=True) as file:
-            file.write_text(json.dumps(description, indent=1) + "\n", "utf-8")
+        write_whole(folder / name, json.dumps(description, indent=1) + "\n")
 
 
 def described(file: Path) -> dict[str, Any] | None:

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError, SetupError
@@ -52,9 +53,11 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
 def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
     from imageio.v2 import get_writer
 
-    how = {"codec": "libx264", "quality": 8, "macro_block_size": 2, "output_params": list(BT709)}
     count = 0
-    with get_writer(path, "FFMPEG", fps=fps, **how) as writer:
+    writer: Any = get_writer(
+        path, "FFMPEG", fps=fps, codec="libx264", quality=8, macro_block_size=2, output_params=list(BT709)
+    )  # fmt: skip
+    with writer:
         for picture in pictures:
             height, width = (n - n % 2 for n in picture.shape[:2])
             writer.append_data(srgb_levels(picture[:height, :width]))

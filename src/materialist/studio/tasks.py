@@ -13,7 +13,7 @@ import materialist as mt
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.io import display
-from materialist.io.atomic import partial, whole_file
+from materialist.io.atomic import partial, write_whole
 from materialist.jobs.worker import Reporter
 from materialist.studio import SETTINGS
 from materialist.types import Array, Materials, Prediction, Scene
@@ -93,8 +93,7 @@ def mesh(report: Reporter, scene: str, output: str) -> None:
 
     report("export", 0, 1)
     loaded = mt.load_scene(scene)
-    with whole_file(output, force=True) as file:
-        file.write_bytes(glb_bytes(loaded, scene_parts(loaded, PAGE_TRIANGLES)[:1]))
+    write_whole(output, glb_bytes(loaded, scene_parts(loaded, PAGE_TRIANGLES)[:1]))
 
 
 def take(report: Reporter, scene: str, steps: Steps, output: str, what: str) -> None:
@@ -170,5 +169,4 @@ def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
 
 
 def write_pixels(path: Path, pixels: Array) -> None:
-    with whole_file(path, force=True) as file:
-        file.write_bytes(display.encoded(pixels, "JPEG", quality=SETTINGS.jpeg_quality))
+    write_whole(path, display.encoded(pixels, "JPEG", quality=SETTINGS.jpeg_quality))

@@ -20,7 +20,7 @@ import numpy as np
 
 from materialist.edits.recipe import Step, read_recipe, with_files
 from materialist.errors import InputError
-from materialist.io.atomic import make_folder, whole_file, writing
+from materialist.io.atomic import make_folder, write_whole, writing
 from materialist.io.display import encoded
 from materialist.studio import SETTINGS
 from materialist.types import Array
@@ -128,8 +128,7 @@ def store(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
     """Write a file whole unless it exists; returns its name, which holds its hash."""
     file = workspace / f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
     if not file.is_file():
-        with whole_file(file, force=True) as temporary:
-            temporary.write_bytes(content)
+        write_whole(file, content)
     return file.name
 
 

@@ -72,7 +72,7 @@ def _base_colour(scene: Scene, weight: Array, wanted: MaterialEdit) -> tuple[Arr
         if isinstance(picture, str | Path):
             from materialist.io.photo import decode_photo
 
-            picture = np.clip(decode_photo(Path(picture)).over(1.0), 0, 1)
+            picture = np.clip(decode_photo(Path(picture)).exposed(), 0, 1)
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
         return projected(scene, region, picture, wanted.texture_scale), list(np.shape(picture))
     if wanted.albedo is not None:

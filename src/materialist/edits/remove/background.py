@@ -47,7 +47,7 @@ def picture_behind(
 
         decoded = decode_photo(Path(background))
         notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
-        background = decoded.over(1.0) * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
+        background = decoded.exposed() * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
     picture = np.asarray(background, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, hole.shape):
         raise InputError(
