@@ -10,7 +10,14 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
 def srgb_to_linear(srgb: Array) -> Array:
-    """Decode sRGB in [0, 1] (any shape) by the piecewise curve of IEC 61966-2-1; returns float32."""
+    """Decode sRGB (any shape) by the piecewise curve of IEC 61966-2-1; returns float32.
+
+    srgb: values in [0, 1], or whole levels of a display file, uint8 or uint16.
+    """
+    srgb = np.asarray(srgb)
+    if srgb.dtype.kind == "u":  # by table: as exact, and faster
+        top = np.iinfo(srgb.dtype).max
+        return srgb_to_linear(np.arange(top + 1, dtype=np.float32) / np.float32(top))[srgb]
     srgb = np.asarray(srgb, np.float32)
     return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
 

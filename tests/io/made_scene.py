@@ -22,7 +22,7 @@ def make_scene(height: int = 24, width: int = 33) -> Scene:
     pixels = rng.integers(0, 256, (height, width, 3)).astype(np.uint8)
     buffer = io.BytesIO()
     Image.fromarray(pixels).save(buffer, "PNG")
-    original = srgb_to_linear(np.arange(256, dtype=np.float32) / np.float32(255))[pixels]
+    original = srgb_to_linear(pixels)
     photo = Photo(original, camera, original, False, "exif", "folder/kitchen.PNG", buffer.getvalue(), ("odd colours",))
     depth = 2 + random(height, width)
     depth[:3] = 0

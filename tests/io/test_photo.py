@@ -30,10 +30,6 @@ def picture(height=20, width=30, seed=0):
     return np.round(127 + 60 * np.stack(waves, -1)).clip(0, 255).astype(np.uint8)
 
 
-def linear8(pixels):
-    return srgb_to_linear(pixels.astype(np.float32) / 255)
-
-
 def save(path, pixels, **options):
     Image.fromarray(pixels).save(path, **options)
     return path
@@ -43,7 +39,7 @@ def save(path, pixels, **options):
 def test_lossless_8_bit_files_decode_exactly(tmp_path, suffix):
     pixels = picture()
     photo = read_photo(save(tmp_path / f"a.{suffix}", pixels, **({"lossless": True} if suffix == "webp" else {})))
-    np.testing.assert_allclose(photo.linear, linear8(pixels), atol=1e-6)
+    np.testing.assert_allclose(photo.linear, srgb_to_linear(pixels), atol=1e-6)
     assert photo.linear.dtype == np.float32 and photo.linear.flags.c_contiguous
     assert photo.source == (tmp_path / f"a.{suffix}").read_bytes() and photo.warnings == ()
     assert (photo.camera.width, photo.camera.height, photo.camera.fov) == (30, 20, 35.0)
@@ -183,7 +179,7 @@ def test_orientation_turns_the_photo_upright(tmp_path, orientation, suffix, dept
         cv2.imwrite(str(file), values[..., ::-1])
         data, block = file.read_bytes(), exif.tobytes().removeprefix(b"Exif\0\0")
         file.write_bytes(data[:33] + chunk(b"eXIf", block) + data[33:])
-    expected = upright.astype(np.float32) if depth == np.float32 else linear8(upright)
+    expected = upright.astype(np.float32) if depth == np.float32 else srgb_to_linear(upright)
     np.testing.assert_allclose(decode_photo(file).linear, expected, atol=1e-6)
 
 
@@ -209,7 +205,7 @@ def test_wide_gamut_profile_is_converted(tmp_path):
     swapped[red : red + 4], swapped[green : green + 4] = b"gXYZ", b"rXYZ"
     pixels = picture()
     photo = read_photo(save(tmp_path / "a.png", pixels, icc_profile=bytes(swapped)))
-    np.testing.assert_allclose(photo.linear, linear8(pixels[..., [1, 0, 2]]), atol=3e-3)
+    np.testing.assert_allclose(photo.linear, srgb_to_linear(pixels[..., [1, 0, 2]]), atol=3e-3)
     plain = read_photo(save(tmp_path / "b.png", pixels, icc_profile=srgb))
     np.testing.assert_array_equal(plain.linear, read_photo(save(tmp_path / "c.png", pixels)).linear)
 

@@ -70,7 +70,7 @@ class PlateBench(Benchmark):
         yield row("untouched", photo.linear)
         shades = np.round(linear_to_srgb(photo.linear) * 255).astype(np.uint8)
         filled = cv2.inpaint(shades, mask.astype(np.uint8), 5, cv2.INPAINT_TELEA)
-        yield row("diffused", srgb_to_linear(filled.astype(np.float32) / 255))
+        yield row("diffused", srgb_to_linear(filled))
         sources = {"bundled": "bundled"} | ({"published maps": f"maps:{data / MAPS}"} if (data / MAPS).is_dir() else {})
         for name, predictor in sources.items():
             picture, cost = timed(self._removed, photo, predictor, mask)

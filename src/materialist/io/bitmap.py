@@ -115,20 +115,16 @@ def _first_of(frames: int) -> list[str]:
 
 def _shallow(image: Image.Image, warnings: list[str]) -> Array:
     """8 bits a channel, any Pillow mode, to [H, W, 3] float32 linear."""
-    alpha = None
+    alpha, profile = None, image.info.get("icc_profile")
     if image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info:
         image_rgba = image.convert("RGBA")
-        alpha = np.asarray(image_rgba)[..., 3:].astype(np.float32) / 255
-        if image.mode not in ("L", "LA", "La"):
-            image_rgba.info.update(image.info)
-            image = image_rgba
-    profile = image.info.get("icc_profile")
+        alpha = np.asarray(image_rgba)[..., 3:]
+        image = image if image.mode in ("L", "LA", "La") else image_rgba
     matrix = matrix_profile(profile) if profile else None
     if matrix is not None and image.mode not in ("CMYK", "L", "LA", "1"):
-        linear = _by_matrix(np.asarray(image.convert("RGB")), matrix)
-    else:
-        linear = _srgb(np.asarray(_through_lcms(image, profile if matrix is None else None, warnings)))
-    return linear if alpha is None else _over_white(linear, alpha, warnings)
+        return _linear(np.asarray(image.convert("RGB")), alpha, matrix, warnings)
+    flat = _through_lcms(image, profile if matrix is None else None, warnings)
+    return _linear(np.asarray(flat), alpha, None, warnings)
 
 
 def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]) -> Image.Image:
@@ -151,10 +147,18 @@ def _deep(colour: Array, alpha: Array | None, profile: bytes | None, warnings: l
     matrix = matrix_profile(profile) if profile else None
     if profile and matrix is None:
         warnings.append("The colour profile of a 16-bit photo is used only where it is a matrix: taken as sRGB.")
-    linear = _by_matrix(colour, matrix)
-    if alpha is None:
+    return _linear(colour, alpha, matrix, warnings)
+
+
+def _linear(colour: Array, alpha: Array | None, matrix: MatrixProfile | None, warnings: list[str]) -> Array:
+    """[H, W, 3] float32 linear of levels, by a profile or as sRGB; straight [H, W, 1] alpha is laid over white."""
+    linear = srgb_to_linear(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour)
+    top = 1 if alpha is None else np.iinfo(alpha.dtype).max
+    if alpha is None or alpha.min() == top:
         return linear
-    return _over_white(linear, alpha / np.float32(np.iinfo(alpha.dtype).max), warnings)
+    warnings.append(OVER_WHITE)
+    share = alpha / np.float32(top)
+    return linear * share + (1 - share)
 
 
 def stored_pixels(path: Path) -> tuple[Array, Array | None]:
@@ -182,25 +186,6 @@ def _rgb(path: Path) -> tuple[Array, Array | None]:
     """`stored_pixels` with grey as RGB."""
     colour, alpha = stored_pixels(path)
     return np.broadcast_to(colour, (*colour.shape[:2], 3)), alpha
-
-
-def _by_matrix(pixels: Array, matrix: MatrixProfile | None) -> Array:
-    """Linear values of uint8 or uint16; sRGB's own where there is no profile or it is sRGB's."""
-    return _srgb(pixels) if matrix is None or matrix.is_srgb else matrix.linear(pixels)
-
-
-def _srgb(pixels: Array) -> Array:
-    """[...] uint8 or uint16 sRGB to float32 linear, by table: exact, and no copy in between."""
-    levels = np.iinfo(pixels.dtype).max + 1
-    return srgb_to_linear(np.arange(levels, dtype=np.float32) / np.float32(levels - 1))[pixels]
-
-
-def _over_white(linear: Array, alpha: Array, warnings: list[str]) -> Array:
-    """Lay [H, W, 3] with straight [H, W, 1] alpha over white, in linear light."""
-    if bool(np.all(alpha >= 1)):
-        return linear
-    warnings.append(OVER_WHITE)
-    return linear * alpha + (1 - alpha)
 
 
 def _upright(pixels: Array, orientation: int) -> Array:

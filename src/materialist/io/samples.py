@@ -58,10 +58,6 @@ class Sample:
         return Prediction(Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, "truth")
 
 
-_DECODED = srgb_to_linear(np.arange(256, dtype=np.float32) / 255)
-"""[256] linear values of 8-bit codes: a table is ten times faster than the curve."""
-
-
 class Source(ABC):
     """A set of samples."""
 
@@ -134,7 +130,7 @@ def read_sample(path: Path) -> Sample:
         length = np.sqrt(np.einsum("hwc,hwc->hw", normal, normal))[..., None]
         return Sample(
             image=as_light(arrays["image"]),
-            albedo=_DECODED[arrays["albedo"]],
+            albedo=srgb_to_linear(arrays["albedo"]),
             roughness=arrays["roughness"].astype(np.float32) / 255,
             metallic=arrays["metallic"].astype(np.float32) / 255,
             normal=normal * (surface[..., None] / np.maximum(length, 1)).astype(np.float32),
