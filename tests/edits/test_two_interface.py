@@ -28,6 +28,7 @@ def back_of_ball(camera):
 
 def shown(maps, thickness, away, picture, sky=0.0, back=None, camera=CAMERA, **options):
     """The model before a wall at depth `away` under an even sky; maps: depth, normal, mask."""
+    options |= {"model": "two-interface", "back": "same" if back is None else "found"}
     depth, normal, mask = maps
     behind = ti.Backdrop(picture, np.full(mask.shape, away), np.full((8, 16, 3), sky))
     return ti.two_interface(camera, normal, depth, mask, thickness, behind, Glass(**options), back)

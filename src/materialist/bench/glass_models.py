@@ -134,9 +134,9 @@ def two_interface(case: Case, found: Thickness, behind: Background, *, papers_ba
     The normals of the back are the known ones, or with `papers_back` the opposite of the front's.
     """
     camera, front, mask = case.scene.camera, case.scene.front, case.scene.mask
-    beyond, material = interfaces.Backdrop(behind.picture, behind.depth, case.envmap), Glass(ior=case.ior)
-    back = None if papers_back else interfaces.back_of(front.depth, mask, found.solid, found.back, camera)
-    return interfaces.two_interface(camera, front.normal, front.depth, mask, found.solid, beyond, material, back)
+    beyond = interfaces.Backdrop(behind.picture, behind.depth, case.envmap)
+    material = Glass(ior=case.ior, model="two-interface", back="same" if papers_back else "found")
+    return interfaces.two_interface(camera, front.normal, front.depth, mask, found.solid, beyond, material, found.back)
 
 
 def closed(case: Case, found: Thickness, behind: Background) -> Array:

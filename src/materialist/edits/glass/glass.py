@@ -95,7 +95,7 @@ def _two_interface(
     scene: Scene, removed: Scene, each: list[tuple[Array, Thickness]], options: Glass, envmap: Array
 ) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
-    from materialist.edits.glass.two_interface import Backdrop, back_of, two_interface
+    from materialist.edits.glass.two_interface import Backdrop, two_interface
 
     own: Array = np.zeros(scene.depth.shape, bool)
     photo = removed.photo
@@ -103,9 +103,7 @@ def _two_interface(
     clear, behind = options.transmission, Backdrop(photo.linear, removed.depth, envmap)
     for part, found in each:
         seen, front, facing = _front(scene, part, found)
-        same = options.back == "same"
-        back = None if same else back_of(front, seen, found.solid, found.back, scene.camera)
-        one = two_interface(scene.camera, facing, front, seen, found.solid, behind, options, back)
+        one = two_interface(scene.camera, facing, front, seen, found.solid, behind, options, found.back)
         picture = np.where(seen[..., None], one, picture)
         own |= seen
     # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.

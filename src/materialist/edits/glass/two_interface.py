@@ -72,12 +72,18 @@ def two_interface(
         normal: [H, W, 3] unit, camera frame. depth: [H, W] planar, scene units: the object's front.
         mask: [H, W] bool or weights.
         thickness: [H, W] scene units, >= 0: along the camera ray; of a back without normals of its own also d1.
-        options: `ior`, `tint` and `roughness` count here.
-        back: [H, W, 3] unit outward normals of the back, read at the exit's place in the picture; d1 is then the
-            distance to the surface that `thickness` describes. None: the paper's assumption, -N_p of the front there.
+        options: `ior`, `tint`, `roughness` and `back` count here: at a back that is the `same`, the paper's assumption,
+            rays have -N_p of the front at the exit's place in the picture; else d1 is the distance to the surface that
+            `thickness` describes, with its normals.
+        back: [H, W, 3] unit outward normals of that surface, where they are known better than by its depth.
     """
-    inside = surface_in(mask, depth, camera)
-    front = Front(camera, normal, depth, inside, back, None if back is None else thickness)
+    inside, rays = surface_in(mask, depth, camera), pixel_rays(camera).astype(np.float64)
+    if options.back == "same":
+        front = Front(camera, normal, depth, inside)
+    else:
+        if back is None:
+            back = back_normals(depth + thickness / np.linalg.norm(rays, axis=-1), inside, rays).astype(np.float32)
+        front = Front(camera, normal, depth, inside, back, thickness)
     d1 = thickness[inside]
     side, tint = SIDES[options.roughness > 0], np.asarray(options.tint, float)
     total = np.zeros((int(inside.sum()), 3))
@@ -91,17 +97,6 @@ def two_interface(
     result = np.zeros((*inside.shape, 3), np.float32)
     result[inside] = total / side**2
     return result
-
-
-def back_of(depth: Array, own: Array, thickness: Array, back: Array | None, camera: Camera) -> Array:
-    """[H, W, 3] unit outward normals of an object's back: those that are known, or those of its depth.
-
-    depth: [H, W] planar, of the front. own: [H, W] bool. thickness: [H, W] along the camera rays.
-    """
-    if back is not None:
-        return back
-    rays = pixel_rays(camera).astype(np.float64)
-    return back_normals(depth + thickness / np.linalg.norm(rays, axis=-1), own, rays).astype(np.float32)
 
 
 class Front:
@@ -134,13 +129,12 @@ class Front:
         self.direction = unit(rays)  # [N, 3]
         self.normal = _facing(unit(bilinear(self._normals, place)), self.direction)  # [N, 3]
 
-    def normal_at(self, point: Array) -> Array:
-        """[N, 3] N_p(S(point)): the front's unit normal at the place in the picture of points [N, 3]."""
-        return _facing(self._read(self._normals, point), unit(point))
-
     def back_at(self, point: Array) -> Array:
-        """[N, 3] the back's outward unit normal at points [N, 3]: its own, or the opposite of the front's."""
-        return -self.normal_at(point) if self._backs is None else self._read(self._backs, point)
+        """[N, 3] the back's outward unit normal at points [N, 3]: its own, or -N_p(S(point)), the front's turned."""
+        place, _ = project(point, self.camera)
+        if self._backs is not None:
+            return unit(bilinear(self._backs, place))
+        return -_facing(unit(bilinear(self._normals, place)), unit(point))
 
     def way(self, inner: Array, d1: Array) -> Array:
         """[N] d1 of rays of unit directions [N, 3] inside: to the back where it is known, else d1 [N] as it is."""
@@ -148,9 +142,6 @@ class Front:
             return d1
         found = background_distance(self.point, inner, self._ends, self.camera)
         return np.minimum(np.where(np.isfinite(found), found, d1), self._longest)
-
-    def _read(self, normals: Array, point: Array) -> Array:
-        return unit(bilinear(normals, project(point, self.camera)[0]))
 
 
 def cross(front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1)) -> Crossing:
