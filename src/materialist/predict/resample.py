@@ -9,7 +9,7 @@ EDGE_RATIO = 1.1
 """Neighbouring depths further apart than this ratio are on two surfaces and are not mixed."""
 
 
-def values(array: Array, size: tuple[int, int]) -> Array:
+def values(array: Array, size: tuple[int, ...]) -> Array:
     """[H, W] or [H, W, 3] float32 brought to `size` (height, width): area means down, bilinear up."""
     shrinks = array.shape[0] > size[0] or array.shape[1] > size[1]
     return cv2.resize(array, size[::-1], interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)

@@ -11,11 +11,11 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_region
 from materialist.edits.core.surfaces import PHOTO_GLASS
 from materialist.edits.glass.thickness import object_thickness, objects_in, wall_of
-from materialist.edits.remove.patches import resized
 from materialist.edits.remove.remove import remove
 from materialist.geometry.membrane import nearest
 from materialist.geometry.slopes import blurred_normals
 from materialist.options import Glass
+from materialist.predict import resample
 from materialist.predict.refraction.thickness import Thickness
 from materialist.solids.closed import closed_proxy
 from materialist.solids.shell import Shell, joined
@@ -110,8 +110,8 @@ def _two_interface(
     picture = clear * picture + (1 - clear) * scene.photo.linear * own[..., None]
     linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
-    share = np.clip(resized(own.astype(np.float32), native), 0, 1)[..., None]
-    near = resized(picture[nearest(own)], native)  # with nothing else mixed in where it is enlarged
+    share = np.clip(resample.values(own.astype(np.float32), native), 0, 1)[..., None]
+    near = resample.values(picture[nearest(own)], native)  # with nothing else mixed in where it is enlarged
     original = (share * near + (1 - share) * photo.original).astype(np.float32)
     return replace(removed, photo=replace(photo, linear=linear, original=original))
 

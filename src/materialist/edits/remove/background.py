@@ -9,10 +9,11 @@ import numpy as np
 
 from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edits.remove.behind import HiddenGeometry
-from materialist.edits.remove.patches import patched, resized
+from materialist.edits.remove.patches import patched
 from materialist.errors import InputError, SetupError, WeightsError
 from materialist.io.image import same_aspect
 from materialist.options import Removal
+from materialist.predict import resample
 from materialist.predict.weights import INSTEAD
 from materialist.types import Array, Scene
 
@@ -104,5 +105,5 @@ def _diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int
         prompt=PROMPT, image=image, mask_image=mask, height=h, width=w, num_inference_steps=steps,
         generator=torch.Generator("cpu").manual_seed(seed), output_type="np",
     ).images[0]  # fmt: skip
-    large = srgb_to_linear(np.clip(resized(np.asarray(out, np.float32), hole.shape), 0, 1))
+    large = srgb_to_linear(np.clip(resample.values(np.asarray(out, np.float32), hole.shape), 0, 1))
     return np.where(hole[..., None], large, photo).astype(np.float32)

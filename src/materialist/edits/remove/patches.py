@@ -15,6 +15,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import SetupError
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
+from materialist.predict import resample
 from materialist.types import Array
 
 
@@ -47,16 +48,16 @@ def patched(
     native = photo.shape[:2]
     scale = min(1.0, SETTINGS.longest / max(native))
     shape = tuple(max(1, round(n * scale)) for n in native)
-    picture = resized(photo, shape)
+    picture = resample.values(photo, shape)
     near = grown(hole, max(8, round(SETTINGS.near * float(np.sqrt(hole.sum())))))
     behind = np.unique(label[hole])
     planes = behind[behind >= 0]  # the rest is many things
     usable = usable & (near | np.isin(label, planes if planes.size else behind))
-    gap, kept = (resized(m.astype(np.float32), shape) > 0 for m in (hole, ~usable & ~hole))
+    gap, kept = (resample.values(m.astype(np.float32), shape) > 0 for m in (hole, ~usable & ~hole))
     kept &= ~gap
     top = max(1.0, float(picture.max()))
     levels = np.round(255 * _encoded(picture, top)).astype(np.uint8)
-    filled = _inpainted(levels, gap, kept, resized(_guide(depth, label), shape), seed).astype(np.float32) / 255
+    filled = _inpainted(levels, gap, kept, resample.values(_guide(depth, label), shape), seed).astype(np.float32) / 255
     plain = gap & (filled == 0).all(-1)  # where no patch fitted at all
     if plain.any():
         filled = np.where(plain[..., None], membrane(filled, ~gap & ~kept), filled)
@@ -97,13 +98,3 @@ def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) 
             f"Filling what was hidden needs the package PyPatchMatch ({error}); install it with: {sys.executable} -m "
             "pip install --force-reinstall --no-deps PyPatchMatch, or give a background."
         ) from error
-
-
-def resized(picture: Array, shape: tuple[int, ...]) -> Array:
-    """[h, w] or [h, w, C] at another size (rows, columns, ...), averaged when it shrinks."""
-    import cv2
-
-    if picture.shape[:2] == shape[:2]:
-        return picture.copy()
-    how = cv2.INTER_AREA if picture.shape[0] > shape[0] else cv2.INTER_LINEAR
-    return np.asarray(cv2.resize(np.ascontiguousarray(picture, np.float32), shape[1::-1], interpolation=how))

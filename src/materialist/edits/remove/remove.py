@@ -11,10 +11,10 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import picture_behind
 from materialist.edits.remove.behind import behind
 from materialist.edits.remove.hole import evidence_notes, make_hole
-from materialist.edits.remove.patches import resized
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import window
 from materialist.options import Removal
+from materialist.predict import resample
 from materialist.types import Array, Materials, Photo, Scene
 
 FLOOR = 0.05
@@ -76,9 +76,9 @@ def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
     """The photo with a picture [h, w, 3] linear of any size in the hole [H, W] bool; elsewhere bit for bit itself."""
     original, share = photo.original.copy(), _outline(hole, photo.original.shape[:2])
     box = window(hole, share.shape)
-    over, large = share[box][..., None], resized(picture, share.shape)[box]
+    over, large = share[box][..., None], resample.values(picture, share.shape)[box]
     original[box] = np.where(over > 0, over * large + (1 - over) * original[box], original[box])
-    linear = np.where(hole[..., None], resized(picture, hole.shape), photo.linear).astype(np.float32)
+    linear = np.where(hole[..., None], resample.values(picture, hole.shape), photo.linear).astype(np.float32)
     return replace(photo, linear=linear, original=original)
 
 
