@@ -12,10 +12,10 @@ from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
 from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, hull, load
-from materialist.edits.insert.insert import Support, moved, put, support_at, surface_points
+from materialist.edits.insert.insert import Support, moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.errors import InputError
-from materialist.geometry.planes import axes
+from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
@@ -132,12 +132,12 @@ class Falling:
 
     def at(self, poses: list[Pose], gone: frozenset[int] = frozenset()) -> Scene:
         """The scene with the things in these poses, without those of the numbers `gone`."""
-        placed = tuple(
-            _posed(body, self.to_up, self.factor, shift, thing, pose)
-            for k, ((bodies, shift), thing, pose) in enumerate(zip(self.starts, self.things, poses))
-            for body in bodies
-            if k not in gone
-        )
+        placed = []
+        for k, ((bodies, shift), thing, pose) in enumerate(zip(self.starts, self.things, poses)):
+            turn = self.to_up.T @ pose.turn @ self.to_up
+            # In metres, z up: x -> R (x + shift - first centre) + centre.
+            move = (pose.turn @ (shift - thing.centre) + pose.centre) / self.factor @ self.to_up
+            placed += [moved(body, turn, move) for body in bodies if k not in gone]
         dropped = replace(self.scene, bodies=(*self.scene.bodies, *placed))
         return noted(warned(dropped, *self.notes), "drop", self.what)
 
@@ -188,14 +188,8 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
         return direction / np.linalg.norm(direction)
     if support.normal[1] > DEFAULT.upright:
         return -support.normal
-    for label in range(int(scene.geometry.plane_label.max(initial=-1)) + 1):
-        rows, columns = np.nonzero(scene.geometry.plane_label == label)
-        if len(rows):
-            middle = len(rows) // 2
-            plane = support_at(scene, (float(columns[middle]), float(rows[middle])))
-            if plane.normal[1] > DEFAULT.upright:
-                return -plane.normal
-    return np.array([0.0, -1.0, 0.0])
+    floor = upright(scene.normal, scene.geometry.plane_label)
+    return np.array([0.0, -1.0, 0.0]) if floor is None else -floor
 
 
 def _places(at: Any, count: int) -> list[tuple[float, float]]:
@@ -239,13 +233,6 @@ def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: 
         pieces = convex_pieces(points, faces, seed=wanted.seed)
         things.append(RigidBody(tuple(piece - centre for piece in pieces), centre, turning))
     return things
-
-
-def _posed(body: Body, to_up: Array, factor: float, shift: Array, thing: RigidBody, pose: Pose) -> Body:
-    turn = to_up.T @ pose.turn @ to_up
-    # In metres, z up: x -> R (x + shift - first centre) + centre.
-    move = (pose.turn @ (shift - thing.centre) + pose.centre) / factor @ to_up
-    return moved(body, turn, move)
 
 
 def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:

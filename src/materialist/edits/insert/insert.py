@@ -38,8 +38,11 @@ class Support:
     """[3] float64: where the pixel's ray meets it, camera frame, scene units."""
     normal: Array
     """[3] float64 unit, to the camera."""
-    depth: float
-    """Planar depth of the point, scene units."""
+
+    @property
+    def depth(self) -> float:
+        """Planar depth of the point, scene units."""
+        return float(-self.point[2])
 
 
 def insert(
@@ -125,7 +128,7 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
         along = float(ray @ normal)
         if along < -0.05:  # a surface seen edge-on keeps the pixel's own point
             point = ray * np.clip(offset / along, 0.8 * depth, 1.25 * depth)
-    return Support(point, normal, float(-point[2]))
+    return Support(point, normal)
 
 
 def picture_width(scene: Scene, depth: float) -> float:

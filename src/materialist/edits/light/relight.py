@@ -12,7 +12,7 @@ from materialist.color import LUMINANCE, luminance
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
-from materialist.envmap import row_solid_angle
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Relight
@@ -169,7 +169,10 @@ def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 
         raise InputError(f"The sun's azimuth is {azimuth:g}; it must lie in [-360, 360] degrees.")
     if not (np.isfinite(elevation) and -90 <= elevation <= 90):
         raise InputError(f"The sun's elevation is {elevation:g}; it must lie in [-90, 90] degrees.")
-    angle = _angle_to(envmap.shape[0], azimuth, elevation)  # [h, 2h] degrees
+    az, el = np.radians(azimuth), np.radians(elevation)
+    towards = np.array([np.cos(el) * np.sin(az), np.sin(el), -np.cos(el) * np.cos(az)])
+    cosine = texel_directions(*envmap.shape[:2]) @ towards
+    angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))  # [h, 2h]
     solid = row_solid_angle(envmap.shape[0])[:, None]  # [h, 1]
     texel = 180 / envmap.shape[0]
     disc = np.clip((max(SETTINGS.sun_radius, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
@@ -180,15 +183,6 @@ def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 
     calm = envmap * np.minimum(1, limit / np.maximum(bright, 1e-12))[..., None]
     sun = disc[..., None] * radiance * kelvin_colour(5500)
     return calm.astype(np.float32), sun.astype(np.float32)
-
-
-def _angle_to(rows: int, azimuth: float, elevation: float) -> Array:
-    """[h, 2h] angle between texel centres and a direction, degrees."""
-    theta = np.pi * (np.arange(rows) + 0.5)[:, None] / rows
-    phi = np.pi * ((np.arange(2 * rows) + 0.5)[None] / rows - 1)
-    az, el = np.radians(azimuth), np.radians(elevation)
-    cosine = np.sin(theta) * np.cos(el) * np.cos(phi - az) + np.cos(theta) * np.sin(el)
-    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
 
 
 def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
