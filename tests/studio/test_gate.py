@@ -137,25 +137,6 @@ def test_a_page_belongs_to_the_browser_that_used_it_first(studio):
         studio.session("abc", studio.person(bert.cookies[PERSON]))
 
 
-def test_a_page_is_forgotten_with_its_heartbeat_and_one_that_has_none_after_a_while(studio, monkeypatch):
-    page = client(studio)
-    page.get("/")
-    person = page.cookies[PERSON]
-    one, two = studio.session("one", person), studio.session("two", person)
-    held = []
-
-    async def app(scope, receive, send):
-        held.append(one.beats)
-        studio.sweep()
-        await echo(scope, receive, send)
-
-    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(page_seconds=0.0))
-    page.app.app = app
-    assert page.get("/gradio_api/heartbeat/one").status_code == 200
-    assert held[-1] == 1
-    assert studio.session("one", person) is not one and studio.session("two", person) is not two
-
-
 def test_uploads_have_a_quota(studio, monkeypatch):
     monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(upload_quota=1000))
     page = client(studio)

@@ -76,7 +76,7 @@ def test_nothing_is_asked_of_anyone_else(page, running):
     page.wait_for_selector("#report >> text=dB from the photo")
     outside = [u for u in page.requested if not u.startswith((running[0], "data:", "blob:"))]
     assert not outside and len(page.requested) > 20 and not page.errors
-    assert any("/heartbeat/" in url for url in page.requested)  # else it would be forgotten within a minute
+    assert any("/heartbeat/" in url for url in page.requested)  # whose end is the page's
 
 
 def test_by_keyboard_alone(page, running):

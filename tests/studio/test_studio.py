@@ -123,7 +123,7 @@ def test_one_person_cannot_fill_the_queue(shared, tmp_path):
 
 def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
     folders = {}
-    for name in ("old", "fresh", "busy", "elsewhere", "ready", "edited"):
+    for name in ("old", "fresh", "elsewhere", "ready", "edited"):
         place = shared.work.root / "x.scene" if name == "elsewhere" else None
         project = shared.work.new(name, "a" * 32, scene=place)
         folders[name] = project.folder
@@ -134,8 +134,7 @@ def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
             project.workspace("me")
         if name != "fresh":
             os.utime(project.folder, (0, 0))
-    shared.jobs._jobs = [Job("invert", "a" * 32, folders["busy"], print)]
-    shared.sweep()
+    shared.work.sweep()
     assert [name for name, folder in folders.items() if not folder.exists()] == ["old"]
 
 
@@ -175,9 +174,13 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
     assert [file.name for file in tmp_path.iterdir() if file.name != "work"] == []
 
 
-def test_a_page_shows_that_it_is_open(shared):
-    """Without it a page would be forgotten a minute after its last request."""
-    pytest.importorskip("gradio", reason="needs gradio")
+def test_a_page_that_is_closed_is_forgotten(shared):
+    """Gradio calls what is bound to the page's end when the request that the page holds has ended."""
+    gradio = pytest.importorskip("gradio", reason="needs gradio")
     from materialist.studio.page import build
 
-    assert build(shared).get_config_file()["connect_heartbeat"]
+    page, session = build(shared), shared.session("page", "a" * 32)
+    assert page.get_config_file()["connect_heartbeat"]
+    (end,) = [one.fn for one in page.fns.values() if any(event == "unload" for _, event in one.targets)]
+    end(gradio.Request(session_hash="page"))
+    assert shared.session("page", "a" * 32) is not session

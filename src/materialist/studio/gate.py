@@ -1,6 +1,5 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
-import asyncio
 import hmac
 import secrets
 import time
@@ -80,17 +79,7 @@ class Gate:
                     headers.append("set-cookie", f"{name}={value}; Path=/; HttpOnly; SameSite=Lax{kept}{secure}")
             await send(message)
 
-        page = _beating(request)
-        if page is None or app is not self.app:
-            return await app(scope, receive, answer)
-        session = self.studio.session(page, scope["person"])
-        session.beats += 1
-        try:
-            await app(scope, receive, answer)
-        finally:
-            session.beats -= 1
-            if not session.beats:  # its memory is freed beside, not within, what the server does for others
-                asyncio.get_running_loop().run_in_executor(None, self.studio.leave, page)
+        await app(scope, receive, answer)
 
     def allows(self, headers: dict[bytes, bytes]) -> bool:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
@@ -127,11 +116,12 @@ class Gate:
             person = self.studio.person(request.cookies.get(PERSON))
         except InputError:  # its browser is new here
             cookies[PERSON] = person = secrets.token_hex(16)
-        request.scope["person"] = person
+        path = request.url.path.rstrip("/")
+        pages = [request.query_params.get("session_hash"), path.removeprefix(_BEAT) if path.startswith(_BEAT) else None]
         try:
-            for page in filter(None, (_beating(request), request.query_params.get("session_hash"))):
+            for page in filter(None, pages):
                 self.studio.session(page, person)
-            if request.url.path.rstrip("/") == _UPLOAD:
+            if path == _UPLOAD:
                 self.studio.note_upload(person, request.headers.get("content-length", ""))
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 403)
@@ -139,11 +129,10 @@ class Gate:
 
     async def _log_in(self, request: Request, cookies: dict[str, str]) -> Response:
         """The page where the password is right, else the form again; after too many wrong ones whatever it is."""
-        body = b""
-        async for block in request.stream():
-            body += block
-            if len(body) > _FORM_BYTES:
-                return self._form(413, "That is too long for a password.")
+        size = request.headers.get("content-length", "")
+        if not size.isdigit() or int(size) > _FORM_BYTES:
+            return self._form(413, "That is too long for a password.")
+        body = await request.body()
         now = time.monotonic()
         while self._wrong and now - self._wrong[0] > 60:
             self._wrong.popleft()
@@ -159,12 +148,6 @@ class Gate:
 
     def _form(self, status: int, message: str = "") -> Response:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
-
-
-def _beating(request: Request) -> str | None:
-    """The page whose heartbeat a request is, if it is one."""
-    path = request.url.path
-    return path.removeprefix(_BEAT).strip("/") if path.startswith(_BEAT) else None
 
 
 def names_of(host: str) -> tuple[str, ...]:

@@ -1,6 +1,5 @@
 """The page: the stage with its tools on one side, the tabs on the other; on a phone one below the other."""
 
-import secrets
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
@@ -34,10 +33,11 @@ _HEAD = (
 def build(studio: Studio) -> Any:
     context = PageContext(studio)
     parts = context.parts
+
+    def closed(request: gr.Request) -> None:
+        studio.leave(request.session_hash)
+
     with gr.Blocks(title="Materialist studio", analytics_enabled=False, fill_width=True) as page:
-        # A new studio has another key, so what it was started on is shown first.
-        key = f"materialist-last-{secrets.token_hex(4)}"
-        parts["last"] = gr.BrowserState("", storage_key=key, secret="page")
         gr.HTML(_HEAD, elem_id="head", js_on_load=None)
         with gr.Row(elem_id="body"):
             with gr.Column(scale=5, min_width=320, elem_id="left"):
@@ -50,8 +50,7 @@ def build(studio: Studio) -> Any:
         for tab in TABS:
             tab.wire(context)
         tab_open.wire(context, page)
-        # For an event of its end alone a page shows, by a request that it holds (`Gate`), that it is open.
-        page.unload(lambda: None)
+        page.unload(closed)
     return page
 
 

@@ -85,9 +85,10 @@ def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
 
 def serve(
     studio: Studio, *, host: str, port: int, password: str | None = None, proxy: str | None = None,
-    on_ready: Callable[[str], None] | None = None, stop: threading.Event | None = None,
+    on_ready: Callable[[str], None],
 ) -> None:  # fmt: skip
-    """Show the studio until Ctrl-C, or until `stop` is set. `on_ready` gets the address once the page answers."""
+    """Show the studio until Ctrl-C. `on_ready` gets the address once the page answers."""
+    studio.work.sweep()
     # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
     os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache))
     try:
@@ -117,16 +118,14 @@ def serve(
     server = uvicorn.Server(config)
     # A thread of its own: signals are for the command.
     thread = threading.Thread(target=server.run, name="server", daemon=True)
-    stop = stop or threading.Event()
     try:
         thread.start()
         while not server.started and thread.is_alive():
             time.sleep(0.01)
-        if on_ready is not None and server.started:
+        if server.started:
             name = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
             on_ready(f"https://{proxy}/" if proxy else f"http://{name}:{port}/")
-        while thread.is_alive() and not stop.wait(0.5):
-            studio.sweep()
+        thread.join()
     except KeyboardInterrupt:
         return
     finally:

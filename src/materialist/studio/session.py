@@ -45,10 +45,6 @@ class Session:
     def __init__(self, person: str, shown: Callable[[str], str] = str, local: bool = True):
         self.person, self.shown, self.local = person, shown, local
         """`shown` is `Studio.shown`; `local`: the person has the command line of this machine, too."""
-        self.beats = 0
-        """Requests that the page holds as long as it is open."""
-        self.seen = 0.0
-        """When it was last asked for, by `time.monotonic`."""
         self.lock = threading.RLock()
         self.project: Project | None = None
         self.live: LivePreview | None = None

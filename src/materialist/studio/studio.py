@@ -39,11 +39,12 @@ class Studio:
     """The scene to open first, or the photo to show on the opening tab."""
     seed: int = 0
     device: str = "auto"
+    last: dict[str, str] = field(default_factory=dict)
+    """Person -> the project last opened or begun; a page that is loaded again goes on with it."""
     _sessions: dict[str, Session] = field(default_factory=dict)
     _uploads: dict[str, deque[tuple[float, int]]] = field(default_factory=dict)
     """Person -> when, and how many bytes."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _swept: float = float("-inf")
 
     def person(self, token: Any) -> str:
         """The person of a page, from the cookie that its browser keeps. Raises InputError for an invalid one."""
@@ -59,7 +60,6 @@ class Studio:
             known = self._sessions.setdefault(page, Session(person, self.shown, self.single_user)) if page else None
             if known is None or known.person != person:
                 raise InputError(LOST)
-            known.seen = time.monotonic()
             return known
 
     def shown(self, text: str) -> str:
@@ -106,6 +106,7 @@ class Studio:
         if psutil.virtual_memory().available < SETTINGS.free_for_scene:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
+        self.last[session.person] = name
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
         """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`.
@@ -130,19 +131,6 @@ class Studio:
             session.close()
             del session
             free_memory()
-
-    def sweep(self) -> None:
-        """Forget pages that never showed that they are open, and photos that were not taken apart to the end."""
-        now = time.monotonic()
-        with self._lock:
-            gone = [
-                page for page, one in self._sessions.items() if not one.beats and now - one.seen > SETTINGS.page_seconds
-            ]
-        for page in gone:
-            self.leave(page)
-        if now - self._swept > 3600:
-            self._swept = now
-            self.work.sweep({job.folder for job in self.jobs.unfinished()})
 
     def final_file(self, session: Session) -> Path:
         """Where a page's path-traced pictures lie, without the suffix; they go when the studio ends."""

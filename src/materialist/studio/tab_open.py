@@ -86,10 +86,10 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             raise InputError("Choose one of your photos in the list first.")
         yield from _resume(context, session, name)
 
-    def arrive(session: Session, last: str) -> Iterator[Updates]:
-        known = _projects(context, session)
+    def arrive(session: Session) -> Iterator[Updates]:
+        known, last = _projects(context, session), studio.last.get(session.person)
         yield {"projects": gr.update(choices=known, value=known[0][1] if known else None)}
-        if any(value == last for _, value in known):
+        if last is not None and any(value == last for _, value in known):
             yield from _resume(context, session, last)
         elif isinstance(studio.start, Project):
             yield from _resume(context, session, studio.start.name)
@@ -101,7 +101,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     context.long(parts["examples"].select, choose_example, data=True)
     context.long(parts["start"].click, start, "file", "predictor", "size", "fov")
     context.long(parts["continue"].click, resume, "projects")
-    context.long(page.load, arrive, "last")
+    context.long(page.load, arrive)
 
 
 @cache
@@ -150,7 +150,8 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     """Progress and first pictures of an inversion until it is over."""
     studio = context.studio
     session.note_job(job)
-    yield {"last": project.name, "start": gr.update(interactive=False)}
+    studio.last[session.person] = project.name
+    yield {"start": gr.update(interactive=False)}
     shown = 0
     for update in context.following(job):
         if len(job.found) > shown:
@@ -167,8 +168,7 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
         shutil.rmtree(project.folder, ignore_errors=True)
     yield {"start": gr.update(interactive=True)}
     if failed:
-        last = session.project.name if session.project else ""
-        yield {"found": gr.update(visible=False, value=[]), "stage": stage(session), "last": last}
+        yield {"found": gr.update(visible=False, value=[]), "stage": stage(session)}
 
 
 def _resume(context: PageContext, session: Session, name: str) -> Iterator[Updates]:
@@ -193,7 +193,7 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
         return
     known = _projects(context, session)
     yield context.everything(session) | {
-        "stage": stage(session, with_edits=False), "last": project.name, "tabs": gr.Tabs(selected="material"),
+        "stage": stage(session, with_edits=False), "tabs": gr.Tabs(selected="material"),
         "projects": gr.update(choices=known, value=project.name), "found": gr.update(visible=False, value=[]),
         "progress": box("Getting the live preview ready; select something meanwhile.", 0.6),
     }  # fmt: skip

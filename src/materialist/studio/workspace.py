@@ -11,7 +11,7 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Set
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -95,12 +95,12 @@ class WorkFolder:
             (folder / CARD).write_text(json.dumps(content, indent=1), "utf-8")
         return project
 
-    def sweep(self, busy: Set[Path]) -> None:
-        """Remove the folders of photos that were not taken apart to the end and lie idle; no job works in `busy`."""
+    def sweep(self) -> None:
+        """Remove the folders of photos that were not taken apart to the end and lie idle."""
         for project in self.projects():
             idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
-            if idle and ours and not project.ready and project.folder not in busy:
+            if idle and ours and not project.ready:
                 shutil.rmtree(project.folder, ignore_errors=True)
 
 
