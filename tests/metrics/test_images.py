@@ -5,18 +5,11 @@ import pytest
 
 from materialist import metrics
 from materialist.color import srgb_to_linear
+from materialist.envmap import texel_directions
 from materialist.errors import InputError
 from materialist.metrics.residual import LIMIT, shading_residual
 
 H = 64
-
-
-def directions(h: int) -> np.ndarray:
-    """[h, 2h, 3] unit directions of envmap texel centres, written out from the convention."""
-    theta = (np.arange(h) + 0.5) / h * np.pi
-    phi = ((np.arange(2 * h) + 0.5) / (2 * h) - 0.5) * 2 * np.pi
-    theta, phi = np.meshgrid(theta, phi, indexing="ij")
-    return np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)], -1)
 
 
 def test_psnr_of_a_known_offset_on_the_srgb_encoding():
@@ -60,7 +53,7 @@ def test_ssim_is_one_for_equal_pictures_and_falls_with_structure_lost():
 @pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0, -1), (1, 0, 0), (0.48, -0.6, 0.64)])
 def test_linear_map_is_degree_one_with_norm_of_its_gradient(axis):
     """E(d) = d . a has only degree 1 with norm |a| sqrt(4 pi / 3)."""
-    value = directions(H) @ np.asarray(axis, float)
+    value = texel_directions(H, 2 * H) @ np.asarray(axis, float)
     coefficients = metrics.sh_coefficients(np.repeat(value[..., None], 3, 2))[:, 0]
     assert np.linalg.norm(coefficients[1:4]) == pytest.approx(np.sqrt(4 * np.pi / 3), rel=1e-3)
     assert np.abs(np.delete(coefficients, [1, 2, 3])).max() < 2e-3
