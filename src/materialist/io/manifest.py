@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.errors import InputError, MaterialistError, SceneError
+from materialist.errors import InputError, SceneError
 from materialist.io.bitmap import stored_pixels
 from materialist.io.decode import RAW_SUFFIXES, image_size
 from materialist.io.exr import exr_headers, exr_size, read_exr
@@ -21,20 +21,18 @@ MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
 
 
 def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
-    """Raise SceneError unless the files are there, lie in the folder, and decode to at most `most` bytes."""
+    """Raise SceneError unless the files are there, lie in the folder, and decode to at most `most` bytes.
+
+    Raises whatever the readers of their headers raise.
+    """
     pictures = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS]
     pictures += ["photo.exr", "rerender.exr", "envmap.exr"]
     pictures += [f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3]]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
-    try:
-        total = sum(_exr_bytes(_inside(folder, name)) for name in pictures)
-        total += sum(_inside(folder, name).stat().st_size for name in meshes)
-        total += _photo_bytes(_inside(folder, original))
-        _check_size(label := _inside(folder, "plane_label.png"), image_size(label))
-    except SceneError:
-        raise
-    except Exception as error:  # readers of damaged files raise anything
-        raise SceneError(f"The scene package {folder} is damaged: {error}") from error
+    total = sum(_exr_bytes(inside(folder, name)) for name in pictures)
+    total += sum(inside(folder, name).stat().st_size for name in meshes)
+    total += _photo_bytes(inside(folder, original))
+    _check_size(label := inside(folder, "plane_label.png"), image_size(label))
     if total > most:
         raise SceneError(
             f"The scene {folder} takes {total / 1e9:.1f} GB of memory, more than {most / 1e9:g} GB; "
@@ -43,11 +41,8 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
 
 
 def read_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
-    """A map of a known shape, or of any. Raises SceneError for another one, and for NaN."""
-    try:
-        array = read_exr(path) if path.suffix == ".exr" else stored_pixels(path)[0][..., 0]
-    except MaterialistError as error:
-        raise SceneError(f"The scene package is damaged: {error}") from error
+    """A map of a known shape, or of any. Raises SceneError for another one, and for NaN, InputError for none."""
+    array = read_exr(path) if path.suffix == ".exr" else stored_pixels(path)[0][..., 0]
     if shape is not None and array.shape != shape:
         raise SceneError(f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged.")
     if not np.isfinite(array).all():
@@ -78,7 +73,7 @@ def _check_size(file: Path, found: tuple[int, int]) -> None:
         raise SceneError(f"{file} is {found[0]} x {found[1]} pixels; {LONGEST} on a side is the limit.")
 
 
-def _inside(folder: Path, name: str) -> Path:
+def inside(folder: Path, name: str) -> Path:
     """A file of the package. Raises SceneError where it is missing, or a link leads out of the folder."""
     file = folder / name
     if not file.resolve().is_relative_to(folder.resolve()):

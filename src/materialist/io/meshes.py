@@ -56,23 +56,20 @@ def write_ply(path: str | Path, mesh: Mesh) -> None:
 
 
 def read_ply(path: str | Path) -> Mesh:
-    """Read a mesh that `write_ply` wrote. Raises SceneError for a missing, damaged or foreign PLY."""
+    """Read a mesh that `write_ply` wrote. Raises SceneError for a damaged or foreign PLY."""
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            head, mark, _ = file.read(2048).partition(b"end_header\n")
-            found = re.findall(rb"^element \w+ (\d{1,10})$", head, re.MULTILINE)
-            counts = [int(count) for count in found]
-            if len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
-                raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
-            split = counts[0] * 32  # bytes of eight floats
-            if path.stat().st_size != len(head + mark) + split + counts[1] * _FACE.itemsize:
-                raise SceneError(f"The mesh {path} is truncated; save the scene again.")
-            file.seek(len(head + mark))
-            vertices = np.frombuffer(file.read(split), "<f4").reshape(-1, 8)
-            faces = np.frombuffer(file.read(), _FACE)
-    except OSError as error:
-        raise SceneError(f"The mesh {path} cannot be read: {error.strerror}.") from error
+    with path.open("rb") as file:
+        head, mark, _ = file.read(2048).partition(b"end_header\n")
+        found = re.findall(rb"^element \w+ (\d{1,10})$", head, re.MULTILINE)
+        counts = [int(count) for count in found]
+        if len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
+            raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
+        split = counts[0] * 32  # bytes of eight floats
+        if path.stat().st_size != len(head + mark) + split + counts[1] * _FACE.itemsize:
+            raise SceneError(f"The mesh {path} is truncated; save the scene again.")
+        file.seek(len(head + mark))
+        vertices = np.frombuffer(file.read(split), "<f4").reshape(-1, 8)
+        faces = np.frombuffer(file.read(), _FACE)
     corners = faces["vertex_indices"]
     if (faces["count"] != 3).any() or not np.isfinite(vertices).all():
         raise SceneError(f"The mesh {path} has faces that are no triangles, or vertices that are NaN; it is damaged.")

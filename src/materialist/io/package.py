@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from materialist import __version__
-from materialist.errors import InputError, MaterialistError, SceneError
+from materialist.errors import SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png, write_png_bytes
-from materialist.io.manifest import MAPS, MOST, check_files, read_map
+from materialist.io.manifest import MAPS, MOST, check_files, inside, read_map
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -41,33 +41,36 @@ def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
 
     Raises SceneError when it is missing, incomplete, damaged, too large or of an unknown version.
     """
-    folder = Path(path)
-    meta = _read_meta(folder)
     try:
-        camera, prior = Camera(**meta["camera"]), meta["prior"]
-        check_files(folder, Path(meta["photo"]["original"]).name, len(meta.get("bodies", ())), most)
-        shape = (camera.height, camera.width)
-        before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
-        label = (read_map(folder / "plane_label.png", shape).astype(np.int16) - 1).astype(np.int8)
-        return Scene(
-            camera=camera,
-            photo=_read_photo(folder, meta["photo"], shape),
-            prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {})),
-            materials=materials,
-            normal=normal,
-            depth=depth,
-            geometry=Geometry(read_ply(folder / "mesh.ply"), label),
-            envmap=read_map(folder / "envmap.exr"),
-            rerender=read_map(folder / "rerender.exr", (*shape, 3)),
-            report=_read_report(folder / "report.json"),
-            provenance=meta["provenance"],
-            lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
-            bodies=read_bodies(folder, meta.get("bodies", [])),
-        )
-    except SceneError:
+        return _read(Path(path), most)
+    except (SceneError, MemoryError):
         raise
-    except (InputError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError) as error:
-        raise SceneError(f"{folder / MARKER} is incomplete or damaged ({error}); save the scene again.") from error
+    except Exception as error:  # readers of damaged files raise anything
+        raise SceneError(f"The scene package {path} cannot be read: {' '.join(str(error).split())}") from error
+
+
+def _read(folder: Path, most: float) -> Scene:
+    meta = _read_meta(folder)
+    camera, photo, prior = Camera(**meta["camera"]), meta["photo"], meta["prior"]
+    check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
+    shape = (camera.height, camera.width)
+    before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
+    label = read_map(folder / "plane_label.png", shape).astype(np.int16) - 1
+    return Scene(
+        camera=camera,
+        photo=_read_photo(folder, photo, shape),
+        prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {})),
+        materials=materials,
+        normal=normal,
+        depth=depth,
+        geometry=Geometry(read_ply(folder / "mesh.ply"), label.astype(np.int8)),
+        envmap=read_map(folder / "envmap.exr"),
+        rerender=read_map(folder / "rerender.exr", (*shape, 3)),
+        report=_read_report(folder),
+        provenance=meta["provenance"],
+        lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
+        bodies=read_bodies(folder, meta.get("bodies", [])),
+    )
 
 
 def _write(scene: Scene, folder: Path) -> None:
@@ -133,15 +136,11 @@ def _suffix_of(source: bytes) -> str:
 
 def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> Photo:
     """The Photo; its native pixels are decoded again from the original file."""
-    file = folder / Path(meta["original"]).name
-    try:
-        stops = int(meta.get("stops", 0))
-        if meta["has_source"]:
-            original, source = decode_photo(file).exposed(stops), file.read_bytes()
-        else:
-            original, source = read_exr(file), None
-    except (MaterialistError, OSError) as error:
-        raise SceneError(f"The original photo in {folder} cannot be read: {error}") from error
+    file, stops = folder / Path(meta["original"]).name, int(meta.get("stops", 0))
+    if meta["has_source"]:
+        original, source = decode_photo(file).exposed(stops), file.read_bytes()
+    else:
+        original, source = read_exr(file), None
     return Photo(
         read_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
         meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
@@ -155,15 +154,11 @@ def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, 
 
 def _read_meta(folder: Path) -> dict[str, Any]:
     """scene.json, checked for kind and version."""
-    try:
-        aside, there = interrupted_replacement(folder), folder.is_dir()
-    except OSError as error:  # a folder one may not enter, a name that is too long
-        raise SceneError(f"{folder} cannot be read: {(error.strerror or str(error)).lower()}.") from error
-    if aside is not None:
+    if (aside := interrupted_replacement(folder)) is not None:
         raise SceneError(f"An interrupted save left {folder} without its scene; get it back: mv {aside} {folder}")
-    if not there:
+    if not folder.is_dir():
         raise SceneError(f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}")
-    meta = _read_json(folder / MARKER)
+    meta = _read_json(folder, MARKER)
     if meta.get("format") != FORMAT:
         raise SceneError(f"{folder / MARKER} does not describe a scene of this program.")
     if meta.get("version") != VERSION:
@@ -174,13 +169,12 @@ def _read_meta(folder: Path) -> dict[str, Any]:
     return meta
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(folder: Path, name: str) -> dict[str, Any]:
+    path = inside(folder, name)
+    if path.stat().st_size > _JSON_BYTES:
+        raise SceneError(f"{path} has more than {_JSON_BYTES / 1e6:g} MB; the scene package is damaged.")
     try:
-        if path.stat().st_size > _JSON_BYTES:
-            raise SceneError(f"{path} has more than {_JSON_BYTES / 1e6:g} MB; the scene package is damaged.")
         content = json.loads(path.read_text("utf-8"), parse_float=_finite, parse_constant=_finite)
-    except OSError as error:
-        raise SceneError(f"{path} is missing; this is not a whole scene package.") from error
     except (ValueError, RecursionError) as error:
         raise SceneError(f"{path} is damaged ({error}); save the scene again.") from error
     if not isinstance(content, dict):
@@ -200,7 +194,7 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
     path.write_text(text, "utf-8", "backslashreplace")  # bytes of a name that are no UTF-8 become JSON's own escapes
 
 
-def _read_report(path: Path) -> FitReport:
-    content = _read_json(path)
+def _read_report(folder: Path) -> FitReport:
+    content = _read_json(folder, "report.json")
     metrics = {k: math.nan if v is None else v for k, v in content.items() if k not in ("stages", "warnings")}
     return FitReport(tuple(content.get("stages", ())), metrics, tuple(content.get("warnings", ())))
