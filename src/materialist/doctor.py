@@ -37,7 +37,6 @@ _EXTRAS = {
     "coacd": ("physics", "their convex parts"),
     "imageio-ffmpeg": ("video", "films"),
     "usd-core": ("usd", "export to USD"),
-    "fsspec": ("batch", "batches of photos behind URLs"),
     "ray": ("ray", "batches on a cluster"),
     "transformers": ("hub", "hub predictors"),
     "diffusers": ("hub", "Marigold predictor"),

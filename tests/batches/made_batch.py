@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +15,7 @@ from PIL import Image
 from materialist.errors import InputError, SetupError
 from materialist.types import Geometry, Photo, Scene
 
-TESTS = Path(__file__).resolve().parents[1]
-HELPERS = os.pathsep.join(
-    filter(None, [*(str(TESTS / folder) for folder in ("batches", "cli", "io")), os.environ.get("PYTHONPATH")])
-)
+HELPERS = os.pathsep.join(sys.path)
 """What a worker needs on its path to find these."""
 
 

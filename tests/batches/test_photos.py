@@ -1,5 +1,6 @@
 """Which photos a batch finds, and what their results are called."""
 
+import fsspec
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -47,7 +48,6 @@ def test_what_holds_no_photo_is_refused(tmp_path, make, said):
 
 
 def test_urls_are_listed_versioned_and_fetched(tmp_path):
-    fsspec = pytest.importorskip("fsspec")
     photos(tmp_path, "x", "deep/y.jpg")
     store = fsspec.filesystem("memory")
     for name in ("x.png", "deep/y.jpg"):
@@ -97,7 +97,6 @@ def test_names_are_legal_distinct_and_the_same_in_any_order(texts, random):
 
 
 def test_a_batch_behind_a_url_resumes_with_what_has_changed(tmp_path):
-    pytest.importorskip("fsspec")
     photos(tmp_path / "in", "a", "b", "c")
     (tmp_path / "in/c.png").rename(tmp_path / "c.png")
     options = {"function": "made_batch:made_up", "workers": 1, "device": "cpu"}

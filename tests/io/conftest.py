@@ -3,9 +3,6 @@
 from pathlib import Path
 
 import pytest
-from made_scene import make_scene
-
-from materialist.types import Scene
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -16,8 +13,3 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip("needs the captures in ../shared/data")
     return SHARED
-
-
-@pytest.fixture
-def scene() -> Scene:
-    return make_scene()

@@ -8,7 +8,7 @@ from PIL import Image
 
 from materialist.camera import unproject
 from materialist.color import srgb_to_linear
-from materialist.types import Camera, FitReport, Geometry, Materials, Mesh, Photo, Prediction, Scene
+from materialist.types import Body, Camera, FitReport, Geometry, Materials, Mesh, Photo, Prediction, Scene, Surface
 
 
 def make_scene(height: int = 24, width: int = 33) -> Scene:
@@ -61,3 +61,11 @@ def make_mesh(depth: np.ndarray, normal: np.ndarray, camera: Camera) -> Mesh:
     plane[-5:] = [0, 1, 2, 300, 0]
     points = unproject(depth, camera).reshape(-1, 3)
     return Mesh(points, faces, normal.reshape(-1, 3), uv, faces[:, 0].copy(), plane)
+
+
+def make_body() -> Body:
+    """A square of two triangles, of glass in part."""
+    rng = np.random.default_rng(3)
+    numbers = lambda *shape: rng.random(shape, np.float32)  # noqa: E731
+    surface = Surface(numbers(2, 3, 3), numbers(2, 3), numbers(1, 1), 0.9, 1.5, (0.5, 0.6, 1.0))
+    return Body(numbers(4, 3), np.int32([[0, 1, 2], [0, 2, 3]]), numbers(4, 3), numbers(4, 2), surface, "a jug")

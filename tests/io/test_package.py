@@ -10,7 +10,7 @@ from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
 import pytest
-from made_scene import make_scene
+from made_scene import make_body, make_scene
 
 from materialist import __version__
 from materialist.errors import OutputError, SceneError
@@ -19,7 +19,6 @@ from materialist.io.atomic import ensure_writable
 from materialist.io.exr import write_exr
 from materialist.io.meshes import read_ply, write_ply
 from materialist.io.package import load_scene, save_scene
-from materialist.types import Body, Surface
 
 
 @pytest.fixture
@@ -48,10 +47,7 @@ def assert_same(a, b, where="scene"):
 
 @pytest.mark.parametrize("from_memory", [False, True])
 def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
-    rng = np.random.default_rng(3)
-    numbers = lambda *shape: rng.random(shape, np.float32)  # noqa: E731
-    surface = Surface(numbers(2, 3, 3), numbers(2, 3), numbers(1, 1), 0.9, 1.4, (0.5, 0.6, 1.0))
-    body = Body(numbers(4, 3), np.int32([[0, 1, 2], [0, 2, 3]]), numbers(4, 3), numbers(4, 2), surface, "a jug")
+    body = make_body()
     coated = replace(body, name="another", surface=replace(body.surface, glass_roughness=0.25))
     full = replace(scene, bodies=(body, coated))
     if from_memory:

@@ -5,6 +5,7 @@ import os
 import shutil
 import struct
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 import psutil
@@ -12,12 +13,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from made_png import png_header
-from made_scene import make_scene
+from made_scene import make_body, make_scene
 
 from materialist.errors import SceneError
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
-from materialist.types import Body, Scene, Surface
+from materialist.types import Scene
 
 resource = pytest.importorskip("resource", reason="needs POSIX limits")
 FEW = settings(max_examples=60, deadline=5000, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -26,14 +27,8 @@ FEW = settings(max_examples=60, deadline=5000, suppress_health_check=[HealthChec
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """A package with a body."""
-    rng = np.random.default_rng(3)
-    one = lambda *shape: rng.random(shape, np.float32)  # noqa: E731
-    body = Body(
-        one(4, 3), np.int32([[0, 1, 2], [0, 2, 3]]), one(4, 3), one(4, 2), Surface(one(2, 3, 3), one(2, 3), one(1, 1))
-    )
-    scene = make_scene()
     path = tmp_path_factory.mktemp("whole") / "a.scene"
-    save_scene(Scene(**{**vars(scene), "bodies": (body,)}), path)
+    save_scene(replace(make_scene(), bodies=(make_body(),)), path)
     load_scene(path)
     return path
 

@@ -59,14 +59,13 @@ def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
 
 def _of_folder(folder: Path, runs: Path) -> list[Listed]:
     found = []
-    own = os.path.realpath(runs)
-    if os.path.realpath(folder) == own:
+    seen = {os.path.realpath(runs)}
+    if os.path.realpath(folder) in seen:
         raise InputError(f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}.")
     try:
-        seen = set[str]()
         for place, below, files in os.walk(folder, onerror=_raise, followlinks=True):
             real = os.path.realpath(place)
-            if MARKER in files or LEDGER in files or real == own or real in seen:
+            if MARKER in files or LEDGER in files or real in seen:
                 below.clear()
                 continue
             seen.add(real)

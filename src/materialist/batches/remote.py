@@ -67,10 +67,8 @@ def local_copy(location: str) -> Iterator[Path]:
 @contextmanager
 def _opened(url: str) -> Iterator[tuple[Any, str]]:
     """The file system of a URL and the path in it; errors of the store become a sentence without the URL's secrets."""
-    try:
-        import fsspec
-    except ModuleNotFoundError as error:
-        raise SetupError("Photos behind URLs need fsspec; install it with: pip install 'materialist[batch]'") from error
+    import fsspec
+
     try:
         yield fsspec.core.url_to_fs(url)
     except (InputError, SetupError):
