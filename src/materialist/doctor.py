@@ -35,7 +35,8 @@ _EXTRAS = {
     "gradio": ("studio", "the studio"),
     "mujoco": ("physics", "things that fall"),
     "coacd": ("physics", "their convex parts"),
-    "imageio-ffmpeg": ("video", "films"),
+    "imageio": ("video", "films"),
+    "imageio-ffmpeg": ("video", "their encoder"),
     "usd-core": ("usd", "export to USD"),
     "ray": ("ray", "batches on a cluster"),
     "transformers": ("hub", "hub predictors"),
@@ -68,18 +69,11 @@ def examine(device: str = "auto") -> list[Finding]:
         llvm,
         _renderer(path),
         _cuda(needed=device == "cuda"),
-        *(_extra(name, *what) for name, what in _EXTRAS.items()),
+        *(_package(name, *what) for name, what in _EXTRAS.items()),
         _weights(),
         _memory(),
         _disk(),
     ]
-
-
-def _package(name: str) -> Finding:
-    try:
-        return Finding(name, "ok", version(name))
-    except PackageNotFoundError:
-        return Finding(name, "broken", "not installed", _pip(name))
 
 
 def _pip(name: str) -> str:
@@ -131,11 +125,14 @@ def _cuda(needed: bool = False) -> Finding:
     return Finding("GPU (CUDA)", "missing", "no NVIDIA GPU answers; everything runs on the CPU")
 
 
-def _extra(name: str, extra: str, purpose: str) -> Finding:
+def _package(name: str, extra: str = "", purpose: str = "") -> Finding:
+    """Whether a package is installed, which the main job needs unless it is of an extra."""
     try:
-        return Finding(name, "ok", f"{version(name)} ({purpose})")
+        return Finding(name, "ok", version(name) + (f" ({purpose})" if extra else ""))
     except PackageNotFoundError:
-        return Finding(name, "missing", f"optional: {purpose}", _pip(f"'materialist[{extra}]'"))
+        if extra:
+            return Finding(name, "missing", f"optional: {purpose}", _pip(f"'materialist[{extra}]'"))
+        return Finding(name, "broken", "not installed", _pip(name))
 
 
 def _weights() -> Finding:

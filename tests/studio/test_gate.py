@@ -11,11 +11,11 @@ from starlette.testclient import TestClient
 
 from materialist.errors import InputError
 from materialist.studio import StudioSettings, gate
-from materialist.studio.gate import Gate, names_of
+from materialist.studio.gate import Gate
 from materialist.studio.server import password_of
 from materialist.studio.studio import PERSON
 
-ALONE = names_of("127.0.0.1")
+ALONE = "127.0.0.1"
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ def headers(**values):
     ],
 )  # fmt: skip
 def test_welcome(studio, sent, alone, everyone, behind):
-    assert Gate(echo, studio, names=ALONE).allows(headers(**sent)) is alone
+    assert Gate(echo, studio, host=ALONE).allows(headers(**sent)) is alone
     assert Gate(echo, studio).allows(headers(**sent)) is everyone
     assert Gate(echo, studio, proxy="studio.example").allows(headers(**sent)) is behind
 
@@ -84,7 +84,7 @@ def test_no_preflight_of_another_site_is_answered(studio):
 
 def test_every_answer_tells_the_browser_to_be_careful(studio):
     page = client(studio, password="word")
-    for answer in (client(studio).get("/"), page.get("/"), client(studio, names=ALONE).get("/")):
+    for answer in (client(studio).get("/"), page.get("/"), client(studio, host=ALONE).get("/")):
         assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
         assert answer.headers["x-content-type-options"] == "nosniff"
 

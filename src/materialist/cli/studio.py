@@ -1,5 +1,7 @@
 """`materialist studio [PHOTO|SCENE]`."""
 
+import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -7,52 +9,57 @@ import typer
 
 from materialist.cli.options import Computing
 from materialist.cli.outcome import report_success
+from materialist.option_kinds import option
+
+# fmt: off
+
+
+@dataclass(frozen=True, kw_only=True)
+class Serving(Computing):
+    """Who can reach the studio, and what it works with."""
+
+    host: str = option(
+        "127.0.0.1", "Address to serve on; other than this machine needs a password or --open.", kind="name")
+    port: int = option(7860, "Port.", kind="whole", low=1, high=65535, called="--port")
+    work: Path = option(Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR")
+    password: str | None = option(
+        None, "Ask everyone for it; `ps` shows an argument, so MATERIALIST_PASSWORD may hold it.", kind="name",
+        metavar="WORD")
+    password_file: Path | None = option(None, "Its first line is the password.", kind="file", metavar="FILE")
+    behind_proxy: str | None = option(
+        None, "The name that people ask a proxy before the studio for.", kind="name", metavar="HOST")
+    everyone: bool = option(False, "Let everybody in who can reach --host.", kind="switch", flag="--open")
+    workers: int = option(
+        1, "How many fits and renderings may run at once.", kind="whole", low=1, high=64, called="--workers",
+        metavar="N")
+
+
+# fmt: on
 
 
 def studio(
+    how: Serving,
     target: Annotated[
         str | None, typer.Argument(metavar="[PHOTO|SCENE]", help="What to open first: a photo, or a scene package.")
     ] = None,
-    host: Annotated[
-        str, typer.Option(help="Address to serve on; other than this machine needs a password or --open.")
-    ] = ("127.0.0.1"),
-    port: Annotated[int, typer.Option(help="Port.")] = 7860,
-    work: Annotated[Path, typer.Option(metavar="DIR", help="Where scenes and edits are kept.")] = Path(
-        "materialist-studio"
-    ),
-    password: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WORD", envvar="MATERIALIST_PASSWORD", help="Ask everyone for it; `ps` shows an argument."
-        ),
-    ] = None,
-    password_file: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Its first line is the password.", show_default=False)
-    ] = None,
-    behind_proxy: Annotated[
-        str | None, typer.Option(metavar="HOST", help="The name that people ask a proxy before the studio for.")
-    ] = None,
-    everyone: Annotated[bool, typer.Option("--open", help="Let everybody in who can reach --host.")] = False,
-    workers: Annotated[int, typer.Option(metavar="N", help="How many fits and renderings may run at once.")] = 1,
-    computing: Computing = Computing(),  # noqa: B008
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.studio.server import check_host, check_port, first_target, new_studio, password_of, serve
 
-    password = password_of(password, password_file)
-    single_user = check_host(host, password, everyone, behind_proxy)
-    check_port(host, port)
-    if computing.device != "auto":
+    password = password_of(how.password or os.environ.get("MATERIALIST_PASSWORD"), how.password_file)
+    single_user = check_host(how.host, password, how.everyone, how.behind_proxy)
+    check_port(how.host, how.port)
+    if how.device != "auto":
         from materialist.render.variant import setup
 
-        setup(computing.device)
-    made = new_studio(work, single_user=single_user, workers=workers, seed=computing.seed, device=computing.device)
+        setup(how.device)
+    made = new_studio(how.work, single_user=single_user, workers=how.workers, seed=how.seed, device=how.device)
     made.start = first_target(made.work, target)
-    if not computing.as_json:
+    if not how.as_json:
         typer.echo(f"Scenes and edits are kept in {made.work.root}")
 
     def on_ready(address: str) -> None:
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
-        report_success("studio", computing.as_json, lines, address=address, work=str(made.work.root))
+        report_success("studio", how.as_json, lines, address=address, work=str(made.work.root))
 
-    serve(made, host=host, port=port, password=password, proxy=behind_proxy, on_ready=on_ready)
+    serve(made, host=how.host, port=how.port, password=password, proxy=how.behind_proxy, on_ready=on_ready)

@@ -47,12 +47,14 @@ class Gate:
     """
 
     def __init__(
-        self, app: Application, studio: Studio, *, names: tuple[str, ...] | None = None, proxy: str | None = None,
+        self, app: Application, studio: Studio, *, host: str | None = None, proxy: str | None = None,
         password: str | None = None, port: int = 0,
     ) -> None:  # fmt: skip
-        """names: host names that may be asked for; None for all. proxy: HOST[:PORT] of the proxy before the studio."""
+        """host: what a studio for this machine only is bound to. proxy: HOST[:PORT] of the proxy before the studio."""
         self.app, self.studio = app, studio
-        self.names = names if proxy is None else (str(_name(f"//{proxy}")),)
+        own = None if host is None else {*LOCAL, host.lower().strip("[]")}
+        self.names = own if proxy is None else {_place(f"http://{proxy}")[0]}
+        """Host names that may be asked for; None for all."""
         self.proxy, self.password = proxy, password
         self._cookie = f"materialist_login_{port}"
         self._logins: set[str] = set()
@@ -85,13 +87,13 @@ class Gate:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
         told = {name.decode(): value.decode("latin-1").lower() for name, value in headers.items()}
         asked = told.get("x-forwarded-host", told.get("host", "")) if self.proxy else told.get("host", "")
-        if self.names is not None and _name(f"//{asked}") not in self.names:
+        origin = told.get("origin", "")
+        place = _place(f"{origin.partition('://')[0] or 'http'}://{asked}")
+        if self.names is not None and place[0] not in self.names:
             return False
         if told.get("sec-fetch-site") in ("cross-site", "same-site") and told.get("sec-fetch-mode") != "navigate":
             return False
-        origin = told.get("origin", "")
-        scheme, place = origin.partition("://")[0], _place(origin)
-        return not origin or (place is not None and place == _place(f"{scheme}://{asked}"))
+        return not origin or (_place(origin) == place and "" not in place)
 
     def _heard(self, headers: list[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
         """The headers that count: those of a proxy only where there is one, whose name then is the page's own."""
@@ -150,23 +152,10 @@ class Gate:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
 
 
-def names_of(host: str) -> tuple[str, ...]:
-    """Host names of a studio that serves this machine only, bound to `host`."""
-    return (*LOCAL, host.lower().strip("[]"))
-
-
-def _name(address: str) -> str | None:
-    try:
-        return urlsplit(address).hostname
-    except ValueError:
-        return None
-
-
-def _place(address: str) -> tuple[str, int | None] | None:
-    """(host, port) of an address, the usual port of its scheme where it names none; None where it has no host."""
+def _place(address: str) -> tuple[str, int | None]:
+    """(host, port) of an address, the usual port of its scheme where it names none; an empty host where it has none."""
     try:
         parts = urlsplit(address)
-        port = parts.port or {"http": 80, "https": 443}.get(parts.scheme)
+        return parts.hostname or "", parts.port or {"http": 80, "https": 443}.get(parts.scheme)
     except ValueError:
-        return None
-    return (parts.hostname, port) if parts.hostname else None
+        return "", None

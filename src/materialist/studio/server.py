@@ -53,9 +53,7 @@ def password_of(word: str | None, file: Path | None) -> str | None:
 
 
 def check_port(host: str, port: int) -> None:
-    """Raises InputError where the port is no port, or is taken."""
-    if not 1 <= port <= 65535:
-        raise InputError(f"--port is a number from 1 to 65535, not {port}.")
+    """Raises InputError where the port is taken."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -100,7 +98,7 @@ def serve(
     import uvicorn
     from fastapi import FastAPI
 
-    from materialist.studio.gate import Gate, names_of
+    from materialist.studio.gate import Gate
     from materialist.studio.page import build
 
     page = build(studio)
@@ -110,8 +108,7 @@ def serve(
         max_file_size=f"{SETTINGS.upload_megabytes}mb", theme=_theme(gr), css=asset("style.css"), js=asset("page.js"),
         enable_monitoring=False, pwa=False, mcp_server=False, run_history=False,
     )  # fmt: skip
-    names = names_of(host) if studio.single_user else None
-    gate = Gate(app, studio, names=names, proxy=proxy, password=password, port=port)
+    gate = Gate(app, studio, host=host if studio.single_user else None, proxy=proxy, password=password, port=port)
     config = uvicorn.Config(
         gate, host, port, log_level="warning", proxy_headers=False, server_header=False, timeout_graceful_shutdown=1
     )
@@ -137,8 +134,6 @@ def serve(
 
 def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
     """A studio on a work folder. Raises OutputError where it cannot be written."""
-    if not 1 <= workers <= 64:
-        raise InputError(f"--workers is a number from 1 to 64, not {workers}.")
     return Studio(WorkFolder(work), JobQueue(workers), single_user, seed=seed, device=device)
 
 
