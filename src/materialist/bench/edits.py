@@ -128,10 +128,10 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator
     vertices, normals, uv = (np.ascontiguousarray(x, np.float32) for x in (solid.vertices, solid.normals, solid.uv))
     surface = uniform_surface(np.array([0.15, 0.35, 0.6], np.float32), 0.4, 0.0)
     model = MeshModel((Body(vertices, solid.faces, normals, uv, surface),), "cup")
-    (body,) = insert(true_scene(sample), model, at).bodies
+    material = "as-is" if kind == "insert" else "glass"
+    (body,) = insert(true_scene(sample), model, at, material=material).bodies
     placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
-    cup = Item(placed, np.tile(body.surface.albedo, (2, 2, 1)), float(body.surface.roughness.mean()), 0.0)
-    cup, material = (cup, "as-is") if kind == "insert" else (_of_glass(cup, stage), "glass")
+    cup = Item(placed, np.tile(surface.albedo, (2, 2, 1)), float(surface.roughness.mean()), 0.0, kind == "glass cup")
     truth = staged(stage, [*stage.items, cup])
     mask = truth.seen == len(stage.items)
     yield Edit(kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask)

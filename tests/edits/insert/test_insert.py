@@ -34,6 +34,9 @@ def test_a_box_stands_upright_on_the_floor_at_the_click(box):
     np.testing.assert_allclose(place, [40, 50], atol=0.3)
     assert edited.provenance["edits"][-1]["kind"] == "insert" and scene.bodies == ()
     assert edited.materials is scene.materials and edited.geometry is scene.geometry
+    (glass,) = insert(scene, box, (40.0, 50.0), material="glass").bodies
+    gap = (glass.vertices.astype(np.float64) - body.vertices) @ UP
+    np.testing.assert_allclose(gap, 0.005 * longest, rtol=0.01)  # air, which keeps light in the glass
 
 
 def test_scale_size_and_turn(box):

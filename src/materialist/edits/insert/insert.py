@@ -12,6 +12,7 @@ from materialist.edits.core.region import checked_pixel
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.errors import InputError
 from materialist.options import Insertion
+from materialist.render.bodies import is_transparent
 from materialist.types import Array, Body, Scene
 
 
@@ -25,6 +26,7 @@ class InsertSettings:
     alike: float = 0.7  # cosine from which a neighbour's normal counts as that of the same surface
     fewest: int = 12  # pixels whose median counts, at least; with fewer the one pixel decides
     nearby: float = 1 / 24  # radius around the place, share of the picture's width, where no radius is given
+    air: float = 0.005  # under glass, share of its longest side: glass and floor without any are one block; derived
 
 
 SETTINGS = InsertSettings()
@@ -89,7 +91,9 @@ def put(
     support = support_at(scene, at, footprint)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     turned = frame(support) @ Rotation.from_euler("y", turn, degrees=True).as_matrix()
-    bodies = tuple(moved(part, turned * unit, support.point - (turned * unit) @ base) for part in model.parts)
+    air = SETTINGS.air * unit * longest if any(is_transparent(part.surface) for part in model.parts) else 0.0
+    origin = support.point + air * support.normal - (turned * unit) @ base
+    bodies = tuple(moved(part, turned * unit, origin) for part in model.parts)
     nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
     if nearest < SETTINGS.nearest * support.depth:
         raise InputError(
