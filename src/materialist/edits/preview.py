@@ -146,8 +146,6 @@ class Preview:
     def _sky(self, envmap: Array) -> Array:
         """[S, 3] radiance of the pixels without a surface."""
         rays = pixel_rays(self.scene.camera).reshape(-1, 3)[self._skies]
-        if not len(rays):
-            return np.zeros((0, 3), np.float32)
         rays = rays / np.linalg.norm(rays, axis=-1, keepdims=True)
         return environment(rays, envmap).astype(np.float32)
 

@@ -6,6 +6,7 @@ so that no ray through the picture passes between them. See docs/geometry.md for
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -86,33 +87,25 @@ def corner_vertices(surface: Array, cuts: Cuts) -> Array:
     Around a grid corner the up to four pixels fall into connected components under the links between them; each
     component has its own vertex. surface: [H, W] bool.
     """
-    height, width = surface.shape
-    pixels = np.zeros((height + 1, width + 1, 4), bool)  # which of the corner's four pixels have a surface
-    pixels[1:, 1:, TOP_LEFT], pixels[1:, :-1, TOP_RIGHT] = surface, surface
-    pixels[:-1, 1:, BOTTOM_LEFT], pixels[:-1, :-1, BOTTOM_RIGHT] = surface, surface
-    links = np.zeros((height + 1, width + 1), np.uint8)  # four bits: top, bottom, left, right pair
-    links[1:, 1:-1] |= cuts.link_x.astype(np.uint8)
-    links[:-1, 1:-1] |= cuts.link_x.astype(np.uint8) << 1
-    links[1:-1, 1:] |= cuts.link_y.astype(np.uint8) << 2
-    links[1:-1, :-1] |= cuts.link_y.astype(np.uint8) << 3
-    component = _component_table()[links]  # [H+1, W+1, 4] smallest slot of each slot's component
+    # Which of a corner's four pixels have a surface, and which pairs of them are linked: [H+1, W+1] each.
+    before, after, both = (1, 0), (0, 1), (1, 1)
+    pixels = np.stack([np.pad(surface, sides) for sides in product((before, after), repeat=2)], -1)
+    linked = [
+        (TOP_LEFT, TOP_RIGHT, np.pad(cuts.link_x, (before, both))),
+        (BOTTOM_LEFT, BOTTOM_RIGHT, np.pad(cuts.link_x, (after, both))),
+        (TOP_LEFT, BOTTOM_LEFT, np.pad(cuts.link_y, (both, before))),
+        (TOP_RIGHT, BOTTOM_RIGHT, np.pad(cuts.link_y, (both, after))),
+    ]
+    component = np.broadcast_to(np.arange(4), pixels.shape).copy()  # smallest slot of each slot's component
+    for _ in range(3):  # the longest chain has three links
+        for a, b, link in linked:
+            pair = component[..., [a, b]]
+            component[..., [a, b]] = np.where(link[..., None], pair.min(-1, keepdims=True), pair)
     leads = pixels & (component == np.arange(4))
     number = (np.cumsum(leads) - 1).reshape(leads.shape)
     index = np.where(pixels, np.take_along_axis(number, component, -1), -1)
     upper = index[:-1, :-1, BOTTOM_RIGHT], index[:-1, 1:, BOTTOM_LEFT]
     return np.stack([*upper, index[1:, :-1, TOP_RIGHT], index[1:, 1:, TOP_LEFT]], -1)
-
-
-def _component_table() -> Array:
-    """[16, 4] int64: for each pattern of links around a corner, the smallest slot connected to each slot."""
-    pairs = ((TOP_LEFT, TOP_RIGHT), (BOTTOM_LEFT, BOTTOM_RIGHT), (TOP_LEFT, BOTTOM_LEFT), (TOP_RIGHT, BOTTOM_RIGHT))
-    table = np.tile(np.arange(4), (16, 1))
-    for pattern in range(16):
-        for _ in range(3):  # the longest chain has three links
-            for bit, (a, b) in enumerate(pairs):
-                if pattern >> bit & 1:
-                    table[pattern, [a, b]] = table[pattern, [a, b]].min()
-    return table
 
 
 def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
