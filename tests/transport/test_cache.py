@@ -7,7 +7,7 @@ import pytest
 from disney_reference import diffuse_coefficients, specular_split
 
 from materialist.envmap import texel_directions
-from materialist.transport.cache import MISS, ROUGHNESS_LEVELS, CacheSettings, TransportCache, point
+from materialist.transport.cache import ROUGHNESS_LEVELS, CacheSettings, TransportCache, point
 from materialist.types import Camera, Geometry, Mesh
 
 CAMERA = Camera(12, 9, 60.0)
@@ -138,12 +138,15 @@ def test_wall_hides_the_light_behind_it(walled_floor):
         np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 0], expected, atol=6e-3)
 
 
-def test_wall_sends_the_radiance_of_its_pixel(walled_floor):
+@pytest.mark.parametrize("plane", [-1, 0], ids=["seen", "continued"])
+def test_wall_sends_the_radiance_of_its_pixel(plane):
+    geometry = quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, plane])
+    cache = TransportCache(geometry, CAMERA, CacheSettings(4096, 16))
     radiance = np.zeros((CAMERA.height, CAMERA.width, 3), np.float32)
     radiance.reshape(-1, 3)[WALL_PIXEL] = (3.0, 2.0, 1.0)
-    tables = walled_floor.gather(constant(0.0), radiance)
+    tables = cache.gather(constant(0.0), radiance)
     d, weight = hemisphere()
-    for row, p, wo in floor_rows(walled_floor):
+    for row, p, wo in floor_rows(cache):
         expected = (diffuse_coefficients(UP, d, wo) * (_meets_wall(p, d) * weight)[:, None]).sum(0) / np.pi
         measured = tables.diffuse[row].reshape(3, 3).numpy()
         np.testing.assert_allclose(measured, expected[:, None] * [3, 2, 1], atol=1.5e-2)
@@ -155,19 +158,6 @@ def _meets_wall(p, d):
         t = (-WALL_DISTANCE - p[2]) / d[:, 2]
         y = p[1] + t * d[:, 1]
     return (d[:, 2] < 0) & (y < WALL_HEIGHT - 1)
-
-
-def test_continued_planes_have_slots_of_their_own():
-    cache = TransportCache(quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, 0]), CAMERA, CacheSettings(64, 4))
-    size = CAMERA.width * CAMERA.height
-    np.testing.assert_array_equal(cache.slots, [0, 0, size, size + 1])
-    radiance = np.random.default_rng(0).random((CAMERA.height, CAMERA.width, 3)).astype(np.float32)
-    slots = cache.slot_radiance(radiance)
-    np.testing.assert_array_equal(slots[:size], radiance.reshape(-1, 3))
-    np.testing.assert_array_equal(slots[size:], radiance.reshape(-1, 3)[[WALL_PIXEL, WALL_PIXEL]])
-    assert not cache.slot_radiance(None).any()
-    hits = np.array(cache.trace()[0])
-    assert set(np.unique(hits)) <= {0, size, size + 1, MISS}
 
 
 def test_equal_seeds_give_equal_tables():
