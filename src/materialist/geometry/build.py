@@ -107,9 +107,14 @@ def pixel_corners(mesh: Mesh, surface: Array) -> Array:
     return corner
 
 
-def part(mesh: Mesh, plane: int) -> Mesh:
-    """The faces of one plane's continuation, or (-1) of the depth surface, with the vertices they use."""
+def part(mesh: Mesh, plane: int, pixels: Array | None = None) -> Mesh:
+    """The faces of one plane's continuation, or (-1) of the depth surface, with the vertices they use.
+
+    pixels: [H, W] bool: those whose faces are meant; None: all.
+    """
     chosen = mesh.face_plane == plane
+    if pixels is not None:
+        chosen &= pixels.ravel()[mesh.face_pixel]
     faces = {name: getattr(mesh, name)[chosen] for name in ("faces", "face_pixel", "face_plane")}
     return _tidy(replace(mesh, **faces))
 

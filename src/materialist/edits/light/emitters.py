@@ -163,11 +163,6 @@ def _estimated(
 
 def _patch(scene: Scene, mask: Array, name: str) -> Body:
     """The surface of the masked pixels, black, and moved a little towards the camera."""
-    surface = part(scene.geometry.mesh, -1)
-    faces = surface.faces[mask.reshape(-1)[surface.face_pixel]]
-    used, numbers = np.unique(faces, return_inverse=True)
-    vertices = (surface.vertices[used] * np.float32(1 - DEFAULT.lift)).astype(np.float32)
-    return Body(
-        vertices, numbers.reshape(faces.shape).astype(np.int32), surface.normals[used], surface.uv[used],
-        uniform_surface(0.0, 1.0, 0.0), name,
-    )  # fmt: skip
+    surface = part(scene.geometry.mesh, -1, mask)
+    vertices = (surface.vertices * np.float32(1 - DEFAULT.lift)).astype(np.float32)
+    return Body(vertices, surface.faces, surface.normals, surface.uv, uniform_surface(0.0, 1.0, 0.0), name)
