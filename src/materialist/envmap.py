@@ -12,13 +12,12 @@ def row_solid_angle(height: int) -> Array:
     return (edges[:-1] - edges[1:]) * np.pi / height
 
 
-def texel_directions(height: int, width: int) -> Array:
-    """[h, w, 3] unit directions of texel centres, camera frame."""
-    theta = np.pi * (np.arange(height) + 0.5)[:, None] / height
-    phi = 2 * np.pi * ((np.arange(width) + 0.5)[None, :] / width - 0.5)
-    return np.stack(
-        np.broadcast_arrays(np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)), -1
-    ).astype(np.float32)
+def texel_directions(height: int, width: int, kind: type = np.float32) -> Array:
+    """[h, w, 3] unit directions of texel centres, of that floating type, in the frame of the map."""
+    theta = (np.arange(height) + 0.5)[:, None] / height * np.pi
+    phi = ((np.arange(width) + 0.5)[None, :] / width * 2 - 1) * np.pi
+    x, z = np.sin(theta) * np.sin(phi), -np.sin(theta) * np.cos(phi)
+    return np.stack(np.broadcast_arrays(x, np.cos(theta), z), -1).astype(kind)
 
 
 def sh_basis(direction: Array, degree: int) -> Array:

@@ -13,26 +13,18 @@ import cv2
 import numpy as np
 
 from materialist.color import luminance
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.io.exr import read_exr
-from materialist.procedural import patterns
+from materialist.procedural import tiles
 from materialist.procedural.objects.shapes import turn_upright
 from materialist.procedural.options import captures
 from materialist.types import Array
 
-HEIGHT = 256
-"""Rows of a benchmark envmap (the paper's 512 x 256)."""
+ROWS = 256
+"""Rows of an envmap (the paper's 512 x 256), as many as the captures have."""
 
 Radiance = Callable[[Array], Array]
 """Unit directions [..., 3] in the scene frame (+Y up) -> linear radiance [..., 3]."""
-
-
-def directions(height: int) -> Array:
-    """[h, 2h, 3] float64 unit directions of texel centres, in the project's envmap convention."""
-    theta = (np.arange(height) + 0.5)[:, None] / height * np.pi
-    phi = ((np.arange(2 * height) + 0.5)[None, :] / height - 1) * np.pi
-    return np.stack(
-        [np.sin(theta) * np.sin(phi), np.cos(theta) * np.ones_like(phi), -np.sin(theta) * np.cos(phi)], axis=-1
-    )
 
 
 def environment(light_index: int, *, seed: int, data: Path | None, unseen: bool = False) -> Radiance:
@@ -50,15 +42,15 @@ def environment(light_index: int, *, seed: int, data: Path | None, unseen: bool 
 
 
 def envmap(radiance: Radiance, to_scene: Array) -> Array:
-    """[HEIGHT, 2 HEIGHT, 3] float32 in the camera frame; `to_scene` [3, 3] turns camera into scene directions."""
+    """[ROWS, 2 ROWS, 3] float32 in the camera frame; `to_scene` [3, 3] turns camera into scene directions."""
     # Four directions a texel keep small suns from flickering between texels.
-    fine = radiance(directions(2 * HEIGHT) @ to_scene.T)
-    return fine.reshape(HEIGHT, 2, 2 * HEIGHT, 2, 3).mean((1, 3)).astype(np.float32)
+    fine = radiance(texel_directions(2 * ROWS, 4 * ROWS, np.float64) @ to_scene.T)
+    return fine.reshape(ROWS, 2, 2 * ROWS, 2, 3).mean((1, 3)).astype(np.float32)
 
 
 def _capture(path: Path, turn: float) -> Radiance:
     """Bilinear lookup in a captured envmap, turned about +Y by `turn` radians."""
-    source = np.nan_to_num(np.maximum(read_exr(path), 0))[..., :3]
+    source = _load(path)
     h, w = source.shape[:2]
     wrapped = cv2.copyMakeBorder(source, 0, 0, 1, 1, cv2.BORDER_WRAP)
 
@@ -177,7 +169,7 @@ def _clouds(rng: np.random.Generator) -> Radiance:
     horizon = zenith + (_tint(rng, 0.15) - zenith) * rng.uniform(0.4, 1)
     ground = np.array([0.3, 0.26, 0.2]) * rng.uniform(0.4, 1.2)
     width, power, colour = np.radians(rng.uniform(1.5, 3)), rng.uniform(0.1, 1.5), _tint(rng, rng.uniform(0, 0.4))
-    field = (0.75 * patterns.noise(rng, rng.uniform(1.4, 2)) + 0.25 * patterns.noise(rng, 1.2)).astype(np.float32)
+    field = (0.75 * tiles.noise(rng, rng.uniform(1.4, 2)) + 0.25 * tiles.noise(rng, 1.2)).astype(np.float32)
     least, soft, thick = np.quantile(field, rng.uniform(0, 0.95)), rng.uniform(0.08, 0.4), rng.uniform(0.3, 0.8)
     bright, dark, spacing = rng.uniform(1, 2), rng.uniform(0.2, 0.9), rng.uniform(15, 60)
 
@@ -202,10 +194,6 @@ def _clouds(rng: np.random.Generator) -> Radiance:
 _KINDS = (_sky, _studio, _room, _overcast)
 
 
-ROWS = 256
-"""Rows of a procedural envmap, as many as the captures have."""
-
-
 def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
     """[h, 2h, 3] float32: a sky over ground, or (often, where there are any) a capture that is brighter above."""
     if captures and rng.random() < 0.6:
@@ -224,12 +212,13 @@ def around(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
 
 def procedural(rng: np.random.Generator, kinds: tuple[Callable[[np.random.Generator], Radiance], ...]) -> Array:
     """[ROWS, 2 ROWS, 3] float32: one of the kinds, each as likely; its mean luminance is 1."""
-    return levelled(kinds[rng.integers(len(kinds))](rng)(directions(ROWS)).astype(np.float32))
+    radiance = kinds[rng.integers(len(kinds))](rng)
+    return levelled(radiance(texel_directions(ROWS, 2 * ROWS, np.float64)).astype(np.float32))
 
 
 def captured(rng: np.random.Generator, captures: tuple[Path, ...]) -> Array:
     """One of the files, turned about the vertical, mirrored and tinted at random."""
-    picture = _load(captures[rng.integers(len(captures))])
+    picture = np.minimum(_load(captures[rng.integers(len(captures))]), 6e4)
     picture = np.roll(picture, int(rng.integers(picture.shape[1])), axis=1)
     if rng.random() < 0.5:
         picture = picture[:, ::-1]
@@ -238,11 +227,10 @@ def captured(rng: np.random.Generator, captures: tuple[Path, ...]) -> Array:
 
 @lru_cache(maxsize=64)
 def _load(path: Path) -> Array:
-    return np.minimum(np.nan_to_num(np.maximum(read_exr(path)[..., :3], 0)), 6e4)
+    return np.nan_to_num(np.maximum(read_exr(path)[..., :3], 0))
 
 
 def levelled(envmap: Array) -> Array:
     """The map scaled to a mean luminance over the sphere of 1."""
-    rows = np.sin((np.arange(len(envmap)) + 0.5) / len(envmap) * np.pi)
-    mean = float((luminance(envmap).mean(1) * rows).sum() / rows.sum())
+    mean = float(np.average(luminance(envmap).mean(1), weights=row_solid_angle(len(envmap))))
     return (envmap / max(mean, 1e-9)).astype(np.float32)

@@ -10,7 +10,7 @@ from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects import street_things as street
 from materialist.procedural.objects import things
 from materialist.procedural.objects.things import Meshes
-from materialist.procedural.world import Parts, ScenePart, World, block, bounds, look, look_down, placed
+from materialist.procedural.world import Parts, ScenePart, World, block, bounds, look, orbit, placed
 
 GROUNDS: tuple[tuple[float, m.Maker], ...] = (
     (0.2, m.wood), (0.13, m.stone), (0.13, m.fabric), (0.1, m.tiled), (0.1, m.plastic), (0.1, m.wall_paint),
@@ -41,7 +41,7 @@ def still_life(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> Wo
     parts += things.scattered(rng, int(rng.integers(3, 10)), (0.42, 0.35), (0.07, 0.4), meshes, 0.45)
     target = np.array([rng.normal() * 0.06, rng.uniform(0.05, 0.18), rng.normal() * 0.06])
     up, turn, distance, fov = rng.uniform([np.radians(5), -0.7, 0.65, 25], [np.radians(60), 0.7, 1.4, 60])
-    view = look_down(target, distance, turn, up, fov, rng.normal() * 0.03)
+    view = look(orbit(target, distance, turn, up, fov).position, target, fov, rng.normal() * 0.03)
     return World(parts, lights.around(rng, captures), view, kind="still life")
 
 

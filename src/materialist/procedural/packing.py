@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 
 from materialist.color import luminance
-from materialist.envmap import row_solid_angle
-from materialist.procedural.lights import directions
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.procedural.world import World
 from materialist.types import Array
 
@@ -118,7 +117,7 @@ def _directions(world: World) -> tuple[Array, Array, bool]:
 
 def _entering(world: World) -> Array:
     """[texels] 1 where light from that direction can come in through some portal."""
-    d = directions(ENV_ROWS).reshape(-1, 3)
+    d = texel_directions(ENV_ROWS, 2 * ENV_ROWS).reshape(-1, 3)
     inward = [np.cross(p.right, p.up) for p in world.portals]
     return np.any([d @ (n / np.linalg.norm(n)) < 0.05 for n in inward], axis=0).astype(float)
 

@@ -5,10 +5,9 @@ import colorsys
 import numpy as np
 
 from materialist.procedural.materials import ANY_COLOUR, shade
+from materialist.procedural.tiles import SIZE, X, Y, noise
 from materialist.types import Array
 
-SIZE = 256
-"""Pixels on a side of a pattern."""
 UNSATURATED = ANY_COLOUR[:3]
 """The shades of `natural` patterns."""
 
@@ -37,47 +36,27 @@ def _colour(rng: np.random.Generator, metal: bool, natural: bool) -> Array:
     return np.array(colorsys.hsv_to_rgb(rng.random(), saturation, value))
 
 
-def noise(rng: np.random.Generator, slope: float) -> Array:
-    """[SIZE, SIZE] periodic noise with spectrum 1 / f**slope, in [0, 1]."""
-    f = np.hypot(np.fft.fftfreq(SIZE)[:, None], np.fft.fftfreq(SIZE)[None, :])
-    f[0, 0] = 1
-    spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) / f**slope
-    spectrum[0, 0] = 0
-    field = np.fft.ifft2(spectrum).real
-    return np.clip(0.5 + field / (5 * field.std()), 0, 1)
-
-
-def _axes() -> tuple[Array, Array]:
-    """Two [SIZE, SIZE] coordinates in [0, 1), to the right and down."""
-    t = (np.arange(SIZE) + 0.5) / SIZE
-    return np.broadcast_to(t[None, :], (SIZE, SIZE)), np.broadcast_to(t[:, None], (SIZE, SIZE))
-
-
 def _checker(rng: np.random.Generator) -> Array:
-    x, y = _axes()
     n = 2 * int(rng.integers(2, 5))
-    return ((np.floor(x * n) + np.floor(y * n)) % 2).astype(float)
+    return ((np.floor(X * n) + np.floor(Y * n)) % 2).astype(float)
 
 
 def _stripes(rng: np.random.Generator) -> Array:
-    x, y = _axes()
     n, m = int(rng.integers(3, 9)), int(rng.integers(0, 3))
-    return np.clip(0.5 + 2 * np.sin(2 * np.pi * (n * y + m * x)), 0, 1)
+    return np.clip(0.5 + 2 * np.sin(2 * np.pi * (n * Y + m * X)), 0, 1)
 
 
 def _wood(rng: np.random.Generator) -> Array:
-    x, y = _axes()
     n = int(rng.integers(5, 10))
-    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * y + 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * x)))
+    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * Y + 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * X)))
     return np.clip(0.7 * rings**2 + 0.3 * noise(rng, 0.8), 0, 1)
 
 
 def _spots(rng: np.random.Generator) -> Array:
-    x, y = _axes()
     mix = np.zeros((SIZE, SIZE))
     for _ in range(int(rng.integers(8, 24))):
         cx, cy, radius = rng.random(), rng.random(), rng.uniform(0.03, 0.1)
-        distance = np.hypot((x - cx + 0.5) % 1 - 0.5, (y - cy + 0.5) % 1 - 0.5)
+        distance = np.hypot((X - cx + 0.5) % 1 - 0.5, (Y - cy + 0.5) % 1 - 0.5)
         mix = np.maximum(mix, np.clip((radius - distance) * SIZE / 2, 0, 1))
     return mix
 

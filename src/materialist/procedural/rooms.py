@@ -17,9 +17,9 @@ from materialist.procedural.world import (
     block,
     bounds,
     look,
-    look_down,
     moved,
     orb,
+    orbit,
     placed,
     rod,
 )
@@ -54,7 +54,8 @@ def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> Wor
     distance, up, turn, fov = rng.uniform([0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60])
     w, d, h = size
     inside = np.array([[-w / 2 + 0.1, 0.2, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
-    view = look_down(target, distance, turn, up, fov, rng.normal() * 0.03, inside)
+    eye = np.clip(orbit(target, distance, turn, up, fov).position, *inside)
+    view = look(eye, target, fov, rng.normal() * 0.03)
     return _world(rng, size, captures, standing.parts, view, "table")
 
 

@@ -30,19 +30,19 @@ def bank() -> tuple[Array, dict[str, range]]:
     return (np.clip(np.stack(tiles), 0, 1) * 255 + 0.5).astype(np.uint8), where
 
 
-def _noise(rng: np.random.Generator, slope: float, stretch: tuple[float, float] = (1, 1)) -> Array:
-    """Periodic noise [SIZE, SIZE] of spectrum 1 / f**slope, mean 0.5, deviation 0.2; `stretch` (down, right) > 1 draws
-    it out along an axis."""
-    fy, fx = np.fft.fftfreq(SIZE)[:, None] * stretch[0], np.fft.rfftfreq(SIZE)[None, :] * stretch[1]
-    f = np.hypot(fy, fx)
+def noise(rng: np.random.Generator, slope: float, stretch: tuple[float, float] = (1, 1)) -> Array:
+    """Periodic noise [SIZE, SIZE] of spectrum 1 / f**slope, in [0, 1], mean 0.5, deviation 0.2; `stretch` (down, right)
+    > 1 draws it out along an axis."""
+    f = np.hypot(np.fft.fftfreq(SIZE)[:, None] * stretch[0], np.fft.fftfreq(SIZE)[None, :] * stretch[1])
     f[0, 0] = 1
-    spectrum = np.fft.rfft2(rng.normal(size=(SIZE, SIZE)).astype(np.float32)) / f**slope
+    spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) / f**slope
     spectrum[0, 0] = 0
-    field = np.fft.irfft2(spectrum, (SIZE, SIZE))
-    return 0.5 + 0.2 * field / max(field.std(), 1e-9)
+    field = np.fft.ifft2(spectrum).real
+    return np.clip(0.5 + field / (5 * field.std()), 0, 1)
 
 
-_X, _Y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZE)
+X, Y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZE)
+"""Coordinates [SIZE, SIZE] in (0, 1), to the right and down."""
 
 
 def _step(x: Array, soft: float = 0.01) -> Array:
@@ -54,45 +54,45 @@ def _from_line(x: Array) -> Array:
 
 
 def _plain(rng):
-    return 0.0, 0.0, _noise(rng, rng.uniform(0.6, 1.6)), _noise(rng, 1.5)
+    return 0.0, 0.0, noise(rng, rng.uniform(0.6, 1.6)), noise(rng, 1.5)
 
 
 def _cloudy(rng):
     """Plaster, concrete, leather, worn paint: soft patches."""
-    soft = _noise(rng, rng.uniform(1.2, 2.0))
-    return soft, 1.2 * _step(_noise(rng, 1.4) - 0.78, 0.1), _noise(rng, 0.7), _noise(rng, 1.6)
+    soft = noise(rng, rng.uniform(1.2, 2.0))
+    return soft, 1.2 * _step(noise(rng, 1.4) - 0.78, 0.1), noise(rng, 0.7), noise(rng, 1.6)
 
 
 def _speckle(rng):
     """Terrazzo, granite, gravel, asphalt."""
-    fine, coarse = _noise(rng, rng.uniform(0.3, 0.9)), _noise(rng, rng.uniform(0.9, 1.3))
-    return _step(coarse - 0.55, 0.1), _step(fine - rng.uniform(0.7, 0.8), 0.05), _noise(rng, 0.4), coarse
+    fine, coarse = noise(rng, rng.uniform(0.3, 0.9)), noise(rng, rng.uniform(0.9, 1.3))
+    return _step(coarse - 0.55, 0.1), _step(fine - rng.uniform(0.7, 0.8), 0.05), noise(rng, 0.4), coarse
 
 
 def _marble(rng):
-    warp = _noise(rng, 2.2) * rng.uniform(1.5, 4)
+    warp = noise(rng, 2.2) * rng.uniform(1.5, 4)
     n = int(rng.integers(1, 4))
-    vein = np.abs(np.sin(np.pi * (n * _X + int(rng.integers(0, 3)) * _Y + warp)))
-    return np.exp(-vein * rng.uniform(4, 12)), _noise(rng, 2.0) * 0.5, _noise(rng, 1.0), 0.3
+    vein = np.abs(np.sin(np.pi * (n * X + int(rng.integers(0, 3)) * Y + warp)))
+    return np.exp(-vein * rng.uniform(4, 12)), noise(rng, 2.0) * 0.5, noise(rng, 1.0), 0.3
 
 
 def _wood(rng):
     """Grain along x."""
-    warp = _noise(rng, 2.3, (1, 4))
+    warp = noise(rng, 2.3, (1, 4))
     n = int(rng.integers(3, 12))
-    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * _Y + rng.uniform(1, 4) * warp))
-    fibre = _noise(rng, 0.7, (1, 16))
+    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * Y + rng.uniform(1, 4) * warp))
+    fibre = noise(rng, 0.7, (1, 16))
     return np.clip(0.55 * rings ** rng.uniform(1, 3) + 0.45 * fibre, 0, 1), 0.0, fibre, 0.5 * rings + 0.5 * fibre
 
 
 def _planks(rng):
     """Floor boards or parquet along x, each of its own shade."""
     rows, columns = int(rng.integers(4, 11)), int(rng.integers(1, 4))
-    r = np.floor(_Y * rows).astype(int)
-    x = (_X + rng.random(rows)[r]) % 1 * columns
+    r = np.floor(Y * rows).astype(int)
+    x = (X + rng.random(rows)[r]) % 1 * columns
     shade = rng.random((rows, columns))[r, np.floor(x).astype(int) % columns]
-    seam = _step(0.035 - np.minimum(_from_line(_Y * rows), _from_line(x) * rows / columns / 2), 0.03)
-    fibre = _noise(rng, 0.9, (1, 14))
+    seam = _step(0.035 - np.minimum(_from_line(Y * rows), _from_line(x) * rows / columns / 2), 0.03)
+    fibre = noise(rng, 0.9, (1, 14))
     mix = np.clip(0.15 + 0.55 * shade + 0.6 * (fibre - 0.5), 0, 1)
     return mix, seam * rng.uniform(0.5, 1), 0.5 + 0.6 * (fibre - 0.5), np.maximum(0.4 * fibre, seam)
 
@@ -100,12 +100,12 @@ def _planks(rng):
 def _bricks(rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bool = True, gap: float = 0.06):
     n = 2 * int(rng.integers(rows[0] // 2, rows[1] // 2 + 1))
     m = max(1, round(n / aspect))
-    r = np.floor(_Y * n).astype(int)
-    x = _X * m + (0.5 * (r % 2) if shift else 0)
-    wobble = 0.03 * (_noise(rng, 0.8) - 0.5)
-    joint = _step(gap + wobble - np.minimum(_from_line(x) * n / m, _from_line(_Y * n)), 0.05)
+    r = np.floor(Y * n).astype(int)
+    x = X * m + (0.5 * (r % 2) if shift else 0)
+    wobble = 0.03 * (noise(rng, 0.8) - 0.5)
+    joint = _step(gap + wobble - np.minimum(_from_line(x) * n / m, _from_line(Y * n)), 0.05)
     shade = rng.random((n, m))[r % n, np.floor(x).astype(int) % m]
-    return shade, joint, 0.5 + 0.7 * (_noise(rng, 0.8) - 0.5), np.maximum(joint, 0.3 * _noise(rng, 1.2))
+    return shade, joint, 0.5 + 0.7 * (noise(rng, 0.8) - 0.5), np.maximum(joint, 0.3 * noise(rng, 1.2))
 
 
 def _tiling(rng):
@@ -115,53 +115,53 @@ def _tiling(rng):
 
 def _checker(rng):
     n = 2 * int(rng.integers(1, 6))
-    board = (np.floor(_X * n) + np.floor(_Y * n)) % 2
-    edge = np.minimum(_from_line(_X * n), _from_line(_Y * n))
-    return board, 0.6 * _step(0.02 - edge, 0.02), 0.5 + 0.6 * (_noise(rng, 1.0) - 0.5), 0.2
+    board = (np.floor(X * n) + np.floor(Y * n)) % 2
+    edge = np.minimum(_from_line(X * n), _from_line(Y * n))
+    return board, 0.6 * _step(0.02 - edge, 0.02), 0.5 + 0.6 * (noise(rng, 1.0) - 0.5), 0.2
 
 
 def _stripes(rng):
     n, k = int(rng.integers(3, 16)), int(rng.integers(2, 5))
     profile = rng.choice([0, 0.5, 1], size=n * k)
     second = rng.choice([0, 0, 0, 1], size=n * k)
-    i = np.floor(_X * n * k).astype(int)
-    return profile[i], second[i], _noise(rng, 0.4), _noise(rng, 1.0)
+    i = np.floor(X * n * k).astype(int)
+    return profile[i], second[i], noise(rng, 0.4), noise(rng, 1.0)
 
 
 def _plaid(rng):
     """Three stripes of their own along both axes."""
     a, b, c = np.tile(np.repeat(rng.random((3, 8)) < 0.4, SIZE // 32, axis=1), (1, 4)).astype(float)
-    return 0.5 * a[:, None] + 0.5 * b, 0.7 * c[:, None] * c, _noise(rng, 0.3), 0.5
+    return 0.5 * a[:, None] + 0.5 * b, 0.7 * c[:, None] * c, noise(rng, 0.3), 0.5
 
 
 def _weave(rng):
     """Cloth seen close: crossing threads."""
     n = int(rng.integers(24, 56))
-    over = (np.floor(_X * n * 2) + np.floor(_Y * n * 2)) % 2 > 0
-    thread = np.abs(np.sin(2 * np.pi * n * np.where(over, _X, _Y)))
-    melange = np.where(over, _noise(rng, 0.3, (1, 8)), _noise(rng, 0.3, (8, 1)))
+    over = (np.floor(X * n * 2) + np.floor(Y * n * 2)) % 2 > 0
+    thread = np.abs(np.sin(2 * np.pi * n * np.where(over, X, Y)))
+    melange = np.where(over, noise(rng, 0.3, (1, 8)), noise(rng, 0.3, (8, 1)))
     return np.clip(melange * rng.uniform(0.2, 1.2), 0, 1), 0.0, 0.25 + 0.45 * thread, 0.5
 
 
 def _carpet(rng):
     """Rug with borders and a mirrored ornament; the tile is the whole rug."""
-    quarter = _noise(rng, rng.uniform(1.2, 2.2))
+    quarter = noise(rng, rng.uniform(1.2, 2.2))
     field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4 - 0.5
-    edge = np.minimum(_from_line(_X), _from_line(_Y))
+    edge = np.minimum(_from_line(X), _from_line(Y))
     bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
     border, stripes = edge < rng.uniform(0.08, 0.2), rng.random((2, 16)) < 0.5
     second = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
     mix, third = (np.where(border, s[bands], f) for s, f in zip(stripes, (_step(field, 0.02), second)))
-    return mix, third, _noise(rng, 0.2), 0.5
+    return mix, third, noise(rng, 0.2), 0.5
 
 
 def _ornament(rng):
     """Wallpaper or print: repeated mirrored motifs."""
     n = int(2 ** rng.integers(1, 4))
-    base = _noise(rng, rng.uniform(1.5, 2.2))[::n, ::n]
+    base = noise(rng, rng.uniform(1.5, 2.2))[::n, ::n]
     base = np.tile((base + base[:, ::-1]) / 2, (n, n))
     t = np.quantile(base, rng.uniform(0.55, 0.85))
-    return _step(base - t, 0.04), _step(base - t - 0.12, 0.04), _noise(rng, 0.6), 0.6 - 0.3 * _step(base - t, 0.04)
+    return _step(base - t, 0.04), _step(base - t - 0.12, 0.04), noise(rng, 0.6), 0.6 - 0.3 * _step(base - t, 0.04)
 
 
 def _spots(rng):
@@ -169,22 +169,22 @@ def _spots(rng):
     radius = rng.uniform(0.015, 0.08)
     for _ in range(int(rng.integers(10, 60))):
         x, y, r = rng.random(), rng.random(), radius * rng.uniform(0.5, 1.3)
-        disc = _step(r - np.hypot((_X - x + 0.5) % 1 - 0.5, (_Y - y + 0.5) % 1 - 0.5), 0.006)
+        disc = _step(r - np.hypot((X - x + 0.5) % 1 - 0.5, (Y - y + 0.5) % 1 - 0.5), 0.006)
         first, second = np.maximum(first, disc), np.maximum(second, disc * (rng.random() < 0.4))
-    return first, second, _noise(rng, 1.0), 0.3
+    return first, second, noise(rng, 1.0), 0.3
 
 
 def _picture(rng):
     """A painting or photograph of sorts: sky, hills and blocks in three colours."""
-    line = 0.3 + 0.4 * rng.random() + 0.15 * (_noise(rng, 2.2)[:1] - 0.5) * 3
-    hills = _step(_Y - line, 0.02)
-    first = np.clip(hills * _noise(rng, 1.6) * 1.6, 0, 1)
-    second = np.clip((1 - hills) * (1 - _Y) * rng.uniform(0.5, 1.5), 0, 1)
+    line = 0.3 + 0.4 * rng.random() + 0.15 * (noise(rng, 2.2)[:1] - 0.5) * 3
+    hills = _step(Y - line, 0.02)
+    first = np.clip(hills * noise(rng, 1.6) * 1.6, 0, 1)
+    second = np.clip((1 - hills) * (1 - Y) * rng.uniform(0.5, 1.5), 0, 1)
     for _ in range(int(rng.integers(0, 9))):
         x, y, w, h = rng.random(), rng.random(), rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3)
-        block = (np.abs(_X - x) < w) & (np.abs(_Y - y) < h)
+        block = (np.abs(X - x) < w) & (np.abs(Y - y) < h)
         first, second = np.where(block, rng.random(), first), np.where(block, rng.random(), second)
-    return first, second, _noise(rng, 1.3), 0.3
+    return first, second, noise(rng, 1.3), 0.3
 
 
 def _print(rng):
@@ -193,38 +193,38 @@ def _print(rng):
     for r in range(rows):
         if rng.random() < 0.85:
             words = np.repeat(rng.random(SIZE // 4) < 0.8, 4)
-            inside = (np.abs(_X - 0.3) < rng.uniform(0.1, 0.22)) & (np.floor(_Y * rows) == r)
-            first = np.maximum(first, inside * words[None] * (np.abs((_Y * rows) % 1 - 0.5) < 0.28))
-    block = (np.abs(_X - rng.random()) < 0.2) & (np.abs(_Y - rng.random()) < 0.15)
-    return first * 0.9, block * (rng.random() < 0.6) * 0.9, _noise(rng, 1.2), 0.5
+            inside = (np.abs(X - 0.3) < rng.uniform(0.1, 0.22)) & (np.floor(Y * rows) == r)
+            first = np.maximum(first, inside * words[None] * (np.abs((Y * rows) % 1 - 0.5) < 0.28))
+    block = (np.abs(X - rng.random()) < 0.2) & (np.abs(Y - rng.random()) < 0.15)
+    return first * 0.9, block * (rng.random() < 0.6) * 0.9, noise(rng, 1.2), 0.5
 
 
 def _facade(rng):
     """Rows of windows in a wall; channel 1 is the pane, channel 3 where it shines."""
     n, m = int(rng.integers(2, 5)), int(rng.integers(2, 5))
-    x, y = (_X * m) % 1, (_Y * n) % 1
+    x, y = (X * m) % 1, (Y * n) % 1
     w, h = rng.uniform(0.18, 0.38), rng.uniform(0.22, 0.36)
     frame = _step(np.minimum(w + 0.04 - np.abs(x - 0.5), h + 0.04 - np.abs(y - 0.5)), 0.02)
     bars = np.minimum(np.abs(x - 0.5), np.abs(y - 0.5 - rng.uniform(-0.1, 0.1))) < 0.012
     pane = _step(np.minimum(w - np.abs(x - 0.5), h - np.abs(y - 0.5)), 0.02) * (1 - bars)
-    wall = 0.35 * _noise(rng, 1.4) * (1 - frame) + frame
-    return wall, pane, 0.5 + 0.6 * (_noise(rng, 1.0) - 0.5) * (1 - pane), pane
+    wall = 0.35 * noise(rng, 1.4) * (1 - frame) + frame
+    return wall, pane, 0.5 + 0.6 * (noise(rng, 1.0) - 0.5) * (1 - pane), pane
 
 
 def _grass(rng):
-    blades = _noise(rng, 0.5, (3, 1))
-    return _noise(rng, 1.3), _step(_noise(rng, 0.9) - 0.7, 0.1), blades, 0.6
+    blades = noise(rng, 0.5, (3, 1))
+    return noise(rng, 1.3), _step(noise(rng, 0.9) - 0.7, 0.1), blades, 0.6
 
 
 def _rust(rng):
     """Worn metal: channel 0 is where it is corroded or painted over."""
-    patch = _noise(rng, rng.uniform(1.3, 1.9))
+    patch = noise(rng, rng.uniform(1.3, 1.9))
     first = _step(patch - rng.uniform(0.5, 0.75), rng.uniform(0.02, 0.2))
-    return first, 0.5 * _noise(rng, 0.8) * first, _noise(rng, 0.8), first
+    return first, 0.5 * noise(rng, 0.8) * first, noise(rng, 0.8), first
 
 
 def _brushed(rng):
-    return 0.0, 0.0, 0.5 + 0.5 * (_noise(rng, 0.4, (1, 40)) - 0.5), _noise(rng, 0.8, (1, 40))
+    return 0.0, 0.0, 0.5 + 0.5 * (noise(rng, 0.4, (1, 40)) - 0.5), noise(rng, 0.8, (1, 40))
 
 
 _KINDS = {

@@ -69,20 +69,10 @@ def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewp
 
 
 def orbit(target: Array, distance: float, azimuth: float, elevation: float, fov: float) -> Viewpoint:
-    """The camera `distance` metres from `target` [3], at an azimuth (from +Z towards +X) and elevation in radians."""
+    """The camera that looks at `target` [3] from `distance` metres, at an azimuth (from +Z towards +X) and elevation in
+    radians."""
     back = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
     return Viewpoint(target + distance * back, turn_upright(back), float(fov))
-
-
-def look_down(
-    target: Array, distance: float, turn: float, up: float, fov: float, roll: float = 0.0, within: Array | None = None
-) -> Viewpoint:
-    """The camera that looks at `target` [3] from `distance` metres, `turn` radians to its side and `up` above it.
-
-    within: [2, 3] lower and upper corner of a box that the camera stays in.
-    """
-    eye = target + distance * np.array([np.sin(turn) * np.cos(up), np.sin(up), np.cos(turn) * np.cos(up)])
-    return look(eye if within is None else np.clip(eye, *within), target, fov, roll)
 
 
 def block(

@@ -108,11 +108,8 @@ def load(path: Path) -> Solid:
 
 
 def placed(solid: Solid, *, scale: float = 1.0, turn: float = 0.0, at: tuple[float, float] = (0.0, 0.0)) -> Solid:
-    """The solid scaled, turned about Y by `turn` radians, and moved to (x, z) on the ground."""
-    c, s = np.cos(turn), np.sin(turn)
-    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    vertices = solid.vertices @ rotation.T * scale + [at[0], 0, at[1]]
-    return replace(solid, vertices=vertices, normals=solid.normals @ rotation.T)
+    """The solid as `moved` to (x, z) on the ground, its texture as many times on it as before."""
+    return replace(moved(solid, (at[0], 0, at[1]), turn, scale=scale), uv=solid.uv)
 
 
 def _grid(points: Array) -> Solid:
@@ -332,5 +329,5 @@ def moved(
     """The solid scaled, tipped about X, turned about Y (radians) and moved by `at` [3]."""
     c, s, ct, st = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
     rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, ct, -st], [0, st, ct]])
-    vertices = (solid.vertices * scale) @ rotation.T + np.asarray(at, float)
+    vertices = solid.vertices @ rotation.T * scale + np.asarray(at, float)
     return replace(solid, vertices=vertices, normals=solid.normals @ rotation.T, uv=solid.uv * scale)
