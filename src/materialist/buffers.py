@@ -44,12 +44,13 @@ def placed(values: Any) -> Any:
 
 
 def _padded(array: Array, kind) -> Array:
-    """[N] copy whose memory goes on for a vector.
+    """[N] copy whose memory begins at a whole vector and goes on for another.
 
-    Dr.Jit borrows numpy's memory on the CPU, and its kernels read the last, partly filled vector in full: beyond the
-    end, which ends the process where the next page is not mapped.
+    Dr.Jit borrows numpy's memory on the CPU. Its kernels read the last, partly filled vector in full: beyond the end,
+    which ends the process where the next page is not mapped. And it compiles them anew for memory aligned otherwise.
     """
     flat = np.ravel(array)
-    memory = np.empty(len(flat) + WIDEST, kind)
-    memory[: len(flat)] = flat
-    return memory[: len(flat)]
+    memory = np.empty(len(flat) + 2 * WIDEST, kind)
+    start = -(memory.ctypes.data // memory.itemsize) % WIDEST
+    memory[start : start + len(flat)] = flat
+    return memory[start : start + len(flat)]

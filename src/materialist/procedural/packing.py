@@ -33,10 +33,10 @@ class Packed:
     """[F, FACE] float32: three corners of position, normal, uv; material; probability density as a light, 1 / m2."""
     material: Array
     """[M, MATERIAL] float32."""
-    lights: Array
+    lamps: Array
     """[LIGHT_TABLE] uint32 numbers of faces, each as often as it is to be drawn; all 0 without lamps."""
     env: Array
-    """[h, 2h, 4] float32 radiance; the last channel is unused."""
+    """[h, 2h, 3] float32 radiance."""
     env_table: Array
     """[ENV_TABLE] uint32 texels of an ENV_ROWS x 2 ENV_ROWS map."""
     env_density: Array
@@ -63,21 +63,20 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     faces = np.concatenate([p.solid.faces + k for p, k in zip(world.parts, start)]).astype(np.uint32)
     owner = np.repeat(np.arange(len(world.parts)), [len(p.solid.faces) for p in world.parts])
     material = np.stack([p.material.row(tuple(rng.random(2))) for p in world.parts]).astype(np.float32)
-    lights, density = _lights(vertices, faces, owner, material)
+    lamps, density = _lamps(vertices, faces, owner, material)
     extra = np.zeros((len(faces), 4), np.float32)
     extra[:, 0], extra[:, 1] = owner, density
     face = np.concatenate([corner[faces].reshape(len(faces), 24), extra], -1).astype(np.float32)
     env_table, env_density, sunny = _directions(world)
     portals = _portals(world)
-    env = np.concatenate([world.envmap, np.zeros_like(world.envmap[..., :1])], -1).astype(np.float32)
     shares = _shares(world, bool(density.any()), sunny)
     return Packed(
-        vertices, faces, face, material, lights, env, env_table, env_density, portals, shares,
+        vertices, faces, face, material, lamps, world.envmap, env_table, env_density, portals, shares,
         rotation.astype(np.float32), float(np.abs(vertices).max()),
     )  # fmt: skip
 
 
-def _lights(vertices: Array, faces: Array, owner: Array, material: Array) -> tuple[Array, Array]:
+def _lamps(vertices: Array, faces: Array, owner: Array, material: Array) -> tuple[Array, Array]:
     """(table of luminous faces, [F] density 1 / m2), each face drawn by its power."""
     density = np.zeros(len(faces), np.float32)
     glow = luminance(material[:, 20:23] * material[:, 0:3])[owner]

@@ -8,14 +8,12 @@ from materialist.color import linear_to_srgb, luminance
 from materialist.io.samples import LIGHT_ROWS
 from materialist.procedural import outdoors, packing, rooms
 from materialist.procedural.options import SPLITS, DataSetOptions
-from materialist.procedural.tracer import SampleTracer
+from materialist.procedural.tracer import CENTRE, SampleTracer
 from materialist.procedural.world import World
 from materialist.render.denoise import denoise
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 
-PROBE = 3
-"""Label rays a pixel and axis."""
 LIGHT_SPP = 128
 """Rays of each of its texels."""
 LIGHT_HIDDEN = 0.1
@@ -42,7 +40,7 @@ def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
         world = make_world(rng, options)
         camera = Camera(options.size, options.size, world.view.fov)
         tracer = SampleTracer(packing.pack(world, rng), camera, device=options.device)
-        probe = tracer.probe(PROBE)
+        probe = tracer.probe()
         if attempt == ATTEMPTS - 1 or worth_seeing(probe):
             break
     return _developed(world, probe, tracer, rng, options)
@@ -100,30 +98,23 @@ def things_of(world: World, probe: dict[str, Array]) -> Array:
     for k, part in enumerate(world.parts):
         own = number.setdefault(("part", k) if part.thing is None else part.thing, len(number) + 1)
         of_part.append(-own if part.thing is None else own)
-    owner = probe["owner"][..., _centre(probe)].astype(int)
+    owner = probe["owner"][..., CENTRE].astype(int)
     return np.array(of_part, np.int16)[owner + 1]
 
 
 def labels_of(probe: dict[str, Array]) -> dict[str, Array]:
     """Maps [H, W, ...] of a probe [H, W, N, ...]: of the surface at the pixel's centre, its texture averaged over the
     rays of the pixel that see the same part; all 0 where there is no surface."""
-    centre = _centre(probe)
-    owner = probe["owner"][..., centre]
+    owner = probe["owner"][..., CENTRE]
     mask = owner >= 0
     same = ((probe["owner"] == owner[..., None]) & mask[..., None]).astype(np.float32)
     share = same / np.maximum(same.sum(-1, keepdims=True), 1)
     out = {k: (probe[k] * share).sum(2) for k in ("roughness", "metallic")}
     out["albedo"] = (probe["albedo"] * share[..., None]).sum(2)
-    out["normal"] = probe["normal"][:, :, centre] * mask[..., None]
-    out["depth"] = probe["depth"][..., centre] * mask
+    out["normal"] = probe["normal"][:, :, CENTRE] * mask[..., None]
+    out["depth"] = probe["depth"][..., CENTRE] * mask
     out["mask"] = mask
     return out
-
-
-def _centre(probe: dict[str, Array]) -> int:
-    """The number of the ray through the middle of a pixel."""
-    side = round(np.sqrt(probe["owner"].shape[2]))
-    return side * (side // 2) + side // 2
 
 
 def exposure(image: Array, rng: np.random.Generator) -> float:

@@ -1,6 +1,7 @@
 """What the path tracer knows about a point: surface, material, light. Dr.Jit code on flat buffers."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import drjit as dr
@@ -10,8 +11,9 @@ import numpy as np
 from materialist.bsdf import lobes
 from materialist.bsdf.disney import base_reflectance, specular_probability
 from materialist.bsdf.ggx import alpha_of
+from materialist.buffers import floats, integers, tensor
 from materialist.procedural import tiles
-from materialist.procedural.packing import ENV_ROWS, ENV_TABLE, FACE, LIGHT_TABLE, MATERIAL, MAX_PORTALS, PORTAL
+from materialist.procedural.packing import ENV_ROWS, ENV_TABLE, FACE, LIGHT_TABLE, MATERIAL, MAX_PORTALS, PORTAL, Packed
 
 _ALBEDO_RANGE = (0.01, 0.95)
 _LEAST_ROUGHNESS = 0.05
@@ -58,13 +60,18 @@ class ToLight:
     pdf: Any
 
 
-@dataclass
-class Surfaces:
-    """The mesh and its materials: `face` [F * FACE] and `material` [M * MATERIAL] Floats, `bank` UInt32 texels."""
+class Shading:
+    """A packed world on the device: surfaces with their materials, light from afar, and luminous faces."""
 
-    face: Any
-    material: Any
-    bank: Any
+    def __init__(self, packed: Packed):
+        self.face, self.material = floats(mi, packed.face), floats(mi, packed.material)
+        self.env_density, self.portals = floats(mi, packed.env_density), floats(mi, packed.portals)
+        self.env_table, self.lamps, self.bank = integers(mi, packed.env_table), integers(mi, packed.lamps), _bank()
+        self.env = mi.Texture2f(tensor(mi, packed.env), wrap_mode=dr.WrapMode.Repeat)
+        self.rows = dr.opaque(mi.Float, float(len(packed.env)))
+        self.shares = [dr.opaque(mi.Float, float(share)) for share in packed.shares]
+        self.turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
+        """Three rows of the rotation from camera to scene directions."""
 
     def hit(self, found, d) -> Hit:
         """The surface at preliminary intersections `found` of rays with directions d."""
@@ -111,37 +118,11 @@ class Surfaces:
         emission = mi.Color3f(r[5].x, r[5].y, r[5].z) * albedo
         return Look(albedo, roughness, metallic, emission)
 
-
-@dataclass
-class Lights:
-    """Light from afar and from luminous faces; the buffers of `packing.Packed`."""
-
-    env: Any
-    sizes: Any
-    env_table: Any
-    env_density: Any
-    portals: Any
-    faces: Any
-    shares: Any
-    turn: Any
-    """Three rows of the rotation from camera to scene directions."""
-
     def sky(self, d):
         """Radiance from direction d (camera frame), bilinear."""
         u, v = self._place(d)
-        x, y = u * self.sizes[1] - 0.5, v * self.sizes[0] - 0.5
-        columns, rows = mi.Int32(self.sizes[1]), mi.Int32(self.sizes[0])
-        x0, y0 = dr.floor(x), dr.floor(y)
-        fx, fy = x - x0, y - y0
-        total = mi.Color3f(0)
-        for dy in (0, 1):
-            row = dr.clip(mi.Int32(y0) + dy, 0, rows - 1)
-            for dx in (0, 1):
-                column = (mi.Int32(x0) + dx + columns) % columns
-                value = dr.gather(mi.Vector4f, self.env, mi.UInt32(row * columns + column))
-                weight = (fx if dx else 1 - fx) * (fy if dy else 1 - fy)
-                total += mi.Color3f(value.x, value.y, value.z) * weight
-        return total
+        edge = 0.5 / self.rows  # rows do not go on beyond the poles
+        return mi.Color3f(self.env.eval(mi.Point2f(u, dr.clip(v, edge, 1 - edge))))
 
     def _place(self, d):
         """(u, v) in [0, 1) of directions in the camera frame."""
@@ -180,7 +161,7 @@ class Lights:
         corner, right = mi.Point3f(r[0].x, r[0].y, r[0].z), mi.Vector3f(r[0].w, r[1].x, r[1].y)
         return corner, right, mi.Vector3f(r[1].z, r[1].w, r[2].x), mi.Vector3f(r[2].y, r[2].z, r[2].w), r[3].x
 
-    def aim(self, hit: Hit, surfaces: Surfaces, draws) -> ToLight:
+    def aim(self, hit: Hit, draws) -> ToLight:
         """One direction from each hit towards a light, chosen by `draws.which` and `draws.light`."""
         s0, s1, s2 = self.shares
         to_sky, to_portal = draws.which < s0, draws.which < s0 + s1
@@ -194,16 +175,15 @@ class Lights:
         d_portal = dr.normalize(corner + right * draws.light.x + up * draws.light.y - hit.p + 1e-9)
         # A luminous face: a uniform point on it.
         rest = dr.clip((draws.which - s0 - s1) / dr.maximum(s2, 1e-6), 0, 0.999999)
-        face = dr.gather(mi.UInt32, self.faces, mi.UInt32(rest * LIGHT_TABLE))
+        face = dr.gather(mi.UInt32, self.lamps, mi.UInt32(rest * LIGHT_TABLE))
         root = dr.sqrt(draws.light.x)
         b = mi.Point2f(1 - root, root * draws.light.y)
-        lamp_active = ~to_portal
-        lamp = surfaces.at(face, b, mi.Vector3f(0, 0, 1), mi.Float(0), lamp_active)
+        lamp = self.at(face, b, mi.Vector3f(0, 0, 1), mi.Float(0), ~to_portal)
         away = lamp.p - hit.p
         distance = dr.norm(away)
         d_lamp = away / dr.maximum(distance, 1e-9)
         towards = dr.dot(dr.select(lamp.front, lamp.ng, -lamp.ng), d_lamp)
-        look = surfaces.look(lamp, draws.texel)
+        look = self.look(lamp, draws.texel)
         lamp_pdf = s2 * lamp.density * distance * distance / dr.maximum(-towards, 1e-6)
         d = dr.select(to_sky, d_sky, dr.select(to_portal, d_portal, d_lamp))
         pdf = dr.select(to_portal, self._sky_density(hit.p, d), dr.select(towards < 0, lamp_pdf, 0))
@@ -226,6 +206,12 @@ class Lights:
         scene = mi.Vector3f(r * s, y, -r * c)
         rows = self.turn
         return mi.Vector3f(*(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3)))
+
+
+@cache
+def _bank():
+    """The tiles on the device, once a process: [N * SIZE * SIZE] UInt32, four channels of 8 bits."""
+    return integers(mi, np.ascontiguousarray(tiles.bank()[0]).view(np.uint32))
 
 
 def value(wi, wo, look: Look):

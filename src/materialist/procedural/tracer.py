@@ -9,18 +9,17 @@ the balance heuristic between the BSDF and one draw from {envmap, portals, lumin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from materialist.buffers import floats, integers
+from materialist.buffers import floats
 from materialist.camera import project, unproject
 from materialist.errors import InputError
-from materialist.procedural import shading, tiles
+from materialist.procedural import shading
 from materialist.procedural.packing import Packed
-from materialist.procedural.shading import Hit, Lights, Surfaces
+from materialist.procedural.shading import Hit
 from materialist.render.scene import shape
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
@@ -35,10 +34,10 @@ CLAMP = 30.0
 """Largest contribution of one light sample after the first surface, against fireflies; mean light is about 1."""
 
 
-@cache
-def _bank():
-    """The tiles on the device, once a process: [N * SIZE * SIZE] UInt32, four channels of 8 bits."""
-    return integers(mi, np.ascontiguousarray(tiles.bank()[0]).view(np.uint32))
+PROBE = 3
+"""Label rays a pixel and axis, an odd number."""
+CENTRE = PROBE * PROBE // 2
+"""The number of that through the pixel's centre."""
 
 
 class SampleTracer:
@@ -49,24 +48,8 @@ class SampleTracer:
         if camera.width * camera.height % VECTOR:
             raise InputError(f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4.")
         self.camera = camera
-        zero = dr.opaque(mi.Float, 0.0)
-
-        def flat(array: Array):
-            """The array in Dr.Jit's own memory: numpy's may be aligned otherwise, and then other code is compiled."""
-            copy = floats(mi, array) + zero
-            dr.eval(copy)
-            return copy
-
         self.scene = mi.load_dict({"type": "scene", "mesh": shape(mi, packed)})
-        self.surfaces = Surfaces(flat(packed.face), flat(packed.material), _bank())
-        rows, columns = packed.env.shape[:2]
-        sizes = dr.opaque(mi.Float, float(rows)), dr.opaque(mi.Float, float(columns))
-        shares = [dr.opaque(mi.Float, float(s)) for s in packed.shares]
-        turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
-        self.lights = Lights(
-            flat(packed.env), sizes, integers(mi, packed.env_table), flat(packed.env_density), flat(packed.portals),
-            integers(mi, packed.lights), shares, turn,
-        )  # fmt: skip
+        self.shading = shading.Shading(packed)
         self.offset = dr.opaque(mi.Float, 2e-5 * (1 + packed.reach))
         self.focal = dr.opaque(mi.Float, float(camera.focal))
 
@@ -91,19 +74,19 @@ class SampleTracer:
         both = np.stack([p.reshape(h, w) for p in planes], -1)
         return np.ascontiguousarray(both[..., :3]), np.ascontiguousarray(both[..., 3:])
 
-    def probe(self, side: int) -> dict[str, Array]:
-        """What side x side rays through each pixel see.
+    def probe(self) -> dict[str, Array]:
+        """What PROBE x PROBE rays through each pixel see.
 
-        Returns arrays of a leading [H, W, side * side]: owner (-1 for nothing), depth (planar, metres, 0 for
+        Returns arrays of a leading [H, W, PROBE * PROBE]: owner (-1 for nothing), depth (planar, metres, 0 for
         nothing), normal [., 3] (camera frame, towards the camera), albedo [., 3], roughness, metallic.
         """
-        h, w, n = self.camera.height, self.camera.width, side * side
+        h, w, n = self.camera.height, self.camera.width, PROBE * PROBE
         lane = dr.arange(mi.UInt32, h * w * n)
         pixel, sample = lane // n, lane % n
-        places = (mi.Point2f(mi.Float(sample % side), mi.Float(sample // side)) + 0.5) / side
+        places = (mi.Point2f(mi.Float(sample % PROBE), mi.Float(sample // PROBE)) + 0.5) / PROBE
         ray = self._camera_ray(pixel, places)
         hit = self._hit(ray, mi.Bool(True))
-        look = self.surfaces.look(hit, mi.Point2f(0.5, 0.5))
+        look = self.shading.look(hit, mi.Point2f(0.5, 0.5))
         depth = dr.select(hit.valid, -hit.p.z, 0)
         owner = dr.select(hit.valid, mi.Int32(hit.owner), -1)
         out = {
@@ -126,9 +109,8 @@ class SampleTracer:
         light from afar behind visible surfaces, which counts as well where it is above 0.
         """
         h, w = self.camera.height, self.camera.width
-        centre = probe["owner"].shape[2] // 2
-        owner, depth = (np.ascontiguousarray(probe[k][..., centre]) for k in ("owner", "depth"))
-        normal = probe["normal"][:, :, centre].reshape(-1, 3)
+        owner, depth = (np.ascontiguousarray(probe[k][..., CENTRE]) for k in ("owner", "depth"))
+        normal = probe["normal"][:, :, CENTRE].reshape(-1, 3)
         seen = np.flatnonzero(owner.ravel() >= 0)
         if not len(seen):
             return np.zeros((rows, 2 * rows, 4), np.float32)
@@ -156,9 +138,7 @@ class SampleTracer:
         open_ = ~((np.array(hit.valid) & inside & same & near) | below)
         random = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))  # type: ignore[operator]
         total, _ = self._paths(ray, lane % texels, lane // texels, random, dr.opaque(mi.UInt32, seed))
-        behind = self.lights.sky(ray.d)
-        channels = lambda colour: np.stack([np.array(colour[k]) for k in range(3)])  # noqa: E731
-        radiance = np.where(open_, channels(total), channels(behind))
+        radiance = np.where(open_, np.array(total), np.array(self.shading.sky(ray.d)))
         weight = np.where(open_, 1, hidden).reshape(spp, texels, 1).astype(np.float32)
         count = weight.sum(0)
         mean = (radiance.T.reshape(spp, texels, 3) * weight).sum(0) / np.maximum(count, 1e-6)
@@ -173,7 +153,7 @@ class SampleTracer:
 
     def _hit(self, ray, active) -> Hit:
         found = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        return self.surfaces.hit(found, ray.d)
+        return self.shading.hit(found, ray.d)
 
     def _paths(self, ray, pixel, sample, rng, seed):
         """Radiance and white diffuse shading along camera rays; each three Floats."""
@@ -185,17 +165,17 @@ class SampleTracer:
         def body(ray, rng, fate, depth, beta, beta_white, total, white, pdf, active):
             hit = self._hit(ray, active)
             draws = even.draw(rng, depth)
-            look = self.surfaces.look(hit, draws.texel)
+            look = self.shading.look(hit, draws.texel)
             # What the ray itself found: the sky, or a lamp; weighed against having been aimed at.
-            aimed = self.lights.density(ray, hit)
+            aimed = self.shading.density(ray, hit)
             weight = dr.select(pdf < 0, 1, pdf / dr.maximum(pdf + aimed, 1e-20))
-            glow = dr.select(hit.valid, dr.select(hit.front, look.emission, mi.Color3f(0)), self.lights.sky(ray.d))
+            glow = dr.select(hit.valid, dr.select(hit.front, look.emission, mi.Color3f(0)), self.shading.sky(ray.d))
             glow = dr.select(active, dr.select(depth > 1, dr.minimum(glow * weight, CLAMP), glow * weight), 0)
             total = total + beta * glow
             white = white + beta_white * glow
             active = active & hit.valid & (depth < MAX_DEPTH)
             # Aim at a light.
-            to_light = self.lights.aim(hit, self.surfaces, draws)
+            to_light = self.shading.aim(hit, draws)
             start = hit.p + hit.ng * self.offset
             wo = hit.frame.to_local(to_light.d)
             above = dr.dot(hit.ng, to_light.d) > 0
