@@ -7,20 +7,7 @@ from materialist.errors import InputError
 from materialist.pipeline import invert, render_scene
 
 WIDTH, HEIGHT = 24, 18
-
-
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    """Small tensors: waking threads costs more than the work."""
-    from materialist.render.variant import setup
-
-    setup("cpu")  # before torch, as in a run
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("mitsuba", "one_thread")  # Mitsuba before torch, as in a run
 
 
 @pytest.fixture(scope="module")

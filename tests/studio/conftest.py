@@ -1,6 +1,7 @@
 """A session on a small scene; a studio that runs on it, and pages of a browser."""
 
 import pytest
+import studio_browser
 import studio_server
 from studio_scenes import package
 
@@ -20,8 +21,8 @@ def running(tmp_path_factory):
 
 
 @pytest.fixture
-def page(browser):
-    """A fresh page (a new person's browser) that notes its requests and the errors in it, refused content too."""
+def empty_page(browser):
+    """A page of a new browser that notes its requests and the errors in it, refused content too."""
     context = browser.new_context(viewport={"width": 1280, "height": 1000}, accept_downloads=True)
     made = context.new_page()
     made.requested, made.errors = [], []
@@ -32,6 +33,16 @@ def page(browser):
     made.set_default_timeout(40_000)
     yield made
     context.close()
+
+
+@pytest.fixture
+def page(empty_page, running):
+    """The small scene on a page, without edits; those that a test makes go with it."""
+    address, work = running
+    studio_browser.opened(empty_page, address)
+    yield empty_page
+    for file in work.glob("photo-*/edits-me/edits.yaml"):
+        file.unlink()
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,12 @@ def opened(page, address):
     page.wait_for_selector(READY)
 
 
+def select_block(page):
+    """A click on the block of the small scene."""
+    click_photo(page, 0.39, 0.5)
+    page.wait_for_selector("#stage .view[data-selected=yes]")
+
+
 def click_photo(page, x, y, modifiers=()):
     """A click at a share of the stage's width and height."""
     box = page.locator("#stage .view").bounding_box()

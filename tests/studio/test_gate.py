@@ -18,11 +18,6 @@ from materialist.studio.studio import PERSON
 ALONE = "127.0.0.1"
 
 
-@pytest.fixture
-def studio(shared):
-    return shared
-
-
 async def echo(scope, receive, send):
     """Says what it heard of proxies, and allows everything to everyone, as Gradio's CORS does."""
     heard = [f"{k.decode()}={v.decode()}" for k, v in scope["headers"] if b"forwarded" in k]
@@ -30,8 +25,8 @@ async def echo(scope, receive, send):
     await answer(scope, receive, send)
 
 
-def client(studio, base="http://studio.example", **options):
-    return TestClient(Gate(echo, studio, **options), base_url=base, follow_redirects=False)
+def client(shared, base="http://studio.example", **options):
+    return TestClient(Gate(echo, shared, **options), base_url=base, follow_redirects=False)
 
 
 def headers(**values):
@@ -60,36 +55,36 @@ def headers(**values):
         ({}, False, True, False),
     ],
 )  # fmt: skip
-def test_welcome(studio, sent, alone, everyone, behind):
-    assert Gate(echo, studio, host=ALONE).allows(headers(**sent)) is alone
-    assert Gate(echo, studio).allows(headers(**sent)) is everyone
-    assert Gate(echo, studio, proxy="studio.example").allows(headers(**sent)) is behind
+def test_welcome(shared, sent, alone, everyone, behind):
+    assert Gate(echo, shared, host=ALONE).allows(headers(**sent)) is alone
+    assert Gate(echo, shared).allows(headers(**sent)) is everyone
+    assert Gate(echo, shared, proxy="studio.example").allows(headers(**sent)) is behind
 
 
-def test_forwarded_headers_count_behind_a_proxy_only(studio):
+def test_forwarded_headers_count_behind_a_proxy_only(shared):
     told = {"x-forwarded-host": "studio.example", "x-forwarded-for": "1.2.3.4", "forwarded": "host=evil.example"}
-    assert client(studio).get("/", headers=told).text == ""
-    page = client(studio, "http://10.0.0.5:7860", proxy="studio.example")
+    assert client(shared).get("/", headers=told).text == ""
+    page = client(shared, "http://10.0.0.5:7860", proxy="studio.example")
     assert page.get("/", headers=told).text == "x-forwarded-host=studio.example x-forwarded-proto=https"
     assert "Secure" in page.get("/", headers=told).headers["set-cookie"]
     assert page.get("/", headers={**told, "x-forwarded-host": "evil.example"}).status_code == 403
     assert page.get("/").status_code == 403
 
 
-def test_no_preflight_of_another_site_is_answered(studio):
+def test_no_preflight_of_another_site_is_answered(shared):
     asked = {"access-control-request-method": "POST", "origin": "http://evil.example"}
-    answer = client(studio).options("/gradio_api/queue/join", headers=asked)
+    answer = client(shared).options("/gradio_api/queue/join", headers=asked)
     assert answer.status_code == 403 and "access-control-allow-origin" not in answer.headers
 
 
-def test_every_answer_tells_the_browser_to_be_careful(studio):
-    page = client(studio, password="word")
-    for answer in (client(studio).get("/"), page.get("/"), client(studio, host=ALONE).get("/")):
+def test_every_answer_tells_the_browser_to_be_careful(shared):
+    page = client(shared, password="word")
+    for answer in (client(shared).get("/"), page.get("/"), client(shared, host=ALONE).get("/")):
         assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
         assert answer.headers["x-content-type-options"] == "nosniff"
 
 
-def test_sockets_are_closed_and_the_lifespan_passes(studio):
+def test_sockets_are_closed_and_the_lifespan_passes(shared):
     reached, sent = [], []
 
     async def app(scope, receive, send):
@@ -99,15 +94,15 @@ def test_sockets_are_closed_and_the_lifespan_passes(studio):
         sent.append(message)
 
     for kind in ("websocket", "lifespan"):
-        call = Gate(app, studio)({"type": kind, "headers": []}, None, send)
+        call = Gate(app, shared)({"type": kind, "headers": []}, None, send)
         with ThreadPoolExecutor(1) as thread:  # browser tests leave an event loop running in this one
             thread.submit(asyncio.run, call).result()
     assert reached == ["lifespan"] and sent == [{"type": "websocket.close", "code": 1008}]
 
 
-def test_a_password_closes_every_door(studio, monkeypatch):
+def test_a_password_closes_every_door(shared, monkeypatch):
     monkeypatch.setattr(gate, "SETTINGS", StudioSettings(wrong_passwords=3))
-    page = client(studio, password="open sesame ü")
+    page = client(shared, password="open sesame ü")
     enter = lambda word: page.post("/login", data={"password": word})  # noqa: E731
     for place in ("/", "/config", "/assets/a.js", "/gradio_api/heartbeat/abc"):
         assert page.get(place).status_code == 401
@@ -125,21 +120,21 @@ def test_a_password_closes_every_door(studio, monkeypatch):
     assert page.get("/").status_code == 200
 
 
-def test_a_page_belongs_to_the_browser_that_used_it_first(studio):
-    anna, bert = client(studio), client(studio)
+def test_a_page_belongs_to_the_browser_that_used_it_first(shared):
+    anna, bert = client(shared), client(shared)
     anna.get("/")
     person = anna.cookies[PERSON]
     assert anna.get("/gradio_api/queue/data?session_hash=abc").status_code == 200
-    assert studio.session("abc", person).person == person
+    assert shared.session("abc", person).person == person
     for place in ("heartbeat/abc", "queue/data?session_hash=abc"):
         assert bert.get(f"/gradio_api/{place}").status_code == 403
     with pytest.raises(InputError, match="reload"):
-        studio.session("abc", studio.person(bert.cookies[PERSON]))
+        shared.session("abc", shared.person(bert.cookies[PERSON]))
 
 
-def test_uploads_have_a_quota(studio, monkeypatch):
+def test_uploads_have_a_quota(shared, monkeypatch):
     monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(upload_quota=1000))
-    page = client(studio)
+    page = client(shared)
     page.get("/")
     send = lambda size: page.post("/gradio_api/upload", content=b"x" * size)  # noqa: E731
     assert send(600).status_code == 200 and send(300).status_code == 200

@@ -10,16 +10,14 @@ import urllib.request
 import numpy as np
 import pytest
 from PIL import Image
-from studio_browser import READY, click_photo, move, opened, pixels, slide
+from studio_browser import READY, click_photo, move, opened, pixels, select_block, slide
 from studio_scenes import package
 from studio_server import studio
 
 
-def test_select_edit_undo(page, running):
-    opened(page, running[0])
+def test_select_edit_undo(page):
     first = pixels(page)
-    click_photo(page, 0.39, 0.5)
-    page.wait_for_selector("#stage .view[data-selected=yes]")
+    select_block(page)
     slide(page, "hue", 120)
     green = pixels(page)
     assert green[24, 25, 1] > green[24, 25, 0] + 40 and first[24, 25, 0] > first[24, 25, 1] + 40
@@ -43,11 +41,9 @@ def test_select_edit_undo(page, running):
     assert not page.errors
 
 
-def test_progress_is_at_the_picture_and_stop_never_under_the_cursor(page, running):
+def test_progress_is_at_the_picture_and_stop_never_under_the_cursor(page):
     page.set_viewport_size({"width": 1280, "height": 720})
-    opened(page, running[0])
-    click_photo(page, 0.39, 0.5)
-    page.wait_for_selector("#stage .view[data-selected=yes]")
+    select_block(page)
     slide(page, "hue", 120)
     page.get_by_role("button", name="Final picture").dblclick()
     page.wait_for_selector("#frame #progress .bar")
@@ -56,12 +52,9 @@ def test_progress_is_at_the_picture_and_stop_never_under_the_cursor(page, runnin
         assert box["y"] + box["height"] <= 720, part
     page.wait_for_selector("#stage .badge >> text=Path traced, 256")
     page.wait_for_selector("#stop", state="hidden")
-    page.get_by_role("button", name="Remove: edit 1").click()
-    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
 
 
-def test_what_cannot_be_done_is_said_on_the_page(page, running):
-    opened(page, running[0])
+def test_what_cannot_be_done_is_said_on_the_page(page):
     page.get_by_role("button", name="Select nothing").click()
     move(page, "hue", 90)
     page.wait_for_selector("#message:visible >> text=Click the object")
@@ -70,7 +63,6 @@ def test_what_cannot_be_done_is_said_on_the_page(page, running):
 
 
 def test_nothing_is_asked_of_anyone_else(page, running):
-    opened(page, running[0])
     for name in ("Open", "Light", "Objects", "Take away", "Look"):
         page.get_by_role("tab", name=name).click()
     page.wait_for_selector("#report >> text=dB from the photo")
@@ -79,8 +71,7 @@ def test_nothing_is_asked_of_anyone_else(page, running):
     assert any("/heartbeat/" in url for url in page.requested)  # whose end is the page's
 
 
-def test_by_keyboard_alone(page, running):
-    opened(page, running[0])
+def test_by_keyboard_alone(page):
     page.locator("#stage .view").focus()
     for _ in range(4):
         page.keyboard.press("ArrowLeft")
@@ -105,7 +96,6 @@ def test_by_keyboard_alone(page, running):
 def test_on_a_phone(browser, running):
     context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
     page = context.new_page()
-    opened(page, running[0])
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     page.locator("#stage .view").tap(position={"x": 0.39 * 300, "y": 0.5 * 225})
     page.wait_for_selector("#stage .view[data-selected=yes]")
@@ -146,9 +136,10 @@ CONTRAST = """() => {
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_is_readable_and_things_have_names(page, running, scheme):
+def test_text_is_readable_and_things_have_names(page, scheme):
     page.emulate_media(color_scheme=scheme)
-    opened(page, running[0])
+    page.reload()
+    page.wait_for_selector(READY)
     paper = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
     assert (max(page.evaluate(paper)) < 64) == (scheme == "dark")
     for name in ("Open", "Material", "Light", "Objects", "Look", "Take away"):
@@ -222,14 +213,12 @@ def test_two_people_at_once(browser, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_whole_story(page, running, tmp_path):
+def test_the_whole_story(page, tmp_path):
     """A dropped photo, cancelled and begun again, reloaded in the middle, edited, traced, taken away."""
     from materialist.io.photo import example_path
 
-    address, _ = running
     page.set_default_timeout(300_000)
     Image.open(example_path("coffee")).resize((150, 100)).save(tmp_path / "coffee.png")  # nothing is enlarged
-    opened(page, address)
     page.get_by_role("tab", name="Open").click()
     page.set_input_files("#file input[type=file]", str(tmp_path / "coffee.png"))
     page.wait_for_selector("#facts >> text=is ready")
@@ -274,7 +263,8 @@ def test_the_whole_story(page, running, tmp_path):
 
 
 @pytest.mark.slow
-def test_every_tab_opens_without_a_scene(page, tmp_path):
+def test_every_tab_opens_without_a_scene(empty_page, tmp_path):
+    page = empty_page
     with studio(tmp_path) as (_, address):
         page.goto(address)
         for name in ("Material", "Light", "Objects", "Take away", "Look", "Open"):

@@ -1,7 +1,7 @@
 """The brush, falling objects and live glass in a real browser."""
 
 import pytest
-from studio_browser import PICTURE, click_photo, mask, move, opened, pixels, place, press, slide
+from studio_browser import PICTURE, click_photo, mask, move, pixels, place, press, select_block, slide
 
 MASK = "getComputedStyle(document.querySelector('#stage .fill')).maskImage"
 
@@ -22,8 +22,7 @@ def stroke(page, points, key=None):
     page.wait_for_function(f"(old) => {MASK} !== old", arg=before)
 
 
-def test_the_brush_paints_and_rubs_out(page, running):
-    opened(page, running[0])
+def test_the_brush_paints_and_rubs_out(page):
     press(page, "Brush")
     move(page, "brush", 3)
     page.mouse.move(*place(page, 0.5, 0.5))
@@ -41,13 +40,10 @@ def test_the_brush_paints_and_rubs_out(page, running):
     assert not mask(page)[36, 14:25].any() and mask(page)[36, 44]
     slide(page, "hue", 120)  # what is painted can be edited
     page.wait_for_selector("#steps >> text=hue 120")
-    page.get_by_role("button", name="Remove: edit 1").click()
-    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
     assert not page.errors
 
 
-def test_what_is_zoomed_is_hit_where_it_is_seen(page, running):
-    opened(page, running[0])
+def test_what_is_zoomed_is_hit_where_it_is_seen(page):
     press(page, "Brush")
     move(page, "brush", 2)
     wide = "parseFloat(document.querySelector('#stage .sheet').style.width)"
@@ -68,11 +64,9 @@ def test_what_is_zoomed_is_hit_where_it_is_seen(page, running):
     page.wait_for_function(f"{wide} === 100")
 
 
-def test_the_photo_is_seen_as_long_as_a_key_is_held(page, running):
-    opened(page, running[0])
+def test_the_photo_is_seen_as_long_as_a_key_is_held(page):
     photo = page.evaluate(PICTURE)
-    click_photo(page, 0.39, 0.5)
-    page.wait_for_selector("#stage .view[data-selected=yes]")
+    select_block(page)
     slide(page, "hue", 120)
     before = page.locator("#stage .before")
     page.locator("#before").hover()
@@ -82,12 +76,9 @@ def test_the_photo_is_seen_as_long_as_a_key_is_held(page, running):
         assert before.is_visible() and before.get_attribute("src") == photo
         let_go()
         assert not before.is_visible()
-    page.get_by_role("button", name="Remove: edit 1").click()
-    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
 
 
-def test_light_that_was_dragged_is_made_again_at_rest(page, running):
-    opened(page, running[0])
+def test_light_that_was_dragged_is_made_again_at_rest(page):
     page.get_by_role("tab", name="Light").click()
     page.locator("#lights button").nth(5).click()
     page.wait_for_selector("#steps >> text=sunset")
@@ -95,14 +86,10 @@ def test_light_that_was_dragged_is_made_again_at_rest(page, running):
         document.querySelector('#stage .photo'), {attributes: true, attributeFilter: ['src']}); }""")
     move(page, "rotate", 90)
     page.wait_for_function("window.seen === 2")
-    page.get_by_role("button", name="Remove: edit 1").click()
-    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
 
 
-def test_selecting_by_clicks(page, running):
-    opened(page, running[0])
-    click_photo(page, 0.39, 0.5)
-    page.wait_for_selector("#stage .view[data-selected=yes]")
+def test_selecting_by_clicks(page):
+    select_block(page)
     first, one = mask(page), page.evaluate(MASK)
     click_photo(page, 0.8, 0.8, ["Shift"])
     page.wait_for_function(f"(old) => {MASK} !== old", arg=one)
@@ -114,11 +101,9 @@ def test_selecting_by_clicks(page, running):
 
 
 @pytest.mark.slow
-def test_glass_follows_its_slider(page, running):
+def test_glass_follows_its_slider(page):
     page.set_default_timeout(240_000)
-    opened(page, running[0])
-    click_photo(page, 0.39, 0.5)
-    page.wait_for_selector("#stage .view[data-selected=yes]")
+    select_block(page)
     page.get_by_role("tab", name="Objects").click()
     page.get_by_role("button", name="Turn the selection to glass").click()
     page.click("#glass")
@@ -148,10 +133,9 @@ def test_glass_follows_its_slider(page, running):
 
 
 @pytest.mark.slow
-def test_an_object_falls_on_the_page(page, running):
+def test_an_object_falls_on_the_page(page):
     pytest.importorskip("mujoco", reason="needs the physics extra")
     page.set_default_timeout(120_000)
-    opened(page, running[0])
     page.get_by_role("tab", name="Objects").click()
     page.get_by_label("Object", exact=True).click()
     page.get_by_role("option", name="Cube").click()
@@ -163,13 +147,10 @@ def test_an_object_falls_on_the_page(page, running):
     page.wait_for_selector("#steps >> text=/Fallen: cube/")
     page.get_by_role("button", name="Undo").click()
     page.wait_for_selector("#steps >> text=Object: cube")
-    page.get_by_role("button", name="Remove: edit 1").click()
-    page.wait_for_function("document.querySelectorAll('#steps li').length === 0")
     assert not page.errors
 
 
-def test_a_refused_file_leaves_its_field(page, running, tmp_path):
-    opened(page, running[0])
+def test_a_refused_file_leaves_its_field(page, tmp_path):
     (tmp_path / "broken.png").write_bytes(b"not an image")
     (tmp_path / "empty.yaml").write_text("nothing")
     (tmp_path / "none.obj").write_text("v 0 0 0\n")
