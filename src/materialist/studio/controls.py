@@ -10,15 +10,16 @@ from typing import Any
 import gradio as gr
 import numpy as np
 
+from materialist.color import srgb_levels
 from materialist.errors import InputError
-from materialist.option_kinds import ON, OperationOptions, declarations
+from materialist.option_kinds import ON, OperationOptions, declarations, parse_colour
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight
 from materialist.studio import objects
 from materialist.studio.session import Session
 
 SUN = (45.0, 40.0)
 """Where a new sun stands: degrees right of ahead, and above the horizon."""
-WHITE = "#ffffff"
+WHITE, GREY = "#ffffff", "#808080"
 
 
 def number_text(value: float) -> str:
@@ -36,18 +37,12 @@ def hex_colour(value: Any) -> str:
     numbers = [float(v) for v in re.findall(r"[\d.]+", value)[:3]]
     if len(numbers) == 3 and all(0 <= v <= 255 for v in numbers):
         return "#" + "".join(f"{round(v):02x}" for v in numbers)
-    return "#808080"
+    return GREY
 
 
 def picked_colour(colour: Any) -> str:
-    """A colour of the list of edits, linear numbers or #rrggbb, as #rrggbb. Raises ValueError for other words."""
-    from materialist.color import linear_to_srgb
-
-    if isinstance(colour, str) and colour.startswith("#"):
-        return colour
-    numbers = colour.split(",") if isinstance(colour, str) else colour
-    encoded = np.round(255 * linear_to_srgb(np.array([float(v) for v in numbers], np.float32)))
-    return "#" + "".join(f"{int(v):02x}" for v in encoded)
+    """A colour of the list of edits, linear numbers or #rrggbb, as #rrggbb. Raises InputError for other words."""
+    return "#" + srgb_levels(np.array(parse_colour(colour), np.float32)).tobytes().hex()
 
 
 def _inside(hollow: Any) -> str:
@@ -68,7 +63,7 @@ class Control:
     text: Callable[[Any], str | None] = number_text
     """Value of the component -> the option in the list of edits; None clears it."""
     value: Callable[[Any], Any] = float
-    """The option -> value of the component; a TypeError or ValueError leaves the component as it is."""
+    """The option -> value of the component; one that is not valid leaves the component as it is."""
 
     @property
     def default(self) -> Any:
@@ -79,7 +74,7 @@ class Control:
 CONTROLS = {
     **{name: Control(MaterialEdit, name) for name in ("hue", "saturation", "value", "roughness", "metallic")},
     **{name: Control(MaterialEdit, name) for name in ("texture_scale", "grow", "feather")},
-    "colour": Control(MaterialEdit, "albedo", hex_colour, lambda v: v if str(v).startswith("#") else "#808080"),
+    "colour": Control(MaterialEdit, "albedo", hex_colour, lambda v: picked_colour(v or GREY)),
     **{name: Control(Relight, name) for name in ("rotate", "ambient", "sun_power")},
     "sun_on": Control(Relight, "sun", value=lambda sun: sun is not None),
     "azimuth": Control(Relight, "sun", value=lambda sun: float((sun or SUN)[0])),
@@ -132,7 +127,7 @@ def control_values(session: Session) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, control in CONTROLS.items():
         if control.operation in given:
-            with suppress(TypeError, ValueError):
+            with suppress(TypeError, ValueError, InputError):
                 values[name] = control.value(given[control.operation].get(control.option, control.default))
     for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
         if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit

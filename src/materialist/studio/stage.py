@@ -109,13 +109,13 @@ def jpeg_file(file: Path) -> str:
 
 def maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
-    materials = scene.materials
+    shown = display.maps(scene)
     return [
-        (srgb_levels(materials.albedo), "Albedo: colour without light"),
-        (display.grey(materials.roughness), "Roughness: black is a mirror, white is chalk"),
-        (display.grey(materials.metallic), "Metallic: white is metal"),
-        (display.normals(scene.normal), "Normals: which way surfaces face"),
-        (display.depths(scene.depth), "Depth: near is bright"),
+        (shown["albedo"], "Albedo: colour without light"),
+        (shown["roughness"], "Roughness: black is a mirror, white is chalk"),
+        (shown["metallic"], "Metallic: white is metal"),
+        (shown["normal"], "Normals: which way surfaces face"),
+        (shown["depth"], "Depth: near is bright"),
         (display.light(scene.envmap), "Light, all around; ahead is the middle"),
         (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
         (display.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),

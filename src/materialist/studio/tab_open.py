@@ -2,7 +2,7 @@
 
 import shutil
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -81,26 +81,21 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
                 return
         yield from _show_project(context, session, project)
 
-    def resume(session: Session, name: str | None) -> Iterator[Updates]:
-        if not name:
-            raise InputError("Choose one of your photos in the list first.")
-        yield from _resume(context, session, name)
-
     def arrive(session: Session) -> Iterator[Updates]:
         known, last = _projects(context, session), studio.last.get(session.person)
         yield {"projects": gr.update(choices=known, value=known[0][1] if known else None)}
-        if last is not None and any(value == last for _, value in known):
+        if not any(value == last for _, value in known):
+            last = studio.start.name if isinstance(studio.start, Project) else None
+        if last is not None:
             yield from _resume(context, session, last)
-        elif isinstance(studio.start, Project):
-            yield from _resume(context, session, studio.start.name)
-        elif studio.start is not None:
+        elif isinstance(studio.start, Path):
             yield {"file": studio.public_copy(studio.start)}
 
     sent = context.long(parts["file"].change, uploaded, "file")
     sent.failure(lambda: None, None, parts["file"], **LONG)  # what was refused is not there
     context.long(parts["examples"].select, choose_example, data=True)
     context.long(parts["start"].click, start, "file", "predictor", "size", "fov")
-    context.long(parts["continue"].click, resume, "projects")
+    context.long(parts["continue"].click, partial(_resume, context), "projects")
     context.long(page.load, arrive)
 
 
@@ -171,9 +166,11 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
         yield {"found": gr.update(visible=False, value=[]), "stage": stage(session)}
 
 
-def _resume(context: PageContext, session: Session, name: str) -> Iterator[Updates]:
+def _resume(context: PageContext, session: Session, name: str | None) -> Iterator[Updates]:
     """Open a project, or follow its inversion if that still runs."""
     studio = context.studio
+    if not name:
+        raise InputError("Choose one of your photos in the list first.")
     project = studio.project(name, session.person)
     running = [j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder]
     if running:

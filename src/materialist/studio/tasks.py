@@ -52,17 +52,14 @@ def invert(
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     if isinstance(value, Prediction):
-        shown = {"depth": display.depths(value.depth), "normals": display.normals(value.normal)}
-        value = value.materials
+        shown = display.maps(value)
+    elif isinstance(value, Materials):
+        shown = {"albedo": srgb_levels(value.albedo)}
+        shown |= {"roughness": display.grey(value.roughness), "metallic": display.grey(value.metallic)}
     else:
-        shown = {}
-    if isinstance(value, Materials):
-        shown |= {"albedo": srgb_levels(value.albedo), "roughness": display.grey(value.roughness)}
-        shown["metallic"] = display.grey(value.metallic)
-    else:
-        shown[name] = display.light(value) if name == "light" else srgb_levels(value)
+        shown = {name: display.light(value) if name == "light" else srgb_levels(value)}
     for title, pixels in shown.items():
-        file = folder / f"found-{title.replace(' ', '-')}.jpg"
+        file = folder / f"found-{title}.jpg"
         write_pixels(file, pixels)
         report.found(name=title, file=file.name)
 
