@@ -9,9 +9,9 @@ from materialist.errors import InputError
 from materialist.studio.glass import Pane
 
 
-def trace(report, request):
+def trace(report, scene, others, step):
     """A pane whose colour is the index of refraction; 1.9 takes for ever, 1.8 kills the process, 1.7 fails."""
-    ior = float(request["glass"]["ior"])
+    ior = float(step.options["ior"])
     with open(os.environ["GLASS_LOG"], "a") as log:
         log.write(f"{os.getpid()} {ior}\n")
     report("build", 0, 1)

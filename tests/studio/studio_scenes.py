@@ -1,5 +1,6 @@
 """Small scenes for the studio: `edit_scenes` again, with a field of view and a warning, as packages on disk."""
 
+import zipfile
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -39,6 +40,21 @@ def package(folder: Path) -> Path:
     path = folder / "room.scene"
     save_scene(room(), path)
     return path
+
+
+def zipped(file: Path, members: dict[str, str | bytes]) -> Path:
+    """A zip file of these members."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as made:
+        for name, content in members.items():
+            made.writestr(name, content)
+    return file
+
+
+def zipped_package(folder: Path, root: str = "", **more: str) -> Path:
+    """The room's package as a zip file, in a folder `root/` of it."""
+    scene = package(folder)
+    files = {f"{root}{file.relative_to(scene)}": file.read_bytes() for file in scene.rglob("*") if file.is_file()}
+    return zipped(folder / "a.zip", files | more)
 
 
 def click(session, x: float = 25, y: float = 24, mode: str = "new") -> None:

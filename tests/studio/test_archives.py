@@ -4,7 +4,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from studio_scenes import block, click
+from studio_scenes import block, click, zipped
 
 from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
@@ -73,13 +73,6 @@ def test_a_list_of_another_photo_does_not_take_this_one_s_files(studio, session,
     other.close()
 
 
-def zipped(folder, members):
-    with zipfile.ZipFile(folder / "a.zip", "w", zipfile.ZIP_DEFLATED) as made:
-        for name, content in members.items():
-            made.writestr(name, content)
-    return folder / "a.zip"
-
-
 LIST = "- edit: {mask: m.png, hue: 3}"
 
 
@@ -101,7 +94,7 @@ def test_zips_that_are_refused(studio, tmp_path, monkeypatch, members, words):
     desk = tmp_path / "desk"
     desk.mkdir()
     with pytest.raises(InputError, match=words) as error:
-        unpack(desk, zipped(tmp_path, members))
+        unpack(desk, zipped(tmp_path / "a.zip", members))
     assert str(tmp_path) not in studio.shown(str(error.value)) and not list(desk.iterdir())
 
 
@@ -110,6 +103,6 @@ def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path)
     members = {"room/edits.yaml": LIST, "room/m.png": (tmp_path / "m.png").read_bytes(), "room/x.py": "x", "../e": "x"}
     desk = tmp_path / "desk"
     desk.mkdir()
-    (step,) = unpack(desk, zipped(tmp_path, members))
+    (step,) = unpack(desk, zipped(tmp_path / "a.zip", members))
     assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
     assert not (tmp_path / "e").exists() and EditList((step,)).active

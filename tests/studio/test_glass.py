@@ -84,12 +84,10 @@ class _Report:
 def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
     from materialist.edits.glass.preview import GlassPreview
 
-    request = {
-        "scene": str(package(tmp_path)), "folder": str(tmp_path), "others": [["relight", {"ambient": "0.5"}]],
-        "glass": {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"},
-    }  # fmt: skip
+    scene, others = str(package(tmp_path)), (Step("relight", {"ambient": "0.5"}, tmp_path),)
+    given = {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"}
     first = _Report()
-    pane = studio_glass.trace(first, request)
+    pane = studio_glass.trace(first, scene, others, Step("glass", given, tmp_path))
     assert first.stages == ["build", "trace"]
     dim = replace(room(), envmap=room().envmap * 0.5)
     truth = GlassPreview(dim, block(), thickness="symmetry").picture(ior=1.2, tint=(1, 0.5, 0.5))
@@ -98,7 +96,7 @@ def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
     assert outside.any() and np.array_equal(truth[outside], room().photo.linear[outside])
     assert pane.share.max() == 1 and (pane.share > 0.5).sum() > 0.8 * block().sum()
     late = _Report(outdated=True)
-    assert studio_glass.trace(late, {**request, "glass": {**request["glass"], "ior": "1.4"}}) is None
+    assert studio_glass.trace(late, scene, others, Step("glass", {**given, "ior": "1.4"}, tmp_path)) is None
     assert late.stages == ["build"]  # the body is kept, and nothing is traced
     with pytest.raises(InputError, match="must be 4 numbers"):
-        studio_glass.trace(_Report(), {**request, "glass": {"ior": "1.4", "box": "0,0,9"}})
+        studio_glass.trace(_Report(), scene, others, Step("glass", {"ior": "1.4", "box": "0,0,9"}, tmp_path))

@@ -1,11 +1,9 @@
 """What strangers send."""
 
-import zipfile
-
 import numpy as np
 import pytest
 from made_png import png_header
-from studio_scenes import package
+from studio_scenes import zipped, zipped_package
 
 from materialist.errors import InputError, SceneError
 from materialist.io.decode import image_size
@@ -50,27 +48,18 @@ def test_sizes_of_other_headers(tmp_path):
 
 @pytest.mark.parametrize("root", ["", "room.scene/"])
 def test_a_zipped_scene_comes_back(tmp_path, root):
-    scene = package(tmp_path)
-    with zipfile.ZipFile(tmp_path / "a.zip", "w") as pack:
-        for file in scene.rglob("*"):
-            pack.write(file, f"{root}{file.relative_to(scene)}")
-        pack.writestr(f"{root}../evil.txt", "x")
-        pack.writestr("/abs.txt", "x")
-        pack.writestr(f"{root}maps/extra.py", "x")
-    archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target")
+    more = {f"{root}../evil.txt": "x", "/abs.txt": "x", f"{root}maps/extra.py": "x"}
+    archives.unpack_scene(zipped_package(tmp_path, root, **more), tmp_path / "target")
     assert load_scene(tmp_path / "target").camera.width == 64
     assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
 
 
 def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_path, monkeypatch):
-    scene = package(tmp_path)
-    with zipfile.ZipFile(tmp_path / "a.zip", "w") as pack:
-        for file in scene.rglob("*"):
-            pack.write(file, file.relative_to(scene))
+    file = zipped_package(tmp_path)
     before = studio.work.projects()
     monkeypatch.setattr(tab_open, "SETTINGS", StudioSettings(decoded_bytes=100_000))
     with pytest.raises(SceneError, match="GB of memory") as error:
-        tab_open._unpack(PageContext(studio), Session("me"), tmp_path / "a.zip")
+        tab_open._unpack(PageContext(studio), Session("me"), file)
     assert studio.work.projects() == before and str(studio.work.root) not in studio.shown(str(error.value))
 
 
@@ -78,16 +67,12 @@ def test_zips_that_are_none(tmp_path, monkeypatch):
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
     with pytest.raises(InputError, match="not a readable zip"):
         archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target")
-    with zipfile.ZipFile(tmp_path / "b.zip", "w") as pack:
-        pack.writestr("readme.txt", "x")
     with pytest.raises(InputError, match="no scene package"):
-        archives.unpack_scene(tmp_path / "b.zip", tmp_path / "target")
-    with zipfile.ZipFile(tmp_path / "c.zip", "w", zipfile.ZIP_DEFLATED) as pack:
-        pack.writestr("scene.json", "{}")
-        pack.writestr("mesh.ply", b"\0" * 5_000_000)
+        archives.unpack_scene(zipped(tmp_path / "b.zip", {"readme.txt": "x"}), tmp_path / "target")
+    large = zipped(tmp_path / "c.zip", {"scene.json": "{}", "mesh.ply": b"\0" * 5_000_000})
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(unpacked_bytes=1_000_000))
     with pytest.raises(InputError, match="unpacks to"):
-        archives.unpack_scene(tmp_path / "c.zip", tmp_path / "target")
+        archives.unpack_scene(large, tmp_path / "target")
     assert not (tmp_path / "target").exists()
 
 

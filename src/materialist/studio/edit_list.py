@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -82,6 +84,16 @@ class EditList:
 def with_options(step: Step, **options: Any) -> Step:
     """The step with some options set, or cleared (None)."""
     return replace(step, options={k: v for k, v in {**step.options, **options}.items() if v is not None})
+
+
+def kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any], most: int) -> Any:
+    """What a store holds for some steps, made where it is missing; it keeps those that were last asked for."""
+    key = json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)
+    found = store.pop(key, None)
+    store[key] = found = make() if found is None else found
+    for old in list(store)[:-most]:
+        store.pop(old, None)
+    return found
 
 
 def summary(step: Step) -> str:

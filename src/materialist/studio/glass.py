@@ -16,12 +16,16 @@ from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
 from materialist.studio import SETTINGS
+from materialist.studio.edit_list import kept, with_options
 from materialist.types import Array, Scene
 
 VALUES = ("ior", "transmission", "tint", "roughness")
 """Options of a glass step that its body does not depend on."""
 Tint = tuple[float, float, float]
-Request = dict[str, Any]
+Request = tuple[tuple[Step, ...], Step]
+"""The other steps of a list, and the glass whose picture is wanted."""
+_BODIES: dict[str, Any] = {}
+"""The last `GlassPreview`s of this process."""
 _WORDS = {"build": "Building the glass body …", "trace": "Tracing the glass …"}
 
 
@@ -74,32 +78,32 @@ class GlassClient:
         self.changed = threading.Condition(threading.RLock())
         self._scene = str(scene)
         self._worker: Worker | None = None
-        self._key = ""
+        self._asked: Request | None = None
         """The last request."""
         self._number = 0
         """Its number at the worker."""
         self.state = GlassState()
-        self._panes: dict[str, tuple[str, Pane]] = {}
+        self._panes: dict[str, tuple[Request, Pane]] = {}
         """Object -> (request, its answer)."""
 
     def ask(self, steps: tuple[Step, ...], step: Step) -> None:
         """Request the picture of a glass step of this list; once for equal requests."""
-        key = self._request(steps, step)
+        request = _request(steps, step)
         with self.changed:
-            if key == self._key:
+            if request == self._asked:
                 return
-            self._key, self.state = key, GlassState()
+            self._asked, self.state = request, GlassState()
             if not self.fresh(steps, step):
-                self._send(key)
+                self._send(*request)
             self.changed.notify_all()
 
     def pane(self, step: Step) -> Pane | None:
         """The last picture of a glass step, perhaps with earlier values."""
-        return self._panes.get(_place(step), ("", None))[1]
+        return self._panes.get(_place(step), (None, None))[1]
 
     def fresh(self, steps: tuple[Step, ...], step: Step) -> bool:
         """Whether `pane` shows exactly this step of this list."""
-        return self._panes.get(_place(step), ("", None))[0] == self._request(steps, step)
+        return self._panes.get(_place(step), (None, None))[0] == _request(steps, step)
 
     def keep(self, steps: tuple[Step, ...]) -> None:
         """Forget panes of other steps than these, and end the process when there is no glass any more."""
@@ -114,20 +118,12 @@ class GlassClient:
         with self.changed:
             worker, self._worker = self._worker, None
             self._panes.clear()
-            self._key, self.state = "", GlassState()
+            self._asked, self.state = None, GlassState()
             self.changed.notify_all()
         if worker is not None:
             worker.kill()
 
-    def _request(self, steps: tuple[Step, ...], step: Step) -> str:
-        request: Request = {
-            "scene": self._scene, "folder": str(step.folder.resolve()),
-            "others": [[one.kind, one.options] for one in steps if one is not step],
-            "glass": {name: step.options[name] for name in sorted(step.options) if name != "skip"},
-        }  # fmt: skip
-        return json.dumps(request, default=str)
-
-    def _send(self, key: str) -> None:
+    def _send(self, others: tuple[Step, ...], step: Step) -> None:
         """Send a request to the process; start one where none runs."""
         import psutil
 
@@ -144,7 +140,7 @@ class GlassClient:
             self.state = GlassState(False, str(error), True)
             return
         self.state = GlassState(True, "Getting the glass ready …")
-        self._number = self._worker.begin(trace, {"request": json.loads(key)})
+        self._number = self._worker.begin(trace, {"scene": self._scene, "others": others, "step": step})
 
     def _listen(self, worker: Worker) -> None:
         """Take the messages of a process until it ends."""
@@ -158,7 +154,7 @@ class GlassClient:
         if message.kind == LOST:
             self._worker = None
             if self.state.waiting:
-                self._key = ""
+                self._asked = None
                 self.state = GlassState(
                     False, "The tracing of glass ended by itself; move a slider to start it again.", True
                 )
@@ -166,11 +162,15 @@ class GlassClient:
             return  # a newer request is under way
         elif message.kind == PROGRESS:
             self.state = GlassState(True, _WORDS.get(message.facts["stage"], self.state.words))
-        elif message.kind == DONE and message.facts is not None:
-            self._panes[_place(Step("glass", json.loads(self._key)["glass"]))] = (self._key, message.facts)
+        elif message.kind == DONE and message.facts is not None and self._asked is not None:
+            self._panes[_place(self._asked[1])] = (self._asked, message.facts)
             self.state = GlassState()
         elif message.kind == FAILED:
             self.state = GlassState(False, sentence(message.facts), True)
+
+
+def _request(steps: tuple[Step, ...], step: Step) -> Request:
+    return tuple(one for one in steps if one is not step), with_options(step, skip=None)
 
 
 def _place(step: Step) -> str:
@@ -183,24 +183,19 @@ def _loaded(path: str) -> Scene:
     return mt.load_scene(path)
 
 
-@lru_cache(SETTINGS.glass_bodies)
-def _body(path: str, folder: str, others: str, glass: str) -> Any:
-    """The `GlassPreview` of a scene after other steps (JSON), for the options (JSON) that a body depends on."""
-    from materialist.edits.glass.preview import GlassPreview
-
-    scene = _loaded(path)
-    step = Step("glass", json.loads(glass), Path(folder))
-    edited = apply(scene, [Step(kind, given, Path(folder)) for kind, given in json.loads(others)])
-    return GlassPreview(edited, region_of(scene, step), options_of(step))
-
-
-def trace(report: Reporter, request: Request) -> Pane | None:
-    """The pane of one request; None where a newer one came meanwhile. Raises InputError."""
-    path, folder, glass = request["scene"], request["folder"], request["glass"]
-    options = options_of(Step("glass", glass, Path(folder)))
+def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) -> Pane | None:
+    """The pane of a glass step after other steps; None where a newer request came meanwhile. Raises InputError."""
+    options = options_of(step)
     report("build", 0, 1)
-    fixed = {name: value for name, value in glass.items() if name not in VALUES}
-    preview = _body(path, folder, json.dumps(request["others"]), json.dumps(fixed))
+    fixed = with_options(step, **dict.fromkeys(VALUES))
+
+    def build() -> Any:
+        from materialist.edits.glass.preview import GlassPreview
+
+        loaded = _loaded(scene)
+        return GlassPreview(apply(loaded, list(others)), region_of(loaded, fixed), options_of(fixed))
+
+    preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:
         return None
     report("trace", 0, 1)

@@ -2,9 +2,7 @@
 
 import ctypes
 import gc
-import json
 import sys
-from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -17,7 +15,7 @@ from materialist.color import luminance
 from materialist.edits.recipe import Step, apply
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, glass
-from materialist.studio.edit_list import summary
+from materialist.studio.edit_list import kept, summary
 from materialist.types import Array, Body, Scene
 
 
@@ -80,11 +78,11 @@ class LivePreview:
                 reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
                 raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
 
-        return _kept(self._edited, steps, make) if steps else self.scene
+        return kept(self._edited, steps, make, SETTINGS.scenes_kept) if steps else self.scene
 
     def _glass(self, step: Step) -> tuple[Array, glass.Tint]:
         """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
-        return _kept(self._panes, (step,), lambda: glass.checked(self.scene, step))
+        return kept(self._panes, (step,), lambda: glass.checked(self.scene, step), SETTINGS.scenes_kept)
 
     def picture(
         self, steps: tuple[Step, ...], client: glass.GlassClient | None = None, *, coarse: bool = False
@@ -122,17 +120,6 @@ class LivePreview:
         self._preview.set_exception(InputError("This photo was closed; open it again."))  # for who waits
         self._edited.clear()
         self._panes.clear()
-
-
-def _kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any]) -> Any:
-    """What a store holds for some steps, made where it is missing; the store keeps the last ones."""
-    key = json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)
-    found = store.get(key)
-    if found is None:
-        found = store[key] = make()
-        for old in list(store)[: -SETTINGS.scenes_kept]:
-            store.pop(old, None)
-    return found
 
 
 def _build(scene: Scene, file: Path | None) -> Any:
