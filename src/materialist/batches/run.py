@@ -60,7 +60,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     photos, folder = list_photos(source, runs=runs), Path(runs)
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
-        template = PhotoTask("", "", "", folder.resolve(), asked, how.recipe, how.spp, function=how.function)
+        template = PhotoTask("", "", "", folder.resolve(), asked, how)
         tasks = plan(photos, ledger, template)
         run = _Run(
             folder, photos, ledger, {task.id: task for task in tasks}, asked, progress or (lambda _: None), start
@@ -170,7 +170,7 @@ class _Run:
         write_page(outcome)
 
     def _begin(self, pool: LocalPool | RayPool, task: PhotoTask) -> None:
-        places = ([] if task.kept else [task.scene]) + ([] if task.edits is None else [task.picture])
+        places = ([] if task.kept else [task.scene]) + ([] if task.how.recipe is None else [task.picture])
         for place in places:
             if place.exists() and place.name not in self.ledger.owned:
                 reason = f"{place} exists and is not of this batch; move it away."

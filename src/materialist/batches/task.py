@@ -13,7 +13,7 @@ import numpy as np
 
 import materialist as mt
 from materialist.batches.edits import edits_for, edits_key
-from materialist.batches.options import INVERSION
+from materialist.batches.options import BatchOptions
 from materialist.batches.remote import fingerprint, is_url, local_copy
 from materialist.batches.results import file_hash, package_hash, package_size
 from materialist.color import srgb_levels
@@ -46,12 +46,9 @@ class PhotoTask:
     runs: Path
     options: dict[str, Any] = field(default_factory=dict)
     """Keywords of the inversion; `{name}` in a text stands for the name."""
-    edits: Path | None = None
-    spp: int | None = None
-    """Paths per pixel of each rendering of the edit; None: those of `composite`."""
+    how: BatchOptions = field(default_factory=BatchOptions)
     kept: dict[str, Any] = field(default_factory=dict)
     """OF_THE_SCENE, where the package is there, whole and of this photo and these options: only the edit is missing."""
-    function: str = INVERSION
 
     @property
     def scene(self) -> Path:
@@ -71,10 +68,10 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     scene, facts = _scene(task, report)
     pictures = [scene.photo.linear, scene.rerender]
     warnings = scene.warnings
-    if task.edits is not None:
+    if task.how.recipe is not None:
         begun = time.perf_counter()
         try:
-            picture, notes = _edited(task, task.edits, scene, report)
+            picture, notes = _edited(task, task.how.recipe, scene, report)
         except Exception as error:
             # The scene is whole: with it in the ledger, the failure costs no second inversion.
             error.facts = {**facts, "scene_bytes": package_size(task.scene)}  # type: ignore[attr-defined]
@@ -82,7 +79,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
         pictures.append(picture)
         warnings += notes
         facts |= {"edit_seconds": time.perf_counter() - begun, "picture_hash": file_hash(task.picture)}
-        facts["edits"] = edits_key(task.edits, task.name, task.spp)
+        facts["edits"] = edits_key(task.how.recipe, task.name, task.how.spp)
     write_whole(task.runs / "thumbs" / f"{task.name}.jpg", _thumbnails(pictures))
     metrics = scene.report.metrics
     facts |= {
@@ -113,7 +110,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     report("start", 0, 1)
     begun = time.perf_counter()
-    module, _, attribute = task.function.partition(":")
+    module, _, attribute = task.how.function.partition(":")
     scene = getattr(import_module(module), attribute)(photo, size=size, fov=fov, progress=report, **options)
     report("save", 0, 1)
     mt.save_scene(scene, task.scene, force=True)
@@ -134,7 +131,7 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
         edited = apply(scene, edits_for(edits, task.name), seed=seed, device=device)
     except InputError as error:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
-    picture = mt.composite(scene, edited, spp=task.spp, seed=seed, device=device, progress=report)
+    picture = mt.composite(scene, edited, spp=task.how.spp, seed=seed, device=device, progress=report)
     write_composite(task.picture, picture, scene.photo, force=True)
     return picture, [*warnings_since(scene, edited), *effect_notes(scene, edited, mean_change(scene, picture))]
 
