@@ -10,7 +10,9 @@ from edit_scenes import scene_of
 from materialist import metrics
 from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
-from materialist.edits.composite.into_photo import in_photo
+from materialist.edits.composite.into_photo import in_photo, into_photo
+from materialist.edits.composite.layers import Layers
+from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.core.surfaces import KEY, emitting
 from materialist.edits.light.emitters import _patch, dimmed, visible_lights
 from materialist.edits.light.relight import relight
@@ -157,6 +159,10 @@ def test_dimmed_lights_keep_what_is_seen_in_them():
     np.testing.assert_allclose(out[7, 13:15], 0.1 * original[7, 13:15], rtol=1e-5)
     np.testing.assert_allclose(out[7, 20:28], 0.8, rtol=0.05)
     assert (out[20:] == 9).all()
+    # Something that was inserted stands before it.
     before = np.zeros((30, 40), np.float32)
-    before[7, 20:28] = 1  # something that was inserted stands before it
-    np.testing.assert_array_equal(in_photo(np.full_like(original, 9), photo, LIGHT, found, before)[7, 20:28], 9)
+    before[7, 20:28] = 1
+    nothing = np.zeros((30, 40), bool)
+    native = NativeLayer(before, before, np.full_like(original, 0.5))
+    layers = Layers(original, original, nothing, nothing, native=native)
+    np.testing.assert_array_equal(into_photo(photo, layers, (LIGHT, found))[7, 20:28], 0.5)

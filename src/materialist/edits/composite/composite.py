@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from materialist import metrics
-from materialist.edits.composite.into_photo import in_photo, into_photo
+from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.edits.core.renderer import EditRenderer, denoised, paths_for, rendered
@@ -116,12 +116,9 @@ def _picture(
         picture = denoised(picture, *renderer.guides(edited)) if denoise else picture
         return picture if upscale is None else _enlarged(picture, upscale)
     layers = render_layers(renderer, edited, spp=spp, seed=seed, clean=denoise, progress=progress)
-    photo, dimmed = renderer.scene.photo, dimmed_emitters(scene, edited)
-    picture = into_photo(photo, layers)
-    if not dimmed:
-        return picture
-    before = None if layers.native is None else layers.native.share
-    return in_photo(picture, photo, renderer.emitter_pixels(edited), dimmed, before)
+    dimmed = dimmed_emitters(scene, edited)
+    lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
+    return into_photo(renderer.scene.photo, layers, lights)
 
 
 def _enlarged(picture: Array, upscale: Upscale) -> Array:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.edits.composite.layers import Layers
-from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
 from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Photo
@@ -30,15 +29,26 @@ class CompositeSettings:
 DEFAULT = CompositeSettings()
 
 
-def into_photo(photo: Photo, layers: Layers) -> Array:
+def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None = None) -> Array:
     """[H0, W0, 3] the photo with the difference of two renderings added.
 
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
     At the border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
+
+    New bodies stand before it: they are the rendering alone, and hide the photo by their share. At the rim of bodies
+    brighter than an ordinary photo's white, white is mixed in: a few hundredths of a lamp's radiance would fill a
+    pixel, and its outline would be ragged.
+
+    lights: of in-photo emitters that are dimmed: where they are seen, and what is known of them; see `in_photo`.
     """
-    return _in_front(
-        _changed(photo, layers) if layers.reached.any() else photo.original.copy(), layers.native, photo.hdr
-    )
+    picture = _changed(photo, layers) if layers.reached.any() else photo.original.copy()
+    if lights is not None:
+        picture = in_photo(picture, photo, *lights)
+    if layers.native is None:
+        return picture
+    share, own = layers.native.share[..., None], layers.native.picture
+    own = own if photo.hdr else np.where(share < 1, np.minimum(own, 1), own)
+    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
 
 
 def _changed(photo: Photo, layers: Layers) -> Array:
@@ -141,29 +151,16 @@ def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
     return stack[row, column], away <= DEFAULT.rim
 
 
-def _in_front(picture: Array, native: NativeLayer | None, hdr: bool) -> Array:
-    """[H0, W0, 3] with new bodies before it: they are the rendering alone, and hide the photo by their share.
-
-    At the rim of bodies brighter than an ordinary photo's white, white is mixed in: a few hundredths of a lamp's
-    radiance would fill a pixel, and its outline would be ragged.
-    """
-    if native is None:
-        return picture
-    share = native.share[..., None]
-    own = native.picture if hdr else np.where(share < 1, np.minimum(native.picture, 1), native.picture)
-    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
-
-
 def _unclipped(photo: Array, base: Array) -> Array:
     """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
     return np.where(photo >= DEFAULT.white, np.maximum(photo, base), photo)
 
 
-def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Array | None = None) -> Array:
+def in_photo(picture: Array, photo: Photo, seen: Array, found: dict) -> Array:
     """[H0, W0, 3] a composite in which emitters show the photo itself, dimmed: with the trees in the window.
 
     Clipped pixels have the estimated radiance of the emitters. seen: [H, W] bool: where lights are seen. found:
-    `core.surfaces.KEY` of the provenance. before: [H0, W0] share of new bodies, which stand before the lights.
+    `core.surfaces.KEY` of the provenance.
     """
     dim = float(found["dim"])
     if dim == 1 or not seen.any():
@@ -171,8 +168,6 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict, before: Arr
     share, picture = matte(seen, photo.original), picture.copy()
     box = window(seen, picture.shape[:2], 4)
     share, seen_so, here = share[box][..., None], photo.original[box], picture[box]
-    if before is not None:
-        share = share * (1 - before[box])[..., None]
     white = seen_so.min(-1, keepdims=True)
     own = dim * seen_so
     if not photo.hdr:
