@@ -21,7 +21,6 @@ from materialist.types import Array, Scene
 
 VALUES = ("ior", "transmission", "tint", "roughness")
 """Options of a glass step that its body does not depend on."""
-Tint = tuple[float, float, float]
 Request = tuple[tuple[Step, ...], Step]
 """The other steps of a list, and the glass whose picture is wanted."""
 _BODIES: dict[str, Any] = {}
@@ -54,17 +53,6 @@ class GlassState:
 def is_traced(step: Step) -> bool:
     """Whether a step is glass that the worker traces: the paper's two-interface model is shown by other means."""
     return step.kind == "glass" and str(step.options.get("model", "closed")) == "closed"
-
-
-def checked(scene: Scene, step: Step) -> tuple[Array, Tint]:
-    """Region [H, W] bool and tint of a glass step, without building anything.
-
-    Raises InputError for values out of range, and for a region without a surface.
-    """
-    region, options = region_of(scene, step), options_of(step)
-    if not (region & (scene.depth > 0)).any():
-        raise InputError("The selection covers only sky; select a surface.")
-    return region, options.tint
 
 
 class GlassClient:

@@ -12,8 +12,9 @@ import numpy as np
 
 from materialist.camera import project
 from materialist.color import luminance
-from materialist.edits.recipe import Step, apply
+from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.errors import InputError
+from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import kept, summary
 from materialist.types import Array, Body, Scene
@@ -39,8 +40,8 @@ class LivePreview:
 
     def __init__(self, scene: Scene, file: Path | None = None):
         self.scene = scene
-        self._edited: dict[str, Scene] = {}
-        self._panes: dict[str, tuple[Array, glass.Tint]] = {}
+        self._kept: dict[str, Any] = {}
+        """What steps make: scenes, and what a sketch needs of glass."""
         self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
         _THREAD.submit(self._prepare, self._preview)
 
@@ -78,11 +79,12 @@ class LivePreview:
                 reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
                 raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
 
-        return kept(self._edited, steps, make, SETTINGS.scenes_kept) if steps else self.scene
+        return kept(self._kept, steps, make, SETTINGS.scenes_kept) if steps else self.scene
 
-    def _glass(self, step: Step) -> tuple[Array, glass.Tint]:
-        """Region [H, W] bool and tint of a glass step. Raises InputError where it cannot be."""
-        return kept(self._panes, (step,), lambda: glass.checked(self.scene, step), SETTINGS.scenes_kept)
+    def _glass(self, step: Step) -> tuple[Array, Colour]:
+        """Region [H, W] bool and tint of a glass step; builds nothing. Raises InputError where it cannot be."""
+        made = lambda: (region_of(self.scene, step), options_of(step).tint)  # noqa: E731
+        return kept(self._kept, (step,), made, SETTINGS.scenes_kept)
 
     def picture(
         self, steps: tuple[Step, ...], client: glass.GlassClient | None = None, *, coarse: bool = False
@@ -118,8 +120,7 @@ class LivePreview:
         self._preview.cancel()
         self._preview = Future()
         self._preview.set_exception(InputError("This photo was closed; open it again."))  # for who waits
-        self._edited.clear()
-        self._panes.clear()
+        self._kept.clear()
 
 
 def _build(scene: Scene, file: Path | None) -> Any:
@@ -152,7 +153,7 @@ def draw_bodies(picture: Array, scene: Scene) -> Array:
     return picture.astype(np.float32)
 
 
-def sketch_glass(picture: Array, region: Array, tint: glass.Tint) -> Array:
+def sketch_glass(picture: Array, region: Array, tint: Colour) -> Array:
     """[H, W, 3] with the object under a region [H, W] bool blurred and tinted, until its glass is traced."""
     import cv2
 

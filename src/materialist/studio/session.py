@@ -162,12 +162,10 @@ class Session:
         Raises InputError, and changes nothing, for values that are not valid.
         """
         with self.lock:
-            scene, mask, edits = self.scene, self.selection.mask, self.edits
+            _, mask, edits = self.scene, self.selection.mask, self.edits
             if self.current_kind != kind:
                 if mask is None:
                     raise InputError("Click the object that you want to change first.")
-                if not (mask & (scene.depth > 0)).any():
-                    raise InputError("The selection covers only sky; select a surface.")
                 edits = edits.add(Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace))
             self.put(edits, **options)
 

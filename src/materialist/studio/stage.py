@@ -18,6 +18,11 @@ from materialist.studio.session import Session
 from materialist.studio.tasks import before_of
 from materialist.types import Array, Scene
 
+_EMPTY: dict[str, Any] = {
+    "picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False, "coarse": False,
+}  # fmt: skip
+"""What the page shows without a photo."""
+
 
 def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) -> dict[str, Any]:
     """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
@@ -33,8 +38,7 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     with session.lock:
         live, edits, final = session.live, session.edits, session.final
         masks, client = session.selection.pictures, session.glass
-    shown = {"picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False}
-    shown |= {"serial": serial, "before": None, "coarse": False, **masks}
+    shown = {**_EMPTY, "serial": serial, "before": None, **masks}
     if live is None:
         return shown
     camera, steps = live.scene.camera, edits.active if with_edits else ()
@@ -64,8 +68,8 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
 
 def waiting_photo(file: Path) -> dict[str, Any]:
     """A photo (JPEG) that is being taken apart, without anything to click."""
-    shown = {"width": 0, "height": 0, "lamps": [], "waiting": False, "bad": False, "serial": time(), "before": ""}
-    return {**shown, **Selection().pictures, "picture": jpeg_file(file), "badge": "Your photo, being taken apart"}
+    shown = {**_EMPTY, **Selection().pictures, "serial": time(), "before": ""}
+    return {**shown, "picture": jpeg_file(file), "badge": "Your photo, being taken apart"}
 
 
 def _lamps(edits: EditList) -> list[list[float]]:
