@@ -1,30 +1,24 @@
 """What lies between radiance and the pixels of a JPEG: camera, developing, compression; batches of tensors."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import lru_cache
 
+import cv2
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from materialist.color import LUMINANCE
 from materialist.io.samples import Sample
 from materialist.types import Array
-
-_MULTIPLE = 16
-"""Sides of pictures are multiples of this: JPEG's blocks of chroma."""
-_LUMINANCE = (0.2126, 0.7152, 0.0722)
 
 
 def photographic(image: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """(photo, gains) of one picture [H, W, 3] of any size, as `developed`; [H, W, 3] and [3] float32."""
-    height, width = image.shape[:2]
-    more = -height % _MULTIPLE, -width % _MULTIPLE
-    padded = np.pad(np.asarray(image, np.float32), ((0, more[0]), (0, more[1]), (0, 0)), mode="edge")
     random = torch.Generator().manual_seed(int(rng.integers(2**63)))
-    photo, gains = developed(torch.from_numpy(padded).permute(2, 0, 1)[None], random)
-    shown = photo[0].permute(1, 2, 0)[:height, :width]
-    return np.ascontiguousarray(shown.numpy()), gains.view(3).numpy()
+    photo, gains = developed(torch.tensor(image, dtype=torch.float32).permute(2, 0, 1)[None], random)
+    return np.ascontiguousarray(photo[0].permute(1, 2, 0).numpy()), gains.view(3).numpy()
 
 
 def as_photo(sample: Sample, rng: np.random.Generator) -> Sample:
@@ -38,15 +32,14 @@ def developed(image: Tensor, random: torch.Generator) -> tuple[Tensor, Tensor]:
     """(photos, gains): the pictures [B, 3, H, W] as 8-bit photos would decode, linear in [0, 1], and white balance and
     exposure [B, 3, 1, 1] that they got.
 
-    Sides are multiples of 16. White balance, exposure, blur, vignetting, noise, tone curve, saturation, 8 bits and
+    White balance, exposure, blur, vignetting, noise, tone curve, saturation, 8 bits and
     JPEG, each at random and often weak. `image` is linear Rec.709 radiance, exposed so that white is 1.
     """
     draw = _Draw(len(image), image.device, random)
     picture = image.nan_to_num(posinf=1e4).clamp(min=0)
     gains = _gains(picture, draw) * torch.exp2(draw.normal() * 0.2)
     picture = _vignetted(_blurred((picture * gains).clamp(max=8), draw), draw)
-    encoded = _tone(_noisy(picture, draw), draw)
-    encoded = _compressed(encoded, draw)
+    encoded = _compressed(_tone(_noisy(picture, draw), draw), draw)
     linear = torch.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     return linear, gains
 
@@ -123,7 +116,7 @@ def _tone(image: Tensor, draw: _Draw) -> Tensor:
     kind, knee = draw.uniform(), draw.uniform(0.5, 0.9)
     bent = knee + (1 - knee) * (1 - torch.exp(-(image - knee) / (1 - knee)))
     image = torch.where((kind >= 0.35) & (image > knee), bent, image)
-    weight = image.new_tensor(_LUMINANCE).view(1, 3, 1, 1)
+    weight = image.new_tensor(LUMINANCE).view(1, 3, 1, 1)
     grey = (image * weight).sum(1, keepdim=True)
     image = (grey + (image - grey) * draw.uniform(0.8, 1.3)).clamp(0, 1)
     encoded = torch.where(image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
@@ -135,51 +128,15 @@ def _tone(image: Tensor, draw: _Draw) -> Tensor:
 
 def _compressed(encoded: Tensor, draw: _Draw) -> Tensor:
     """8 bits and, mostly, JPEG with chroma at half resolution."""
-    pixels = (encoded * 255).round()
-    quality = torch.where(draw.chance(0.5), draw.uniform(55, 98), draw.uniform(85, 100)).floor()
-    scale = torch.where(quality < 50, 50 / quality, 2 - quality / 50)
-    luma, chroma, turn = _tables(encoded.device)
-    ycc = torch.einsum("ij,bjhw->bihw", turn, pixels)
-    bright = _coded(ycc[:, :1] - 128, luma, scale) + 128
-    colours = _coded(F.avg_pool2d(ycc[:, 1:], 2), chroma, scale)
-    colours = F.interpolate(colours, scale_factor=2, mode="bilinear", align_corners=False)
-    back = torch.einsum("ij,bjhw->bihw", torch.linalg.inv(turn), torch.cat([bright, colours], 1))
-    return torch.where(draw.chance(0.75), back.round().clamp(0, 255), pixels) / 255
+    pixels = (encoded * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
+    quality = torch.where(draw.chance(0.5), draw.uniform(55, 98), draw.uniform(85, 100)).flatten().tolist()
+    chosen = draw.chance(0.75).flatten().tolist()
+    with ThreadPoolExecutor() as pool:
+        decoded = list(pool.map(lambda p, q, c: _jpeg(p, int(q)) if c else p, pixels, quality, chosen))
+    return torch.from_numpy(np.stack(decoded)).to(encoded.device).permute(0, 3, 1, 2).contiguous() / 255
 
 
-def _coded(plane: Tensor, table: Tensor, scale: Tensor) -> Tensor:
-    """Planes [B, C, H, W] after the quantisation of the cosine transform of their 8 x 8 blocks."""
-    batch, channels, height, width = plane.shape
-    cosine = _cosine(plane.device)
-    blocks = plane.view(batch, channels, height // 8, 8, width // 8, 8)
-    found = torch.einsum("ui,bcyixj,vj->bcyuxv", cosine, blocks, cosine)
-    step = (table * scale.view(-1, 1, 1)).round().clamp(1, 255).view(batch, 1, 1, 8, 1, 8)
-    found = (found / step).round() * step
-    return torch.einsum("ui,bcyuxv,vj->bcyixj", cosine, found, cosine).reshape(plane.shape)
-
-
-@lru_cache(maxsize=4)
-def _cosine(device: torch.device) -> Tensor:
-    """[8, 8] orthonormal DCT-II."""
-    k = torch.arange(8, dtype=torch.float64)
-    matrix = torch.cos(torch.pi * (2 * k[None] + 1) * k[:, None] / 16) / 2
-    matrix[0] /= 2**0.5
-    return matrix.float().to(device)
-
-
-@lru_cache(maxsize=4)
-def _tables(device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
-    """Quantisation of luma and chroma [8, 8] (JPEG, Annex K), and RGB to YCbCr (JFIF) without offset."""
-    luma = [
-        16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56,
-        14, 17, 22, 29, 51, 87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113, 92,
-        49, 64, 78, 87, 103, 121, 120, 101, 72, 92, 95, 98, 112, 100, 103, 99,
-    ]  # fmt: skip
-    chroma = torch.full((8, 8), 99.0)
-    chroma[:4, :4] = torch.tensor([[17, 18, 24, 47], [18, 21, 26, 66], [24, 26, 56, 99], [47, 66, 99, 99]])
-    turn = [[0.299, 0.587, 0.114], [-0.168736, -0.331264, 0.5], [0.5, -0.418688, -0.081312]]
-    return (
-        torch.tensor(luma, dtype=torch.float32).view(8, 8).to(device),
-        chroma.to(device),
-        torch.tensor(turn).to(device),
-    )
+def _jpeg(pixels: Array, quality: int) -> Array:
+    """RGB levels [H, W, 3] uint8 as a JPEG of that quality shows them."""
+    _, packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    return np.asarray(cv2.imdecode(packed, cv2.IMREAD_COLOR))[..., ::-1]

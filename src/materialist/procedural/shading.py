@@ -67,7 +67,8 @@ class Shading:
         self.face, self.material = floats(mi, packed.face), floats(mi, packed.material)
         self.env_density, self.portals = floats(mi, packed.env_density), floats(mi, packed.portals)
         self.env_table, self.lamps, self.bank = integers(mi, packed.env_table), integers(mi, packed.lamps), _bank()
-        self.env = mi.Texture2f(tensor(mi, packed.env), wrap_mode=dr.WrapMode.Repeat)
+        texture: Any = mi.Texture2f
+        self.env = texture(tensor(mi, packed.env), wrap_mode=dr.WrapMode.Repeat)
         self.rows = dr.opaque(mi.Float, float(len(packed.env)))
         self.shares = [dr.opaque(mi.Float, float(share)) for share in packed.shares]
         self.turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
