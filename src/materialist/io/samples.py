@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import os
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -163,13 +167,33 @@ def write_arrays(path: Path, arrays: dict[str, Array]) -> None:
 
 
 def complete(
-    folder: Path, names: Sequence[str], make: Callable[[int], dict[str, Array]], what: str, progress: Progress
-) -> None:
-    """Write those of the files that FOLDER lacks, each whole or not at all: `make` gives the arrays of number k."""
-    for k, name in enumerate(names):
-        if not (folder / name).exists():
-            write_arrays(folder / name, make(k))
-        progress(what, k + 1, len(names))
+    paths: Sequence[Path], make: Callable[[int], dict[str, Array]], what: str, progress: Progress, workers: int = 1
+) -> int:
+    """Write those of the files of a folder that are missing, each whole or not at all; returns how many.
+
+    `make` gives the arrays of number k; several processes make them where there are more `workers`.
+    """
+    folder = paths[0].parent
+    folder.mkdir(exist_ok=True)
+    for stale in folder.glob(".*.partial-*"):
+        stale.unlink(missing_ok=True)
+    missing = [k for k, path in enumerate(paths) if not path.exists()]
+    # Fresh processes: a renderer that has started does not survive a fork.
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, spawn, _one_thread) if workers > 1 else nullcontext() as pool:
+        written = (pool.map if pool else map)(_write, [paths[k] for k in missing], repeat(make), missing)
+        for done, _ in enumerate(written, len(paths) - len(missing) + 1):
+            progress(what, done, len(paths))
+    return len(missing)
+
+
+def _one_thread() -> None:
+    """Renderers that start later in this process use one thread."""
+    os.environ["OMP_NUM_THREADS"] = "1"
+
+
+def _write(path: Path, make: Callable[[int], dict[str, Array]], number: int) -> None:
+    write_arrays(path, make(number))
 
 
 def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:

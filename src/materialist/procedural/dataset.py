@@ -1,12 +1,8 @@
 """The procedural data set on disk: whole samples only, made by one process or several, resumable."""
 
-import multiprocessing
-import os
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +11,7 @@ import numpy as np
 from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import Progress, SampleFolder, claim, described, write_arrays
+from materialist.io.samples import Progress, SampleFolder, claim, complete, described
 from materialist.procedural.objects import things
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
@@ -40,7 +36,7 @@ class Made:
 
 def produce(
     folder: str | Path, options: DataSetOptions, *, count: int, workers: int = 1, resume: bool = False,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> Made:  # fmt: skip
     """Render the samples 0 .. count - 1 that `folder` lacks; sample i depends on the options and i alone.
 
@@ -57,48 +53,14 @@ def produce(
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)
-    (folder / "samples").mkdir(exist_ok=True)
-    for stale in (folder / "samples").glob(".*.partial-*"):
-        stale.unlink(missing_ok=True)
-    missing = [k for k in range(count) if not sample_path(folder, k).exists()]
-    start, done = time.monotonic(), 0
-    for done, _ in enumerate(_rendered(folder, options, missing, workers), 1):
-        if progress is not None:
-            progress("samples", count - len(missing) + done, count)
-    return Made(done, count - len(missing), time.monotonic() - start)
+    start, paths = time.monotonic(), [sample_path(folder, k) for k in range(count)]
+    made = complete(paths, partial(make_sample, options=options), "samples", progress, workers)
+    return Made(made, count - made, time.monotonic() - start)
 
 
 def sample_path(folder: Path, index: int) -> Path:
     """Where sample `index` lies."""
     return folder / "samples" / f"{index:07d}.npz"
-
-
-def _rendered(folder: Path, options: DataSetOptions, missing: list[int], workers: int) -> Iterator[int]:
-    if workers == 1 or len(missing) < 2:
-        yield from (_write(folder, options, k) for k in missing)
-        return
-    # Fresh processes: a renderer that has started does not survive a fork.
-    context = multiprocessing.get_context("spawn")
-    with _one_thread_each(), ProcessPoolExecutor(workers, mp_context=context) as pool:
-        yield from pool.map(_write, [folder] * len(missing), [options] * len(missing), missing)
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Processes that start meanwhile use one thread: numpy reads these variables once, when it is imported."""
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in names}
-    os.environ.update(dict.fromkeys(names, "1"))
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
-
-
-def _write(folder: Path, options: DataSetOptions, index: int) -> int:
-    write_arrays(sample_path(folder, index), make_sample(index, options))
-    return index
 
 
 def _description(options: DataSetOptions) -> dict[str, Any]:

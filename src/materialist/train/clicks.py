@@ -81,7 +81,7 @@ def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None
             "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
         }  # fmt: skip
 
-    complete(folder, [path.name for path in source.paths], view, "views", progress)
+    complete([folder / path.name for path in source.paths], view, "views", progress)
 
 
 def load_views(folder: Path) -> list[View]:

@@ -42,8 +42,8 @@ def produce(folder: Path, plan: ViewPlan, progress: Progress = lambda *_: None) 
     Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
     """
     claim(folder, DESCRIPTION, {"format": FORMAT, **asdict(plan)}, ("format", "views", "split", "seed"))
-    names = [f"{index:05d}.npz" for index in range(plan.shapes)]
-    complete(folder, names, lambda index: make_views(index, plan), "shapes", progress)
+    paths = [folder / f"{index:05d}.npz" for index in range(plan.shapes)]
+    complete(paths, lambda index: make_views(index, plan), "shapes", progress)
 
 
 def make_views(index: int, plan: ViewPlan) -> dict[str, Array]:
