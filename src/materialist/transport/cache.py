@@ -84,8 +84,11 @@ class TransportCache:
         self.lobes = [(s.diffuse_samples, 1.0), *zip(narrow, alphas, strict=True)]
         """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each roughness level."""
         self.scene = build_scene(geometry.mesh)
-        self.slots = _radiance_slots(geometry.mesh, camera)
-        self._slots = integers(mi, self.slots)
+        continued = geometry.mesh.face_plane >= 0
+        slots = geometry.mesh.face_pixel.astype(np.uint32)
+        slots[continued] = camera.width * camera.height + np.arange(continued.sum(), dtype=np.uint32)
+        self.slots = integers(mi, slots)
+        """[F] radiance slot of every face: its pixel, or one of its own on a continued plane."""
         self._primary()
         self._hits: list[mi.UInt32] = []
         self._progress = progress
@@ -119,7 +122,7 @@ class TransportCache:
         width = len(self.pixels)
         hits = dr.empty(mi.UInt32, count * width)
         _trace_loop(
-            self.scene, self._slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
+            self.scene, self.slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
             self.face, self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count),
             dr.opaque(mi.Float, alpha), diffuse,
         )  # fmt: skip
@@ -180,14 +183,6 @@ class TransportCache:
         out = np.zeros((self.camera.height * self.camera.width, values.shape[1]), np.float32)
         out[self.pixels] = values
         return out.reshape(self.camera.height, self.camera.width, -1)
-
-
-def _radiance_slots(mesh: Mesh, camera: Camera) -> Array:
-    """[F] uint32 radiance slot of every face: its pixel, or one of its own on a continued plane."""
-    slots = mesh.face_pixel.astype(np.uint32).copy()
-    on_plane = mesh.face_plane >= 0
-    slots[on_plane] = camera.width * camera.height + np.arange(on_plane.sum(), dtype=np.uint32)
-    return slots
 
 
 def _towards(normal, view):

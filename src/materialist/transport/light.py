@@ -90,7 +90,7 @@ def light_matrix(
     hits = []
     for some in LobeRays(cache, rows, rough, metallic, shape, per_texel, specular_samples).parts():
         pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
-        slots_met = dr.gather(mi.UInt32, cache._slots, pi.prim_index, pi.is_valid())
+        slots_met = dr.gather(mi.UInt32, cache.slots, pi.prim_index, pi.is_valid())
         slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] uint32 radiance slot that each ray meets
         index, share = bilinear(np.array(some.ray.d).T, shape)
         leaves = slot == MISS
