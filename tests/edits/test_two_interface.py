@@ -100,6 +100,27 @@ def test_without_refraction_the_background_is_seen_unchanged():
     assert (out[~MAPS[2]] == 0).all()
 
 
+def test_a_pixel_is_the_mean_of_finer_ones(monkeypatch):
+    """A ball that crowds a striped background together, against a picture of five times the resolution."""
+
+    def glass(fine):
+        camera = Camera(48 * fine, 40 * fine, 40)
+        *maps, thick = ball(camera, CENTRE, RADIUS)
+        stripe = np.sin(2 * np.pi * (np.arange(camera.width) + 0.5) / (6 * fine)) > 0
+        picture = np.broadcast_to(stripe[None, :, None], (*thick.shape, 3)).astype(np.float32)
+        return shown(maps, thick, 9.0, picture, back=back_of_ball(camera), camera=camera), maps[2]
+
+    monkeypatch.setattr(ti, "SIDES", (1, 1))
+    fine, inside = glass(5)
+    twin = fine.reshape(40, 5, 48, 5, 3).mean((1, 3))
+    whole = inside.reshape(40, 5, 48, 5).all((1, 3))
+    error = []
+    for side in (1, 2):
+        monkeypatch.setattr(ti, "SIDES", (side, side))
+        error.append(np.sqrt(np.mean((glass(1)[0] - twin)[whole] ** 2)))
+    assert error[1] < 0.5 * error[0], error
+
+
 @pytest.mark.parametrize("roughness", [0.0, 0.4])
 def test_no_light_is_made_or_lost(roughness):
     out = shown(MAPS, THICK, 6.0, np.ones((*SHAPE, 3)), 1.0, roughness=roughness)

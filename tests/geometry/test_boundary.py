@@ -7,7 +7,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from materialist.geometry.boundary import depth_to_mesh
+from materialist.geometry.boundary import corner_inverse_depth, corner_vertices, depth_to_mesh
+from materialist.geometry.cuts import find_cuts
 from materialist.types import Camera
 
 
@@ -31,6 +32,55 @@ def depth_maps(draw):
     depth[rng.random(depth.shape) < draw(st.sampled_from([0, 0.2, 0.6]))] = 0
     depth[rng.integers(height), rng.integers(width)] = 1.5
     return depth
+
+
+def corners_by_loop(depth, cuts):
+    """Slow twin of `corner_vertices` and `corner_inverse_depth`: loops over grid corners, flood fill at each."""
+    height, width = depth.shape
+    vertex = np.full((height, width, 4), -1)
+    inverse = np.zeros((height, width, 4))
+
+    def linked(p, q):
+        (i, j), (k, m) = min(p, q), max(p, q)
+        return bool(cuts.link_x[i, j] if i == k else cuts.link_y[i, j]) if abs(i - k) + abs(j - m) == 1 else False
+
+    def gradient(i, j, axis):
+        steps = []
+        for sign in (-1, 1):
+            k, m = (i, j + sign) if axis == 0 else (i + sign, j)
+            if 0 <= k < height and 0 <= m < width and depth[k, m] > 0 and linked((i, j), (k, m)):
+                steps.append(sign * (1 / depth[k, m] - 1 / depth[i, j]))
+        return sum(steps) / len(steps) if steps else 0.0
+
+    count = 0
+    for row in range(height + 1):
+        for column in range(width + 1):
+            around = [(row - 1, column - 1), (row - 1, column), (row, column - 1), (row, column)]
+            around = [(i, j) for i, j in around if 0 <= i < height and 0 <= j < width and depth[i, j] > 0]
+            while around:
+                group = [around.pop(0)]
+                for member in group:
+                    for other in [p for p in around if linked(member, p)]:
+                        around.remove(other)
+                        group.append(other)
+                for i, j in group:
+                    slot = 2 * (row - i) + column - j
+                    vertex[i, j, slot] = count
+                    own = 1 / depth[i, j]
+                    value = own + (column - j - 0.5) * gradient(i, j, 0) + (row - i - 0.5) * gradient(i, j, 1)
+                    inverse[i, j, slot] = min(max(value, own / 2), own * 2)
+                count += 1
+    return vertex, inverse
+
+
+@given(depth_maps(), st.sampled_from([1.0, 6.0, 20.0]))
+@settings(max_examples=40, deadline=None)
+def test_duplication_agrees_with_its_slow_twin(depth, tau):
+    cuts = find_cuts(depth, Camera(depth.shape[1], depth.shape[0], 40.0), tau)
+    vertex, inverse = corners_by_loop(depth, cuts)
+    np.testing.assert_array_equal(corner_vertices(depth > 0, cuts), vertex)
+    fast = corner_inverse_depth(np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0), cuts)
+    np.testing.assert_allclose(fast[depth > 0], inverse[depth > 0], rtol=1e-12)
 
 
 @given(depth_maps(), st.sampled_from([1.0, 6.0, 20.0]))
