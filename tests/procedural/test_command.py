@@ -6,16 +6,13 @@ import os
 from materialist.procedural.dataset import sample_path
 
 
-def test_makes_resumes_refuses_and_draws(run, tmp_path):
+def test_makes_resumes_and_draws(run, tmp_path):
     folder, sheet = tmp_path / "set", tmp_path / "sheet.png"
     make = ("train", "data", "-o", folder, "--size", 32, "--spp", 1, "--seed", 5, "--device", "cpu", "--count")
-    code, out, _ = run(*make, 1, "--json")
-    assert code == 0 and json.loads(out.splitlines()[-1])["rendered"] == 1
-    code, out, _ = run(*make, 2, "--resume", "--json")
-    told = json.loads(out.splitlines()[-1])
-    assert (code, told["rendered"], told["existing"]) == (0, 1, 1)
-    code, _, err = run(*make, 2)
-    assert code == 2 and "--resume" in err
+    for count, resume in ((1, ()), (2, ("--resume",))):
+        code, out, _ = run(*make, count, *resume, "--json")
+        told = json.loads(out.splitlines()[-1])
+        assert (code, told["rendered"], told["existing"]) == (0, 1, count - 1)
     draw = ("train", "data", "-o", folder, "--sheet", sheet)
     assert run(*draw)[0] == 0
     drawn = sheet.read_bytes()

@@ -14,7 +14,7 @@ import pytest
 
 from materialist.errors import InputError
 from materialist.procedural.dataset import identity, produce, sample_path
-from materialist.procedural.objects import things
+from materialist.procedural.objects import shapes
 from materialist.procedural.options import HELD_OUT, DataSetOptions
 from materialist.procedural.sample import make_sample
 
@@ -125,11 +125,10 @@ FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
      HEADER + FACES + 3 * "0 0 0\n" + "3 0 1 2\n"],
     ids=["text", "cut off", "corner that is not there", "point"],
 )  # fmt: skip
-@pytest.mark.filterwarnings("ignore:invalid value")
 def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
-    assert len(things.mesh(tmp_path / "meshes" / "chair.ply").faces) == 1
+    assert len(shapes.load(tmp_path / "meshes" / "chair.ply").faces) == 1
     (tmp_path / "meshes" / "vase.ply").write_text(text)
     options = DataSetOptions(size=SIZE, device="cpu", meshes=tmp_path / "meshes")
     with pytest.raises(InputError, match=r"vase\.ply .*; mend it"):

@@ -11,11 +11,6 @@ from materialist.cli.outcome import run_to_exit_code
 from materialist.predict.bundled.network import BundledNetwork
 
 
-@pytest.fixture(scope="module")
-def data(tmp_path_factory):
-    return made_samples.write_set(tmp_path_factory.mktemp("data"), 2)
-
-
 def _call(*arguments):
     result = CliRunner().invoke(app, ["train", *map(str, arguments)])
     assert result.exit_code == 0, result.output
@@ -29,7 +24,7 @@ def test_one_step_and_its_weights(data, tmp_path):
     assert made["step"] == 1
     weights = tmp_path / "run" / "weights.safetensors"
     assert weights.stat().st_size < 40e6, "what the package can hold"
-    assert BundledNetwork.load(weights)[1]["data"] == {"samples": 5, "seed": [5, 5]}
+    assert BundledNetwork.load(weights)[1]["data"] == {"samples": 7, "seed": [5, 5]}
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import json
 
-import made_samples
 import numpy as np
 import pytest
 import torch
@@ -17,9 +16,9 @@ from materialist.train.matnet import MAPS, PaperTask, enlarged, freeze, load_sta
 from materialist.train.stream import epoch
 
 
-@pytest.fixture(scope="module")
-def source(tmp_path_factory):
-    return SampleFolder(made_samples.write_set(tmp_path_factory.mktemp("set"), 2))
+@pytest.fixture
+def source(data):
+    return SampleFolder(data)
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import signal
 from dataclasses import replace
 
 import made_runs
-import made_samples
 import psutil
 import pytest
 import torch
@@ -18,11 +17,6 @@ from materialist.train import checkpoint
 from materialist.train.bundled import RECIPE
 from materialist.train.schedule import Budget, TrainingSchedule
 from materialist.train.trainer import RunOptions
-
-
-@pytest.fixture(scope="module")
-def data(tmp_path_factory):
-    return made_samples.write_set(tmp_path_factory.mktemp("data"), 4)
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from materialist.option_kinds import option
 from materialist.predict.refraction.network import RefractionNet
 from materialist.predict.refraction.thickness import WEIGHTS
 from materialist.procedural.objects.glassware import Shape, centred
-from materialist.procedural.objects.things import mesh
+from materialist.procedural.objects.shapes import load
 from materialist.procedural.options import captures
 from materialist.procedural.thickness.dataset import ViewPlan, draw_views, make_views
 from materialist.procedural.thickness.errors import errors
@@ -56,7 +56,7 @@ class ThicknessBench(Benchmark):
             yield from _rows("held-out", f"shape {k}", network, make_views(k, plan))
         for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
             for k, file in enumerate(captures(group, "**/*.ply")):
-                shape = Shape(centred(mesh(file)), hollow=False, upright=True)
+                shape = Shape(centred(load(file)), hollow=False, upright=True)
                 rng = np.random.default_rng([self.seed, k])
                 views = draw_views(shape, ShapeTracer(shape.solid), rng, self.mesh_views, exact=True)
                 yield from _rows(f"{group.name} meshes", file.stem, network, views)

@@ -12,7 +12,7 @@ from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
 from materialist.io.samples import Progress, SampleFolder, claim, complete, described
-from materialist.procedural.objects import things
+from materialist.procedural.objects import shapes
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
 from materialist.render.variant import setup
@@ -49,7 +49,7 @@ def produce(
     if options.mesh_files:
         setup(options.device)
     for path in options.mesh_files:  # a damaged one must not end a long run
-        things.mesh(path)
+        shapes.load(path)
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)

@@ -79,21 +79,13 @@ class TrainingSchedule:
         return rise * (last + (1 - last) * 0.5 * (1 + math.cos(math.pi * self.progress)))
 
 
-@dataclass
-class StopRequest:
-    """Whether a run was asked to end with a checkpoint, and whether by Ctrl-C."""
-
-    asked: bool = False
-    interrupted: bool = False
-
-
 @contextmanager
-def stop_requests() -> Iterator[StopRequest]:
-    """Note SIGTERM or Ctrl-C, so that a run can end with a checkpoint; the second signal ends it at once.
+def stop_requests() -> Iterator[list[int]]:
+    """Notes SIGTERM or Ctrl-C in a list, so that a run can end with a checkpoint; the second signal ends it at once.
 
     Outside of the main thread nothing is noted.
     """
-    found, before = StopRequest(), dict[int, Any]()
+    found, before = list[int](), dict[int, Any]()
 
     def restore() -> None:
         while before:
@@ -101,7 +93,7 @@ def stop_requests() -> Iterator[StopRequest]:
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
     def note(number: int, _: Any) -> None:
-        found.asked, found.interrupted = True, number == signal.SIGINT
+        found.append(number)
         restore()
 
     if threading.current_thread() is threading.main_thread():

@@ -2,6 +2,7 @@
 
 import copy
 import math
+import signal
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
@@ -15,7 +16,7 @@ from materialist.errors import InputError
 from materialist.io.atomic import make_folder, writing
 from materialist.io.samples import Progress
 from materialist.train import checkpoint, stream
-from materialist.train.schedule import Budget, StopRequest, TrainingSchedule, stop_requests
+from materialist.train.schedule import Budget, TrainingSchedule, stop_requests
 from materialist.train.task import Batch, Task
 
 Note = Callable[[str], None]
@@ -85,12 +86,12 @@ class Trainer:
         """
         with stop_requests() as stop:
             self._train(stop, progress)
-            self.interrupted = stop.interrupted
-            scores = {} if stop.asked else self.score()
+            self.interrupted = signal.SIGINT in stop
+            scores = {} if stop else self.score()
             self.save()
         return scores
 
-    def _train(self, stop: StopRequest, progress: Progress) -> None:
+    def _train(self, stop: list[int], progress: Progress) -> None:
         losses: dict[str, float] = {}
         count, since = 0, time.monotonic()
         saved = time.monotonic()
@@ -98,7 +99,7 @@ class Trainer:
             for name, value in self._step(batch).items():
                 losses[name] = losses.get(name, 0.0) + value
             count += 1
-            done = self.schedule.done or stop.asked
+            done = self.schedule.done or bool(stop)
             if self.schedule.step % self.options.report_steps == 0 or done:
                 self._report(losses, count, time.monotonic() - since, progress)
                 losses, count, since = {}, 0, time.monotonic()

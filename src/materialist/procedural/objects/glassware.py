@@ -95,7 +95,7 @@ def _mug(rng: np.random.Generator) -> Solid:
     width, t = np.abs(solid.vertices[:, 0]).max(), np.linspace(-1.3, 1.3, 24)
     reach, high = width * rng.uniform(0.3, 0.6), rng.uniform(0.2, 0.35)
     line = np.stack([width * 0.9 + reach * np.cos(t), rng.uniform(0.45, 0.55) + high * np.sin(t), 0 * t], -1)
-    return shapes.joined([solid, _tube(line, width * rng.uniform(0.06, 0.14), 12)])
+    return shapes.joined([solid, shapes.tube(line, width * rng.uniform(0.06, 0.14), 12)])
 
 
 def _goblet(rng: np.random.Generator) -> Solid:
@@ -120,12 +120,6 @@ def _bottle(rng: np.random.Generator) -> Solid:
     inside = _turned(np.stack([radius - wall, y], -1)[keep])
     outside = _turned(np.stack([radius, y], -1))
     return shapes.joined([outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)])
-
-
-def _tube(line: Array, radius: Array | float, n: int) -> Solid:
-    """`shapes.tube` with its faces turned outwards."""
-    solid = shapes.tube(line, radius, n)
-    return replace(solid, faces=solid.faces[:, ::-1])
 
 
 def _superquadric(rng: np.random.Generator) -> Solid:
@@ -179,7 +173,7 @@ def _stick(rng: np.random.Generator) -> Solid:
     line = CubicSpline(knots, np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0))(t)
     radius = np.interp(t, [0, rng.uniform(0.2, 0.8), 1], rng.uniform(0.06, 0.3, 3))
     radius[[0, -1]] = 1e-3
-    return _tube(line, radius * np.linalg.norm(line[-1] - line[0]).clip(0.5), 20)
+    return shapes.tube(line, radius * np.linalg.norm(line[-1] - line[0]).clip(0.5), 20)
 
 
 def creature(rng: np.random.Generator) -> Solid:

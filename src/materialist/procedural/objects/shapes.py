@@ -1,6 +1,7 @@
 """Procedural triangle meshes with texture coordinates: closed solids, and sheets, tubes and leaves."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import mitsuba as mi
@@ -9,6 +10,8 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from materialist.camera import unit
+from materialist.errors import InputError
+from materialist.render.variant import setup
 from materialist.types import Array
 
 
@@ -90,11 +93,22 @@ def panel(origin: ArrayLike, right: Array, up: Array, repeat: tuple[float, float
     return replace(solid, uv=np.array([[0, 0], [0, 1], [1, 0], [1, 1]]) * repeat)
 
 
+@lru_cache(maxsize=40)
 def load(path: Path) -> Solid:
-    """A PLY mesh, stood on y = 0 with longest side 1, smooth normals, and a texture wrapped around its Y axis."""
-    params = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
-    vertices = np.array(params["vertex_positions"], np.float64).reshape(-1, 3)
-    faces = np.array(params["faces"], np.int32).reshape(-1, 3)
+    """A PLY mesh, stood on y = 0 with longest side 1, smooth normals, and a texture wrapped around its Y axis.
+
+    Raises InputError when it is damaged, or has no faces or no size.
+    """
+    setup()
+    try:
+        params = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
+        vertices = np.array(params["vertex_positions"], np.float64).reshape(-1, 3)
+        faces = np.array(params["faces"], np.int32).reshape(-1, 3)
+        used = vertices[faces]
+    except (RuntimeError, LookupError, ValueError) as error:
+        raise InputError(f"The mesh {path} cannot be read; mend it, or take it out of the folder.") from error
+    if not len(faces) or not 0 < np.ptp(used, axis=(0, 1)).max() < np.inf:
+        raise InputError(f"The mesh {path} has no faces, or no size; mend it, or take it out of the folder.")
     low, high = vertices.min(0), vertices.max(0)
     vertices = (vertices - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) / (high - low).max()
     normals = _exact_normals(vertices, faces)
@@ -283,7 +297,7 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     vertices = line[:, None] + width[:, None, None] * normal
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=-1))])
     uv = np.stack(np.broadcast_arrays(phi[..., 0] * width.mean(), length[:, None]), -1)
-    faces = grid_faces(*vertices.shape[:2])
+    faces = grid_faces(len(line), n + 1, flip=True)
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
 

@@ -1,17 +1,13 @@
 """Movable things, 3 to 60 centimetres high: what stands on tables, shelves and floors. Base on y = 0."""
 
 from dataclasses import replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from materialist.errors import InputError
 from materialist.procedural import materials as m
 from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects.shapes import Solid
 from materialist.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
-from materialist.render.variant import setup
 
 Meshes = tuple[Path, ...]
 
@@ -25,24 +21,9 @@ def thing(rng: np.random.Generator, size: float, meshes: Meshes = (), share: flo
 
 def captured(rng: np.random.Generator, size: float, meshes: Meshes) -> Parts:
     """A mesh from a file in any material, its longest side `size`."""
-    solid = mesh(meshes[rng.integers(len(meshes))])
-    solid = replace(solid, uv=solid.uv * [np.pi * 0.6, 1])
+    solid = s.metric(s.load(meshes[rng.integers(len(meshes))]), np.pi * 0.6, 1)
     tip = rng.choice([0, 0, 0, np.pi / 2, -np.pi / 2]) if rng.random() < 0.3 else 0.0
     return [ScenePart(s.grounded(s.moved(solid, tip=tip, scale=size)), m.any_object(rng))]
-
-
-@lru_cache(maxsize=40)
-def mesh(path: Path) -> Solid:
-    """The mesh in a .ply file; see `shapes.load`. Raises InputError when it is damaged or has no faces."""
-    setup()
-    try:
-        solid = s.load(path)
-        usable = len(solid.faces) > 0 and bool(np.isfinite(solid.vertices).all())
-    except (RuntimeError, LookupError, ValueError) as error:
-        raise InputError(f"The mesh {path} cannot be read; mend it, or take it out of the folder.") from error
-    if not usable:
-        raise InputError(f"The mesh {path} has no faces, or no size; mend it, or take it out of the folder.")
-    return solid
 
 
 def _box(rng, size) -> Parts:
