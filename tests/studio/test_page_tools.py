@@ -112,7 +112,7 @@ def test_glass_follows_its_slider(page):
     sketch = pixels(page)
     move(page, "glass_ior", 1.2)  # while the body is in the making
     page.wait_for_selector("#stage .badge >> text=Glass traced")
-    assert "ior 1.2" in page.inner_text("#steps")
+    assert "refraction 1.2" in page.inner_text("#steps")
     clear = pixels(page)
     assert abs(clear[18:30, 18:32].astype(int) - sketch[18:30, 18:32]).max() > 10
     move(page, "glass_transmission", 0.3)

@@ -35,15 +35,10 @@ def wire(context: PageContext) -> None:
         if session.live is not None:
             yield {"report": session.shown(report(session.scene)), "maps": maps(session.scene)}
 
-    def make_mesh(session: Session) -> Iterator[Updates]:
+    def show_mesh(session: Session) -> Iterator[Updates]:
         file = session.workspace / MESH
-        if not file.is_file():
-            yield from context.work(session, tasks.mesh, file)
-
-    def show_mesh(session: Session) -> Updates:
-        file = session.workspace / MESH
-        return {"mesh": studio.public_copy(file) if file.is_file() else None}
+        if file.is_file() or (yield from context.work(session, tasks.mesh, file)):
+            yield {"mesh": studio.public_copy(file)}
 
     context.long(parts["look"].select, look)
-    # Two steps: the viewer loads nothing when its value is sent twice, as the end of a generator does.
-    context.live(context.long(parts["mesh_button"].click, make_mesh).then, show_mesh, more=("mesh",))
+    context.long(parts["mesh_button"].click, show_mesh)

@@ -161,9 +161,8 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
-    yield {"start": gr.update(interactive=True)}
-    if failed:
-        yield {"found": gr.update(visible=False, value=[]), "stage": stage(session)}
+    before = {"found": gr.update(visible=False, value=[]), "stage": stage(session)} if failed else {}
+    yield {"start": gr.update(interactive=True), **before}  # at last: a click before the end of an event is lost
 
 
 def _resume(context: PageContext, session: Session, name: str | None) -> Iterator[Updates]:

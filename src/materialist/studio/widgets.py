@@ -83,6 +83,7 @@ class PageContext:
             try:
                 for updates in change(self.session(request), *([told._data] if data else []), *values):
                     yield self._outputs(updates)
+                yield gr.skip()  # Gradio sends the last one twice, and None to every component where there was none
             except Exception as error:
                 yield self._outputs({"progress": "", "stop": gr.update(visible=False)})
                 raise self.message(error) from error
