@@ -25,7 +25,7 @@ class AddedLightSettings:
     """Sizes of added lights."""
 
     map_rows: int = 256  # of the largest map; derived: memory
-    sun_radius: float = 1.5  # angular radius of an added sun, degrees: six real ones, as a map of 512 x 256 needs
+    sun_radius: float = 6.0  # of an added sun, degrees: a hard shadow shows each step of a predicted depth; 5 photos
     lamp_unit: float = 0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
     lamp_radius: float = 0.015  # radius of a lamp, share of the median depth; tuned by eye
 
