@@ -39,6 +39,7 @@ def wire(context: PageContext) -> None:
         file = session.workspace / MESH
         if file.is_file() or (yield from context.work(session, tasks.mesh, file)):
             yield {"mesh": studio.public_copy(file)}
+            yield {}  # Gradio sends the last updates twice, and of a value sent twice the viewer loads nothing
 
     context.long(parts["look"].select, look)
     context.long(parts["mesh_button"].click, show_mesh)

@@ -162,7 +162,7 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
     before = {"found": gr.update(visible=False, value=[]), "stage": stage(session)} if failed else {}
-    yield {"start": gr.update(interactive=True), **before}  # at last: a click before the end of an event is lost
+    yield {"start": gr.update(interactive=True), **before}  # at last: a click before the event's end is lost
 
 
 def _resume(context: PageContext, session: Session, name: str | None) -> Iterator[Updates]:

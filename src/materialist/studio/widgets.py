@@ -80,10 +80,12 @@ class PageContext:
         """Let an event call change(session, *values of inputs), which yields updates of any components."""
 
         def run(request: gr.Request, told: gr.EventData, *values: Any) -> Iterator[Any]:
+            updates = None
             try:
                 for updates in change(self.session(request), *([told._data] if data else []), *values):
                     yield self._outputs(updates)
-                yield gr.skip()  # Gradio sends the last one twice, and None to every component where there was none
+                if updates is None:  # Gradio would send None to every component
+                    yield gr.skip()
             except Exception as error:
                 yield self._outputs({"progress": "", "stop": gr.update(visible=False)})
                 raise self.message(error) from error
