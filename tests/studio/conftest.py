@@ -11,9 +11,9 @@ from materialist.studio.studio import Studio
 from materialist.studio.workspace import WorkFolder
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    """(address, work folder) of a studio that was started on the small scene."""
+    """(address, work folder) of a studio that was started on the small scene; it goes on with what was opened last."""
     pytest.importorskip("gradio", reason="needs gradio")
     folder = tmp_path_factory.mktemp("browser")
     with studio_server.studio(folder, str(package(folder))) as (_, address):
