@@ -14,7 +14,7 @@ from studio_server import free_port
 from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
-from materialist.studio import SETTINGS, widgets
+from materialist.studio import SETTINGS, StudioSettings, widgets
 from materialist.studio.server import check_host, new_studio
 from materialist.studio.studio import LOCAL_PERSON
 from materialist.studio.widgets import PageContext
@@ -132,9 +132,9 @@ def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
             (project.scene / "scene.json").touch()
         if name == "edited":
             project.workspace("me")
-        if name != "fresh":
-            os.utime(project.folder, (0, 0))
-    shared.work.sweep()
+    for name in folders.keys() - {"fresh"}:
+        os.utime(folders[name], (0, 0))
+    shared.work.new("another", "a" * 32)
     assert [name for name, folder in folders.items() if not folder.exists()] == ["old"]
 
 
@@ -184,3 +184,10 @@ def test_a_page_that_is_closed_is_forgotten(shared):
     (end,) = [one.fn for one in page.fns.values() if any(event == "unload" for _, event in one.targets)]
     end(gradio.Request(session_hash="page"))
     assert shared.session("page", "a" * 32) is not session
+
+
+def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shared, monkeypatch):
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(page_seconds=0))
+    person = "a" * 32
+    silent, open_ = shared.session("silent", person), shared.session("open", person, beats=True)
+    assert shared.session("silent", person) is not silent and shared.session("open", person) is open_

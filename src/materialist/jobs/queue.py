@@ -89,7 +89,7 @@ class JobQueue:
     def close(self) -> None:
         for job in self.unfinished():
             self.stop(job)
-        self._threads.shutdown(wait=False, cancel_futures=True)
+        self._threads.shutdown(cancel_futures=True)
 
     def _run(self, job: Job) -> None:
         with self._lock:

@@ -23,6 +23,7 @@ class StudioSettings:
     jobs: int = 60  # of all
     wrong_passwords: int = 20  # a minute, of all who try
     person_seconds: int = 31_536_000  # a browser stays the same person: a year
+    page_seconds: float = 60.0  # a page that never showed that it is open is forgotten after its last request
     unfinished_seconds: float = 86_400.0  # the folder of a photo that was not taken apart to the end goes
     free_for_scene: float = 1.2e9  # bytes of memory that must be free before another scene is opened
     free_for_glass: float = 2.0e9  # bytes of memory that must be free before glass is traced

@@ -119,10 +119,11 @@ class Gate:
         except InputError:  # its browser is new here
             cookies[PERSON] = person = secrets.token_hex(16)
         path = request.url.path.rstrip("/")
-        pages = [request.query_params.get("session_hash"), path.removeprefix(_BEAT) if path.startswith(_BEAT) else None]
         try:
-            for page in filter(None, pages):
+            if page := request.query_params.get("session_hash"):
                 self.studio.session(page, person)
+            if path.startswith(_BEAT):
+                self.studio.session(path.removeprefix(_BEAT), person, beats=True)
             if path == _UPLOAD:
                 self.studio.note_upload(person, request.headers.get("content-length", ""))
         except InputError as error:

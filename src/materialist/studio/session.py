@@ -59,6 +59,8 @@ class Session:
         self.running: list[Job] = []
         self.mark = secrets.token_hex(4)
         """Tells this page's path-traced pictures from those of other pages."""
+        self.seen, self.beats = 0.0, False
+        """When this page last asked for something, by the monotonic clock, and whether it shows that it is open."""
         self._kept: bytes | None = None
         """The list of edits as this page last read or wrote it."""
         self.final: FinalPicture | None = None

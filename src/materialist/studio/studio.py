@@ -54,13 +54,23 @@ class Studio:
             raise InputError(LOST)
         return token
 
-    def session(self, page: str | None, person: str) -> Session:
-        """The session of a page, by Gradio's session hash. Raises InputError where it is another person's."""
+    def session(self, page: str | None, person: str, *, beats: bool = False) -> Session:
+        """The session of a page, by Gradio's session hash; `beats` where the page holds a request until it is closed.
+
+        Forgets pages that never did so, a while after their last request. Raises InputError for another person's page.
+        """
+        now = time.monotonic()
         with self._lock:
+            last = now - SETTINGS.page_seconds
+            gone = [name for name, one in self._sessions.items() if not one.beats and one.seen < last and name != page]
             known = self._sessions.setdefault(page, Session(person, self.shown, self.single_user)) if page else None
-            if known is None or known.person != person:
-                raise InputError(LOST)
-            return known
+            if known is not None and known.person == person:
+                known.seen, known.beats = now, known.beats or beats
+        for name in gone:
+            self.leave(name)
+        if known is None or known.person != person:
+            raise InputError(LOST)
+        return known
 
     def shown(self, text: str) -> str:
         """A text for a page: names in place of the paths of this machine."""

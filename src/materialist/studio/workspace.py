@@ -82,7 +82,8 @@ class WorkFolder:
         return sorted(mine, key=lambda p: p.name, reverse=True)
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
-        """An empty project; with `scene` one that uses a package elsewhere."""
+        """An empty project; with `scene` one that uses a package elsewhere. Old unfinished ones go."""
+        self.sweep()
         with self._lock:  # two people may ask at once
             taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
             folder = self.root / f"photo-{max(taken, default=0) + 1:03d}"
