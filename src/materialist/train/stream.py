@@ -44,7 +44,7 @@ def epoch(
         batch_size=batch,
         num_workers=workers,
         worker_init_fn=_init_worker,
-        prefetch_factor=4 if workers else None,
+        prefetch_factor=2 if workers else None,
         collate_fn=partial(_drawn, task, side),
         pin_memory=random.device.type == "cuda",
     )
