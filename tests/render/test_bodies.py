@@ -1,5 +1,7 @@
 """Bodies beside the depth surface, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from render_scenes import empty
@@ -83,6 +85,21 @@ def test_the_share_of_a_pixel_covered_by_a_body():
     assert ((share > 0) & (share < 1)).any() and not coverage(target.mi_scene, CAMERA, ["body1"]).any()
     larger = first_hits(target.mi_scene, CAMERA, {"body0": body}, (4 * CAMERA.height, 4 * CAMERA.width)).share
     assert larger.sum() == pytest.approx(16 * np.pi * outline() ** 2, rel=0.02)
+
+
+@pytest.mark.parametrize("at", [(1.9, 0.4, -5.0), (0.0, 0.0, -1.0), (0.0, 0.0, 3.0), (30.0, 0.0, -5.0)])
+def test_looking_around_bodies_alone_sees_what_looking_everywhere_does(at, monkeypatch):
+    """Beyond the frame, around the camera, behind it, and out of view."""
+    body = sphere(surface())
+    body = replace(body, vertices=body.vertices + np.array(at, np.float32) + (0, 0, np.float32(DISTANCE)))
+    scene, box = RenderScene(empty(CAMERA), CAMERA, bodies=(body,)).mi_scene, (slice(3, 60), slice(10, 96))
+    seen = first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)
+    monkeypatch.setattr("materialist.render.coverage._around", lambda *given: given[-1])
+    for found, slow in zip(
+        vars(seen).values(), vars(first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)).values()
+    ):
+        np.testing.assert_array_equal(found, slow)
+    assert seen.share.any() == (at[0] < 2 and at[2] < 0)
 
 
 def test_radiance_is_that_of_the_rays_that_meet_the_body_first():

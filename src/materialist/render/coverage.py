@@ -1,11 +1,13 @@
 """What the camera sees of bodies, at any resolution: coverage of pixels, and guides for denoisers."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from materialist.camera import project
 from materialist.geometry.silhouette import area
 from materialist.types import Array, Body, Camera
 
@@ -55,15 +57,33 @@ def first_hits(
     bodies: by the names of their shapes; None for one without a material, as lamps, which is taken as white.
     size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
     """
-    rows, columns = box or (slice(0, size[0]), slice(0, size[1]))
+    whole = box or (slice(0, size[0]), slice(0, size[1]))
+    rows, columns = _around(scene, camera, bodies, size, whole)
+    found = np.zeros((*(side.stop - side.start for side in whole), 8))
+    inside = found[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))]
     step = max(1, _RAYS // max(columns.stop - columns.start, 1))
-    strips = [
-        _strip(scene, camera, bodies, size, (slice(first, min(first + step, rows.stop)), columns))
-        for first in range(rows.start, rows.stop, step)
-    ]
-    found = np.concatenate(strips)  # [h, w, 8]
+    for first in range(rows.start, rows.stop, step) if area((rows, columns)) else ():
+        strip = slice(first, min(first + step, rows.stop))
+        inside[first - rows.start : strip.stop - rows.start] = _strip(scene, camera, bodies, size, (strip, columns))
     take = lambda v: np.ascontiguousarray(v, np.float32)  # noqa: E731
     return FirstHits(take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7]))
+
+
+def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box) -> Box:
+    """The part of a box where shapes may be seen: around the corners of their bounds; all of it where one is behind."""
+    bounds = [shape.bbox() for shape in scene.shapes() if shape.id() in names]
+    corners = np.array([list(product(*zip(b.min, b.max))) for b in bounds], float).reshape(-1, 3)
+    at, depth = project(corners, camera)
+    if (depth <= 0).any():
+        return box
+    sides = []
+    for side, n, working, places in zip(box, size, (camera.height, camera.width), at.T[::-1]):
+        places = places * n / working
+        margin = 2 * max(1.0, n / working)  # the sides of the working size are rounded
+        low, high = (np.clip([places.min() - margin, places.max() + margin], side.start, side.stop) if len(places)
+                     else (side.start, side.start))  # fmt: skip
+        sides.append(slice(int(np.floor(low)), int(np.ceil(high))))
+    return sides[0], sides[1]
 
 
 def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box) -> Array:
