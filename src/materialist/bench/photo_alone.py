@@ -11,8 +11,9 @@ was predicted (the true light replaces the fitted one); `ceiling` is the edit wi
 (degrees), log depth (RMSE), and the light's spherical harmonics after one factor (relative error, 1 is as bad as
 darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` and `metal` (copper) after one factor on
 the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also in the true `shadow`
-and reflection alone; `glass` is the largest object turned to glass, `remove` the picture without it. sheet.png: photo,
-truth, and the pictures of the rows after `untouched`. An edit that the program refuses has no row.
+and reflection alone, and with `screen space` shadows of the fitted light; `glass` is the largest object turned to
+glass, `remove` the picture without it. sheet.png: photo, truth, and the pictures of the rows after `untouched`. An edit
+that the program refuses has no row.
 """
 
 from collections.abc import Iterator
@@ -26,6 +27,7 @@ from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist.bench.edits import KINDS, Edit, edits, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
+from materialist.bench.screen_space import screen_space
 from materialist.edits.composite.composite import composite
 from materialist.errors import InputError
 from materialist.fit.settings import PAPER
@@ -128,6 +130,10 @@ class PhotoAloneBench(Benchmark):
             except InputError:
                 continue
             picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
+            if (edit.kind, name) == ("insert", "fitted"):
+                flat = screen_space(sample.photo.linear, edited, picture, device=self.device)
+                shown.append(flat)
+                yield {"method": "insert: screen space", **self._scores(edit, flat, after, inside)}
             shown.append(picture)
             method = f"{CEILING} {edit.kind}" if name == CEILING else f"{edit.kind}: {name}"
             yield {"method": method, **self._scores(edit, picture, after, inside)}

@@ -11,6 +11,7 @@ import shutil
 import tempfile
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -73,7 +74,8 @@ class WorkFolder:
             make_folder(self.root)
             tempfile.TemporaryFile(dir=self.root).close()
         self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
-        """Uploads and results that are handed over; they go when the studio ends."""
+        """Uploads and results that are handed over; they go with this object."""
+        self._end = weakref.finalize(self, shutil.rmtree, self.cache, ignore_errors=True)
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
