@@ -34,7 +34,8 @@ class EditRenderer:
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
         self.scene, self.device = scene, device
-        self._built: list[tuple[Scene, Any]] = []
+        self._built: dict[bool, tuple[Scene, Any]] = {}
+        """The base's (True) and those of the last edit of other shapes."""
         self._base: dict[tuple, Array] = {}
         self._sky: Array | None = None
 
@@ -118,17 +119,20 @@ class EditRenderer:
 
     def _target(self, scene: Scene):
         """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of its last use."""
-        for other, target in self._built:
-            if other.geometry is scene.geometry and (other.lamps, other.bodies) == (scene.lamps, scene.bodies):
-                return target
-        from materialist.render.scene import RenderScene
+        of_base = _same_shapes(scene, self.scene)
+        known = self._built.get(of_base)
+        if known is None or not _same_shapes(known[0], scene):
+            from materialist.render.scene import RenderScene
 
-        target = RenderScene(
-            scene.geometry, scene.camera, bodies=scene.bodies, lamps=scene.lamps, device=self.device
-        )  # fmt: skip
-        # The base, and the last edit of another shape: a moving lamp must not fill the memory.
-        self._built = [*self._built[:1], (scene, target)]
-        return target
+            target = RenderScene(
+                scene.geometry, scene.camera, bodies=scene.bodies, lamps=scene.lamps, device=self.device
+            )  # fmt: skip
+            known = self._built[of_base] = scene, target
+        return known[1]
+
+
+def _same_shapes(one: Scene, other: Scene) -> bool:
+    return one.geometry is other.geometry and (one.lamps, one.bodies) == (other.lamps, other.bodies)
 
 
 def photo_sky(scene: Scene) -> Array:
