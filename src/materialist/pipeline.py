@@ -85,11 +85,10 @@ def invert(
     )  # fmt: skip
     lap("setup")
     best = fitting.invert(fit_setup, progress=progress, found=tell)
-    prepared = best.prepared
     report = _report(picture, prior, best, (*stages, *best.stages), start)
     return Scene(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
-        depth=prior.depth, geometry=prepared.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
+        depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
             "predictor": prior.predictor, "sources": prior.sources, "engine": wanted.engine, "preset": preset,
             "completion": fit_setup.completion, "completion_asked": wanted.completion,

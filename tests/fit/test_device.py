@@ -70,6 +70,6 @@ def test_a_fit_elsewhere_finds_what_it_finds_here(engine, preset, request):
     np.testing.assert_allclose(there.envmap, here.envmap, rtol=1e-4)
     np.testing.assert_allclose(there.materials.albedo, here.materials.albedo, atol=1e-5)
     if engine == "transport":  # and the quick look
-        seen = there.materials, prior.normal, prior.depth, there.prepared.geometry, there.envmap, there.rerender
+        seen = there.materials, prior.normal, prior.depth, there.geometry, there.envmap, there.rerender
         scene = Scene(room.camera, room.photo, prior, *seen)
         assert Preview(scene).render(replace(scene, envmap=2 * scene.envmap)).mean() > 0

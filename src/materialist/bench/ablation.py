@@ -112,16 +112,16 @@ class _Photo:
     def fitted(self) -> tuple[Any, Array]:
         """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
         shared: dict[str, Any] = {"seed": self.bench.seed, "device": self.bench.device}
-        prepared: Any = prepare(FitSetup(self.photo, self.prior, PAPER, **shared))
-        state = prepared.fit.start()
-        prepared.fit.fit_light(state, self.prior.materials)
-        return prepared, state.envmap
+        fitting: Any = prepare(FitSetup(self.photo, self.prior, PAPER, **shared))
+        state = fitting.start()
+        fitting.fit_light(state, self.prior.materials)
+        return fitting, state.envmap
 
     def materials(self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False) -> Row:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
-        prepared, envmap = self.fitted
-        engine: Any = prepared.fit.engine
-        prior = prepared.fit.start().maps
+        fitting, envmap = self.fitted
+        engine: Any = fitting.engine
+        prior = fitting.start().maps
         if blind:
             prior[:, 3:] = 0.5
         held = prior if blind else remapped(prior)
@@ -141,7 +141,7 @@ class _Photo:
             maps = model()
             render(maps)
         found = replaced(self.prior.materials, engine.pixels, maps)
-        picture = prepared.render(found, envmap, self.bench.spp, self.bench.seed + 1)
+        picture = fitting.render(found, envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {**self.against_photo(method, picture), "loss": loss, "steps": sum(r.steps for r in results)}
 

@@ -204,8 +204,8 @@ def fit(
         photo, given, replace(named, light=light), completion, method.engine, envmap_height=height, seed=seed,
         device=device,
     )  # fmt: skip
-    prepared = prepare(setup)
-    fit, state = prepared.fit, prepared.fit.start()
+    fit = prepare(setup)
+    state = fit.start()
     if method.field in FITLESS:
         problem, target = fit.engine.light_problem(given.materials), placed(photo.linear.reshape(-1, 3))
         if method.field == "constant":
@@ -215,7 +215,7 @@ def fit(
         state.envmap = fit.prepared_light(found)
     else:
         fit.fit_light(state, given.materials)
-    return state.envmap, sum(stage["steps"] for stage in state.stages), prepared.renderer
+    return state.envmap, sum(stage["steps"] for stage in state.stages), fit.renderer
 
 
 def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:

@@ -62,10 +62,14 @@ class FitState:
 
 @dataclass(frozen=True)
 class Fit:
-    """One inverse problem: what is asked, and an engine to render with."""
+    """One inverse problem: what is asked, the mesh, its path tracer, and an engine to render with."""
 
     setup: FitSetup
+    geometry: Geometry
+    renderer: RenderScene
     engine: Engine
+    stages: tuple[dict, ...] = ()
+    """What it took to make them."""
     progress: Progress | None = None
 
     def start(self) -> FitState:
@@ -136,6 +140,12 @@ class Fit:
         """Full-size maps of the state; the prior's values where there is no surface."""
         return replaced(self.setup.prior.materials, self.engine.pixels, state.maps)
 
+    def render(self, materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
+        """[H, W, 3] linear, path traced."""
+        self.renderer.set_materials(materials)
+        self.renderer.set_envmap(envmap)
+        return self.renderer.render(spp=spp, seed=seed)
+
     def _photo(self) -> torch.Tensor:
         return placed(np.ascontiguousarray(self.setup.photo.linear.reshape(-1, 3)))
 
@@ -155,26 +165,10 @@ def replaced(materials: Materials, pixels: torch.Tensor, maps: torch.Tensor) -> 
 
 
 @dataclass(frozen=True)
-class PreparedFit:
-    """A mesh, its path tracer, and a fit that has not run."""
-
-    geometry: Geometry
-    renderer: RenderScene
-    fit: Fit
-    stages: tuple[dict, ...]
-
-    def render(self, materials: Materials, envmap: Array, spp: int, seed: int) -> Array:
-        """[H, W, 3] linear, path traced."""
-        self.renderer.set_materials(materials)
-        self.renderer.set_envmap(envmap)
-        return self.renderer.render(spp=spp, seed=seed)
-
-
-@dataclass(frozen=True)
 class FitResult:
     """What an inversion came to."""
 
-    prepared: PreparedFit
+    geometry: Geometry
     materials: Materials
     envmap: Array
     """[h, 2h, 3] linear radiance."""
@@ -190,8 +184,8 @@ class FitResult:
         return (self.halves[0] + self.halves[1]) / 2
 
 
-def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
-    """The mesh and an engine on it."""
+def prepare(setup: FitSetup, progress: Progress | None = None) -> Fit:
+    """The mesh, and what renders it."""
     tick, stages = progress or (lambda *_: None), list[dict]()
     photo, prior = setup.photo, setup.prior
     tick("geometry", 0, 1)
@@ -200,7 +194,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> PreparedFit:
     ))  # fmt: skip
     renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
-    return PreparedFit(geometry, renderer, Fit(setup, engine, progress), tuple(stages))
+    return Fit(setup, geometry, renderer, engine, tuple(stages), progress)
 
 
 def invert(
@@ -210,8 +204,8 @@ def invert(
 
     found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
     """
-    prepared = prepare(setup, progress)
-    fit, stages, seed = prepared.fit, list(prepared.stages), setup.seed
+    fit = prepare(setup, progress)
+    stages, seed = list(fit.stages), setup.seed
     if isinstance(fit.engine, TransportEngine):
         timed(stages, "trace", fit.engine.cache.trace)
     state = fit.run()
@@ -223,9 +217,9 @@ def invert(
         progress("rerender", 0, 1)
     each = max(1, (setup.spp or setup.settings.rerender_spp) // 2)
     first, second = timed(stages, "rerender", lambda: [
-        prepared.render(materials, state.envmap, each, seed + k) for k in (1, 2)
+        fit.render(materials, state.envmap, each, seed + k) for k in (1, 2)
     ])  # fmt: skip
-    return FitResult(prepared, materials, state.envmap, (first, second), 2 * each, tuple(stages))
+    return FitResult(fit.geometry, materials, state.envmap, (first, second), 2 * each, tuple(stages))
 
 
 def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress: Progress | None) -> Engine:
