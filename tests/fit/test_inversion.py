@@ -46,7 +46,7 @@ class Room:
         engine = TransportEngine(
             self.geometry, self.camera, self.photo.linear, light_height=settings.light_grid, cache=CacheSettings(32, 8)
         )  # fmt: skip
-        return Fit(self.setup(settings, **options), engine)
+        return Fit(self.setup(settings, **options), self.geometry, self.path, engine)
 
     def setup(self, settings: FitSettings, prior: Materials | None = None, **options) -> FitSetup:
         maps = Prediction(prior or self.prior, np.zeros_like(self.photo.linear), np.ones(self.photo.linear.shape[:2]))
@@ -143,7 +143,7 @@ def test_papers_engine_runs_the_same_fit(room):
     settings = replace(
         PAPER.at_most(6), light=replace(PAPER.light, height=ENVMAP_HEIGHT, schedule=Schedule(max_steps=6))
     )
-    fit = Fit(room.setup(settings), engine)
+    fit = Fit(room.setup(settings), room.geometry, room.path, engine)
     state = fit.run()
     assert [s["name"] for s in state.stages] == ["light", "roughness+metallic", "materials"]
     assert state.stages[0]["loss_last"] < state.stages[0]["loss_first"]
