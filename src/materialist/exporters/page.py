@@ -13,6 +13,7 @@ from jinja2 import Template
 
 from materialist.color import srgb_levels
 from materialist.exporters.parts import Part, farthest
+from materialist.geometry.boundary import joined_faces
 from materialist.io import display
 from materialist.types import Array, Camera, Scene
 
@@ -103,8 +104,7 @@ def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
     shown = [parts[0], *(part for part in parts if part.surface is not None)]
     parts = [*shown, *(part for part in parts[1:] if part.surface is None)]
     vertices = np.concatenate([_vertices(part) for part in parts])
-    starts = np.cumsum([0, *(len(part.mesh.vertices) for part in parts)])
-    indices = np.concatenate([part.mesh.faces + start for part, start in zip(parts, starts)]).astype("<u4")
+    indices = joined_faces([part.mesh for part in parts])[1].astype("<u4")
     seen = depth[depth > 0]
     return {
         "vertices": _deflated(vertices), "indices": _deflated(indices),

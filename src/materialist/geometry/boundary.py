@@ -5,8 +5,10 @@ one vertex per surface (the paper's duplication), and the farther surface is con
 so that no ray through the picture passes between them. See docs/geometry.md for why corners and not centres.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -38,6 +40,13 @@ def grid_faces(rows: int, columns: int) -> Array:
     index = np.arange(rows * columns).reshape(rows, columns)
     cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]], -1)
     return cells.reshape(-1, 4)[:, QUAD].reshape(-1, 3)
+
+
+def joined_faces(parts: Sequence[Any]) -> tuple[Array, Array]:
+    """Vertices [V, 3] and faces [F, 3] int32 of several meshes or bodies as one; faces keep their order."""
+    first = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32)
+    return np.concatenate([part.vertices for part in parts]), faces
 
 
 def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0) -> Mesh:

@@ -4,14 +4,14 @@ Nothing that the picture shows changes: inside the picture only what lies behind
 where the picture shows open sky nothing is.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 from skimage.morphology import convex_hull_image
 
 from materialist.camera import rays_through, unproject
-from materialist.geometry.boundary import grid_faces
+from materialist.geometry.boundary import grid_faces, joined_faces
 from materialist.geometry.planes import Plane, axes
 from materialist.types import Array, Camera, Mesh
 
@@ -77,7 +77,11 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, w
         if walls or sheet.plane.normal[1] >= DEFAULT.upward:
             found.append(_beyond_frame(sheet, stops, camera))  # [T, 3, 3]
         parts += [_patch(sheet, corners, camera) for corners in found if len(corners)]
-    return join(parts)
+    # Faces keep their order.
+    vertices, faces = joined_faces(parts)
+    names = ("normals", "uv", "face_pixel", "face_plane")
+    others = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return Mesh(vertices, faces, **others)
 
 
 def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
@@ -208,11 +212,3 @@ def _patch(sheet: _Sheet, corners: Array, camera: Camera) -> Mesh:
         face_pixel=np.repeat(nearest, len(triangles)).astype(np.int32),
         face_plane=np.full(count * len(triangles), sheet.index, np.int16),
     )
-
-
-def join(parts: list[Mesh]) -> Mesh:
-    """One mesh of several; faces keep their order."""
-    first = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32)
-    names = ("vertices", "normals", "uv", "face_pixel", "face_plane")
-    return replace(parts[0], faces=faces, **{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})

@@ -7,6 +7,7 @@ import numpy as np
 
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle, texel_directions
+from materialist.geometry.boundary import joined_faces
 from materialist.procedural.world import World
 from materialist.types import Array
 
@@ -56,11 +57,10 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     rotation, origin = world.view.to_scene, world.view.position
     place = [(p.solid.vertices - origin) @ rotation for p in world.parts]
     normal = [p.solid.normals @ rotation for p in world.parts]
-    start = np.cumsum([0, *(len(p) for p in place)])
     vertices = np.concatenate(place).astype(np.float32)
     uv = np.concatenate([p.solid.uv for p in world.parts])
     corner = np.concatenate([vertices, np.concatenate(normal), uv], -1)
-    faces = np.concatenate([p.solid.faces + k for p, k in zip(world.parts, start)]).astype(np.uint32)
+    faces = joined_faces([p.solid for p in world.parts])[1].astype(np.uint32)
     owner = np.repeat(np.arange(len(world.parts)), [len(p.solid.faces) for p in world.parts])
     material = np.stack([p.material.row(tuple(rng.random(2))) for p in world.parts]).astype(np.float32)
     lamps, density = _lamps(vertices, faces, owner, material)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.buffers import integers
 from materialist.camera import project
 from materialist.geometry.silhouette import area
 from materialist.types import Array, Body, Camera
@@ -31,14 +32,6 @@ class FirstHits:
     """[h, w, 3] float32, camera frame; 0 where none is seen."""
     depth: Array
     """[h, w] float32 planar, scene units; 0 where none is seen."""
-
-
-def coverage(scene, camera: Camera, names: Sequence[str]) -> Array:
-    """[H, W] float32 in [0, 1]: share of each pixel in which the first thing seen is one of the named shapes.
-
-    scene: a Mitsuba scene (`RenderScene.mi_scene`).
-    """
-    return first_hits(scene, camera, dict.fromkeys(names), (camera.height, camera.width)).share
 
 
 def only(scene, names: Sequence[str]):
@@ -111,23 +104,28 @@ def _grid(camera: Camera, size: tuple[int, ...], box: Box) -> Iterator:
     import drjit as dr
     import mitsuba as mi
 
-    pixel = dr.arange(mi.UInt32, area(box))
+    pixel = integers(mi, pixel_numbers(size, box))
     for k in range(GRID * GRID):
         x, y = (dr.opaque(mi.Float, (n + 0.5) / GRID) for n in (k % GRID, k // GRID))
-        yield directions(camera, size, box, pixel, x, y)
+        yield directions(camera, size, pixel, x, y)
 
 
-def directions(camera: Camera, size: tuple[int, ...], box: Box, pixel: Any, x: Any, y: Any) -> Any:
-    """Unit directions through pixels of a box (row-major, UInt32), at places x, y in [0, 1] inside of them.
+def pixel_numbers(size: tuple[int, ...], where: Box | Array) -> Array:
+    """Row-major numbers of some pixels of a picture of `size`: [h, w] of a box, [N] of a mask [H, W] bool."""
+    return np.arange(size[0] * size[1], dtype=np.uint32).reshape(size)[where]
+
+
+def directions(camera: Camera, size: tuple[int, ...], pixel: Any, x: Any, y: Any) -> Any:
+    """Unit directions through pixels of a picture by their numbers (UInt32), at places x, y in [0, 1] inside of them.
 
     The sides of the working size are rounded, so at the upper and lower rim this may be off by half a pixel of it.
     """
     import drjit as dr
     import mitsuba as mi
 
-    width, half = box[1].stop - box[1].start, float(np.tan(np.radians(camera.fov) / 2))
-    across = (mi.Float(pixel % width) + box[1].start + x) / size[1] * 2 - 1
-    up = 1 - (mi.Float(pixel // width) + box[0].start + y) / size[0] * 2
+    half = float(np.tan(np.radians(camera.fov) / 2))
+    across = (mi.Float(pixel % size[1]) + x) / size[1] * 2 - 1
+    up = 1 - (mi.Float(pixel // size[1]) + y) / size[0] * 2
     return dr.normalize(mi.Vector3f(across * half, up * (half * camera.height / camera.width), -1))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from materialist.buffers import integers
-from materialist.render.coverage import directions
+from materialist.render.coverage import Box, directions, pixel_numbers
 from materialist.types import Array
 
 _PATHS = 2**23
@@ -13,15 +13,15 @@ _PATHS = 2**23
 
 
 def radiance(
-    target, size: tuple[int, ...], pixels: Array, *, spp: int, seed: int, max_depth: int,
+    target, size: tuple[int, ...], where: Box | Array, *, spp: int, seed: int, max_depth: int,
     names: Sequence[str] | None = None,
 ) -> Array:  # fmt: skip
     """[..., 3] float32 linear radiance of pixels of a `RenderScene`, path traced, with at least `spp` paths each.
 
-    size: (H, W) of the whole picture. pixels: [...] int, row-major numbers in it.
+    size: (H, W) of the whole picture. where: the pixels, in the order of the result, as of `pixel_numbers`.
     names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
     """
-    mi = target.mi
+    mi, pixels = target.mi, pixel_numbers(size, where)
     # Bounded wavefronts, and whole squares of samples, which suit the sampler.
     passes = max(1, -(-spp * pixels.size // _PATHS))
     each = int(np.ceil(np.sqrt(spp / passes))) ** 2
@@ -36,11 +36,6 @@ def radiance(
     return np.ascontiguousarray(mean.reshape(*pixels.shape, 3), np.float32)
 
 
-def numbers_in(size: tuple[int, ...], box: tuple[slice, slice]) -> Array:
-    """[h, w] row-major numbers of the pixels of a box in a picture of `size`."""
-    return np.arange(size[0] * size[1]).reshape(size)[box]
-
-
 def _sums(
     target, size: tuple[int, ...], pixels: Array, integrator, sampler, each: int, names: Sequence[str] | None
 ) -> Array:  # fmt: skip
@@ -51,8 +46,7 @@ def _sums(
     # Numbers that differ from call to call are data, or every call would be compiled anew.
     slot = dr.arange(mi.UInt32, len(pixels) * each) // dr.opaque(mi.UInt32, each)
     inside = sampler.next_2d()
-    whole = (slice(0, size[0]), slice(0, size[1]))
-    way = directions(target.camera, size, whole, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y)
+    way = directions(target.camera, size, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y)
     ray, counts = mi.RayDifferential3f(mi.Point3f(0), way), mi.Bool(True)
     if names is not None:
         first, counts = scene.ray_intersect_preliminary(ray), mi.Bool(False)

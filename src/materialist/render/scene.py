@@ -96,7 +96,7 @@ class RenderScene:
         mi = self.mi
         if where is not None:
             picture = np.zeros((*where.shape, 3), np.float32)
-            picture[where] = radiance(self, where.shape, np.flatnonzero(where), spp=spp, seed=seed, max_depth=max_depth)
+            picture[where] = radiance(self, where.shape, where, spp=spp, seed=seed, max_depth=max_depth)
             return picture
         integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
         # Bounded wavefronts, all of one size: memory stays the same for any number of samples.

@@ -15,7 +15,7 @@ from materialist.errors import InputError
 from materialist.geometry.membrane import membrane, nearest
 from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in, window
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
-from materialist.solids.shell import Sheets, Shell, closed, inside_out, joined, region
+from materialist.solids.shell import Shell, closed, inside_out, joined, region
 from materialist.types import Array, Camera
 
 
@@ -158,13 +158,10 @@ def _closed(view: _View, camera: Camera) -> Shell:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
         back = blurred_normals(view.back, known, sigma)
-    front_normal = _between(blurred_normals(view.normal, known, sigma), known, place)
-    back_normal = _between(back, known, place)
+    normals = _between(blurred_normals(view.normal, known, sigma), known, place), _between(back, known, place)
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)
-    place = place + np.array([view.left, view.top])
-    sheets = Sheets(place, own, through, front_normal, back_normal, outward)
-    return closed(faces, sheets, camera)
+    return closed(faces, place + np.array([view.left, view.top]), own, through, normals, outward, camera)
 
 
 def _between(normal: Array, known: Array, place: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from materialist.camera import rays_through, unit
-from materialist.geometry.boundary import grid_faces
+from materialist.geometry.boundary import grid_faces, joined_faces
 from materialist.types import Array, Camera
 
 
@@ -27,9 +27,8 @@ class Shell(NamedTuple):
 
 def joined(shells: Sequence[Shell]) -> Shell:
     """Several surfaces as one; none of them shares a vertex with another."""
-    first = np.cumsum([0] + [len(shell.vertices) for shell in shells])
-    faces = np.concatenate([shell.faces + start for shell, start in zip(shells, first)]).astype(np.int32)
-    vertices, normals, uv = (np.concatenate([getattr(s, n) for s in shells]) for n in ("vertices", "normals", "uv"))
+    vertices, faces = joined_faces(shells)
+    normals, uv = (np.concatenate([getattr(shell, name) for shell in shells]) for name in ("normals", "uv"))
     return Shell(vertices, faces, normals, uv, any(shell.hollow for shell in shells))
 
 
@@ -54,44 +53,34 @@ def region(field: Array) -> tuple[Array, Array]:
     return np.asarray(above.vertices[:, :2]), np.asarray(above.faces)
 
 
-class Sheets(NamedTuple):
-    """What front and back are at the vertices of a region."""
-
-    place: Array
-    """[V, 2] (x, y) pixels of the picture, 0 at the centre of the first one."""
-    front: Array
-    """[V] planar depth, scene units."""
-    thick: Array
-    """[V] to the back along the ray, scene units > 0."""
-    front_normal: Array
-    """[V, 3] unit, outwards."""
-    back_normal: Array
-    """[V, 3] unit, outwards."""
-    outward: Array
-    """[V, 2] direction (y down) in the picture in which the region ends, on its border."""
-
-
-def closed(region: Array, sheets: Sheets, camera: Camera) -> Shell:
-    """The closed surface over the faces [F, 3] of a region.
+def closed(
+    region: Array, place: Array, front: Array, thick: Array, normals: tuple[Array, Array], outward: Array,
+    camera: Camera,
+) -> Shell:  # fmt: skip
+    """The closed surface over the faces [F, 3] of a region, between a front and a back over its vertices.
 
     Its wall has vertices of its own, which look across the rays: it is a silhouette.
+
+    place: [V, 2] (x, y) pixels of the picture, 0 at the centre of the first one. front: [V] planar depth, scene units.
+    thick: [V] to the back along the ray, scene units > 0. normals: of front and back, [V, 3] unit, outwards.
+    outward: [V, 2] direction (y down) in the picture in which the region ends, on its border.
     """
-    count = len(sheets.place)
+    count = len(place)
     edges = np.concatenate([region[:, [0, 1]], region[:, [1, 2]], region[:, [2, 0]]])
     border = edges[~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])]
     rim = np.unique(border)
     index = np.concatenate([np.arange(count), np.arange(count), rim, rim])  # front, back, the wall's two sides
-    beyond = np.concatenate([np.zeros(count), sheets.thick, np.zeros(len(rim)), sheets.thick[rim]])
-    place = sheets.place[index] + 0.5
-    rays = rays_through(place, camera)
-    vertices = rays * (sheets.front[index] + beyond / np.linalg.norm(rays, axis=-1))[:, None]
-    uv = np.clip(place / [camera.width, camera.height], 0, 1).astype(np.float32)
+    beyond = np.concatenate([np.zeros(count), thick, np.zeros(len(rim)), thick[rim]])
+    screen = place[index] + 0.5
+    rays = rays_through(screen, camera)
+    vertices = rays * (front[index] + beyond / np.linalg.norm(rays, axis=-1))[:, None]
+    uv = np.clip(screen / [camera.width, camera.height], 0, 1).astype(np.float32)
     a, b = 2 * count + np.searchsorted(rim, border).T
     wall = [np.stack([b, a, a + len(rim)], -1), np.stack([b, a + len(rim), b + len(rim)], -1)]
     faces = np.concatenate([region, region[:, ::-1] + count, *wall])
-    side = _across(vertices[rim], sheets.outward[rim])
-    normals = np.concatenate([sheets.front_normal, sheets.back_normal, side, side])
-    return Shell(vertices.astype(np.float32), faces.astype(np.int32), normals.astype(np.float32), uv)
+    side = _across(vertices[rim], outward[rim])
+    every = np.concatenate([*normals, side, side])
+    return Shell(vertices.astype(np.float32), faces.astype(np.int32), every.astype(np.float32), uv)
 
 
 def _across(points: Array, outward: Array) -> Array:

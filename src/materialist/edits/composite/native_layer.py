@@ -52,7 +52,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     import cv2
 
     from materialist.render.coverage import first_hits, only
-    from materialist.render.native import numbers_in, radiance
+    from materialist.render.native import radiance
 
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
@@ -79,7 +79,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     # As many paths as a picture of working size has, on the part that the bodies take.
     paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // area(part)))
     depth = path_depth(edited)
-    picture = spread(radiance(target, size, numbers_in(size, part), spp=paths, seed=seed, max_depth=depth, names=names))
+    picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names))
     if clean:
         guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
         picture = denoised(picture, guide.albedo, guide.normal)

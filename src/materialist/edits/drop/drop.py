@@ -11,10 +11,11 @@ import numpy as np
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
-from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, hull, load
+from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, load
 from materialist.edits.insert.insert import Support, moved, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.errors import InputError
+from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Drop
@@ -169,7 +170,7 @@ def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: D
         )
     starts = [(bodies, np.array([0, 0, lift + clear])) for (bodies, *_), lift in zip(stood, lifts)]
     things = _things(starts, to_up, factor, wanted)
-    ground = [hull(block) for block in blocks(field, metres=wanted.metres)]
+    ground = blocks(field, metres=wanted.metres)
     what: dict[str, Any] = {
         "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
         **{name: getattr(wanted, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
@@ -224,12 +225,11 @@ def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: 
     rng = np.random.default_rng(wanted.seed)
     things = []
     for bodies, shift in starts:
-        points = np.concatenate([b.vertices for b in bodies]).astype(np.float64) @ to_up.T * factor + shift
+        vertices, faces = joined_faces(bodies)
+        points = vertices.astype(np.float64) @ to_up.T * factor + shift
         centre = (points.min(0) + points.max(0)) / 2
         axis = rng.normal(size=3)
         turning = 2 * np.pi * wanted.spin * axis / np.linalg.norm(axis)
-        corners = np.cumsum([0, *(len(body.vertices) for body in bodies)])
-        faces = np.concatenate([body.faces + first for body, first in zip(bodies, corners)])
         pieces = convex_pieces(points, faces, seed=wanted.seed)
         things.append(RigidBody(tuple(piece - centre for piece in pieces), centre, turning))
     return things

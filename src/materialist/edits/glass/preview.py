@@ -59,14 +59,13 @@ class GlassPreview:
         `spp` paths a working pixel of the object, fewer for objects so large that these are more than PATHS;
         `values`: `ior`, `transmission`, `tint` and `roughness` of this glass.
         """
-        from materialist.render.native import numbers_in, radiance
+        from materialist.render.native import radiance
         from materialist.render.scene import GLASS_DEPTH
 
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target, box = self._target(surface), self._box
         paths = max(FEWEST, min(spp, PATHS // area(box)))
-        where, names = numbers_in(self._size, box), [self._name]
-        seen = radiance(target, self._size, where, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=names)
+        seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
         traced = denoised(without_fireflies(spread(seen)), self._guide.albedo, self._guide.normal)
         out, share = self._edited.photo.linear.copy(), self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]

@@ -18,6 +18,7 @@ from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import edge_faults, uniform_surface
 from materialist.edits.insert.mesh_material import GREY, Textures, coloured, gltf_left_out, gltf_surface, mtl_surface
 from materialist.errors import InputError
+from materialist.geometry.boundary import joined_faces
 from materialist.option_kinds import parse_colour
 from materialist.types import Array, Body, Surface
 
@@ -331,9 +332,7 @@ def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
     """The model with its base at the origin, its faces to the outside, and warnings of what is wrong with it."""
     from trimesh import Trimesh
 
-    corners = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    vertices = np.concatenate([part.vertices for part in parts])
-    faces = np.concatenate([part.faces + first for part, first in zip(parts, corners)])
+    vertices, faces = joined_faces(parts)
     open_edges, crowded = edge_faults(vertices, faces)
     if crowded:
         notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")

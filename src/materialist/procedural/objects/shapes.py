@@ -11,6 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from materialist.camera import unit
 from materialist.errors import InputError
+from materialist.geometry.boundary import joined_faces
 from materialist.render.variant import setup
 from materialist.types import Array
 
@@ -328,13 +329,9 @@ def leaves(rng: np.random.Generator, roots: Array, directions: Array, length: fl
 
 def joined(parts: list[Solid]) -> Solid:
     """Several solids as one."""
-    offset = np.cumsum([0, *(len(p.vertices) for p in parts)])[:-1]
-    return Solid(
-        np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.faces + k for p, k in zip(parts, offset)]).astype(np.int32),
-        np.concatenate([p.normals for p in parts]),
-        np.concatenate([p.uv for p in parts]),
-    )
+    vertices, faces = joined_faces(parts)
+    normals, uv = (np.concatenate([getattr(part, name) for part in parts]) for name in ("normals", "uv"))
+    return Solid(vertices, faces, normals, uv)
 
 
 def moved(
