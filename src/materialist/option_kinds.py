@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -118,9 +119,10 @@ def beside(folder: Path, name: str, value: Any) -> Path:
 
 
 def several(value: Any) -> list[Any]:
-    """A single value, or a list of them: of lists, of texts such as 310,220, or of objects."""
+    """A single value, or a list of them: of lists, of texts such as 310,220, or of objects; also from an array."""
+    value = getattr(value, "tolist", lambda: value)()
     plural = isinstance(value, list | tuple) and all(
-        not isinstance(one, str | int | float) or "," in str(one) for one in value
+        not isinstance(one, str | Real) or "," in str(one) for one in value
     )
     return list(value) if plural else [value]
 

@@ -103,18 +103,18 @@ def test_sky_pixels_see_the_light():
     np.testing.assert_allclose(image[holes], expected[holes], atol=0.01)
 
 
-def test_a_continued_plane_carries_the_mean_of_its_pixels():
+def test_continued_planes_carry_the_means_of_their_own_pixels():
+    """Planes start alike; assigning one must not reach the other."""
     label = np.full(SIZE, -1)
-    label[5:, 2:9] = 0
+    label[5:, 2:9], label[0] = 0, 1
+    geometry = with_floor(wall(CAMERA), label)
+    geometry.mesh.face_plane[-1] = 1  # the second triangle of the floor becomes the other plane
     maps = random_maps(4, SIZE)
-    scene = scene_of(with_floor(wall(CAMERA), label), maps)
-    si = scene.mi_scene.ray_intersect(scene.mi.Ray3f([0.3, 0, -1], [0.1, -1, 0.2]))
-    bsdf = si.shape.bsdf()[0] if isinstance(si.shape.bsdf(), list) else si.bsdf()
-    assert bsdf is not None
-    got = [np.array(scene.params[f"plane0.bsdf.{name}.data"]) for name in ("base_color", "roughness", "metallic")]
-    for value, field in zip(got, (maps.albedo, maps.roughness, maps.metallic)):
-        mean = field[label == 0].mean(0)
-        np.testing.assert_allclose(value, np.broadcast_to(np.atleast_1d(mean), value.shape), rtol=1e-5)
+    scene = scene_of(geometry, maps)
+    for plane in (0, 1):
+        for name, field in (("base_color", maps.albedo), ("roughness", maps.roughness), ("metallic", maps.metallic)):
+            value, mean = scene.params[f"plane{plane}.bsdf.{name}.data"], field[label == plane].mean(0)
+            np.testing.assert_allclose(value, np.broadcast_to(np.atleast_1d(mean), np.shape(value)), rtol=1e-5)
 
 
 def test_updates_give_the_picture_of_a_fresh_scene():
@@ -150,21 +150,6 @@ def test_normals_along_the_picture_s_x_are_normals_like_others():
     normal[..., 0] = 1
     scene = scene_of(build_geometry(np.full(SIZE, 2, np.float32), normal, CAMERA, completion="none"))
     assert np.isfinite(scene.render(spp=4)).all()
-
-
-def test_two_planes_keep_their_own_materials():
-    """Planes start alike; assigning one must not reach the other."""
-    camera = Camera(6, 4, 50.0)
-    label = np.full((4, 6), -1)
-    label[3], label[0] = 0, 1
-    geometry = with_floor(wall(camera), label)
-    geometry.mesh.face_plane[-1] = 1  # the second triangle of the floor becomes the other plane
-    scene = RenderScene(geometry, camera, device="cpu")
-    maps = uniform(camera)
-    maps.albedo[3], maps.albedo[0] = 0.9, 0.1
-    scene.set_materials(maps)
-    for plane, value in ((0, 0.9), (1, 0.1)):
-        assert np.array(scene.params[f"plane{plane}.bsdf.base_color.data"]) == pytest.approx(value, rel=1e-5)
 
 
 def hills():

@@ -52,7 +52,7 @@ class Preview:
         from materialist.transport.cache import Tables
 
         self.scene, key = scene, _key(scene)
-        kept = _read(file, key)
+        kept = None if file is None else _read(file, key)
         if kept is None:
             tables = vars(self._engine.tables(scene.envmap)).items()
             kept = {name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16) for name, v in tables}
@@ -163,14 +163,9 @@ def _key(scene: Scene) -> str:
     return f"{VERSION} {RAYS} {scene.camera} {total:08x}"
 
 
-def _read(file: Path | None, key: str) -> dict[str, Any] | None:
+def _read(file: Path, key: str) -> dict[str, Any] | None:
     """The arrays of a file that were written under this key; None where there are none."""
-    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
-        if file is not None:
-            with np.load(file) as kept:
-                return (
-                    {name: kept[name] for name in ("pixels", "diffuse", "specular")}
-                    if str(kept["key"]) == key
-                    else None
-                )
+    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error), np.load(file) as kept:
+        if str(kept["key"]) == key:
+            return {name: kept[name] for name in ("pixels", "diffuse", "specular")}
     return None

@@ -5,7 +5,8 @@ A model is loaded whole or not at all, and nothing is downloaded here.
 
 import importlib
 import json
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -34,12 +35,21 @@ MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 """Of sRGB values in [0, 1], as the network was trained."""
 
 
+@contextmanager
+def advice(instead: str) -> Iterator[None]:
+    """Errors of a missing library or model end with this advice, not with that of other predictors."""
+    try:
+        yield
+    except (SetupError, WeightsError) as error:
+        raise type(error)(str(error).replace(INSTEAD, instead)) from error
+
+
 def library(name: str) -> Any:
     """The optional library, imported. Raises SetupError that says how to install it."""
     try:
         module = importlib.import_module(name)
     except ImportError as error:
-        raise SetupError(f"This predictor needs {name} ({error}); install it with: {INSTALL}, or {INSTEAD}.") from error
+        raise SetupError(f"This needs {name} ({error}); install it with: {INSTALL}, or {INSTEAD}.") from error
     # What matters is raised; their bars and hints would run through ours.
     module.utils.logging.set_verbosity_error()
     module.utils.logging.disable_progress_bar()

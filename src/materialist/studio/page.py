@@ -6,6 +6,7 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.edits.select import sam
 from materialist.errors import InputError
 from materialist.studio import (
     SETTINGS,
@@ -18,7 +19,7 @@ from materialist.studio import (
     tab_open,
     tab_take,
 )
-from materialist.studio.selection import read_pick, sam_missing
+from materialist.studio.selection import read_pick
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import Studio
@@ -74,7 +75,7 @@ def _left(parts: dict[str, Any]) -> None:
         parts["brush"] = gr.Slider(
             2, 60, 12, step=1, label="Brush size", scale=2, min_width=140, buttons=[], elem_id="brush"
         )
-    missing = sam_missing()
+    missing = sam.missing()
     parts["sam"] = gr.Checkbox(
         False, label="Find objects with SAM 2", interactive=missing is None, elem_id="sam",
         info=missing or "A trained network in place of colour, depth and normals; seconds a click.",

@@ -90,22 +90,6 @@ class Selection:
         return replace(self, parts=tuple(p for p in left if p.any()))
 
 
-def sam_missing() -> str | None:
-    """Why SAM 2 cannot select here, in a sentence that says what to do; None where it can. Imports nothing large."""
-    from importlib.util import find_spec
-
-    from materialist.edits.select.sam import REPO, folder_of
-    from materialist.errors import WeightsError
-
-    if find_spec("transformers") is None:
-        return "Not installed: pip install 'materialist[hub]', then materialist models download sam2."
-    try:
-        folder_of(REPO)
-    except WeightsError:
-        return "Its weights are not here: materialist models download sam2."
-    return None
-
-
 def read_pick(data: Any) -> dict[str, Any]:
     """A pointer event as the page sends it, with everything checked. Raises InputError."""
     try:

@@ -18,6 +18,7 @@ from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
+from materialist.option_kinds import numbers, several
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
@@ -193,11 +194,9 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
     return np.array([0.0, -1.0, 0.0]) if floor is None else -floor
 
 
-def _places(at: Any, count: int) -> list[tuple[float, float]]:
-    several = bool(np.ndim(at[0])) if len(at) else False
-    places = [tuple(place) for place in at] if several else [tuple(at)] * count
-    if len(places) == 1:
-        places = places * count
+def _places(at: Any, count: int) -> list[Any]:
+    places = [numbers(place, 2, "place") for place in several(at)]
+    places = places * count if len(places) == 1 else places
     if len(places) != count:
         raise InputError(f"There are {len(places)} places for {count} meshes; give one, or as many.")
     return places

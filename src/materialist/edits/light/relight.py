@@ -69,9 +69,7 @@ def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | Non
         "ambient": wanted.ambient if wanted.ambient != 1 else None, "lamps": len(lamps) or None, "dim": wanted.dim,
     }  # fmt: skip
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
-    return noted(
-        warned(new, *_warnings(scene)), "light", {name: value for name, value in what.items() if value is not None}
-    )
+    return noted(warned(new, *_warnings(scene)), "light", what)
 
 
 def resolved(scene: Scene, options: Relight) -> Any:

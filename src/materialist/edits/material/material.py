@@ -38,10 +38,9 @@ def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **value
         _mix(materials.metallic, _changed(materials.metallic, wanted.metallic), weight),
     )
     names = ("hue", "saturation", "value", "grow", "feather")
-    shifts = {name: getattr(wanted, name) for name in names if getattr(wanted, name)}
-    levels = {"albedo": wanted.albedo, "roughness": wanted.roughness, "metallic": wanted.metallic, "texture": texture}
-    entry = {**shifts, **{name: level for name, level in levels.items() if level is not None}}
-    return noted(replace(scene, materials=new), "material", {**entry, "pixels": int((weight > 0.5).sum())})
+    what: dict[str, Any] = {name: getattr(wanted, name) or None for name in names}
+    what |= {"albedo": wanted.albedo, "roughness": wanted.roughness, "metallic": wanted.metallic, "texture": texture}
+    return noted(replace(scene, materials=new), "material", {**what, "pixels": int((weight > 0.5).sum())})
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:

@@ -10,11 +10,10 @@ import numpy as np
 from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edits.remove.behind import HiddenGeometry
 from materialist.edits.remove.patches import patched
-from materialist.errors import InputError, SetupError, WeightsError
+from materialist.errors import InputError
 from materialist.io.image import same_aspect
 from materialist.options import Removal
 from materialist.predict import resample
-from materialist.predict.weights import INSTEAD
 from materialist.types import Array, Scene
 
 Inpaint = Callable[[Array, Array], Array]
@@ -73,20 +72,12 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     from materialist.predict.protocol import on_gpu
 
     gpu = on_gpu(device)
-    try:
+    with hub.advice("leave --inpaint out"):
         folder = locate(where, DEFAULT)
         pipeline = hub.pipeline(
             "StableDiffusionInpaintPipeline", folder, gpu, "inpainting pipeline",
             safety_checker=None, requires_safety_checker=False,
         )  # fmt: skip
-    except SetupError as error:
-        raise SetupError(
-            f"Inpainting by diffusion needs diffusers and transformers; install them with: {hub.INSTALL}, or leave "
-            "--inpaint out."
-        ) from error
-    except WeightsError as error:
-        # The hub's own sentence ends with advice about predictors.
-        raise WeightsError(str(error).replace(INSTEAD, "leave --inpaint out")) from error
     return lambda photo, hole: _diffused(pipeline, photo, hole, seed=seed, steps=steps)
 
 

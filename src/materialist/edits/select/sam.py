@@ -1,12 +1,10 @@
 """SAM 2 (Ravi et al. 2024), the paper's way to select, where its weights are there."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.errors import SetupError, WeightsError
 from materialist.types import Array
 
 REPO = "facebook/sam2.1-hiera-tiny"
@@ -25,15 +23,11 @@ def segment(
     import torch
 
     from materialist.predict import hub
+    from materialist.predict.models import locate
     from materialist.predict.protocol import on_gpu
 
-    try:
-        from transformers import Sam2Model
-    except ImportError as error:
-        raise SetupError(
-            f"SAM 2 needs transformers ({error}); install it with: {hub.INSTALL}, or leave --with sam2 out."
-        ) from error
-    model = hub.load(Sam2Model, folder_of(where))
+    with hub.advice("leave --with sam2 out"):
+        model = hub.load(hub.library("transformers").Sam2Model, locate(where, REPO))
     target = torch.device("cuda" if on_gpu(device) else "cpu")
     model = model.to(target).eval()
     side = int(model.config.vision_config.backbone_config.image_size[0])
@@ -55,17 +49,17 @@ def segment(
     return (large[0, 0] > 0).cpu().numpy()
 
 
-def folder_of(where: str) -> Any:
-    """The folder of a model or of a downloaded hub id. Raises WeightsError that says how to get it."""
-    from materialist.predict.models import locate
+def missing() -> str | None:
+    """Why SAM 2 cannot select here, in a sentence that says what to do; None where it can. Imports nothing large."""
+    from importlib.util import find_spec
 
-    try:
-        return locate(where, REPO)
-    except WeightsError as error:
-        raise WeightsError(
-            f"The weights of SAM 2 are not here; fetch them with: materialist models download {where}, or leave "
-            "--with sam2 out."
-        ) from error
+    from materialist.predict.models import hub_model, is_complete
+
+    if find_spec("transformers") is None:
+        return "Not installed: pip install 'materialist[hub]', then materialist models download sam2."
+    if not is_complete(hub_model(REPO)):
+        return "Its weights are not here: materialist models download sam2."
+    return None
 
 
 def _pixels(linear: Array, side: int):

@@ -8,7 +8,7 @@ import numpy as np
 from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
 from materialist.edits.select.objects import Box, object_at, object_in
 from materialist.errors import InputError
-from materialist.option_kinds import numbers
+from materialist.option_kinds import numbers, several
 from materialist.types import Array, Scene
 
 METHODS = ("network", "grabcut", "sam2")
@@ -59,11 +59,7 @@ def select(
 
 def _points(scene: Scene, click) -> list[tuple[int, int]]:
     """One click or several as (column, row), each on a surface."""
-    try:
-        single = len(click) == 2 and all(np.isscalar(v) for v in click)
-    except TypeError as error:
-        raise InputError(f"The click must be (x, y), or a list of such, not {click!r}.") from error
-    points = [checked_pixel(scene, point) for point in ([click] if single else click)]
+    points = [checked_pixel(scene, point) for point in several(click)]
     if not points:
         raise InputError("The list of clicks is empty; give one pixel of the object.")
     for x, y in points:
