@@ -23,6 +23,7 @@ import torch
 from materialist import metrics
 from materialist.bench.batch import chosen
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
+from materialist.bench.edits import sample_and_light
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
 from materialist.errors import InputError
@@ -34,7 +35,7 @@ from materialist.geometry.build import build_geometry
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
-from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.procedural.synthetic import SyntheticSample
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Photo, Prediction
 
@@ -86,10 +87,8 @@ class AblationBench(Benchmark):
 
     def _synthetic(self, data: Path | None) -> "Iterator[_Photo]":
         for k in range(self.scenes):
-            sample, other = (
-                make_sample(k, 0, light, size=self.size, data=data, seed=self.seed) for light in (k, k + 1)
-            )
-            yield _Photo(self, sample.photo, sample, other.envmap)
+            sample, other = sample_and_light(k, 0, k, size=self.size, data=data, seed=self.seed)
+            yield _Photo(self, sample.photo, sample, other)
 
 
 class _Photo:

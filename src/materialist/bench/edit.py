@@ -18,7 +18,7 @@ import numpy as np
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import KINDS, Edit, awaited, edits, true_scene
+from materialist.bench.edits import KINDS, Edit, awaited, edits, sample_and_light, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.into_photo import into_photo
@@ -28,11 +28,8 @@ from materialist.edits.light.relight import relight
 from materialist.edits.material import material
 from materialist.edits.preview import Preview
 from materialist.option_kinds import option
-from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Scene
-
-CAUSTICS = 16
-"""Times as many paths for the truth where light comes through glass: few of them find it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,18 +51,17 @@ class EditBench(Benchmark):
     kinds: str = option(",".join(k for k in KINDS if k not in ("glass", "remove")), "Edits, with commas.", kind="name")
     spp: int = option(256, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(576, "Paths a pixel of the truth.", **COUNT)
+    caustics: int = option(16, "Times as many of the truth where light comes through glass: few find it.", **COUNT)
     latency: int = option(512, "Size of the timed previews and final edit; 0: none.", **COUNT_OR_0)
     large: int = option(4900, "Side of the large photo that an edit is brought into.", **SIZE)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         kinds = names("kinds", self.kinds, KINDS)
         for scene in range(self.scenes):
-            sample, other = (
-                make_sample(scene, 0, k, size=self.size, data=data, seed=self.seed) for k in (scene, scene + 1)
-            )
+            sample, other = sample_and_light(scene, 0, scene, size=self.size, data=data, seed=self.seed)
             fitted, cost = timed(pipeline.invert, sample.photo, prior=sample.truth, seed=self.seed, device=self.device)
             perfect = true_scene(sample)
-            for edit in edits(sample, other.envmap, kinds):
+            for edit in edits(sample, other, kinds):
                 for row in self._compared(edit, sample, perfect, (fitted, cost["seconds"]), report):
                     yield {**row, "sample": sample.name}
         if self.latency:
@@ -76,7 +72,7 @@ class EditBench(Benchmark):
     ) -> Iterator[Row]:
         """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet."""
         before = sample.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
-        caustics = CAUSTICS if edit.kind == "glass cup" else 1
+        caustics = self.caustics if edit.kind == "glass cup" else 1
         after = edit.truth.render(edit.envmap, spp=caustics * self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)
         shared: dict[str, Any] = {"spp": self.spp, "seed": self.seed, "device": self.device}

@@ -18,6 +18,7 @@ from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit, shifted_hsv
 from materialist.edits.remove.remove import remove
 from materialist.geometry.build import build_geometry
+from materialist.options import Glass
 from materialist.procedural.arrangements import Item
 from materialist.procedural.objects import shapes
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
@@ -108,7 +109,7 @@ def _shift(item: Item, kind: str) -> float:
 def _of_glass(item: Item, stage: TrueScene) -> Item:
     """The object in clear glass, LIFT above what it stands on."""
     solid = replace(item.solid, vertices=item.solid.vertices + LIFT * stage.view.to_scene[1])
-    return replace(item, solid=solid, transparent=True)
+    return replace(item, solid=solid, ior=Glass().ior)
 
 
 def staged(stage: TrueScene, items: list[Item]) -> TrueScene:
@@ -131,7 +132,8 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator
     material = "as-is" if kind == "insert" else "glass"
     (body,) = insert(true_scene(sample), model, at, material=material).bodies
     placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
-    cup = Item(placed, np.tile(surface.albedo, (2, 2, 1)), float(surface.roughness.mean()), 0.0, kind == "glass cup")
+    ior = Glass().ior if kind == "glass cup" else None
+    cup = Item(placed, np.tile(surface.albedo, (2, 2, 1)), float(surface.roughness.mean()), 0.0, ior)
     truth = staged(stage, [*stage.items, cup])
     mask = truth.seen == len(stage.items)
     yield Edit(kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask)
@@ -144,6 +146,12 @@ def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]
     mask[third, third] = True
     mask &= scene.depth > 0
     return scene, mask, f"{size} x {size}, {int(mask.sum())} pixels"
+
+
+def sample_and_light(scene: int, view: int, light: int, **how: Any) -> tuple[SyntheticSample, Array]:
+    """The sample of these numbers, and the next light [h, 2h, 3] of its view; `how` as of `make_sample`."""
+    sample, other = (make_sample(scene, view, k, **how) for k in (light, light + 1))
+    return sample, other.envmap
 
 
 def true_scene(sample: SyntheticSample, maps: Prediction | None = None) -> Scene:

@@ -24,10 +24,11 @@ from materialist import metrics
 from materialist.bench import glass_models as models
 from materialist.bench import glass_scenes as scenes
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, numbers, timed
-from materialist.bench.edits import awaited
+from materialist.bench.edits import awaited, true_scene
 from materialist.bench.glass_models import Background, Case
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.edits.glass.preview import GlassPreview
+from materialist.geometry.silhouette import window
 from materialist.metrics.lpips import lpips
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness
@@ -80,35 +81,35 @@ class GlassBench(Benchmark):
             shown: dict[str, Array] = {}
             yield from self._compared(case, behind, shown)
             if len(report.sheet) < self.pictures:
-                inside, room = case.scene.mask[..., None], behind["true"].picture
-                glass = [case.truth, *(shown[name] for name in DRAWN if name in shown)]
-                pictures = [case.photo, *(np.where(inside, picture, room) for picture in glass)]
-                report.sheet.append(strip(*(picture * case.gain for picture in pictures)))
+                inside, room = case.stage.mask[..., None], behind["true"].picture
+                glass = [case.truth, *(shown[name] for name in DRAWN)]
+                pictures = [np.where(inside, picture, room) for picture in glass]
+                report.sheet.append(strip(case.scene.photo.linear, *pictures))
         if self.latency:
             yield from self._latencies(data)
 
     def _cases(self, data: Path | None, iors: list[float]) -> Iterator[tuple[Case, dict[str, Background]]]:
         """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
         for k, thing in enumerate(scenes.things(data, self.shapes, self.seed)):
-            scene = scenes.GlassScene(thing, self.size, self.seed, self.background)
+            stage = scenes.GlassScene(thing, self.size, self.seed, self.background)
             for j in range(self.envmaps):
-                envmap = scenes.environment(k * self.envmaps + j, scene, data=data, seed=self.seed)
-                room = scene.render(envmap, "room", spp=self.reference, seed=1)
-                photo = scene.render(envmap, "diffuse", spp=self.reference, seed=2)
+                light = scenes.environment(k * self.envmaps + j, stage, data=data, seed=self.seed)
+                room = stage.room.render(light, self.reference, seed=1)
                 gain = scenes.exposure(room)
+                scene = true_scene(stage.photo(light * gain, self.reference))
                 behind = {
-                    "true": models.true_background(scene, room, envmap),
-                    "inpainted": models.inpainted_background(scene, photo, envmap, gain),
+                    "true": Background(room * gain, stage.room.truth).fitted(scene.envmap, stage.room),
+                    "inpainted": models.inpainted_background(scene, stage),
                 }
                 for ior in iors:
-                    truth = scene.render(envmap, "glass", ior=ior, spp=self.reference, seed=3)
+                    truth = stage.glass(ior).render(scene.envmap, self.reference, seed=3)
                     name = f"{thing.name} light {j} ior {ior:g}"
-                    yield Case(scene, envmap, photo, truth, gain, ior, name, self.spp), behind
+                    yield Case(stage, scene, truth, ior, name, self.spp), behind
 
     def _compared(self, case: Case, behind: dict[str, Background], shown: dict[str, Array]) -> Iterator[Row]:
         """The rows of all methods for one case; their pictures go into `shown`."""
-        scene, true = case.scene, behind["true"]
-        d = models.thicknesses(scene, np.clip(case.photo * case.gain, 0, 1), true)
+        stage, true = case.stage, behind["true"]
+        d = models.thicknesses(case.scene, stage, true)
 
         def row(method: str, picture: Array, found: Thickness | None = None) -> Row:
             shown[method] = picture
@@ -116,8 +117,8 @@ class GlassBench(Benchmark):
 
         for kind, background in behind.items():
             yield row(f"background alone, {kind}", background.picture)
-        yield row(f"{CEILING}, true mesh", models.before(case, scene.item.solid, true))
-        again = scene.render(case.envmap, "glass", ior=case.ior, spp=self.spp, seed=4)
+        yield row(f"{CEILING}, true mesh", models.before(case, stage.item.solid, true))
+        again = stage.glass(case.ior).render(case.scene.envmap, self.spp, seed=4)
         yield row(f"{CEILING}, truth again", again)
         for model in (models.two_interface, models.closed):
             name = model.__name__
@@ -126,9 +127,8 @@ class GlassBench(Benchmark):
             inpainted = model(case, d["predicted"], behind["inpainted"])
             yield row(f"{name}, predicted d, inpainted", inpainted, d["predicted"])
         for source in ("true", "network"):
-            if source in d:
-                leaning = replace(d[source], back=scene.front.back)
-                yield row(f"closed, {source} d, true back", models.closed(case, leaning, true), leaning)
+            leaning = replace(d[source], back=stage.front.back)
+            yield row(f"closed, {source} d, true back", models.closed(case, leaning, true), leaning)
         same = models.two_interface(case, d["predicted"], true, papers_back=True)
         yield row("two_interface, predicted d, back normal = front normal", same, d["predicted"])
         yield from sensitivity(case, d["predicted"], true, draws=self.draws, seed=self.seed)
@@ -162,16 +162,15 @@ def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, see
 
 def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str, float]:
     """The figures of a picture [H, W, 3] inside the mask, named by the object's group."""
-    mask, group = case.scene.mask, case.scene.thing.group
-    truth = case.truth * case.gain
+    mask, group, truth = case.stage.mask, case.stage.thing.group, case.truth
     # Outside the mask both are the truth, so that windows that reach over its border compare equals.
-    inside = np.where(mask[..., None], picture * case.gain, truth)
+    inside = np.where(mask[..., None], picture, truth)
     found = {"psnr": metrics.psnr(inside, truth, mask=mask), "ssim": metrics.ssim(inside, truth, mask=mask)}
     found["frame"] = float(found["psnr"] - 10 * np.log10(mask.mean()))
-    box = scenes.window(mask)
+    box = window(mask)
     if (distance := lpips(inside[box], truth[box])) is not None:
         found["lpips"] = distance
     if thickness is not None:
-        true = case.scene.front.thickness
+        true = case.stage.front.thickness
         found["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
     return {f"{name}_{group}": value for name, value in found.items()}

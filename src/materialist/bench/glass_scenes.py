@@ -6,27 +6,25 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice, zip_longest
 from pathlib import Path
-from typing import Any
 
 import cv2
-import mitsuba as mi
 import numpy as np
 import trimesh
 
+from materialist.bench.edits import LIFT, staged
 from materialist.camera import pixel_rays
 from materialist.color import luminance
 from materialist.errors import InputError
-from materialist.geometry.silhouette import window
-from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights, patterns
+from materialist.procedural.arrangements import Item, in_camera
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.glassware import KINDS, make_shape
 from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.thickness.ray_paths import ShapeTracer, towards
+from materialist.procedural.synthetic import SyntheticSample, TrueScene
+from materialist.procedural.thickness.dataset import CameraPose, look
+from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.procedural.world import Viewpoint, orbit
-from materialist.render.envmap import half_turn, on_mitsuba_grid
-from materialist.render.scene import look_along, sensor, shape
-from materialist.types import Array, Camera
+from materialist.types import Array, Camera, Photo
 
 GROUPS = ("symmetric", "asymmetric")
 """Whether an object's back is its front mirrored, as the paper sorts its objects."""
@@ -42,13 +40,9 @@ ENVMAP_ROWS = {"room": 64, "envmap": 256}
 class GlassProtocol:
     """How the pictures of `bench glass` are made."""
 
-    diffuse_length: int = 6  # most segments of a path where nothing is glass
-    glass_length: int = 40  # most segments of a path through glass
     brightest: float = 60.0  # largest radiance of the light, in means
-    lift: float = 0.002  # air under an object: where two surfaces are one, either may be met first
     exposed: float = 0.8  # luminance of the brightest fiftieth of the background
     albedo_spp: int = 256  # paths a pixel from which the light on the background is read, denoised
-    albedo_rounds: int = 3  # corrections of the background's albedo: light goes to and fro between surfaces
     brightest_albedo: float = 0.95  # largest albedo of the background
     noise: float = 0.5  # largest relative error of the thickness (paper, eq. ablation_d)
 
@@ -113,7 +107,7 @@ def is_closed(solid: Solid) -> bool:
 
 
 class GlassScene:
-    """One object, seen by a camera: maps that a photo would give, and pictures under any light.
+    """One object, seen by a camera; its true pictures are those of `grey`, of `room` and of `glass`.
 
     `background` is 'room', a floor and a wall, or 'envmap': nothing but the light, as in the paper.
     """
@@ -122,94 +116,49 @@ class GlassScene:
         rng = np.random.default_rng([seed, 9, *thing.name.encode()])
         self.thing, self.background = thing, background
         view = _view(thing.solid, rng)
-        self.to_scene = view.to_scene
-        self.camera = Camera(size, size, view.fov)
         turned = shapes.placed(thing.solid, turn=rng.uniform(-0.5, 0.5))
-        turned = replace(turned, vertices=turned.vertices + np.array([0, PROTOCOL.lift, 0]))
-        item = scenes.Item(turned, np.full((2, 2, 3), 0.5, np.float32), 1.0, 0.0)
-        self.item = scenes.in_camera(item, view)
-        self.room = [scenes.in_camera(i, view) for i in _room(rng)] if background == "room" else []
+        turned = replace(turned, vertices=turned.vertices + np.array([0, LIFT, 0]))
+        self.item = in_camera(Item(turned, np.full((2, 2, 3), 0.5, np.float32), 1.0, 0.0), view)
+        around = [in_camera(item, view) for item in _room(rng)] if background == "room" else []
+        self.room = TrueScene(around, view, size, size)
+        self.grey = staged(self.room, [*around, self.item])
 
-    @cached_property
-    def front(self) -> SeenSide:
-        """The object alone."""
-        return seen(self.item.solid, self.camera)
-
-    @cached_property
-    def behind(self) -> SeenSide:
-        """The room alone."""
-        if self.room:
-            return seen(shapes.joined([i.solid for i in self.room]), self.camera)
-        none = np.zeros((self.camera.height, self.camera.width), np.float32)
-        normal = np.broadcast_to(np.array([0, 0, 1], np.float32), (*none.shape, 3))
-        return SeenSide(none, normal, none, -normal)
+    def glass(self, ior: float) -> TrueScene:
+        """The room with the object of glass."""
+        return staged(self.room, [*self.room.items, replace(self.item, ior=ior)])
 
     @cached_property
     def mask(self) -> Array:
         """[H, W] bool: where the object is."""
-        return self.front.depth > 0
+        return self.grey.seen == len(self.room.items)
 
-    def render(self, envmap: Array, what: str, *, ior: float = 1.5, spp: int = 64, seed: int = 0) -> Array:
-        """[H, W, 3] float32 linear: 'diffuse' (the object grey, albedo 0.5), 'glass', or 'room' (without it).
+    @cached_property
+    def front(self) -> SeenSide:
+        """The object alone."""
+        return seen(self.item.solid, self.room.camera)
 
-        Of 'glass' only the rectangle around the object is rendered, the rest is 0.
-        """
-        things = {f"room{k}": shape(mi, i.solid, painted(i.albedo)) for k, i in enumerate(self.room)}
-        glass = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0}
-        if what != "room":
-            things["object"] = shape(mi, self.item.solid, glass if what == "glass" else painted(self.item.albedo))
-        length = PROTOCOL.glass_length if what == "glass" else PROTOCOL.diffuse_length
-        return self.trace(things, envmap, length=length, spp=spp, seed=seed, cropped=what == "glass")
-
-    def trace(
-        self, things: dict[str, Any], envmap: Array, *, spp: int, length: int, seed: int = 0, cropped: bool = False
-    ) -> Array:
-        """[H, W, 3] float32 linear picture of Mitsuba objects under a light [h, 2h, 3]; 0 outside a `cropped` one,
-        which is the rectangle around the object. By paths of `length` segments at most."""
-        camera = sensor(self.camera, look_along(mi))
-        box = window(self.mask) if cropped else np.s_[:, :]
-        if cropped:
-            for side, axis, part in zip(("width", "height"), "xy", reversed(box), strict=True):
-                camera["film"] |= {f"crop_offset_{axis}": part.start, f"crop_{side}": part.stop - part.start}
-        grid = np.ascontiguousarray(on_mitsuba_grid(np.asarray(envmap, np.float32), np)[:, :-1])
-        light = {"type": "envmap", "bitmap": mi.Bitmap(grid), "to_world": half_turn(mi)}
-        scene = mi.load_dict({"type": "scene", "light": light, **things, "sensor": camera})
-        how = mi.load_dict({"type": "path", "max_depth": length, "rr_depth": 64})
-        edge = int(np.ceil(np.sqrt(spp)))  # whole squares suit the stratified sampler
-        render: Any = mi.render  # whose types know no plain seeds
-        picture = np.array(render(scene, integrator=how, spp=edge * edge, seed=seed & 0x7FFFFFFF))[..., :3]
-        whole = np.zeros((self.camera.height, self.camera.width, 3), np.float32)
-        whole[box] = np.nan_to_num(picture)
-        return whole
-
-
-def painted(albedo: Array) -> dict[str, Any]:
-    """Mitsuba's diffuse surface with a texture [h, w, 3]."""
-    bitmap = mi.Bitmap(np.ascontiguousarray(albedo, np.float32))
-    return {"type": "diffuse", "reflectance": {"type": "bitmap", "bitmap": bitmap, "raw": True}}
+    def photo(self, envmap: Array, spp: int) -> SyntheticSample:
+        """The photo of the grey object under a light [h, 2h, 3] that is exposed."""
+        linear = np.clip(self.grey.render(envmap, spp, seed=2), 0, 1)
+        photo = Photo(linear=linear, camera=self.grey.camera, original=linear, fov_source="option")
+        return SyntheticSample(photo, self.grey.truth, envmap, self.grey)
 
 
 def seen(solid: Solid, camera: Camera) -> SeenSide:
     """What the camera sees of a mesh in its frame."""
-    rays = pixel_rays(camera)
-    size = rays.shape[:2]
     # Off the centres of pixels by a little: rays through the edges of meshes may slip between faces.
-    direction = rays.reshape(-1, 3).astype(np.float64) + np.array([3e-5, 2e-5, 0])
-    found = ShapeTracer(solid).trace(np.zeros_like(direction), direction)
-    hit = np.isfinite(found.first)
-    normal = towards(np.where(hit[:, None], found.normal, [0, 0, 1]), direction, -1)
-    back = towards(np.where(hit[:, None], found.exit_normal, [0, 0, -1]), direction, 1)
-    thickness = found.solid * np.linalg.norm(direction, axis=-1)
-    depth = np.where(hit, found.first, 0)
-    return SeenSide(
-        depth.reshape(size).astype(np.float32), normal.reshape(*size, 3).astype(np.float32),
-        thickness.reshape(size).astype(np.float32), back.reshape(*size, 3).astype(np.float32),
-    )  # fmt: skip
+    rays = pixel_rays(camera).astype(np.float64) + np.array([3e-5, 2e-5, 0])
+    paths, normal, back = look(ShapeTracer(solid), CameraPose(np.eye(3), np.eye(3), np.zeros(3)), rays)
+    hit = np.isfinite(paths.first).reshape(rays.shape[:2])
+    thickness = paths.solid.reshape(hit.shape) * np.linalg.norm(rays, axis=-1)
+    depth, away = np.where(hit, paths.first.reshape(hit.shape), 0), np.array([0, 0, -1], np.float32)
+    normal, back = (np.where(hit[..., None], x, none) for x, none in ((normal, -away), (back, away)))
+    return SeenSide(depth.astype(np.float32), normal, thickness.astype(np.float32), back)
 
 
 def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int = 0) -> Array:
     """[h, 2h, 3] light of that number in the frame of the scene's camera, its peaks clipped; h is ENVMAP_ROWS."""
-    full = lights.envmap(lights.environment(index, seed=seed, data=data), scene.to_scene)
+    full = lights.envmap(lights.environment(index, seed=seed, data=data), scene.room.view.to_scene)
     rows = ENVMAP_ROWS[scene.background]
     small = full if rows == len(full) else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)
     return np.minimum(small, PROTOCOL.brightest * luminance(small).mean()).astype(np.float32)
@@ -220,7 +169,7 @@ def exposure(background: Array) -> float:
     return PROTOCOL.exposed / max(float(np.percentile(luminance(background), 98)), 1e-6)
 
 
-def _room(rng: np.random.Generator) -> list[scenes.Item]:
+def _room(rng: np.random.Generator) -> list[Item]:
     """A floor and a wall 0.6 to 1 behind the object, both patterned."""
     x, y, z = np.eye(3)
     back = rng.uniform(0.6, 1.0)
@@ -228,7 +177,7 @@ def _room(rng: np.random.Generator) -> list[scenes.Item]:
     wall = shapes.panel(np.array([-3.0, 0, -back]), 6 * x, 3 * y, (7, 3.5))
     kinds = ("checker", "noise", "stripes", "wood", "spots")
     chosen = rng.choice(kinds, 2)
-    return [scenes.Item(p, patterns.pattern(rng, str(k)), 1.0, 0.0) for p, k in zip((floor, wall), chosen, strict=True)]
+    return [Item(p, patterns.pattern(rng, str(k)), 1.0, 0.0) for p, k in zip((floor, wall), chosen, strict=True)]
 
 
 def _view(solid: Solid, rng: np.random.Generator) -> Viewpoint:

@@ -22,7 +22,7 @@ import numpy as np
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import staged
+from materialist.bench.edits import sample_and_light, staged
 from materialist.bench.report import CEILING, Column, Report
 from materialist.buffers import placed
 from materialist.fit.invert import FitSetup, prepare
@@ -31,7 +31,7 @@ from materialist.fit.settings import preset
 from materialist.geometry.build import build_geometry
 from materialist.option_kinds import option
 from materialist.predict import NEUTRAL_METALLIC, get_predictor
-from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.procedural.synthetic import SyntheticSample
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Materials, Prediction
 
@@ -117,13 +117,10 @@ class LightBench(Benchmark):
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         methods = names("methods", self.methods, METHODS)
         for scene, view, light in product(range(self.scenes), range(self.views), range(self.lights)):
-            first = scene + view + light
-            sample, other = (
-                make_sample(scene, view, k, size=self.size, data=data, seed=self.seed, unseen=self.unseen)
-                for k in (first, first + 1)
-            )
+            how: dict[str, Any] = {"size": self.size, "data": data, "seed": self.seed, "unseen": self.unseen}
+            sample, other = sample_and_light(scene, view, scene + view + light, **how)
             sample = mirrored(sample) if self.mirrors else sample
-            stage = _Stage(self, sample, other.envmap)
+            stage = _Stage(self, sample, other)
             for row in chain(stage.relit() if self.relight else (), stage.fitted(methods)):
                 yield {**row, "sample": sample.name}
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import KINDS, Edit, edits, true_scene
+from materialist.bench.edits import KINDS, Edit, edits, sample_and_light, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.bench.screen_space import screen_space
 from materialist.edits.composite.composite import composite
@@ -33,7 +33,7 @@ from materialist.errors import InputError
 from materialist.fit.settings import PAPER
 from materialist.metrics.maps import best_scale, score
 from materialist.option_kinds import option
-from materialist.procedural.synthetic import SyntheticSample, make_sample
+from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Prediction, Scene
 
 SCENE_SEED = 38_000
@@ -152,10 +152,7 @@ class PhotoAloneBench(Benchmark):
 def unseen_sample(scene: int, data: Path | None, size: int) -> tuple[SyntheticSample, Array]:
     """Photo `scene` of the benchmark, and the other light that it is shown under; captures for odd numbers."""
     source = data if scene % 2 else None
-    photo, other = (
-        make_sample(scene, 0, k, size=size, data=source, seed=SCENE_SEED, unseen=True) for k in (scene, scene + 1)
-    )
-    return photo, other.envmap
+    return sample_and_light(scene, 0, scene, size=size, data=source, seed=SCENE_SEED, unseen=True)
 
 
 def with_truth(prior: Prediction, truth: Prediction, given: str) -> Prediction:

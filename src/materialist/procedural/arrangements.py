@@ -22,8 +22,8 @@ class Item:
     """[h, w, 3] float32 linear picture, repeated over the texture coordinates."""
     roughness: float
     metallic: float
-    transparent: bool = False
-    """Clear glass of IOR 1.5; the rest of the material does not count."""
+    ior: float | None = None
+    """Index of refraction of clear glass, of which the rest of the material does not count; None: opaque."""
 
 
 def arrangement(scene_index: int, *, seed: int, data: Path | None, unseen: bool = False) -> list[Item]:

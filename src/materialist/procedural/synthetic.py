@@ -7,7 +7,7 @@ the scenes are our own. The frame of the camera is the only frame: objects and l
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -102,8 +102,11 @@ class TrueScene:
         self._params = mi.traverse(self._scene)
         self._params.keep(["light.data"])
         self._item_of_shape = _registry(list(shapes.values()))
-        self.seen: Array  # [H, W] number of the item at a pixel's centre, -1 for the sky
-        self.truth = self._true_maps()
+
+    @property
+    def seen(self) -> Array:
+        """[H, W] number of the item at a pixel's centre, -1 for the sky."""
+        return self._centre["item"]
 
     @property
     def things(self) -> dict[int, Array]:
@@ -115,13 +118,16 @@ class TrueScene:
         """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
         self._params["light.data"] = tensor(mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
         self._params.update()
-        depth = GLASS_DEPTH if any(item.transparent for item in self.items) else MAX_DEPTH
-        integrator = mi.load_dict({"type": "path", "max_depth": depth})
+        integrator = {"type": "path", "max_depth": MAX_DEPTH}
+        if any(item.ior for item in self.items):
+            # Paths that end by chance would be 3 dB of noise behind glass.
+            integrator |= {"max_depth": GLASS_DEPTH, "rr_depth": GLASS_DEPTH}
+        path_tracer = mi.load_dict(integrator)
         # Whole squares suit the stratified sampler; batches bound the memory.
         total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
         for k, part in enumerate(batches):
             picture = mi.render(
-                self._scene, integrator=integrator, spp=part, seed=mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
+                self._scene, integrator=path_tracer, spp=part, seed=mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
             )
             total += np.array(picture)[..., :3] * part
         return (total / sum(batches)).astype(np.float32)
@@ -132,10 +138,11 @@ class TrueScene:
         count = -(-spp // most)
         return [int(np.ceil(np.sqrt(spp / count))) ** 2] * count
 
-    def _true_maps(self, sub: int = 4) -> Prediction:
-        """Depth and normal at pixel centres; albedo averaged over sub x sub places on the object at the centre."""
-        centre = self._probe((0.5, 0.5))
-        self.seen = item = centre["item"]
+    @cached_property
+    def truth(self) -> Prediction:
+        """Depth and normal at pixel centres; albedo averaged over 4 x 4 places on the object at the centre."""
+        centre, sub = self._centre, 4
+        item = centre["item"]
         total, count = np.zeros((*item.shape, 3)), np.zeros((*item.shape, 1))
         for place in np.ndindex(sub, sub):
             part = self._probe(tuple((np.array(place) + 0.5) / sub))
@@ -156,6 +163,11 @@ class TrueScene:
             here = seen["item"] == k
             albedo[here] = _bilinear(item.albedo, seen["uv"][here])
         return albedo
+
+    @cached_property
+    def _centre(self) -> dict[str, Array]:
+        """What is seen at the centres of pixels."""
+        return self._probe((0.5, 0.5))
 
     def _probe(self, offset: tuple[float, float]) -> dict[str, Array]:
         """What rays through that (x, y) place in each pixel see: item (-1 = sky), depth, normal [., 3], uv [., 2]."""
@@ -195,7 +207,7 @@ def _true_scene(
 def _registry(meshes: list[Any]) -> Array:
     """[n] item number by Mitsuba's number of a shape; -1 for number 0 (nothing was hit)."""
     numbers = [int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh)))[0]) for mesh in meshes]
-    table = np.full(max(numbers) + 1, -1)
+    table = np.full(max(numbers, default=0) + 1, -1)
     table[numbers] = np.arange(len(meshes))
     return table
 
@@ -207,8 +219,8 @@ def _mesh(item: scenes.Item) -> Any:
         bitmap = mi.Bitmap(np.ascontiguousarray(values, np.float32))
         return {"type": "bitmap", "bitmap": bitmap, "raw": True, "wrap_mode": "repeat"}
 
-    if item.transparent:
-        return shape(mi, item.solid, {"type": "dielectric", "int_ior": 1.5, "ext_ior": 1.0})
+    if item.ior:
+        return shape(mi, item.solid, {"type": "dielectric", "int_ior": item.ior, "ext_ior": 1.0})
     maps = {"base_color": texture(item.albedo)}
     maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
     return shape(mi, item.solid, {"type": "materialist_disney", **maps})
