@@ -14,7 +14,7 @@ from materialist.camera import rays_through, unit
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane, nearest
 from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in, window
-from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued
+from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued, sampled
 from materialist.solids.shell import Shell, closed, inside_out, joined, region
 from materialist.types import Array, Camera
 
@@ -146,7 +146,7 @@ def _closed(view: _View, camera: Camera) -> Shell:
     if not len(faces):
         raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
     place = (points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
-    at = lambda values: _sampled(values, place, order=1)  # noqa: E731
+    at = lambda values: sampled(values, place, order=1)  # noqa: E731
     # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
     # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
@@ -166,7 +166,7 @@ def _closed(view: _View, camera: Camera) -> Shell:
 
 def _between(normal: Array, known: Array, place: Array) -> Array:
     """[V, 3] unit normals at places [V, 2] of a map [h, w, 3], the nearest known ones beyond the mask."""
-    return unit(_sampled(normal[nearest(known)], place))
+    return unit(sampled(normal[nearest(known)], place))
 
 
 def _room(view: _View) -> Array:
@@ -181,12 +181,3 @@ def _ended(field: Array) -> Array:
     """The field with its outermost points negative, and none so near 0 that its border meets a grid point."""
     field[[0, -1]], field[:, [0, -1]] = np.minimum(field[[0, -1]], -1), np.minimum(field[:, [0, -1]], -1)
     return np.copysign(np.maximum(np.abs(field), DEFAULT.clear), field)
-
-
-def _sampled(values: Array, place: Array, order: int = 3) -> Array:
-    """[V, ...] of a map [H, W, ...] at places [V, 2] (x, y), by splines: with cubic ones normals turn evenly."""
-    from scipy.ndimage import map_coordinates
-
-    flat = np.asarray(values, np.float64).reshape(*values.shape[:2], -1)
-    read = [map_coordinates(flat[..., k], place.T[::-1], order=order, mode="nearest") for k in range(flat.shape[-1])]
-    return np.stack(read, -1).reshape(len(place), *values.shape[2:])

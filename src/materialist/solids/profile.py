@@ -6,6 +6,7 @@ from typing import Self
 import numpy as np
 
 from materialist.camera import unit
+from materialist.geometry.slopes import sampled
 from materialist.types import Array
 
 MARGIN = 8
@@ -54,7 +55,8 @@ class Profile:
 
     def at(self, places: Array) -> Array:
         """[...] the function at places [..., 2]: below 0 in the body."""
-        flat = _read(self.values, ((places - [0, self.low]) / self.cell).reshape(-1, 2)).reshape(places.shape[:-1])
+        own = ((places - [0, self.low]) / self.cell).reshape(-1, 2)
+        flat = sampled(self.values, own, order=1).reshape(places.shape[:-1])
         return np.maximum(flat, (self.floor - places[..., 1]) / self.cell)
 
     def slope(self, places: Array) -> Array:
@@ -92,11 +94,4 @@ class Profile:
         """[K, 2] gradient at (column, row)."""
         whole = np.concatenate([self.values[:, 1:2], self.values], 1)  # the same on the other side of the axis
         (up, out), beside = np.gradient(whole), at + np.array([1, 0])
-        return np.stack([_read(out, beside), _read(up, beside)], -1)
-
-
-def _read(values: Array, at: Array) -> Array:
-    """[N] values at places [N, 2] (column, row), linear between cells."""
-    from scipy.ndimage import map_coordinates
-
-    return map_coordinates(values, [at[:, 1], at[:, 0]], order=1, mode="nearest")
+        return sampled(np.stack([out, up], -1), beside, order=1)

@@ -65,7 +65,7 @@ def render_layers(
     base, other = renderer.pair(edited)
     relit = is_relit(scene, edited)
     changed = changed_pixels(scene, edited)
-    guides = (scene.materials.albedo, edited.materials.albedo, scene.normal, edited.normal)
+    guides = [(one.materials.albedo, one.normal) for one in (scene, edited)]
     alone, covered = None, None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
         alone = native_layer(renderer, edited, spp=spp, seed=seed, clean=clean)
@@ -74,11 +74,8 @@ def render_layers(
         changed = changed | covered
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
         if clean:
-            albedo, normal = renderer.guides(edited, anything)
-            guides = (guides[0], albedo, guides[2], normal)
-    layers = difference(
-        base, other, changed, guides, spp=spp, seed=seed, clean=clean, progress=progress,
-    )  # fmt: skip
+            guides[1] = renderer.guides(edited, anything)
+    layers = difference(base, other, changed, guides if clean else None, spp=spp, seed=seed, progress=progress)
     old, new = (np.maximum(1 - one.materials.metallic, 1e-3) for one in (scene, edited))
     return replace(layers, relit=relit, native=alone, covered=covered, diffuse=np.minimum(new / old, 1))
 
@@ -94,8 +91,8 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 
 def difference(
-    base: Render, edited: Render, changed: Array, guides: tuple[Array, ...], *, spp: int, seed: int,
-    clean: bool = True, progress=None,
+    base: Render, edited: Render, changed: Array, guides: list[tuple[Array, Array]] | None, *, spp: int, seed: int,
+    progress=None,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view.
 
@@ -106,9 +103,8 @@ def difference(
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
-        guides: albedo [H, W, 3] of the base and of the edited scene, normal [H, W, 3] of the base and, if it is
-            another one, of the edited scene.
-        clean: denoise both pictures before they are compared, where the denoiser is installed.
+        guides: albedo and normal [H, W, 3] of the base, and of the edited scene, with which both pictures are denoised
+            before they are compared, where the denoiser is installed; None: as they are.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
@@ -131,9 +127,8 @@ def difference(
     tick("render", 8, 8)
     b, e = ((one + other) / 2 for one, other in ((b0, b1), (e0, e1)))
     gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
-    if clean:
-        b = denoised(b, guides[0], guides[2])
-        e = denoised(without_fireflies(e, changed), guides[1], guides[-1])
+    if guides is not None:
+        b, e = denoised(b, *guides[0]), denoised(without_fireflies(e, changed), *guides[1])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
