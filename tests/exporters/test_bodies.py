@@ -103,9 +103,7 @@ def test_blender_gets_textures_glass_and_glow(tmp_path):
     facts = json.loads((folder / "scene.json").read_text())
     parts = facts["parts"]
     assert parts["body0"]["emission"] == [3.0, 1.5, 0.75] and "glass" not in parts["body0"]
-    assert parts["body1"]["glass"] == {
-        "share": 0.9, "ior": 1.5, "roughness": 0.0, "tint": [0.25, 1.0, 0.81],
-    }  # fmt: skip
+    assert parts["body1"]["glass"] == {"share": 0.9, "ior": 1.5, "roughness": 0.0, "tint": [0.25, 1.0, 0.81]}
     assert parts["surface"] == {"maps": "", "repeat": False} and parts["body2"] == {"maps": "body2_", "repeat": True}
     np.testing.assert_array_equal(read_exr(folder / "body2_albedo.exr"), CHECKS.albedo)
     assert facts["bounces"] == 14

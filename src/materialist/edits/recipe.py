@@ -131,9 +131,7 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     write_whole(path, text)
 
 
-def apply(
-    scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto", onto: Scene | None = None
-) -> Scene:  # fmt: skip
+def apply(scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto", onto: Scene | None = None) -> Scene:
     """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before.
 
     `seed` is that of the steps that name none, where chance has a part in them; `onto` the scene after earlier steps.

@@ -151,9 +151,7 @@ class PageContext:
         part = min(1.0, job.done / job.total) if job.total else 0.0
         return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
-    def work(
-        self, session: Session, task: tasks.Task, output: Path, **arguments: Any
-    ) -> Generator[Updates, Any, bool]:  # fmt: skip
+    def work(self, session: Session, task: tasks.Task, output: Path, **arguments: Any) -> Generator[Updates, Any, bool]:
         """Let a task make OUTPUT of the open scene, with the updates of `following`; returns whether it did."""
         scene = str(session.opened.scene)
         job = self.studio.submit(session, task, output.parent, scene=scene, output=str(output), **arguments)

@@ -153,9 +153,7 @@ def photo_sky(scene: Scene) -> Array:
 def is_relit(scene: Scene, edited: Scene) -> bool:
     """Whether the two scenes have different light."""
     glowing = [[body for body in s.bodies if is_glowing(body.surface)] for s in (scene, edited)]
-    return (
-        scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
-    )  # fmt: skip
+    return scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
 
 
 def paths_for(scene: Scene, edited: Scene) -> int:

@@ -39,9 +39,7 @@ class Field:
     """[n + 1, n + 1] z of the surface at (x, y) = corner + cell * (column, row); NaN where there is none."""
 
 
-def ground_field(
-    scene: Scene, to_up: Array, factor: float, *, places: Array, tops: Array, metres: float
-) -> Field:  # fmt: skip
+def ground_field(scene: Scene, to_up: Array, factor: float, *, places: Array, tops: Array, metres: float) -> Field:
     """Heights of a scene with its bodies, under and around places.
 
     places: [n, 2] x and y over which things fall. metres: longest side of the falling things.

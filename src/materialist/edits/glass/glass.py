@@ -62,9 +62,7 @@ def glass(
     return noted(edited, "glass", what)
 
 
-def _shell(
-    scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: bool | str
-) -> tuple[Shell, list[str]]:  # fmt: skip
+def _shell(scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: bool | str) -> tuple[Shell, list[str]]:
     """(the body of one object, what of a hollow could not be made, in words)."""
     camera, whole = scene.camera, found.revolution
     wall = wall_of(scene, part, found) if hollow else None

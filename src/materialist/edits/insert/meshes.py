@@ -287,9 +287,7 @@ class _Reader:
         # A vertex of no face must not count where the size is measured.
         used, number = np.unique(faces, return_inverse=True)
         take = lambda v: np.ascontiguousarray(v[used], np.float32)  # noqa: E731
-        return Body(
-            take(vertices), number.reshape(-1, 3).astype(np.int32), take(normals), take(uv), surface, name
-        )  # fmt: skip
+        return Body(take(vertices), number.reshape(-1, 3).astype(np.int32), take(normals), take(uv), surface, name)
 
     def _paint(self, mesh: Any, kept: Array) -> tuple[Surface, Array | None, Array | None]:
         """(surface, uv [V, 2] with v DOWN, uv [F, 2] for each kept face where its colours are those of vertices)."""

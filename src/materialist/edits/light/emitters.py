@@ -61,9 +61,7 @@ def visible_lights(scene: Scene) -> list[Array]:
     return sorted(masks, key=lambda mask: -int(mask.sum()))
 
 
-def dimmed(
-    scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None
-) -> Scene:  # fmt: skip
+def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None) -> Scene:
     """The scene with its in-photo emitters as surfaces of `dim` times their radiance; the photo's is 1.
 
     The fitted environment map explains the whole photo. Here it is scaled down to leave room for the emitters, whose

@@ -45,9 +45,7 @@ class HiddenGeometry:
     """[H, W] int: SKY, LOOSE, or the plane."""
 
 
-def behind(
-    depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera
-) -> HiddenGeometry:  # fmt: skip
+def behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera) -> HiddenGeometry:
     """Continue the surfaces around a hole into it.
 
     Surfaces part along straight lines where such lines sort the pixels around; else each hidden pixel belongs to the

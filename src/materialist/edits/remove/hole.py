@@ -36,9 +36,7 @@ class Hole:
     """[H, W] bool: where materials and photo are filled: `gone`, its shadow and reflection on the ground, no bodies."""
 
 
-def make_hole(
-    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array
-) -> Hole:  # fmt: skip
+def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array) -> Hole:
     """The pixels that a removal concerns; `grow` and `shadow` as of `materialist.Removal`.
 
     `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay.

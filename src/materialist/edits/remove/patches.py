@@ -37,9 +37,7 @@ _LOCK = threading.Lock()
 """The library has one seed for all threads."""
 
 
-def patched(
-    photo: Array, hole: Array, usable: Array, depth: Array, label: Array, seed: int = 0
-) -> Array:  # fmt: skip
+def patched(photo: Array, hole: Array, usable: Array, depth: Array, label: Array, seed: int = 0) -> Array:
     """[h, w, 3] float32 linear: a photo [H0, W0, 3] with the hole [H, W] bool filled, at its size or `longest`.
 
     usable [H, W] bool: what may be copied. depth: [H, W] planar, 0 = sky. label: [H, W] int: the surface of a pixel,
