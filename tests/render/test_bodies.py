@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from render_scenes import empty
+from render_scenes import empty, wall
 
 from materialist.procedural.objects import shapes
 from materialist.render.bodies import is_transparent
-from materialist.render.coverage import first_hits
+from materialist.render.pixels import first_hits, radiance
 from materialist.render.scene import GLASS_DEPTH, RenderScene
 from materialist.types import Body, Camera, Surface
 
@@ -94,7 +94,7 @@ def test_looking_around_bodies_alone_sees_what_looking_everywhere_does(at, monke
     body = replace(body, vertices=body.vertices + np.array(at, np.float32) + (0, 0, np.float32(DISTANCE)))
     scene, box = RenderScene(empty(CAMERA), CAMERA, bodies=(body,)).mi_scene, (slice(3, 60), slice(10, 96))
     seen = first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)
-    monkeypatch.setattr("materialist.render.coverage._around", lambda *given: given[-1])
+    monkeypatch.setattr("materialist.render.pixels._around", lambda *given: given[-1])
     for found, slow in zip(
         vars(seen).values(), vars(first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)).values()
     ):
@@ -103,10 +103,6 @@ def test_looking_around_bodies_alone_sees_what_looking_everywhere_does(at, monke
 
 
 def test_radiance_is_that_of_the_rays_that_meet_the_body_first():
-    from render_scenes import wall
-
-    from materialist.render.native import radiance
-
     columns = np.indices((CAMERA.height, CAMERA.width))[1]
     geometry = wall(CAMERA, 2.0, holes=columns >= CAMERA.width // 2)  # hides the left half of the sphere
     target = RenderScene(geometry, CAMERA, bodies=(sphere(surface(0.5, 1.0)),))

@@ -13,7 +13,7 @@ from materialist.camera import project, unproject
 from materialist.color import luminance
 from materialist.edits.core.renderer import EditRenderer
 from materialist.envmap import row_solid_angle, texel_directions
-from materialist.render.coverage import first_hits
+from materialist.render.pixels import first_hits
 from materialist.types import Array, Scene
 
 

@@ -10,7 +10,7 @@ from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
 
-def denoise(image: Array, *, albedo: Array, normal: Array) -> Array:
+def denoise(image: Array, albedo: Array, normal: Array) -> Array:
     """[H, W, 3] float32 linear without the path tracer's noise, guided by the scene's own maps, whose edges stay.
 
     image: [H, W, 3] linear radiance, >= 0, any range. albedo: [H, W, 3] linear, in [0, 1].

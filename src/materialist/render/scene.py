@@ -10,7 +10,7 @@ from materialist.errors import InputError, SetupError
 from materialist.geometry.build import part
 from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
 from materialist.render.envmap import check_envmap, emitter, on_mitsuba_grid
-from materialist.render.native import radiance
+from materialist.render.pixels import radiance
 from materialist.render.variant import setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
 

@@ -51,8 +51,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     """
     import cv2
 
-    from materialist.render.coverage import first_hits, only
-    from materialist.render.native import radiance
+    from materialist.render.pixels import first_hits, only, radiance
 
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps))]

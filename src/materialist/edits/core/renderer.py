@@ -85,7 +85,7 @@ class EditRenderer:
 
         Where `covered` [H, W] bool, by default wherever its bodies are seen, they are those of the bodies.
         """
-        from materialist.render.coverage import first_hits
+        from materialist.render.pixels import first_hits
 
         covered = self.body_coverage(edited) > 0 if covered is None else covered
         if not covered.any():
@@ -111,7 +111,7 @@ class EditRenderer:
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
-        from materialist.render.coverage import first_hits
+        from materialist.render.pixels import first_hits
 
         if not names:
             return np.zeros(scene.depth.shape, np.float32)
@@ -190,8 +190,7 @@ def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, de
     if denoise:
         from materialist.render.denoise import denoise as clean
 
-        albedo, normal = renderer.guides(scene)
-        picture = clean(picture, albedo=albedo, normal=normal)
+        picture = clean(picture, *renderer.guides(scene))
     return picture
 
 
@@ -200,6 +199,6 @@ def denoised(picture: Array, albedo: Array, normal: Array) -> Array:
     from materialist.render.denoise import denoise
 
     try:
-        return denoise(picture, albedo=albedo, normal=normal)
+        return denoise(picture, albedo, normal)
     except SetupError:
         return picture

@@ -31,7 +31,7 @@ class GlassPreview:
     """
 
     def __init__(self, scene: Scene, mask: Array, options: Glass | None = None, **values: Any):
-        from materialist.render.coverage import first_hits
+        from materialist.render.pixels import first_hits
         from materialist.render.variant import setup
 
         self._options = options = Glass.given(options, **values)
@@ -46,12 +46,13 @@ class GlassPreview:
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._size = scene.depth.shape
         traced, body = self._target(self._edited.bodies[-1].surface).mi_scene, {self._name: self._edited.bodies[-1]}
-        self.share = first_hits(traced, scene.camera, body, self._size).share
+        sight = first_hits(traced, scene.camera, body, self._size)
+        self.share = sight.share
         """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
         if not self.share.any():
             raise InputError("The camera sees nothing of the object; mark another one.")
         self._box = window(self.share > 0, margin=MARGIN)
-        self._guide = first_hits(traced, scene.camera, body, self._size, self._box)
+        self._guides = sight.albedo[self._box], sight.normal[self._box]
 
     def picture(self, *, spp: int = 16, seed: int = 0, **values: Any) -> Array:
         """[H, W, 3] float32 linear at working size: the photo with the object as glass.
@@ -59,14 +60,14 @@ class GlassPreview:
         `spp` paths a working pixel of the object, fewer for objects so large that these are more than PATHS;
         `values`: `ior`, `transmission`, `tint` and `roughness` of this glass.
         """
-        from materialist.render.native import radiance
+        from materialist.render.pixels import radiance
         from materialist.render.scene import GLASS_DEPTH
 
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target, box = self._target(surface), self._box
         paths = max(FEWEST, min(spp, PATHS // area(box)))
         seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
-        traced = denoised(without_fireflies(spread(seen)), self._guide.albedo, self._guide.normal)
+        traced = denoised(without_fireflies(spread(seen)), *self._guides)
         out, share = self._edited.photo.linear.copy(), self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]
         return out
