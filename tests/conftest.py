@@ -1,8 +1,16 @@
 """Fixtures for all tests."""
 
+import os
 import shutil
+import sys
 
 import pytest
+
+
+@pytest.fixture(autouse=True)
+def children_find_the_helpers(monkeypatch):
+    """Processes that tests start import what tests import."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
 
 
 @pytest.fixture(scope="module")

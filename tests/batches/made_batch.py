@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -14,9 +13,6 @@ from PIL import Image
 
 from materialist.errors import InputError, SetupError
 from materialist.types import Geometry, Photo, Scene
-
-HELPERS = os.pathsep.join(sys.path)
-"""What a worker needs on its path to find these."""
 
 
 def made_up(photo: Photo, **options) -> Scene:
@@ -72,8 +68,3 @@ def photos(folder: Path, *names: str) -> Path:
         pixels = np.random.default_rng(k).integers(0, 256, (16, 24, 3)).astype(np.uint8)
         Image.fromarray(pixels).save(file)
     return folder
-
-
-def environment(**more: str) -> dict[str, str]:
-    """The environment for processes that use these stand-ins."""
-    return {**os.environ, "PYTHONPATH": HELPERS, **more}

@@ -8,7 +8,7 @@ import sys
 
 import psutil
 import pytest
-from made_batch import environment, photos
+from made_batch import photos
 from made_tasks import until
 
 from materialist.batches.ledger import LEDGER, read_events
@@ -45,7 +45,7 @@ def command(source, runs):
     arguments = ["batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json"]
     return subprocess.Popen(
         [sys.executable, "-c", COMMAND.format(arguments=[str(a) for a in arguments])], stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, env=environment(), start_new_session=True, text=True,
+        stderr=subprocess.PIPE, start_new_session=True, text=True,
     )  # fmt: skip
 
 

@@ -162,21 +162,20 @@ def test_a_failed_rename_puts_the_old_scene_back(scene, tmp_path, monkeypatch):
 def test_leftovers_of_a_killed_run_are_swept_by_the_next_save(scene, tmp_path):
     """A child is killed between two files of the package, and once more between the two renames."""
     script = (
-        "import os, sys\nsys.path.insert(0, {tests!r})\nfrom made_scene import make_scene\n"
+        "import os\nfrom made_scene import make_scene\n"
         "from materialist.io import atomic, package\n"
         "def die(*a, **k): os.kill(os.getpid(), 9)\n{patch}\n"
         "package.save_scene(make_scene(), {place!r}, force=True)\n"
     )
     place = tmp_path / "a.scene"
-    tests = os.path.dirname(__file__)
-    kill_midway = script.format(tests=tests, place=str(place), patch="package.write_ply = die")
+    kill_midway = script.format(place=str(place), patch="package.write_ply = die")
     assert subprocess.run([sys.executable, "-c", kill_midway], check=False).returncode == -9
     assert not place.exists() and len(os.listdir(tmp_path)) == 1
     save_scene(scene, place)
     assert os.listdir(tmp_path) == ["a.scene"]
 
     patch = "old = os.rename\ndef swap(s, d): old(s, d) or die()\natomic.os.rename = swap"
-    kill_between = script.format(tests=tests, place=str(place), patch=patch)
+    kill_between = script.format(place=str(place), patch=patch)
     assert subprocess.run([sys.executable, "-c", kill_between], check=False).returncode == -9
     assert not place.exists()
     with pytest.raises(SceneError, match="mv "):

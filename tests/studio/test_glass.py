@@ -1,8 +1,6 @@
 """Glass that follows its sliders: the tracing process, what is asked of it, and what it answers."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,8 +21,6 @@ def log(tmp_path, monkeypatch):
     written = tmp_path / "log.txt"
     written.touch()
     monkeypatch.setenv("GLASS_LOG", str(written))
-    path = [str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, path)))
     monkeypatch.setattr(studio_glass, "trace", studio_glass_task.trace)
     return written
 

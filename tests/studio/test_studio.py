@@ -158,10 +158,9 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
             made.jobs.submit(Job("final", "me", Path(work), answer, {"how": "wait", "out": work}))
         sys.exit(run_to_exit_code(app, ["studio", "--port", port, "--work", work]))
     """
-    path = os.pathsep.join([os.environ.get("PYTHONPATH", ""), *sys.path])
     port, command = free_port(), [sys.executable, "-c", script, str(tmp_path / "work")]
     process = subprocess.Popen(
-        [*command, str(port)], env={**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": path}, stdout=subprocess.PIPE
+        [*command, str(port)], env={**os.environ, "TMPDIR": str(tmp_path)}, stdout=subprocess.PIPE
     )
     for line in process.stdout:
         if b"The studio is open" in line:
