@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -22,6 +23,24 @@ def one_thread():
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(threads)
+
+
+@pytest.fixture
+def models(monkeypatch, tmp_path):
+    """The folder of downloaded models, where there are none."""
+    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
+    return tmp_path / "models"
+
+
+@pytest.fixture(scope="session")
+def shared():
+    """Finds real captures beside the project by their path there; skips where they are not."""
+
+    def find(name):
+        path = Path(__file__).resolve().parents[2] / "shared" / name
+        return path if path.exists() else pytest.skip(f"needs ../shared/{name}")
+
+    return find
 
 
 @pytest.fixture(scope="session")

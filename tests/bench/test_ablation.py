@@ -6,7 +6,6 @@ import pytest
 
 from materialist import bench
 from materialist.bench import ablation
-from materialist.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -36,14 +35,9 @@ def test_what_matters_does_and_first_weights_hardly(rows):
     assert rows["fov x 1"]["psnr"] > max(20, rows["fov x 1.2"]["psnr"] - 0.5) and "relit_psnr" in rows["fov x 0.8"]
 
 
-def test_real_photos_need_no_truth(mitsuba, tmp_path, monkeypatch):
+def test_real_photos_need_no_truth(measured, monkeypatch):
     monkeypatch.setattr(ablation.AblationBench, "short", 3)
     monkeypatch.setattr(ablation.AblationBench, "deltas", (3.0,))
-    out = bench.run(
-        "ablation", output=tmp_path, photos=True, scenes=1, size=24, spp=4, tables="delta,fov", device="cpu"
-    )
-    rows = json.loads((out / "report.json").read_text())["rows"]
+    rows = measured("ablation", photos=True, scenes=1, size=24, spp=4, tables="delta,fov", device="cpu").rows
     assert [row["method"] for row in rows] == ["delta 3, ARM", "delta 3, RM&A", "fov x 0.8", "fov x 1", "fov x 1.2"]
     assert all(row["psnr"] > 5 and "relit_psnr" not in row and row["sample"].startswith("example:") for row in rows)
-    with pytest.raises(InputError, match="truth"):
-        bench.run("ablation", output=tmp_path / "none", photos=True, predictor="truth")

@@ -1,11 +1,9 @@
 """`bench light` on one tiny sample."""
 
-import json
-
 import numpy as np
 import pytest
 
-from materialist import bench, metrics
+from materialist import metrics
 from materialist.bench import light
 
 
@@ -49,22 +47,20 @@ def test_mirrors_are_photographed_under_the_same_light(sample):
     assert changed[things].mean() > 0.5 > changed[~things].mean()
 
 
-def test_a_run_writes_a_row_for_every_method(mitsuba, tmp_path):
+def test_a_run_writes_a_row_for_every_method(measured):
     options = {"scenes": 1, "lights": 1, "size": 24, "spp": 16, "methods": "default", "relight": False}
-    out = bench.run("light", output=tmp_path / "out", device="cpu", **options)
-    rows = json.loads((out / "report.json").read_text())["rows"]
+    report = measured("light", device="cpu", **options)
+    rows = report.rows
     assert [r["method"] for r in rows] == ["default"]
     assert {c.key for c in light.LightBench.columns} - set(rows[0]) == {"relit_psnr", "albedo_l1"}
     assert rows[0]["mesh_psnr"] > 10 and rows[0]["cpu_seconds"] > 0
-    assert "| default | 1 |" in (out / "report.md").read_text()
+    assert "| default | 1 |" in (report.folder / "report.md").read_text()
 
 
 @pytest.mark.slow
-def test_relit_inversions_and_the_paper_s_engine(mitsuba, tmp_path):
-    out = bench.run(
-        "light", output=tmp_path / "out", scenes=1, lights=1, size=48, spp=64, methods="paper path", device="cpu"
-    )
-    rows = {row["method"]: row for row in json.loads((out / "report.json").read_text())["rows"]}
+def test_relit_inversions_and_the_paper_s_engine(measured):
+    report = measured("light", scenes=1, lights=1, size=48, spp=64, methods="paper path", device="cpu")
+    rows = {row["method"]: row for row in report.rows}
     each = [name + end for end in light.COMPLETIONS.values() for name in ("ceiling", "inversion")]
     assert list(rows) == [*each, "paper path"]
     assert min(row["mesh_psnr"] for row in rows.values()) > 15

@@ -16,9 +16,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(autouse=True)
-def models(tmp_path, monkeypatch):
+def nothing_there(models, monkeypatch):
     """No model on this machine, and no hub."""
-    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
     monkeypatch.setenv("HF_ENDPOINT", "http://127.0.0.1:9")  # nothing listens there
 
 

@@ -48,5 +48,5 @@ def test_tags_that_cannot_be_believed(tags):
 def test_real_cameras(shared, name, fov):
     from materialist.io.photo import read_photo
 
-    photo = read_photo(shared / name, size=64)
+    photo = read_photo(shared(f"data/{name}"), size=64)
     assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(fov, abs=0.01)

@@ -212,7 +212,7 @@ def test_wide_gamut_profile_is_converted(tmp_path):
 
 def test_matrix_profile_agrees_with_lcms(shared):
     """Our float evaluation against LittleCMS on a real file with a display profile."""
-    path = shared / "odd_inputs" / "rgba_concert.tiff"
+    path = shared("data/odd_inputs/rgba_concert.tiff")
     photo = read_photo(path, size=1024)
     image = Image.open(path)
     source = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
@@ -290,11 +290,12 @@ def test_raw_without_rawpy_says_how_to_get_it(tmp_path, monkeypatch):
 
 
 def test_odd_inputs_all_work(shared):
-    shapes = {path.name: read_photo(path, size=128).linear.shape for path in (shared / "odd_inputs").iterdir()}
+    folder = shared("data/odd_inputs")
+    shapes = {path.name: read_photo(path, size=128).linear.shape for path in folder.iterdir()}
     assert len(shapes) == 10
     assert shapes["orientation6_streetlamp_exif.jpg"] == (128, 96, 3)
     assert shapes["orientation8_landscape.jpg"] == (96, 128, 3)
-    assert any("360" in w for w in read_photo(shared / "odd_inputs/panorama_braunschweig_equirect.jpg").warnings)
+    assert any("360" in w for w in read_photo(folder / "panorama_braunschweig_equirect.jpg").warnings)
 
 
 def test_camera_raw_is_linear_and_knows_its_lens(tmp_path):

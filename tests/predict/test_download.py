@@ -55,8 +55,7 @@ class Hub(BaseHTTPRequestHandler):
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
+def folder(models, monkeypatch):
     monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", False)
     return folder_of(MODEL)
 

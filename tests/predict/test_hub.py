@@ -11,14 +11,8 @@ from materialist.errors import InputError, SetupError, WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.protocol import MAPS
 
-pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("one_thread")]
+pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("one_thread", "models")]
 os.environ.setdefault("HF_HUB_OFFLINE", "1")
-
-
-@pytest.fixture(autouse=True)
-def models(tmp_path, monkeypatch):
-    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
-    return tmp_path / "models"
 
 
 @pytest.fixture
@@ -123,17 +117,22 @@ def test_depth_anything_relative_and_metric(hub, models, tmp_path):
         get_predictor("depth-anything")
 
 
-def test_absent_models_say_how_to_get_them():
-    for spec, part, name in (
-        ("marigold", "albedo", "marigold-appearance"),
-        ("marigold", "depth", "marigold-depth"),
-        ("depth-anything", "depth", "depth-anything"),
-        ("marigold:someone/theirs", "normal", "someone/theirs"),
-    ):
-        with pytest.raises(WeightsError, match=f"models download {name}.*maps:DIR"):
-            get_predictor("constant", **{part: spec})
-    with pytest.raises(WeightsError, match="no folder"):
-        get_predictor("constant", depth="depth-anything:nowhere")
+@pytest.mark.parametrize(
+    ("spec", "part", "words"),
+    [
+        ("marigold", "albedo", "models download marigold-appearance.*maps:DIR"),
+        ("marigold", "depth", "models download marigold-depth.*maps:DIR"),
+        ("marigold:someone/theirs", "normal", "models download someone/theirs.*maps:DIR"),
+        ("depth-anything", "depth", "models download depth-anything.*maps:DIR"),
+        ("depth-anything:nowhere", "depth", "no folder"),
+        ("matnet", "albedo", "matnet_weights.pth.*Lez/MatNet.*models download matnet.*maps:DIR"),
+        ("matnet:someone/theirs", "albedo", "models download someone/theirs"),
+        ("matnet:none.pth", "albedo", "no file none.pth.*models download matnet.*maps:DIR"),
+    ],
+)
+def test_absent_models_say_how_to_get_them(spec, part, words):
+    with pytest.raises(WeightsError, match=words):
+        get_predictor("constant", **{part: spec})
 
 
 def test_absent_libraries_say_how_to_get_them(models, monkeypatch):

@@ -5,19 +5,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from made_matnet import made_photo
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.predict import get_predictor
-from materialist.types import Camera, Photo
 
 H, W = 20, 32
-
-
-def photo(height: int = H, width: int = W) -> Photo:
-    linear = np.full((height, width, 3), 0.3, np.float32)
-    return Photo(linear=linear, camera=Camera(width, height, 40.0), original=linear)
 
 
 def good_maps(height: int = H, width: int = W) -> dict[str, np.ndarray]:
@@ -42,7 +37,7 @@ def write(folder: Path, **maps: np.ndarray) -> str:
 
 def test_exr_maps_come_back_bit_for_bit(tmp_path):
     maps = good_maps()
-    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
+    prediction = get_predictor(write(tmp_path, **maps)).predict(made_photo(H, W))
     assert prediction.warnings == () and prediction.predictor.startswith("maps:")
     for name in ("albedo", "roughness", "metallic"):
         assert np.array_equal(getattr(prediction.materials, name), maps[name])
@@ -58,7 +53,7 @@ def test_png_maps_are_decoded_by_their_meaning(tmp_path, dtype):
     for name, values in encoded.items():
         pixels = np.round(values * top).astype(dtype)
         cv2.imwrite(str(tmp_path / f"{name}.png"), pixels[..., ::-1] if pixels.ndim == 3 else pixels)
-    prediction = get_predictor(f"maps:{tmp_path}").predict(photo())
+    prediction = get_predictor(f"maps:{tmp_path}").predict(made_photo(H, W))
     close = 1.5 / top
     assert np.allclose(linear_to_srgb(prediction.materials.albedo), encoded["albedo"], atol=close)
     assert np.allclose(prediction.materials.roughness, maps["roughness"], atol=close)
@@ -71,7 +66,7 @@ def test_png_maps_are_decoded_by_their_meaning(tmp_path, dtype):
 def test_missing_maps_are_neutral_and_told(tmp_path):
     maps = good_maps()
     spec = write(tmp_path, albedo=maps["albedo"], depth=np.full((H, W), 2.0, np.float32))
-    prediction = get_predictor(spec).predict(photo())
+    prediction = get_predictor(spec).predict(made_photo(H, W))
     assert (prediction.materials.roughness == 0.5).all()
     assert np.allclose(prediction.materials.metallic, 0.1)
     assert np.allclose(prediction.normal, [0, 0, 1], atol=1e-4)
@@ -81,7 +76,7 @@ def test_missing_maps_are_neutral_and_told(tmp_path):
 
 def test_maps_of_other_sizes_are_resampled_and_told(tmp_path):
     spec = write(tmp_path, **good_maps(2 * H, 2 * W))
-    prediction = get_predictor(spec).predict(photo())
+    prediction = get_predictor(spec).predict(made_photo(H, W))
     assert prediction.materials.albedo.shape == (H, W, 3)
     assert prediction.depth.shape == prediction.materials.roughness.shape == (H, W)
     assert np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-5)
@@ -95,9 +90,9 @@ def test_resampled_depth_makes_no_surface_between_near_and_far(tmp_path):
     depth = np.full((2 * H, 2 * W), 10.0, np.float32)
     depth[7:23, 9:31] = 2.0
     depth[:5] = 0
-    prediction = get_predictor(write(tmp_path, **(maps | {"depth": depth}))).predict(photo())
+    prediction = get_predictor(write(tmp_path, **(maps | {"depth": depth}))).predict(made_photo(H, W))
     assert set(np.unique(prediction.depth.round(4))) == {0.0, 2.0, 10.0}
-    prediction = get_predictor(f"maps:{tmp_path}").predict(photo(3 * H, 3 * W))
+    prediction = get_predictor(f"maps:{tmp_path}").predict(made_photo(3 * H, 3 * W))
     assert set(np.unique(prediction.depth.round(4))) == {0.0, 2.0, 10.0}
 
 
@@ -125,14 +120,14 @@ def test_maps_that_cannot_be_meant_are_refused(tmp_path, name, change, message):
     if change is not None:
         maps[name] = change(values)
     with pytest.raises(InputError, match=message):
-        get_predictor(write(tmp_path, **maps)).predict(photo())
+        get_predictor(write(tmp_path, **maps)).predict(made_photo(H, W))
 
 
 def test_slight_excess_is_clipped_and_told(tmp_path):
     maps = good_maps()
     maps["albedo"] = maps["albedo"] * 1.05
     maps["depth"][0, 0] = np.inf
-    prediction = get_predictor(write(tmp_path, **maps)).predict(photo())
+    prediction = get_predictor(write(tmp_path, **maps)).predict(made_photo(H, W))
     assert prediction.materials.albedo.max() == 1
     assert prediction.depth[0, 0] == 0
     assert len(prediction.warnings) == 2
@@ -144,6 +139,6 @@ def test_depths_that_no_scene_has_are_sky(tmp_path, far):
     depth = np.full((H, W), far, np.float32)
     depth[H // 2 :] = 3
     depth[-1] = 4000
-    found = get_predictor(write(tmp_path, **{**good_maps(), "depth": depth})).predict(photo())
+    found = get_predictor(write(tmp_path, **{**good_maps(), "depth": depth})).predict(made_photo(H, W))
     assert (found.depth[: H // 2] == 0).all() and (found.depth[H // 2 :] == depth[H // 2 :]).all()
     assert any("taken as sky" in note for note in found.warnings)

@@ -1,16 +1,11 @@
 """Synthetic samples: the truth must be true of the picture."""
 
-from pathlib import Path
-
 import numpy as np
-import pytest
 
 from materialist import metrics
 from materialist.camera import pixel_rays
 from materialist.procedural import arrangements as scenes
 from materialist.procedural.synthetic import make_sample
-
-SHARED = Path(__file__).parents[3] / "shared" / "data"
 
 
 def test_the_same_numbers_give_the_same_sample(sample):
@@ -43,8 +38,7 @@ def test_render_repeats_the_photo_and_is_linear_in_the_light(sample):
     assert np.allclose(twice, 2 * again, rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data folder is absent")
-def test_meshes_and_captures_of_a_data_folder_are_used(mitsuba):
-    sample = make_sample(4, 4, 4, size=(24, 32), data=SHARED, spp=4)
+def test_meshes_and_captures_of_a_data_folder_are_used(mitsuba, shared):
+    sample = make_sample(4, 4, 4, size=(24, 32), data=shared("data"), spp=4)
     assert np.isfinite(sample.photo.linear).all() and (sample.truth.depth > 0).mean() > 0.5
-    assert max(len(i.solid.vertices) for i in scenes.arrangement(4, seed=0, data=SHARED)) > 1000
+    assert max(len(i.solid.vertices) for i in scenes.arrangement(4, seed=0, data=shared("data"))) > 1000

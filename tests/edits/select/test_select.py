@@ -80,8 +80,7 @@ def test_what_cannot_be_selected(table, options, words):
     assert words in str(error.value)
 
 
-def test_sam2_without_weights_says_what_to_do(table, monkeypatch, tmp_path):
-    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path))
+def test_sam2_without_weights_says_what_to_do(table, models):
     with pytest.raises(MaterialistError, match="leave --with sam2 out"):
         select(table[0], click=(50, 50), method="sam2")
 

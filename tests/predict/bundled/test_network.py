@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 import torch
+from made_matnet import made_photo
 from safetensors.torch import load_file, save_file
 
 from materialist.errors import WeightsError
 from materialist.predict.bundled import inference
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
 from materialist.predict.bundled.predictor import BundledPredictor
-from materialist.types import Camera, Photo
 
 TINY = BundledArchitecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
 
@@ -29,15 +29,9 @@ def file(network, tmp_path):
     return path
 
 
-def _photo(height, width, fov=50.0, seed=0):
-    linear = np.random.default_rng(seed).random((height, width, 3), dtype=np.float32)
-    return Photo(linear=linear, camera=Camera(width, height, fov), original=linear)
-
-
 @pytest.mark.parametrize("size", [(32, 32), (45, 61), (97, 33), (7, 150)])
 def test_any_size(file, size):
-    photo = _photo(*size)
-    prediction = BundledPredictor(file).predict(photo)
+    prediction = BundledPredictor(file).predict(made_photo(*size))
     m = prediction.materials
     assert m.albedo.shape == (*size, 3) and m.roughness.shape == m.metallic.shape == prediction.depth.shape == size
     for array in (m.albedo, m.roughness, m.metallic):

@@ -3,7 +3,6 @@
 import json
 import zlib
 from math import prod
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +11,7 @@ import torch
 from materialist.predict.matnet.network import MatNet
 from materialist.predict.matnet.predictor import infer
 
-PARITY = Path(__file__).parents[4] / "shared" / "parity"
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
-
-pytestmark = pytest.mark.skipif(not PARITY.is_dir(), reason="needs ../shared/parity")
 
 
 def filled(name: str, shape: list[int]) -> torch.Tensor:
@@ -29,13 +25,17 @@ def filled(name: str, shape: list[int]) -> torch.Tensor:
 
 
 @pytest.fixture(scope="module")
-def expected() -> dict[str, np.ndarray]:
-    return dict(np.load(PARITY / "matnet_vitb_io.npz"))
+def expected(shared) -> dict[str, np.ndarray]:
+    return dict(np.load(shared("parity/matnet_vitb_io.npz")))
 
 
 @pytest.fixture(scope="module")
-def network() -> MatNet:
-    keys = json.loads((PARITY / "matnet_vitb_keys.json").read_text())
+def keys(shared) -> dict[str, list[int]]:
+    return json.loads(shared("parity/matnet_vitb_keys.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def network(keys) -> MatNet:
     network = MatNet("vitb")
     network.load_state_dict({name: filled(name, shape) for name, shape in keys.items()}, strict=True)
     return network.eval()
@@ -47,8 +47,7 @@ def worst(found: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.abs(found - wanted).max() / np.abs(wanted).max())
 
 
-def test_names_and_shapes_are_the_published_ones():
-    keys = json.loads((PARITY / "matnet_vitb_keys.json").read_text())
+def test_names_and_shapes_are_the_published_ones(keys):
     with torch.device("meta"):
         ours = {name: list(x.shape) for name, x in MatNet("vitb").state_dict().items()}
     assert len(keys) == 303

@@ -17,9 +17,8 @@ from materialist.predict.weights import write_weights
 
 
 @pytest.fixture(autouse=True)
-def tiny(monkeypatch, tmp_path):
+def tiny(monkeypatch, models):
     install(monkeypatch)
-    monkeypatch.setenv("MATERIALIST_MODELS", str(tmp_path / "models"))
 
 
 @pytest.fixture
@@ -127,17 +126,6 @@ def test_the_checksum_beside_the_file_is_obeyed(tmp_path, state):
     assert MatNetPredictor(path).name.endswith(good[:16])
     (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  w.pth\n")
     refused(path, good, "0" * 64, "damaged")
-
-
-def test_a_model_that_was_not_downloaded_says_how_to_get_it(tmp_path):
-    for spec, words in {
-        "matnet": ("matnet_weights.pth", "Lez/MatNet", "models download matnet", "maps:DIR"),
-        "matnet:someone/theirs": ("someone/theirs", "models download someone/theirs"),
-        "matnet:none.pth": ("no file none.pth", "models download matnet", "maps:DIR"),
-    }.items():
-        with pytest.raises(WeightsError) as error:
-            get_predictor(spec)
-        assert all(word in str(error.value) for word in words), str(error.value)
 
 
 def test_downloaded_models_are_found_by_name_and_by_id(tmp_path, state):
