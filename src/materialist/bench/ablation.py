@@ -23,20 +23,19 @@ import torch
 from materialist import metrics
 from materialist.bench.batch import chosen
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
-from materialist.bench.edits import sample_and_light
+from materialist.bench.edits import sample_and_light, true_scene
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
+from materialist.edits.core.renderer import rendered
 from materialist.errors import InputError
 from materialist.fit.invert import FitSetup, prepare, replaced
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
-from materialist.geometry.build import build_geometry
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.procedural.synthetic import SyntheticSample
-from materialist.render.scene import RenderScene
 from materialist.types import Array, Photo, Prediction
 
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
@@ -196,15 +195,12 @@ def _fov(photo: _Photo) -> Iterator[Row]:
             settings = replace(PAPER.materials, stages=_stages(EACH[1:], bench.short))
             yield _Photo(bench, replace(photo.photo, camera=camera)).materials(name, settings)
             continue
-        relit, truth = sample.render(other, spp=bench.spp, seed=bench.seed + 3), sample.truth
-        geometry = build_geometry(truth.depth, truth.normal, camera, completion="planes", seed=bench.seed)
-        mesh = RenderScene(geometry, camera, device=bench.device)
-        mesh.set_materials(truth.materials)
-        mesh.set_envmap(sample.envmap)
-        row = photo.against_photo(name, mesh.render(spp=bench.spp, seed=bench.seed + 1))
-        mesh.set_envmap(other)
-        picture = mesh.render(spp=bench.spp, seed=bench.seed + 1)
-        yield {**row, "relit_psnr": metrics.psnr(picture, relit)}
+        seen = replace(sample, photo=replace(photo.photo, camera=camera))
+        scene = true_scene(seen, completion="planes", seed=bench.seed)
+        how: dict[str, Any] = {"spp": bench.spp, "seed": bench.seed + 1, "device": bench.device}
+        row, relit = photo.against_photo(name, rendered(scene, **how)), rendered(replace(scene, envmap=other), **how)
+        truth = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
+        yield {**row, "relit_psnr": metrics.psnr(relit, truth)}
 
 
 TABLES: dict[str, Callable[[_Photo], Iterator[Row]]] = {

@@ -154,10 +154,12 @@ def sample_and_light(scene: int, view: int, light: int, **how: Any) -> tuple[Syn
     return sample, other.envmap
 
 
-def true_scene(sample: SyntheticSample, maps: Prediction | None = None) -> Scene:
+def true_scene(
+    sample: SyntheticSample, maps: Prediction | None = None, *, completion: str = "auto", seed: int = 0
+) -> Scene:  # fmt: skip
     """The sample as a fit without any error: true maps on the mesh of the true depth, true light; or other `maps`."""
     maps, photo = maps or sample.truth, sample.photo
-    geometry = build_geometry(maps.depth, maps.normal, photo.camera)
+    geometry = build_geometry(maps.depth, maps.normal, photo.camera, completion=completion, seed=seed)
     return Scene(
         photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, sample.envmap, photo.linear
     )  # fmt: skip

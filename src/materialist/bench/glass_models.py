@@ -51,9 +51,11 @@ class Background:
 
     def surfaces(self, camera: Camera) -> list[Item]:
         """The mesh of its depth, and its planes, which go on with their mean albedo."""
-        depth, albedo, found = self.maps.depth, self.maps.materials.albedo, []
-        geometry = build_geometry(depth, self.maps.normal, camera) if depth.any() else None
-        for k in np.unique(geometry.mesh.face_plane) if geometry else ():
+        depth, albedo, found = self.maps.depth, self.maps.materials.albedo, list[Item]()
+        if not depth.any():
+            return found
+        geometry = build_geometry(depth, self.maps.normal, camera)
+        for k in np.unique(geometry.mesh.face_plane):
             mean = np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3)) if k >= 0 else albedo
             mesh: Any = part(geometry.mesh, int(k))
             found.append(Item(mesh, mean, 1.0, 0.0))
@@ -126,6 +128,7 @@ def thicknesses(scene: Scene, stage: GlassScene, behind: Background) -> dict[str
     'true', 'predicted' (what `materialist glass` takes by itself), 'network' (RefractionNet alone), 'symmetry'. Where
     the normals are None they are those of the thickness: 'true' leaves out what true ones add.
     """
-    methods = {"true": stage.front.thickness, "predicted": "auto", "network": "network", "symmetry": "symmetry"}
+    methods: dict[str, Any] = {"true": stage.front.thickness, "predicted": "auto"}
+    methods |= {name: name for name in ("network", "symmetry")}
     depth = behind.maps.depth
     return {name: object_thickness(scene, stage.mask, how, behind=depth) for name, how in methods.items()}

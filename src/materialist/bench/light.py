@@ -22,18 +22,17 @@ import numpy as np
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import sample_and_light, staged
+from materialist.bench.edits import sample_and_light, staged, true_scene
 from materialist.bench.report import CEILING, Column, Report
 from materialist.buffers import placed
+from materialist.edits.core.renderer import rendered
 from materialist.fit.invert import FitSetup, prepare
 from materialist.fit.light import start_light
 from materialist.fit.settings import preset
-from materialist.geometry.build import build_geometry
 from materialist.option_kinds import option
 from materialist.predict import NEUTRAL_METALLIC, get_predictor
 from materialist.procedural.synthetic import SyntheticSample
-from materialist.render.scene import RenderScene
-from materialist.types import Array, Materials, Prediction
+from materialist.types import Array, Geometry, Materials, Prediction, Scene
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
 """Albedo, roughness and metallic of the paper's runs without given materials."""
@@ -138,34 +137,27 @@ class _Stage:
         self.photo = sample.render(sample.envmap, spp=bench.spp, seed=bench.seed + 2)
         self.relit_photo = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
 
-    def mesh(self, completion: str) -> Any:
-        """The RenderScene of the true depth; `auto` continues floors."""
-        camera, truth = self.sample.photo.camera, self.sample.truth
-        geometry = build_geometry(truth.depth, truth.normal, camera, completion=completion, seed=self.bench.seed)
-        return RenderScene(geometry, camera, device=self.bench.device)
-
     def relit(self) -> Iterator[Row]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
         truth, device = self.sample.truth, self.bench.device
         for completion, suffix in COMPLETIONS.items():
-            figures = self._on(self.mesh(completion), truth.materials, self.sample.envmap)
-            yield {"method": CEILING + suffix, **figures}
+            perfect = true_scene(self.sample, completion=completion, seed=self.bench.seed)
+            yield {"method": CEILING + suffix, **self._on(perfect)}
             options: dict[str, Any] = {"completion": completion, "seed": self.bench.seed, "device": device}
             found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
-            mesh = RenderScene(found.geometry, found.camera, device=device)
             off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
-            figures = self._of_light(found.envmap) | self._on(mesh, found.materials, found.envmap)
+            figures = self._of_light(found.envmap) | self._on(found)
             yield {"method": "inversion" + suffix, **figures, "albedo_l1": float(off.mean()), **cost}
 
     def fitted(self, methods: list[str]) -> Iterator[Row]:
         """A row for every method of fitting the light."""
-        bench = self.bench
+        bench, perfect = self.bench, true_scene(self.sample)
         for name in methods:
             method, completion = METHODS[name], bench.completion
-            (envmap, steps, mesh), cost = timed(
+            (envmap, steps, geometry), cost = timed(
                 fit, self.sample, method, completion, seed=bench.seed, device=bench.device
             )
-            seen = self._on(mesh, self.sample.truth.materials, envmap)["mesh_psnr"]
+            seen = self._on(replace(perfect, geometry=geometry, envmap=envmap))["mesh_psnr"]
             yield {"method": name, **self._of_light(envmap), "mesh_psnr": seen, "steps": steps, **cost}
 
     def _of_light(self, envmap: Array) -> dict[str, float]:
@@ -177,21 +169,18 @@ class _Stage:
                 of_map[f"{part}_{name}"] = getattr(metrics, name)(picture, self.photo, mask=mask)
         return of_map
 
-    def _on(self, mesh: Any, materials: Materials, envmap: Array) -> dict[str, float]:
-        """PSNR of a RenderScene with these materials, under this light and under the other."""
-        mesh.set_materials(materials)
-        mesh.set_envmap(envmap)
-        picture = mesh.render(spp=self.bench.spp, seed=self.bench.seed + 1)
-        mesh.set_envmap(self.other)
-        relit = mesh.render(spp=self.bench.spp, seed=self.bench.seed + 1)
+    def _on(self, scene: Scene) -> dict[str, float]:
+        """PSNR of a scene under its light and under the other."""
+        how: dict[str, Any] = {"spp": self.bench.spp, "seed": self.bench.seed + 1, "device": self.bench.device}
+        picture, relit = (rendered(one, **how) for one in (scene, replace(scene, envmap=self.other)))
         return {"mesh_psnr": metrics.psnr(picture, self.photo), "relit_psnr": metrics.psnr(relit, self.relit_photo)}
 
 
 def fit(
     sample: SyntheticSample, method: Method, completion: str, *, seed: int = 0, device: str = "auto"
-) -> tuple[Array, int, Any]:
+) -> tuple[Array, int, Geometry]:
     """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of the depth that is given, in
-    how many steps, and the scene of that mesh."""
+    how many steps, and that mesh."""
     photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
     given = given_maps(sample, method, seed=seed, device=device)
     light = named.light
@@ -212,7 +201,7 @@ def fit(
         state.envmap = fit.prepared_light(found)
     else:
         fit.fit_light(state, given.materials)
-    return state.envmap, sum(stage["steps"] for stage in state.stages), fit.renderer
+    return state.envmap, sum(stage["steps"] for stage in state.stages), fit.geometry
 
 
 def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:
