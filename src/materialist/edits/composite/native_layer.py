@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from materialist.edits.composite.upsample import matte
-from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, new_lamps, path_depth
+from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, path_depth
 from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import area, grown, window
@@ -54,9 +54,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     from materialist.render.pixels import first_hits, only, radiance
 
     scene = renderer.scene
-    lamps = [f"lamp{k}" for k in range(len(edited.lamps))]
-    if not is_relit(scene, edited):
-        lamps = new_lamps(scene, edited)
+    lamps = [f"lamp{k}" for k in range(len(edited.lamps)) if is_relit(scene, edited)]
     bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
     # The photo's own lights and what is turned to glass in it have the outline that the photo shows.
     own = (name for name, body in bodies.items() if not body.name.startswith((PHOTO_LIGHT, PHOTO_GLASS)))

@@ -68,7 +68,8 @@ class EditRenderer:
         seen = np.zeros(self.scene.depth.shape, bool)
         for scene, other in ((self.scene, edited), (edited, self.scene)):
             own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
-            seen |= self._seen(scene, own + new_lamps(other, scene)) > 0
+            own += [f"lamp{k}" for k, lamp in enumerate(scene.lamps) if lamp not in other.lamps]
+            seen |= self._seen(scene, own) > 0
         return seen
 
     def body_coverage(self, scene: Scene) -> Array:
@@ -159,17 +160,6 @@ def is_relit(scene: Scene, edited: Scene) -> bool:
 def paths_for(scene: Scene, edited: Scene) -> int:
     """Paths a pixel of a composite where none are asked for: 128 for new glass, 64 for the rest (by eye, denoised)."""
     return 128 if any(is_transparent(body.surface) and body not in scene.bodies for body in edited.bodies) else 64
-
-
-def new_lamps(scene: Scene, edited: Scene) -> list[str]:
-    """Names of the shapes of lamps that `edited` has and `scene` has not; a second one like the first is new."""
-    known, names = list(scene.lamps), []
-    for k, lamp in enumerate(edited.lamps):
-        if lamp in known:
-            known.remove(lamp)
-        else:
-            names.append(f"lamp{k}")
-    return names
 
 
 def path_depth(scene: Scene) -> int:
