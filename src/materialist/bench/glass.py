@@ -32,6 +32,7 @@ from materialist.geometry.silhouette import window
 from materialist.metrics.lpips import lpips
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness
+from materialist.procedural.synthetic import photographed
 from materialist.types import Array
 
 DRAWN = ("two_interface, true d", "two_interface, predicted d", "closed, predicted d", "closed, predicted d, inpainted")
@@ -96,7 +97,8 @@ class GlassBench(Benchmark):
                 light = scenes.environment(k * self.envmaps + j, stage, data=data, seed=self.seed)
                 room = stage.room.render(light, self.reference, seed=1)
                 gain = scenes.exposure(room)
-                scene = true_scene(stage.photo(light * gain, self.reference))
+                grey = stage.grey.render(light * gain, self.reference, seed=2)
+                scene = true_scene(photographed(stage.grey, grey, light * gain, thing.name))
                 behind = {
                     "true": Background(room * gain, stage.room.truth).fitted(scene.envmap, stage.room),
                     "inpainted": models.inpainted_background(scene, stage),

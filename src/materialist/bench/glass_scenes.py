@@ -20,11 +20,11 @@ from materialist.procedural.arrangements import Item, in_camera
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.glassware import KINDS, make_shape
 from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.synthetic import SyntheticSample, TrueScene
+from materialist.procedural.synthetic import TrueScene
 from materialist.procedural.thickness.dataset import CameraPose, look
 from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.procedural.world import Viewpoint, orbit
-from materialist.types import Array, Camera, Photo
+from materialist.types import Array, Camera
 
 GROUPS = ("symmetric", "asymmetric")
 """Whether an object's back is its front mirrored, as the paper sorts its objects."""
@@ -136,12 +136,6 @@ class GlassScene:
     def front(self) -> SeenSide:
         """The object alone."""
         return seen(self.item.solid, self.room.camera)
-
-    def photo(self, envmap: Array, spp: int) -> SyntheticSample:
-        """The photo of the grey object under a light [h, 2h, 3] that is exposed."""
-        linear = np.clip(self.grey.render(envmap, spp, seed=2), 0, 1)
-        photo = Photo(linear=linear, camera=self.grey.camera, original=linear, fov_source="option")
-        return SyntheticSample(photo, self.grey.truth, envmap, self.grey)
 
 
 def seen(solid: Solid, camera: Camera) -> SeenSide:

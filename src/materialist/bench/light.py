@@ -31,7 +31,7 @@ from materialist.fit.light import start_light
 from materialist.fit.settings import preset
 from materialist.option_kinds import option
 from materialist.predict import NEUTRAL_METALLIC, get_predictor
-from materialist.procedural.synthetic import SyntheticSample
+from materialist.procedural.synthetic import SyntheticSample, photographed
 from materialist.types import Array, Geometry, Materials, Prediction, Scene
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
@@ -228,6 +228,4 @@ def mirrored(sample: SyntheticSample) -> SyntheticSample:
     stage = sample.scene
     polished: dict[str, Any] = {"roughness": 0.1, "metallic": 1.0}
     scene = staged(stage, [replace(x, **polished if k in stage.things else {}) for k, x in enumerate(stage.items)])
-    linear = np.clip(scene.render(sample.envmap, seed=1), 0, 1)
-    photo = replace(sample.photo, linear=linear, original=linear)
-    return replace(sample, photo=photo, truth=scene.truth, scene=scene, name=f"{sample.name} mirrors")
+    return photographed(scene, scene.render(sample.envmap, seed=1), sample.envmap, f"{sample.name} mirrors")

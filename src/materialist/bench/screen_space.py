@@ -13,6 +13,7 @@ from materialist.camera import project, unproject
 from materialist.color import luminance
 from materialist.edits.core.renderer import EditRenderer
 from materialist.envmap import row_solid_angle, texel_directions
+from materialist.procedural.packing import resample
 from materialist.render.pixels import first_hits
 from materialist.types import Array, Scene
 
@@ -72,7 +73,6 @@ def strongest(envmap: Array, count: int) -> tuple[Array, Array]:
     height, width = envmap.shape[:2]
     power = (envmap * row_solid_angle(height)[:, None, None]).reshape(-1, 3).astype(np.float64)
     light = np.maximum(luminance(power), 1e-12)
-    edges = np.cumsum(light)
-    chosen = np.searchsorted(edges, (np.arange(count) + 0.5) / count * edges[-1])
-    share = edges[-1] / count / light[chosen]
+    chosen, _ = resample(light, count)
+    share = light.sum() / count / light[chosen]
     return texel_directions(height, width).reshape(-1, 3)[chosen], power[chosen] * share[:, None]

@@ -8,6 +8,7 @@ import numpy as np
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.geometry.boundary import joined_faces
+from materialist.procedural.objects.shapes import face_normals
 from materialist.procedural.world import World
 from materialist.types import Array
 
@@ -83,15 +84,14 @@ def _lamps(vertices: Array, faces: Array, owner: Array, material: Array) -> tupl
     shining = np.flatnonzero(glow > 0)
     if not len(shining):
         return np.zeros(LIGHT_TABLE, np.uint32), density
-    a, b, c = (vertices[faces[shining, k]] for k in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
+    area = 0.5 * np.linalg.norm(face_normals(vertices, faces[shining]), axis=-1)
     shining, area = shining[area > 1e-12], area[area > 1e-12]
-    chosen, count = _resample(glow[shining] * area, LIGHT_TABLE)
+    chosen, count = resample(glow[shining] * area, LIGHT_TABLE)
     density[shining] = count / LIGHT_TABLE / area
     return shining[chosen].astype(np.uint32), density
 
 
-def _resample(weight: Array, entries: int) -> tuple[Array, Array]:
+def resample(weight: Array, entries: int) -> tuple[Array, Array]:
     """(`entries` indices drawn systematically by weight [N], [N] how often each occurs)."""
     edges = np.cumsum(weight, dtype=np.float64)
     places = (np.arange(entries) + 0.5) / entries * edges[-1]
@@ -110,7 +110,7 @@ def _directions(world: World) -> tuple[Array, Array, bool]:
     top = np.sort(weight)[-len(weight) // 200 :].sum() / max(weight.sum(), 1e-30)
     if weight.sum() <= 0:
         weight = angle
-    chosen, count = _resample(weight, ENV_TABLE)
+    chosen, count = resample(weight, ENV_TABLE)
     return chosen.astype(np.uint32), (count / ENV_TABLE / angle).astype(np.float32), bool(top > 0.3)
 
 

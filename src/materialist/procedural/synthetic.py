@@ -76,10 +76,15 @@ def make_sample(
     photo_seed = int(np.random.default_rng((scene_index, view_index, light_index)).integers(1, 2**31))
     picture = truth_scene.render(envmap, spp=spp, seed=photo_seed)
     exposure = _exposure(picture, truth_scene.truth.depth > 0)
-    linear = np.clip(picture * exposure, 0, 1).astype(np.float32)
     name = f"scene {scene_index} view {view_index} light {light_index}"
-    photo = Photo(linear=linear, camera=truth_scene.camera, original=linear, fov_source="option", path=name)
-    return SyntheticSample(photo, truth_scene.truth, (envmap * exposure).astype(np.float32), truth_scene, name)
+    return photographed(truth_scene, picture * exposure, (envmap * exposure).astype(np.float32), name)
+
+
+def photographed(scene: TrueScene, picture: Array, envmap: Array, name: str) -> SyntheticSample:
+    """The sample of a true scene whose exposed picture [H, W, 3] shows it under the light [h, 2h, 3]."""
+    linear = np.clip(picture, 0, 1).astype(np.float32)
+    photo = Photo(linear=linear, camera=scene.camera, original=linear, fov_source="option", path=name)
+    return SyntheticSample(photo, scene.truth, envmap, scene, name)
 
 
 def _exposure(picture: Array, surface: Array) -> float:

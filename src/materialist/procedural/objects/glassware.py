@@ -136,8 +136,8 @@ def _frustum(rng: np.random.Generator) -> Solid:
     low, high, deep = rng.uniform(0.25, 0.7), rng.choice([1e-2, rng.uniform(0.05, 0.7)]), rng.uniform(0.4, 1)
     profile = np.array([(1e-3, 0), (low, 0), (high, 1), (1e-3, 1)])
     solid = shapes.lathe(profile, int(rng.choice([3, 4, 4, 5, 6, 48])))
-    corners = (solid.vertices * [1, 1, deep])[solid.faces]
-    flat = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    vertices = solid.vertices * [1, 1, deep]
+    corners, flat = vertices[solid.faces], unit(shapes.face_normals(vertices, solid.faces))
     own = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
     return Solid(corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2)))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from materialist.buffers import floats
 from materialist.camera import unit
-from materialist.procedural.objects.shapes import Solid
+from materialist.procedural.objects.shapes import Solid, face_normals
 from materialist.render.scene import shape
 from materialist.render.variant import setup
 from materialist.types import Array
@@ -57,8 +57,7 @@ class ShapeTracer:
         scene = {"type": "scene", "embree_use_robust_intersections": True, "shape": shape(mi, solid)}
         self._scene = mi.load_dict(scene)
         self._faces, self._normals = solid.faces, solid.normals
-        corners = solid.vertices[solid.faces]
-        self._flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self._flat = face_normals(solid.vertices, solid.faces)
 
     def trace(self, origin: Array, direction: Array) -> Paths:
         """Follow straight rays (origin and direction [N, 3]) through everything they meet."""
