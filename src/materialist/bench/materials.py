@@ -42,17 +42,16 @@ class MaterialsBench(Benchmark):
         Column("albedo_psnr", "albedo PSNR", "higher", 2),
         Column("albedo_ssim", "albedo SSIM", "higher"),
         Column("albedo_psnr_raw", "albedo PSNR raw", "higher", 2),
-        *(
-            Column(f"{name}_{key}", f"{name} {title}", better, digits)
-            for name in ("roughness", "metallic")
-            for key, title, better, digits in (
-                ("psnr", "PSNR", "higher", 2),
-                ("psnr_pooled", "PSNR pooled", "higher", 2),
-                ("ssim", "SSIM", "higher", 3),
-            )
-        ),
-        *(Column(f"depth_{key}", f"depth {key.upper()}", "lower") for key in ("mae", "rmse")),
-        *(Column(f"depth_{key}_raw", f"depth {key.upper()} raw", "lower") for key in ("mae", "rmse")),
+        Column("roughness_psnr", "roughness PSNR", "higher", 2),
+        Column("roughness_psnr_pooled", "roughness PSNR pooled", "higher", 2),
+        Column("roughness_ssim", "roughness SSIM", "higher"),
+        Column("metallic_psnr", "metallic PSNR", "higher", 2),
+        Column("metallic_psnr_pooled", "metallic PSNR pooled", "higher", 2),
+        Column("metallic_ssim", "metallic SSIM", "higher"),
+        Column("depth_mae", "depth MAE", "lower"),
+        Column("depth_rmse", "depth RMSE", "lower"),
+        Column("depth_mae_raw", "depth MAE raw", "lower"),
+        Column("depth_rmse_raw", "depth RMSE raw", "lower"),
         Column("depth_si_log_rmse", "depth SI log RMSE", "lower"),
         Column("depth_order", "depth order", "higher"),
         Column("normal_angle", "normal angle", "lower", 1),
