@@ -1,5 +1,6 @@
 """Fixtures for all tests."""
 
+import json
 import os
 import shutil
 import sys
@@ -69,6 +70,31 @@ def run(capsys):
         code = run_to_exit_code(app, [str(argument) for argument in arguments])
         shown = capsys.readouterr()
         return code, shown.out, shown.err
+
+    return call
+
+
+@pytest.fixture
+def done(run):
+    """Run a command line that succeeds; returns what `--json` says."""
+
+    def call(*arguments):
+        code, out, err = run(*arguments, "--json")
+        assert code == 0, err
+        return json.loads(out.splitlines()[-1])
+
+    return call
+
+
+@pytest.fixture
+def refused(run):
+    """Run a command line whose input is bad; returns the sentence that says so, after how it is used if it is that."""
+
+    def call(*arguments):
+        code, out, err = run(*arguments)
+        usage, _, sentence = err.rpartition("Error: ")
+        assert code == 2 and not out and usage[:7] in ("", "Usage: ") and sentence.count("\n") == 1, err
+        return err
 
     return call
 

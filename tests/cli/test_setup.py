@@ -88,23 +88,20 @@ def put(tmp_path, content=b"weights"):
     (folder / "SHA256SUMS").write_text(f"{hashlib.sha256(b'weights').hexdigest()}  matnet_weights.pth\n")
 
 
-def test_list_says_what_is_here(run, tmp_path):
-    code, out, _ = run("models", "list", "--json")
-    models = {m["name"]: m for m in json.loads(out.splitlines()[-1])["models"]}
-    assert code == 0 and not models["matnet"]["here"] and models["matnet"]["repo"] == "Lez/MatNet"
+def test_list_says_what_is_here(run, done, tmp_path):
+    models = {m["name"]: m for m in done("models", "list")["models"]}
+    assert not models["matnet"]["here"] and models["matnet"]["repo"] == "Lez/MatNet"
     put(tmp_path)
-    code, out, _ = run("models", "list")
+    out = run("models", "list")[1]
     assert next(line for line in out.splitlines() if " matnet" in line).startswith("here")
     assert next(line for line in out.splitlines() if "depth-anything" in line).startswith("-")
 
 
-def test_verify(run, tmp_path):
+def test_verify(run, done, refused, tmp_path):
     for name, words in ((), "models download"), (("matnet",), "models download matnet"):
-        code, _, err = run("models", "verify", *name)
-        assert code == 2 and words in err
+        assert words in refused("models", "verify", *name)
     put(tmp_path)
-    code, out, _ = run("models", "verify", "--json")
-    assert code == 0 and list(json.loads(out.splitlines()[-1])["digests"]) == ["matnet"]
+    assert list(done("models", "verify")["digests"]) == ["matnet"]
     weights = tmp_path / "models/Lez--MatNet/matnet_weights.pth"
     for spoil, words in (
         (lambda: weights.write_bytes(b"weightx"), "is damaged"),
@@ -116,24 +113,23 @@ def test_verify(run, tmp_path):
         assert code == 2 and words in err and json.loads(out.splitlines()[-1])["error"] == "WeightsError"
 
 
-def test_files_that_were_fetched_elsewhere_are_taken(run, tmp_path):
+def test_files_that_were_fetched_elsewhere_are_taken(run, done, refused, tmp_path):
     source = tmp_path / "fetched"
     source.mkdir()
-    code, _, err = run("models", "download", "depth-anything", "--from", source)
-    assert code == 2 and "lacks config.json" in err
+    assert "lacks config.json" in refused("models", "download", "depth-anything", "--from", source)
     for name, content in (("config.json", b"{}"), ("model.safetensors", b"weights"), ("notes.md", b"no")):
         (source / name).write_bytes(content)
-    code, _, _ = run("models", "download", "depth-anything", "--from", source)
+    done("models", "download", "depth-anything", "--from", source)
     folder = tmp_path / "models" / "depth-anything--Depth-Anything-V2-Small-hf"
-    assert code == 0 and sorted(p.name for p in folder.iterdir()) == ["SHA256SUMS", "config.json", "model.safetensors"]
-    code, out, _ = run("models", "list")
+    assert sorted(p.name for p in folder.iterdir()) == ["SHA256SUMS", "config.json", "model.safetensors"]
+    out = run("models", "list")[1]
     assert next(line for line in out.splitlines() if "depth-anything" in line).startswith("here")
 
 
-def test_download_without_a_hub_and_of_nothing(run):
-    code, _, err = run("models", "download", "matnet")
-    assert code == 2 and "cannot be fetched" in err and "matnet --from FOLDER" in err and "maps:DIR" in err
-    assert run("models", "download", "nonsense")[0] == 2
+def test_download_without_a_hub_and_of_nothing(refused):
+    err = refused("models", "download", "matnet")
+    assert "cannot be fetched" in err and "matnet --from FOLDER" in err and "maps:DIR" in err
+    assert "nonsense" in refused("models", "download", "nonsense")
 
 
 def test_train_on_without_a_folder_says_what_it_needs():

@@ -1,7 +1,5 @@
 """The public function and the command."""
 
-import json
-
 import pytest
 from export_scenes import room
 
@@ -53,17 +51,15 @@ def test_only_an_earlier_export_is_replaced(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def test_command(run, package, tmp_path):
+def test_command(done, refused, package, tmp_path):
     target = tmp_path / "room.glb"
     arguments = ["export", package, "--to", "glb", "-o", target]
-    code, out, _ = run(*arguments, "--json")
-    told = json.loads(out.splitlines()[-1])
-    assert code == 0 and told["output"] == str(target) and told["beside"] == [str(tmp_path / "room.light.hdr")]
+    told = done(*arguments)
+    assert told["output"] == str(target) and told["beside"] == [str(tmp_path / "room.light.hdr")]
     before = target.read_bytes()
-    code, _, err = run(*arguments)
-    assert code == 2 and "give --force" in err and target.read_bytes() == before
-    assert run(*arguments, "--force", "--max-triangles", 1000)[0] == 0
+    assert "give --force" in refused(*arguments) and target.read_bytes() == before
+    done(*arguments, "--force", "--max-triangles", 1000)
     assert len(target.read_bytes()) < len(before) / 3
     assert sorted(path.name for path in tmp_path.iterdir()) == ["room.glb", "room.light.hdr"]
-    code, _, err = run("export", package, "--to", "html", "-o", tmp_path / "a.html", "--shadow-catcher")
-    assert code == 2 and "options for Blender" in err and not (tmp_path / "a.html").exists()
+    html = ("export", package, "--to", "html", "-o", tmp_path / "a.html", "--shadow-catcher")
+    assert "options for Blender" in refused(*html) and not (tmp_path / "a.html").exists()

@@ -9,8 +9,6 @@ import pytest
 import torch
 from torch.utils.data import default_collate
 
-from materialist.cli import app
-from materialist.cli.outcome import run_to_exit_code
 from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
 from materialist.procedural.thickness import dataset
@@ -26,10 +24,10 @@ def views(tmp_path_factory):
     return folder
 
 
-def test_ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on(tmp_path, monkeypatch):
+def test_ctrl_c_leaves_a_checkpoint_and_says_how_to_go_on(run, tmp_path, monkeypatch):
     monkeypatch.setattr(Trainer, "_step", lambda self, batch: os.kill(os.getpid(), signal.SIGINT) or {"loss": 0.0})
     plan = ["--shapes", "1", "--views", "2", "--heldout", "1", "--batch", "1"]
-    code = run_to_exit_code(app, ["train", "refraction", "-o", str(tmp_path / "run"), "--steps", "9", *plan])
+    code, _, _ = run("train", "refraction", "-o", tmp_path / "run", "--steps", 9, *plan)
     assert code == 130 and checkpoint.load(tmp_path / "run", "refraction")["schedule"]["step"] == 0
 
 
@@ -46,11 +44,10 @@ def test_it_leaves_weights_that_score_as_it_said_and_begin_another_run(views, tm
         torch.testing.assert_close(found.detach(), wanted.detach(), atol=1e-6, rtol=1e-3)  # stored as float16
 
 
-def test_bad_weights_to_begin_with_are_said_before_views_are_made(tmp_path):
+def test_bad_weights_to_begin_with_are_said_before_views_are_made(refused, tmp_path):
     (tmp_path / "bad.safetensors").write_bytes(b"nothing")
-    command = ["train", "refraction", "-o", str(tmp_path / "run"), "--steps", "1", "--init"]
     for name in ("bad.safetensors", "missing.safetensors"):
-        assert run_to_exit_code(app, [*command, str(tmp_path / name)]) == 2
+        assert name in refused("train", "refraction", "-o", tmp_path / "run", "--steps", 1, "--init", tmp_path / name)
     assert not (tmp_path / "run").exists()
 
 
