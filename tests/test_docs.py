@@ -23,8 +23,14 @@ FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "-
 """Options of Blender, the script for it, and MoGe that the pages name."""
 
 
-def _page_id(page):
-    return page.name
+@pytest.fixture(params=PAGES, ids=lambda page: page.name)
+def page(request):
+    return request.param
+
+
+@pytest.fixture
+def text(page):
+    return page.read_text("utf-8")
 
 
 # Commands
@@ -78,9 +84,8 @@ def _bench_options(name):
     return [field.name for field in fields(benchmark_class(name))]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_page_id)
-def test_every_command_line_parses(page):
-    for words, whole in _commands(page.read_text("utf-8")):
+def test_every_command_line_parses(text):
+    for words, whole in _commands(text):
         _parsed(words, whole)
 
 
@@ -97,9 +102,8 @@ def _options():
     return found
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_page_id)
-def test_every_option_in_the_text_exists(page):
-    named = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", page.read_text("utf-8")))
+def test_every_option_in_the_text_exists(text):
+    named = set(re.findall(r"(?<![\w-])--[a-z][\w-]+", text))
     assert not named - _options() - FOREIGN
 
 
@@ -162,10 +166,9 @@ def test_paper_map_names_functions_that_exist():
     assert not missing
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_page_id)
-def test_pages_name_functions_that_exist(page):
+def test_pages_name_functions_that_exist(text):
     ours = {path.stem for path in SOURCE.iterdir()}
-    dotted = re.findall(r"`(?:materialist\.)?([a-z_]+(?:\.\w+)+)(?:\([^`]*\))?`", page.read_text("utf-8"))
+    dotted = re.findall(r"`(?:materialist\.)?([a-z_]+(?:\.\w+)+)(?:\([^`]*\))?`", text)
     files = (".py", ".jsonl", ".txt", ".exr", ".yaml")
     assert not [n for n in dotted if n.split(".")[0] in ours and not n.endswith(files) and not _place(n)]
 
@@ -186,7 +189,6 @@ def test_paper_map_names_tests_that_exist():
 # Links
 
 
-@pytest.mark.parametrize("page", PAGES, ids=_page_id)
-def test_links_lead_to_files(page):
-    targets = re.findall(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)", page.read_text("utf-8"))
+def test_links_lead_to_files(page, text):
+    targets = re.findall(r"\]\((?!https?:|#)([^)#\s]+)(?:#[^)]*)?\)", text)
     assert not [target for target in targets if not (page.parent / target).exists()]

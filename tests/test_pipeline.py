@@ -114,9 +114,10 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
     scene = invert(**options(folder, engine="path", settings="paper", steps=3, progress=lambda *a: told.append(a[0])))
     assert scene.provenance["engine"] == "path"
     assert scene.provenance["preset"] == "paper"
-    names = [stage["name"] for stage in scene.report.stages]
+    stages = {stage["name"]: stage for stage in scene.report.stages}
     wanted = ["light", "roughness+metallic", "materials"]
-    assert [n for n in names if n in wanted] == wanted
+    assert [n for n in stages if n in wanted] == wanted
+    assert stages["light"]["loss_last"] < stages["light"]["loss_first"]
     assert scene.envmap.shape == (16, 32, 3)
     assert {"read", "predict", "geometry", "light", "rerender"} <= set(told)
 

@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, rendered_scene
+from edit_scenes import MASK, rendered_scene
 from made_meshes import box_file, floor_scene, textured_obj
 from PIL import Image
 
 from materialist.color import linear_to_srgb
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
-
-MASK = block_mask(36, 48)
 
 
 @pytest.fixture(scope="module")

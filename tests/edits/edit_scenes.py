@@ -16,6 +16,12 @@ def block_mask(height: int, width: int) -> np.ndarray:
     return mask
 
 
+MASK = block_mask(36, 48)
+"""Of the block of `flat_scene` and `rendered_scene`."""
+INNER = np.pad(np.ones((6, 6), bool), ((15, 15), (15, 27)))
+"""The middle of the block."""
+
+
 def scene_of(
     camera: Camera, depth, normal, albedo, *, roughness=0.5, photo=None, original=None, envmap=None, completion="planes"
 ) -> Scene:

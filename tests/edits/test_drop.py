@@ -186,13 +186,11 @@ def test_what_cannot_be_seen_at_rest_is_told(box, monkeypatch, poses, words):
     assert len(edited.bodies) == 1 and any(words in note for note in edited.report.warnings)
 
 
-def test_a_film_that_ends_out_of_view_says_so(box, monkeypatch):
-    monkeypatch.setattr(FALL, lambda *_, **__: [[Pose(np.array([0, 0, z]), np.eye(3))] for z in (0.0, 2.0)])
-    film = drop(floor_scene(96, 72), box, AT, frames=2)
+def test_a_film_that_ends_out_of_view_says_so_and_one_beside_everything_is_refused(box, monkeypatch):
+    scene, height = floor_scene(96, 72), [0.0, 2.0]
+    monkeypatch.setattr(FALL, lambda *_, **__: [[Pose(np.array([0, 0, z]), np.eye(3))] for z in height])
+    film = drop(scene, box, AT, frames=2)
     assert [any("does not look" in note for note in one.report.warnings) for one in film] == [False, True]
-
-
-def test_what_falls_beside_everything_is_refused(box, monkeypatch):
-    monkeypatch.setattr(FALL, lambda *_, **__: [[Pose(np.array([0, 0, -1e6]), np.eye(3))]] * 14)
+    height[:] = 14 * [-1e6]
     with pytest.raises(InputError, match="falls beside everything"):
-        settle(floor_scene(96, 72), [box], AT)
+        settle(scene, [box], AT)

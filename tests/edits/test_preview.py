@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, rendered_scene
+from edit_scenes import MASK, rendered_scene
 
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.preview import Preview
 from materialist.metrics import psnr
-
-MASK = block_mask(36, 48)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene
+from edit_scenes import MASK, flat_scene
 from PIL import Image
 
 from materialist.edits.light.relight import lamp, relight
@@ -12,7 +12,6 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 
 SCENE = flat_scene()
-MASK = block_mask(36, 48)
 
 
 @pytest.fixture

@@ -63,19 +63,15 @@ def test_spherical_harmonics_are_orthonormal_and_the_known_ones():
     np.testing.assert_allclose(basis[..., 6], c2 * (3 * d[..., 1] ** 2 - 1), atol=1e-5)
 
 
-@pytest.mark.parametrize("height", [4, 8, 16, 32, 48, 80])
-def test_resizing_keeps_the_shape_and_the_mean(height):
+@pytest.mark.parametrize("height", [4, 8, 10, 12, 13, 16, 32, 48, 80])
+def test_resizing_keeps_the_mean_and_shrinking_the_light_of_every_texel(height):
+    """By any ratio: an average of windows that overlap loses a small sun, or doubles it."""
     envmap = torch.rand(16, 32, 3, generator=torch.Generator().manual_seed(0))
     resized = resize_envmap(envmap, height)
     assert resized.shape == (height, 2 * height, 3)
     torch.testing.assert_close(resized.mean((0, 1)), envmap.mean((0, 1)), rtol=0.01, atol=0.01)
     assert float(resized.min()) >= float(envmap.min()) and float(resized.max()) <= float(envmap.max())
-
-
-@pytest.mark.parametrize("height", [8, 10, 12, 13])
-def test_shrinking_keeps_the_light_of_every_texel(height):
-    """By any ratio: an average of windows that overlap loses a small sun, or doubles it."""
-    for row, column in ((7, 3), (8, 16), (6, 31)):
+    for row, column in ((7, 3), (8, 16), (6, 31)) if height < 16 else ():
         envmap = torch.zeros(16, 32, 3)
         envmap[row, column] = 100
         small = resize_envmap(envmap, height)

@@ -9,7 +9,7 @@ from transport_scenes import furnished_room, windowed_sky
 
 from materialist import metrics
 from materialist.envmap import paste_visible_sky, texel_directions
-from materialist.fit.engine import PathEngine, TransportEngine
+from materialist.fit.engine import TransportEngine
 from materialist.fit.invert import Fit, FitSetup, invert
 from materialist.fit.losses import CLIPPED
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
@@ -134,21 +134,6 @@ def test_every_light_field_learns(room, field):
     fit = room.fit(replace(DEFAULT, light=light).at_most(25))
     stage = next(s for s in fit.run().stages if s["name"] == "light")
     assert stage["loss_last"] < 0.97 * stage["loss_first"]
-
-
-def test_papers_engine_runs_the_same_fit(room):
-    camera = room.camera
-    pixels = np.arange(camera.width * camera.height)
-    engine = PathEngine(room.path, camera, pixels, spp=4, max_depth=2, envmap_height=ENVMAP_HEIGHT)
-    settings = replace(
-        PAPER.at_most(6), light=replace(PAPER.light, height=ENVMAP_HEIGHT, schedule=Schedule(max_steps=6))
-    )
-    fit = Fit(room.setup(settings), room.geometry, room.path, engine)
-    state = fit.run()
-    assert [s["name"] for s in state.stages] == ["light", "roughness+metallic", "materials"]
-    assert state.stages[0]["loss_last"] < state.stages[0]["loss_first"]
-    assert state.envmap.shape == (ENVMAP_HEIGHT, 2 * ENVMAP_HEIGHT, 3)
-    assert torch.isfinite(state.maps).all()
 
 
 def test_visible_sky_is_pasted_where_it_is_seen():

@@ -63,6 +63,12 @@ def screen_rays(camera: Camera, screen):
     return np.stack([x / camera.focal, y / camera.focal, -np.ones(len(x))], -1)
 
 
+def look(mesh, camera: Camera, within=0.5):
+    """`trace` along a ray through each pixel, row by row; `within` is where in its pixel, [P, 2] or for all."""
+    rows, columns = np.indices((camera.height, camera.width)).reshape(2, -1)
+    return trace(mesh, np.zeros(3), screen_rays(camera, np.stack([columns, rows], -1) + within))
+
+
 def trace(mesh, origin, directions, slack: float = 1e-7):
     """First hits of rays [N, 3] from origin [3]: distance in units of the direction [N] (inf: none) and face [N] (-1).
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from geometry_scenes import plane_depth, screen_rays, trace
+from geometry_scenes import look, plane_depth, screen_rays, trace
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import ndimage
@@ -114,10 +114,7 @@ def test_the_mesh_is_sound_for_any_depth_map(depth, tau):
 @settings(max_examples=30, deadline=None)
 def test_rays_see_every_surface_and_only_its_own_pixel(depth, tau, seed):
     mesh, camera = mesh_of(depth, tau=tau)
-    rows, columns = np.nonzero(np.ones_like(depth))
-    rng = np.random.default_rng(seed)
-    screen = np.stack([columns, rows], -1) + rng.uniform(0.01, 0.99, (depth.size, 2))
-    distance, face = trace(mesh, np.zeros(3), screen_rays(camera, screen))
+    distance, face = look(mesh, camera, np.random.default_rng(seed).uniform(0.01, 0.99, (depth.size, 2)))
     surface = depth.ravel() > 0
     np.testing.assert_array_equal(face >= 0, surface)  # no white border, and the sky is open
     np.testing.assert_array_equal(mesh.face_pixel[face[surface]], np.flatnonzero(surface))
@@ -151,10 +148,7 @@ def test_thin_bars_stand_free_of_the_background(width, tau):
     depth = np.full((12, 40), 6.0)
     depth[:, 14 : 14 + width] = 2.0
     mesh, camera = mesh_of(depth, fov=40, tau=tau)
-    rng = np.random.default_rng(0)
-    rows, columns = np.nonzero(depth)
-    screen = np.stack([columns, rows], -1) + rng.random((depth.size, 2))
-    distance, face = trace(mesh, np.zeros(3), screen_rays(camera, screen))
+    distance, face = look(mesh, camera, np.random.default_rng(0).random((depth.size, 2)))
     np.testing.assert_allclose(distance, depth.ravel(), rtol=1e-5)
     np.testing.assert_array_equal(mesh.face_pixel[face], np.arange(depth.size))
     # Nothing spans the gap: every face is all bar or all background ...

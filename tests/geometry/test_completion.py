@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from geometry_scenes import box_depth, plane_depth, room, screen_rays, trace
+from geometry_scenes import box_depth, look, plane_depth, room, trace
 
 from materialist.errors import InputError
 from materialist.geometry.boundary import depth_to_mesh
@@ -66,9 +66,7 @@ def test_planes_stop_at_each_other_and_leave_light_from_above_and_behind(furnish
 def test_the_camera_sees_none_of_it(furnished):
     geometry, depth, _, _, _ = furnished
     assert (geometry.mesh.face_plane >= 0).sum() > 500
-    rows, columns = np.nonzero(depth)
-    screen = np.stack([columns, rows], -1) + np.random.default_rng(0).uniform(0.01, 0.99, (depth.size, 2))
-    _, face = trace(geometry.mesh, np.zeros(3), screen_rays(CAMERA, screen))
+    _, face = look(geometry.mesh, CAMERA, np.random.default_rng(0).uniform(0.01, 0.99, (depth.size, 2)))
     np.testing.assert_array_equal(geometry.mesh.face_pixel[face], np.arange(depth.size))
     assert (geometry.mesh.face_plane[face] == -1).all()
 
@@ -80,8 +78,7 @@ def test_outdoors_the_sky_stays_open_and_the_ground_goes_far():
     normal = np.where((box <= ground)[..., None], box_normal, [0, 1, 0])
     depth = np.where(depth < 100, depth, 0)
     geometry = build_geometry(depth, normal, CAMERA)
-    rows, columns = np.nonzero(np.ones_like(depth))
-    _, face = trace(geometry.mesh, np.zeros(3), screen_rays(CAMERA, np.stack([columns + 0.43, rows + 0.58], -1)))
+    _, face = look(geometry.mesh, CAMERA, (0.43, 0.58))
     np.testing.assert_array_equal(face >= 0, depth.ravel() > 0)
     assert (geometry.mesh.face_plane[face[face >= 0]] == -1).all()
     distance, plane, _ = hit(geometry.mesh, (40, 5, -20), (0, -1, 0))

@@ -1,15 +1,11 @@
 """Clicks, boxes and strokes."""
 
-import numpy as np
 import pytest
 from studio_scenes import block, room
 
+from materialist.edits.select.objects import overlap
 from materialist.errors import InputError
 from materialist.studio.selection import Selection, read_pick
-
-
-def overlap(mask: np.ndarray, truth: np.ndarray) -> float:
-    return float((mask & truth).sum() / (mask | truth).sum())
 
 
 def test_click_add_and_remove():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene
+from edit_scenes import MASK, flat_scene, rendered_scene
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
@@ -22,7 +22,6 @@ from materialist.io.decode import decode
 from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
 
-MASK = block_mask(36, 48)
 FLAT = flat_scene()
 
 

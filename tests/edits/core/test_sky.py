@@ -3,17 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from edit_scenes import block_mask, flat_scene
+from edit_scenes import INNER, MASK, flat_scene
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.renderer import photo_sky
 from materialist.edits.glass.glass import glass
 from materialist.edits.light.relight import relight
 from materialist.geometry.build import build_geometry
-
-MASK = block_mask(36, 48)
-INNER = np.zeros_like(MASK)
-INNER[15:21, 15:21] = True
 
 
 def before_sky():

@@ -2,14 +2,13 @@
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene
+from edit_scenes import MASK, flat_scene
 
 from materialist.color import linear_to_srgb
 from materialist.edits.material.material import edit, shifted_hsv
 from materialist.errors import InputError
 
 SCENE = flat_scene()
-MASK = block_mask(36, 48)
 
 
 def test_hue_by_a_third_of_a_turn_exchanges_the_channels():

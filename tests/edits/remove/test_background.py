@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene
+from edit_scenes import MASK, flat_scene, rendered_scene
 from made_hub import save_inpainting
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.remove.background import inpainter
 from materialist.edits.remove.remove import remove
 from materialist.errors import InputError, WeightsError
-
-MASK = block_mask(36, 48)
 
 
 def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
@@ -21,8 +19,8 @@ def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
     scene = rendered_scene()
     hdr = replace(scene, photo=replace(scene.photo, hdr=True, stops=7))
     write_exr(tmp_path / "behind.exr", scene.photo.original / 128)
-    plain = remove(scene, block_mask(36, 48), background=scene.photo.linear)
-    told = remove(hdr, block_mask(36, 48), background=tmp_path / "behind.exr")
+    plain = remove(scene, MASK, background=scene.photo.linear)
+    told = remove(hdr, MASK, background=tmp_path / "behind.exr")
     np.testing.assert_array_equal(told.photo.linear, plain.photo.linear)
 
 

@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import block_mask, flat_scene, rendered_scene, tetrahedron
+from edit_scenes import MASK, flat_scene, rendered_scene, tetrahedron
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.region import body_coverage
 from materialist.edits.remove.hole import make_hole
 from materialist.edits.remove.remove import remove
 from materialist.errors import InputError
-
-MASK = block_mask(36, 48)
 
 
 def far_from(mask, pixels):
@@ -91,7 +89,7 @@ def test_what_was_put_before_it_stays_whole():
     picture = composite(scene, red, spp=16)
     saved = replace(red, photo=replace(scene.photo, linear=picture, original=picture), rerender=picture)
     here = body_coverage(saved) > 0
-    mask = block_mask(36, 48)
+    mask = MASK.copy()
     mask |= here & (np.arange(48) < np.median(np.nonzero(here)[1]))
     assert (here & mask).sum() > 10
     gone = remove(saved, mask, shadow=0).photo.original

@@ -5,6 +5,7 @@ import pytest
 from edit_scenes import scene_of
 from PIL import Image
 
+from materialist.edits.select.objects import overlap
 from materialist.edits.select.sam import segment
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
@@ -30,10 +31,6 @@ def table():
     depth[:4] = 0
     scene = scene_of(Camera(w, h, 40.0), depth, np.broadcast_to([0, 0, 1], (h, w, 3)), photo, completion="none")
     return scene, first, second
-
-
-def overlap(a, b):
-    return (a & b).sum() / (a | b).sum()
 
 
 @pytest.mark.parametrize("click", [(50, 50), (75, 70), (45, 75)])
