@@ -44,14 +44,14 @@ class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
     radiance: [H, W, 3] what the surfaces send to each other: the photograph; None: nothing, as the paper writes L_i.
-    light_height: rows of the environment map inside the light fit.
+    light_height: rows of the environment map inside the light fit. roughness: [H, W], where the fit leaves it alone.
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, radiance: Array | None, *, seed: int = 0, light_height: int = 32,
-        cache: CacheSettings | None = None, progress=None,
+        self, geometry: Geometry, camera: Camera, radiance: Array | None, *, roughness: Array | None = None,
+        seed: int = 0, light_height: int = 32, cache: CacheSettings | None = None, progress=None,
     ):  # fmt: skip
-        self.cache = TransportCache(geometry, camera, cache, seed=seed, progress=progress)
+        self.cache = TransportCache(geometry, camera, cache, roughness=roughness, seed=seed, progress=progress)
         self.camera, self.seed, self.light_height, self.radiance = camera, seed, light_height, radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)

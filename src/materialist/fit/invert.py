@@ -228,9 +228,13 @@ def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress
         surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
         return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
     radiance = setup.photo.linear if setup.settings.photo_light else None
+    settings = setup.settings.materials
+    stays = setup.mask is None and setup.strategy == "default" and not settings.remap
+    stays &= all("roughness" not in stage.targets for stage in settings.stages)
     return TransportEngine(
-        geometry, camera, radiance, seed=seed, light_height=setup.settings.light_grid, progress=progress
-    )
+        geometry, camera, radiance, roughness=setup.prior.materials.roughness if stays else None, seed=seed,
+        light_height=setup.settings.light_grid, progress=progress,
+    )  # fmt: skip
 
 
 def timed(stages: list[dict], name: str, work: Callable[[], Any]) -> Any:

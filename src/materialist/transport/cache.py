@@ -1,8 +1,9 @@
 """The transport cache: rays are traced once, then every light is one gather and every material one shading call.
 
-Per pixel, `diffuse_samples` cosine-weighted directions and `specular_samples` visible-normal directions at each of
-ROUGHNESS_LEVELS are traced against the mesh. What is kept of a ray is one integer: MISS, or the radiance slot of the
-face it hit. Directions are regenerated from their index, so that a gather is pure memory traffic.
+Per pixel, `diffuse_samples` cosine-weighted directions and `specular_samples` visible-normal directions, at each of
+ROUGHNESS_LEVELS or at the pixel's own roughness, are traced against the mesh. What is kept of a ray is one integer:
+MISS, or the radiance slot of the face it hit. Directions are regenerated from their index, so that a gather is pure
+memory traffic.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class Tables:
     diffuse: torch.Tensor
     """[P, 9]: D0, D1, D2 (RGB each); diffuse radiance is A (1 - M) (D0 + D1 R + D2 R^2)."""
     specular: torch.Tensor
-    """[L, P, 6]: S0, S1 (RGB each) per roughness level; specular radiance is C0 S0(R) + S1(R)."""
+    """[L, P, 6]: S0, S1 (RGB each) per roughness level, or at the pixel's own roughness if L is 1; specular radiance
+    is C0 S0(R) + S1(R)."""
 
 
 def build_scene(mesh: Mesh) -> mi.Scene:
@@ -70,19 +72,16 @@ def build_scene(mesh: Mesh) -> mi.Scene:
 class TransportCache:
     """Traced visibility of one camera and mesh; equal seeds of the point sets give equal caches.
 
-    The faces of the mesh carry the pixel whose radiance a ray that hits them sees.
+    The faces of the mesh carry the pixel whose radiance a ray that hits them sees. roughness: [H, W] perceptual, where
+    it is known and stays: the specular lobe is then tabulated at it alone, which takes a sixth of the rays.
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, settings: CacheSettings | None = None, *, seed: int = 0, progress=None
-    ):
+        self, geometry: Geometry, camera: Camera, settings: CacheSettings | None = None, *,
+        roughness: Array | None = None, seed: int = 0, progress=None,
+    ):  # fmt: skip
         self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
-        self.settings = settings or CacheSettings()
-        s = self.settings
-        narrow = [max(1, round(share * s.specular_samples)) for share in s.level_share]
-        alphas = [float(alpha_of(roughness)) for roughness in ROUGHNESS_LEVELS]
-        self.lobes = [(s.diffuse_samples, 1.0), *zip(narrow, alphas, strict=True)]
-        """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each roughness level."""
+        self.settings = s = settings or CacheSettings()
         self.scene = build_scene(geometry.mesh)
         continued = geometry.mesh.face_plane >= 0
         slots = geometry.mesh.face_pixel.astype(np.uint32)
@@ -90,6 +89,15 @@ class TransportCache:
         self.slots = integers(mi, slots)
         """[F] radiance slot of every face: its pixel, or one of its own on a continued plane."""
         self._primary()
+        counts, self.roughness = s.level_share, [np.array([r], np.float32) for r in ROUGHNESS_LEVELS]
+        """Of each level of the specular lobe, [1], or [P] of the pixels."""
+        if roughness is not None:
+            own = np.clip(roughness.reshape(-1)[self.pixels], ROUGHNESS_LEVELS[0], 1)
+            counts, self.roughness = (1.0,), [own.astype(np.float32)]
+        specular = (max(1, round(share * s.specular_samples)) for share in counts)
+        alphas = (floats(mi, alpha_of(r)) for r in self.roughness)
+        self.lobes = [(s.diffuse_samples, dr.opaque(mi.Float, 1.0)), *zip(specular, alphas, strict=True)]
+        """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each level."""
         self._hits: list[mi.UInt32] = []
         self._progress = progress
 
@@ -117,14 +125,13 @@ class TransportCache:
         self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
         dr.eval(self.position, self.geometric_normal, self.face, self.normal, self.frame, self.wo, self.shift)
 
-    def _trace(self, count: int, alpha: float, diffuse: bool) -> mi.UInt32:
+    def _trace(self, count: int, alpha: mi.Float, diffuse: bool) -> mi.UInt32:
         """[count * P] radiance slots that a lobe's rays meet, sample-major."""
         width = len(self.pixels)
         hits = dr.empty(mi.UInt32, count * width)
         _trace_loop(
             self.scene, self.slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
-            self.face, self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count),
-            dr.opaque(mi.Float, alpha), diffuse,
+            self.face, self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count), alpha, diffuse,
         )  # fmt: skip
         dr.eval(hits)
         return hits
@@ -159,10 +166,11 @@ class TransportCache:
         for k, (hits, (count, alpha)) in enumerate(zip(self.trace(), self.lobes, strict=True)):
             # Diffuse lobes are sampled alike in every tile: what falls between their few directions would be missing
             # from the whole picture, or be in all of it twice.
-            env = pyramid.level(4 * np.pi / count if k == 0 else 4 * np.pi * alpha**2 / count)
+            level = pyramid.level(4 * np.pi * alpha * alpha / count)
+            dr.make_opaque(level)
             sums = _gather_loop(
-                hits, slots, env, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
-                dr.opaque(mi.UInt32, count), dr.opaque(mi.Float, alpha), diffuse=k == 0,
+                hits, slots, pyramid, level, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
+                dr.opaque(mi.UInt32, count), alpha, diffuse=k == 0,
             )  # fmt: skip
             dr.eval(*sums)
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
@@ -224,10 +232,10 @@ def _trace_loop(
         i += 1
 
 
-def _incoming(hits, slots, env, index, direction, above):
+def _incoming(hits, slots, env, level, index, direction, above):
     slot = dr.gather(mi.UInt32, hits, index)
     miss = slot == MISS
-    sky = env.lookup(direction, above & miss)
+    sky = env.lookup(direction, level, above & miss)
     surface = dr.gather(mi.Color3f, slots, slot, above & ~miss)
     return dr.select(above, dr.select(miss, sky, surface), mi.Color3f(0))
 
@@ -243,13 +251,13 @@ def _added(sums, diffuse: bool, wi, wo, h, alpha, light):
 
 
 @dr.syntax
-def _gather_loop(hits, slots, env, lane, face, frame, wo, shift, count, alpha, diffuse: bool):
+def _gather_loop(hits, slots, env, level, lane, face, frame, wo, shift, count, alpha, diffuse: bool):
     width = dr.opaque(mi.UInt32, dr.width(lane))
     i = dr.zeros(mi.UInt32, dr.width(lane))
     sums = [mi.Color3f(0)] * (3 if diffuse else 2)
     while i < count:
         wi, h = _drawn(diffuse, wo, alpha, point(i, count, shift))
-        light = _incoming(hits, slots, env, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
+        light = _incoming(hits, slots, env, level, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
         sums = _added(sums, diffuse, wi, wo, h, alpha, light)
         i += 1
     return sums
