@@ -33,8 +33,21 @@ def models(monkeypatch, tmp_path):
     return tmp_path / "models"
 
 
+@pytest.fixture
+def untrained(tmp_path):
+    """Weights of a RefractionNet that has learnt nothing: it answers with the mirrored thickness and a bit."""
+    import torch
+
+    from materialist.predict.network import UNetArchitecture
+    from materialist.predict.refraction.network import RefractionNet
+
+    torch.manual_seed(0)
+    RefractionNet(UNetArchitecture((8,) * 5, (1,) * 5)).save(tmp_path / "plain.safetensors", {"step": 0})
+    return tmp_path / "plain.safetensors"
+
+
 @pytest.fixture(scope="session")
-def shared():
+def real_data():
     """Finds real captures beside the project by their path there; skips where they are not."""
 
     def find(name):

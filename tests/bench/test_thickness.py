@@ -1,26 +1,14 @@
 """The benchmark of RefractionNet: a ball is known by symmetry, and every view has its row."""
 
 import pytest
-import torch
 import trimesh
 
-from materialist.predict.network import UNetArchitecture
-from materialist.predict.refraction.network import RefractionNet
 
-
-@pytest.fixture
-def plain(tmp_path):
-    """Weights of a network that has learnt nothing: it answers with the mirrored thickness and a bit."""
-    torch.manual_seed(0)
-    RefractionNet(UNetArchitecture((8,) * 5, (1,) * 5)).save(tmp_path / "plain.safetensors", {"step": 0})
-    return str(tmp_path / "plain.safetensors")
-
-
-def test_shapes_and_meshes_have_rows(tmp_path, plain, measured):
+def test_shapes_and_meshes_have_rows(tmp_path, untrained, measured):
     folder = tmp_path / "data" / "meshes" / "symmetric"
     folder.mkdir(parents=True)
     trimesh.creation.icosphere(3, 0.7).export(folder / "ball.ply")
-    options = {"shapes": 2, "views": 2, "mesh_views": 1, "weights": plain}
+    options = {"shapes": 2, "views": 2, "mesh_views": 1, "weights": str(untrained)}
     report = measured("thickness", data=tmp_path / "data", **options)
     assert len(report.rows) == 2 * (2 * 2 + 1)
     ball = {row["method"]: row for row in report.rows if row["sample"].startswith("ball")}

@@ -60,8 +60,6 @@ def test_an_insert_may_have_several_places(folder):
         ("- [", "not valid YAML"),
         ("- paint: {}", "is 'paint'; it must be one of edit,"),
         ("- edit: {mask: block.png, hue: 1}\n- edit: {colour: red}", "Step 2"),
-        ("- edit: {mask: block.png, shininess: 1}", "shininess"),
-        ("- edit: {mask: block.png, hue: blue}", "hue"),
         ("- relight: now", "no options"),
         ("- edit: {mask: block.png, hue: 3, hue: 90}", "'hue' is given twice"),
         ("edits: [{edit: {mask: block.png, hue: 3}}]\nlights: 3", "says 'lights' beside its edits"),

@@ -45,8 +45,8 @@ def test_tags_that_cannot_be_believed(tags):
         ("odd_inputs/flower.heic", 56.40),  # 26 mm equivalent, portrait
     ],
 )
-def test_real_cameras(shared, name, fov):
+def test_real_cameras(real_data, name, fov):
     from materialist.io.photo import read_photo
 
-    photo = read_photo(shared(f"data/{name}"), size=64)
+    photo = read_photo(real_data(f"data/{name}"), size=64)
     assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(fov, abs=0.01)

@@ -82,6 +82,9 @@ def test_masks(tmp_path):
         read_mask(tmp_path / "e.png", (40, 60))
     cv2.imwrite(str(tmp_path / "red.png"), mask[..., None] * np.uint8([0, 0, 1]))
     np.testing.assert_array_equal(read_mask(tmp_path / "red.png", (40, 60)), mask > 0)
+    cv2.imwrite(str(tmp_path / "alpha.png"), np.dstack([np.full((40, 60, 3), 255, np.uint8), mask]))
+    np.testing.assert_array_equal(read_mask(tmp_path / "alpha.png", (40, 60)), mask > 0)  # transparent is outside
+    assert read_map(tmp_path / "alpha.png").min() == 1, "a map has no alpha"
     photo = np.random.default_rng(0).integers(40, 200, (40, 60, 3)).astype(np.uint8)
     cv2.imwrite(str(tmp_path / "photo.png"), photo)
     with pytest.raises(InputError, match="a colour picture, not a mask"):
@@ -154,12 +157,3 @@ def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words
     tifffile.imwrite(tmp_path / "a.tif", pixels, **settings)
     with pytest.raises(InputError, match=words):
         decode(tmp_path / "a.tif")
-
-
-def test_what_is_transparent_is_outside_of_a_mask(tmp_path):
-    pixels = np.full((20, 30, 4), 255, np.uint8)
-    pixels[..., 3] = 0
-    pixels[5:15, 10:20, 3] = 255
-    cv2.imwrite(str(tmp_path / "m.png"), pixels)
-    assert read_mask(tmp_path / "m.png", (20, 30)).sum() == 100
-    assert read_map(tmp_path / "m.png").min() == 1, "a map has no alpha"

@@ -78,7 +78,7 @@ def test_the_files_of_the_contract(scene, tmp_path):
     assert load_scene(root).provenance["tool_version"] == "0.0.9"
 
 
-def test_an_existing_scene_is_kept_without_force_and_replaced_with_it(scene, tmp_path):
+def test_force_alone_replaces_a_scene_and_never_what_somebody_put_beside_it(scene, tmp_path):
     place = tmp_path / "a.scene"
     save_scene(scene, place)
     other = replace(scene, envmap=scene.envmap * 2)
@@ -88,6 +88,15 @@ def test_an_existing_scene_is_kept_without_force_and_replaced_with_it(scene, tmp
     save_scene(other, place, force=True)
     assert_same(load_scene(place), other)
     assert os.listdir(tmp_path) == ["a.scene"]
+    for name in ("mask.png", "maps/mask.png", "original.psd", ".keys/a.txt", "bodies/notes.txt"):
+        (place / name).parent.mkdir(exist_ok=True)
+        (place / name).write_text("mine")
+        with pytest.raises(OutputError, match=f"holds {re.escape(name)}, which does not belong to a scene package"):
+            save_scene(scene, place, force=True)
+        assert (place / name).read_text() == "mine"
+        (place / name).unlink()
+    (place / ".DS_Store").touch()  # a file manager's
+    save_scene(scene, place, force=True)
 
 
 def test_force_never_replaces_what_is_not_a_scene(scene, tmp_path):
@@ -99,21 +108,6 @@ def test_force_never_replaces_what_is_not_a_scene(scene, tmp_path):
         with pytest.raises(OutputError, match=words):
             save_scene(scene, tmp_path / name, force=True)
     assert (tmp_path / "holiday/precious.jpg").exists()
-
-
-def test_force_never_deletes_what_somebody_put_beside_a_scene(scene, tmp_path):
-    target = tmp_path / "a.scene"
-    save_scene(scene, target)
-    save_scene(scene, target, force=True)
-    for name in ("mask.png", "maps/mask.png", "original.psd", ".keys/a.txt", "bodies/notes.txt"):
-        (target / name).parent.mkdir(exist_ok=True)
-        (target / name).write_text("mine")
-        with pytest.raises(OutputError, match=f"holds {re.escape(name)}, which does not belong to a scene package"):
-            save_scene(scene, target, force=True)
-        assert (target / name).read_text() == "mine"
-        (target / name).unlink()
-    (target / ".DS_Store").touch()  # a file manager's
-    save_scene(scene, target, force=True)
 
 
 @pytest.mark.parametrize("place", ["/proc/a.scene", "FILE/a.scene", "n" * 300, "/"])

@@ -210,9 +210,9 @@ def test_wide_gamut_profile_is_converted(tmp_path):
     np.testing.assert_array_equal(plain.linear, read_photo(save(tmp_path / "c.png", pixels)).linear)
 
 
-def test_matrix_profile_agrees_with_lcms(shared):
+def test_matrix_profile_agrees_with_lcms(real_data):
     """Our float evaluation against LittleCMS on a real file with a display profile."""
-    path = shared("data/odd_inputs/rgba_concert.tiff")
+    path = real_data("data/odd_inputs/rgba_concert.tiff")
     photo = read_photo(path, size=1024)
     image = Image.open(path)
     source = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"]))
@@ -289,8 +289,8 @@ def test_raw_without_rawpy_says_how_to_get_it(tmp_path, monkeypatch):
         read_photo(tmp_path / "a.CR2")
 
 
-def test_odd_inputs_all_work(shared):
-    folder = shared("data/odd_inputs")
+def test_odd_inputs_all_work(real_data):
+    folder = real_data("data/odd_inputs")
     shapes = {path.name: read_photo(path, size=128).linear.shape for path in folder.iterdir()}
     assert len(shapes) == 10
     assert shapes["orientation6_streetlamp_exif.jpg"] == (128, 96, 3)

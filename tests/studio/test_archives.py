@@ -1,16 +1,16 @@
-"""Lists of edits with their files: taken away, and loaded on the same photo or another."""
+"""What is taken away, and lists of edits with their files loaded on the same photo or another."""
 
 import zipfile
 
 import numpy as np
 import pytest
-from studio_scenes import block, click, zipped
+from studio_scenes import block, click, package, zipped
 
-from materialist.edits.recipe import Step, apply
+from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png_bytes
-from materialist.studio import StudioSettings, objects, uploads
+from materialist.studio import StudioSettings, objects, tasks, uploads
 from materialist.studio.archives import pack, unpack
 from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
@@ -31,6 +31,19 @@ def packed(session, tmp_path):
     session.save()
     pack(session.edits.steps, session.workspace / "edits.yaml", tmp_path / "edits.zip")
     return session, tmp_path / "edits.zip"
+
+
+def test_results_are_whole_files(tmp_path):
+    told = lambda stage, done, total: None  # noqa: E731
+    scene = package(tmp_path)
+    (tmp_path / "edits.yaml").write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n")
+    tasks.take(told, str(scene), tuple(read_recipe(tmp_path / "edits.yaml")), str(tmp_path / "a.zip"), "glb")
+    tasks.take(told, str(scene), (), str(tmp_path / "a.html"), "html")
+    tasks.mesh(told, str(scene), str(tmp_path / "a.glb"))
+    names = zipfile.ZipFile(tmp_path / "a.zip").namelist()
+    assert "a/scene.glb" in names and "a/scene.light.hdr" in names
+    assert (tmp_path / "a.html").stat().st_size > 10_000 and (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"
+    assert not list(tmp_path.glob(".partial*"))
 
 
 def other_photo(studio, session) -> Session:
@@ -77,8 +90,14 @@ LIST = "- edit: {mask: m.png, hue: 3}"
 
 
 @pytest.mark.parametrize(
-    ("members", "words"),
+    ("given", "words"),
     [
+        ("- edit: {mask: /etc/hostname, hue: 3}", "plain file name"), ("- edit: {mask: ../x.png}", "plain file name"),
+        ("- edit: {mask: nothere.png}", "not here"), ("- edit: {colour: red}", "says 'colour'"),
+        ("- explode: {}", "must be one of"), ("!!python/object/apply:os.system ['true']", "must be one of"),
+        ("- relight: {envmap: /etc/hostname}", "plain file name"), ("- drop: {mesh: [a.ply], at: [3, 4]}", "not here"),
+        ("- drop: {mesh: [../a.ply], at: [3, 4]}", "plain file name"),
+        ("- drop: {mesh: [[a.ply]], at: [3, 4]}", "plain file name"),
         ({"readme.txt": "x"}, "holds no edits.yaml"), ({"edits.yaml": LIST}, "lacks the file m.png"),
         ({"edits.yaml": "- edit: {mask: ../m.png}", "../m.png": "x"}, "plain file name"),
         ({"edits.yaml": "- edit: {mask: /etc/hostname}"}, "plain file name"),
@@ -89,13 +108,17 @@ LIST = "- edit: {mask: m.png, hue: 3}"
         ({"edits.yaml": "- explode: {}"}, "must be one of"),
     ],
 )  # fmt: skip
-def test_zips_that_are_refused(studio, tmp_path, monkeypatch, members, words):
+def test_lists_and_zips_that_are_refused_leave_nothing(studio, session, tmp_path, monkeypatch, given, words):
     monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(upload_megabytes=2))
-    desk = tmp_path / "desk"
-    desk.mkdir()
+    file, before = tmp_path / "edits.yaml", sorted(session.workspace.iterdir())
+    if isinstance(given, dict):
+        file = zipped(tmp_path / "a.zip", given)
+    else:
+        file.write_text(given)
     with pytest.raises(InputError, match=words) as error:
-        unpack(desk, zipped(tmp_path / "a.zip", members))
-    assert str(tmp_path) not in studio.shown(str(error.value)) and not list(desk.iterdir())
+        session.read_edits(file)
+    assert str(tmp_path) not in studio.shown(str(error.value)) and session.edits.steps == ()
+    assert sorted(session.workspace.iterdir()) == before
 
 
 def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path):

@@ -25,13 +25,13 @@ def filled(name: str, shape: list[int]) -> torch.Tensor:
 
 
 @pytest.fixture(scope="module")
-def expected(shared) -> dict[str, np.ndarray]:
-    return dict(np.load(shared("parity/matnet_vitb_io.npz")))
+def expected(real_data) -> dict[str, np.ndarray]:
+    return dict(np.load(real_data("parity/matnet_vitb_io.npz")))
 
 
 @pytest.fixture(scope="module")
-def keys(shared) -> dict[str, list[int]]:
-    return json.loads(shared("parity/matnet_vitb_keys.json").read_text())
+def keys(real_data) -> dict[str, list[int]]:
+    return json.loads(real_data("parity/matnet_vitb_keys.json").read_text())
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
-import torch
 from geometry_scenes import ball
 
 from materialist.camera import pixel_rays
-from materialist.predict.network import UNetArchitecture
-from materialist.predict.refraction.network import LEAST, RefractionNet
+from materialist.predict.refraction.network import LEAST
 from materialist.predict.refraction.thickness import WEIGHTS, best_thickness, thickness
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
-
-SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 
 
 def seen(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
@@ -22,19 +18,11 @@ def seen(camera, centre=(0.2, -0.1, -3.0), radius=0.7):
     return photo, mask, normal, np.where(mask, depth, 5.0), thick
 
 
-@pytest.fixture
-def plain(tmp_path):
-    """Weights of a network that has learnt nothing: it answers with the mirrored thickness and a bit."""
-    torch.manual_seed(0)
-    RefractionNet(SMALL).save(tmp_path / "plain.safetensors", {"step": 0})
-    return tmp_path / "plain.safetensors"
-
-
 @pytest.mark.parametrize("size", [(70, 64), (260, 300)])
-def test_an_untrained_network_gives_the_symmetry_prior(plain, size):
+def test_an_untrained_network_gives_the_symmetry_prior(untrained, size):
     camera = Camera(size[1], size[0], 45)
     photo, mask, normal, depth, _ = seen(camera)
-    found = thickness(photo, mask, normal, depth, camera, weights=plain)
+    found = thickness(photo, mask, normal, depth, camera, weights=untrained)
     mirror = symmetric_thickness(depth, normal, mask, camera)
     step = LEAST * np.sqrt(mask.sum()) * np.median(depth[mask]) / camera.focal
     assert np.abs(found.solid - mirror - step)[mask].mean() < 0.12 * mirror[mask].mean()
