@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from made_meshes import box_file, extent, floor_scene
+from made_meshes import extent, floor_scene
 
 from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.ground import Field, blocks
 from materialist.edits.drop.physics import DEFAULT, Pose, RigidBody, convex_pieces, fall
 from materialist.edits.insert.insert import insert
-from materialist.edits.insert.meshes import read_model
 from materialist.edits.recipe import apply, read_recipe, write_recipe
 from materialist.errors import InputError
 from materialist.options import Drop
@@ -23,16 +22,6 @@ BOX = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (
 AT = (48.0, 50.0)
 FALL = "materialist.edits.drop.drop.fall"
 FLAT = Field(np.array([-1.0, -1.0]), 2 / 64, np.zeros((65, 65)))
-
-
-@pytest.fixture(scope="module")
-def box_path(tmp_path_factory):
-    return box_file(tmp_path_factory.mktemp("mesh") / "box.ply")
-
-
-@pytest.fixture(scope="module")
-def box(box_path):
-    return read_model(box_path)
 
 
 @pytest.fixture(scope="module")

@@ -4,15 +4,18 @@ import json
 import struct
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from edit_scenes import scene_of
 
 from materialist.camera import pixel_rays
+from materialist.edits.core.surfaces import uniform_surface
 from materialist.exporters.glb import glb_bytes
 from materialist.exporters.parts import body_parts, scene_parts
+from materialist.exporters.run import export
 from materialist.render.scene import RenderScene
-from materialist.types import Camera, FitReport, Materials, Scene
+from materialist.types import Body, Camera, FitReport, Lamp, Materials, Scene, Surface
 
 
 @cache
@@ -61,6 +64,32 @@ def renderer(scene: Scene) -> RenderScene:
     made.set_materials(scene.materials)
     made.set_envmap(scene.envmap)
     return made
+
+
+def with_bodies(*surfaces: Surface) -> Scene:
+    """The room with a square plate before the box for each surface, facing the camera."""
+    made = []
+    for k, surface in enumerate(surfaces):
+        x = -0.9 + 0.9 * k
+        corners = np.array([[x, -0.4, -2], [x + 0.8, -0.4, -2], [x + 0.8, 0.4, -2], [x, 0.4, -2]], np.float32)
+        uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
+        normals = np.tile(np.float32([0, 0, 1]), (4, 1))
+        made.append(Body(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), normals, uv, surface, f"plate{k}"))
+    return replace(room(), bodies=tuple(made))
+
+
+CHECKS = Surface(
+    np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32), np.full((1, 1), 0.4, np.float32),
+    np.zeros((1, 1), np.float32),
+)  # fmt: skip
+GLASS = uniform_surface(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
+GLOW = uniform_surface(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
+LAMP = Lamp((0.9, 0.3, -2.6), (6.0, 4.5, 3.0), 0.12)
+
+
+def blender_facts(scene: Scene, folder: Path) -> dict:
+    """What the folder for Blender says of a scene."""
+    return json.loads((export(scene, folder, to="blend").path / "scene.json").read_text())
 
 
 def document(scene: Scene) -> dict:

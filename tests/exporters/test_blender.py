@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from export_scenes import renderer, room
+from export_scenes import CHECKS, renderer, room
 
 import materialist as mt
 from materialist.exporters.blender import run_script
@@ -97,7 +97,6 @@ def test_cycles_has_our_bodies(tmp_path, kind):
     from dataclasses import replace
 
     import trimesh
-    from test_bodies import CHECKS
 
     from materialist.edits.core.renderer import rendered
     from materialist.edits.core.surfaces import uniform_surface

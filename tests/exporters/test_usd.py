@@ -1,10 +1,11 @@
 """The USD stage, read back and put before the official validators."""
 
-import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from export_scenes import room
+from export_scenes import CHECKS, GLASS, GLOW, LAMP, room, with_bodies
+from PIL import Image
 
 import materialist as mt
 from materialist.exporters.parts import scene_parts
@@ -62,9 +63,34 @@ def test_the_centre_of_the_light_lies_ahead(written):
     np.testing.assert_allclose(np.array([-1, 0, 0]) @ turn, [1, 0, 0], atol=1e-12)
 
 
-def test_without_the_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pxr", None)
-    monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
-    with pytest.raises(mt.SetupError, match=r"pip install 'materialist\[usd\]'"):
-        mt.export(room(), tmp_path / "a.usdz")
-    assert list(tmp_path.iterdir()) == []
+def test_bodies_have_textures_and_it_is_said_that_nothing_refracts(tmp_path):
+    from pxr import Usd, UsdShade
+
+    done = mt.export(with_bodies(CHECKS, GLASS), tmp_path / "usd", to="usd")
+    assert any("without refraction and tint of glass;" in note for note in done.notes)
+    np.testing.assert_array_equal(
+        np.asarray(Image.open(tmp_path / "usd" / "body0_base_color.png")), CHECKS.albedo * 255
+    )
+    stage = Usd.Stage.Open(str(done.path))
+    texture = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/base_color"))
+    assert (
+        texture.GetInput("file").Get().path == "./body0_base_color.png" and texture.GetInput("wrapS").Get() == "repeat"
+    )
+    own = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/surface/base_color"))
+    assert own.GetInput("file").Get().path == "./base_color.png" and own.GetInput("wrapS").Get() == "clamp"
+    glass = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body1/surface"))
+    assert glass.GetInput("opacity").Get() == 0 and glass.GetInput("ior").Get() == pytest.approx(1.4)
+
+
+def test_lamps_and_what_glows(tmp_path):
+    from pxr import Usd, UsdGeom, UsdLux, UsdShade
+
+    scene = replace(with_bodies(GLOW), lamps=(LAMP,))
+    stage = Usd.Stage.Open(str(mt.export(scene, tmp_path / "usd", to="usd").path))
+    sphere = UsdLux.SphereLight(stage.GetPrimAtPath("/Scene/lamp0"))
+    radiance = sphere.GetIntensityAttr().Get() * np.array(sphere.GetColorAttr().Get())
+    np.testing.assert_allclose(radiance, LAMP.radiance, rtol=1e-5)
+    place = UsdGeom.Xformable(sphere).ComputeLocalToWorldTransform(0).ExtractTranslation()
+    np.testing.assert_allclose(place, LAMP.position)
+    glow = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/surface")).GetInput("emissiveColor").Get()
+    np.testing.assert_allclose(glow, [3, 1.5, 0.75])

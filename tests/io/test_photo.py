@@ -11,7 +11,7 @@ from made_png import chunk, png_header
 from PIL import Image, ImageCms, ImageOps
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.errors import InputError, SetupError
+from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.photo import decode_photo, exposed, read_photo
 from materialist.types import Camera, Photo
@@ -278,15 +278,6 @@ def test_bad_files_get_one_clear_sentence(tmp_path):
             read_photo(path)
         message = str(caught.value)
         assert "\n" not in message and message.endswith(".") and path.name in message
-
-
-def test_raw_without_rawpy_says_how_to_get_it(tmp_path, monkeypatch):
-    import sys
-
-    monkeypatch.setitem(sys.modules, "rawpy", None)
-    (tmp_path / "a.CR2").write_bytes(b"II*\0" * 20)
-    with pytest.raises(SetupError, match="pip install rawpy"):
-        read_photo(tmp_path / "a.CR2")
 
 
 def test_odd_inputs_all_work(real_data):

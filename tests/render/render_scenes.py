@@ -2,25 +2,16 @@
 
 import numpy as np
 
+from materialist.geometry.build import build_geometry
 from materialist.types import Camera, Geometry, Materials, Mesh
 
 
 def wall(camera: Camera, depth: float = 2.0, holes=None) -> Geometry:
-    """A wall at planar `depth` that fills the picture: one quad a pixel, none where `holes` [H, W] is true."""
-    h, w = camera.height, camera.width
-    row, col = np.meshgrid(np.arange(h + 1), np.arange(w + 1), indexing="ij")
-    x, y = (col - w / 2) / camera.focal * depth, -(row - h / 2) / camera.focal * depth
-    vertices = np.stack([x, y, np.full_like(x, -depth)], -1).reshape(-1, 3)
-    uv = np.stack([col / w, row / h], -1).reshape(-1, 2)
-    corner = (row * (w + 1) + col)[:-1, :-1].reshape(-1)
-    pixels = np.arange(h * w) if holes is None else np.flatnonzero(~holes.reshape(-1))
-    a = corner[pixels]
-    faces = np.concatenate([np.stack([a, a + w + 1, a + 1], 1), np.stack([a + 1, a + w + 1, a + w + 2], 1)])
-    mesh = Mesh(
-        vertices.astype(np.float32), faces.astype(np.int32), np.tile(np.float32([0, 0, 1]), (len(vertices), 1)),
-        uv.astype(np.float32), np.tile(pixels, 2).astype(np.int32), np.full(len(faces), -1, np.int16),
-    )  # fmt: skip
-    return Geometry(mesh, np.full((h, w), -1, np.int8))
+    """A wall at planar `depth` that fills the picture but for `holes` [H, W]."""
+    seen = np.full((camera.height, camera.width), depth, np.float32)
+    if holes is not None:
+        seen[holes] = 0
+    return build_geometry(seen, np.tile(np.float32([0, 0, 1]), (*seen.shape, 1)), camera, completion="none")
 
 
 def empty(camera: Camera) -> Geometry:

@@ -1,11 +1,9 @@
 """Denoising: noise goes, edges of the guides and the level of the light stay."""
 
-import sys
 
 import numpy as np
 import pytest
 
-from materialist.errors import SetupError
 from materialist.render.denoise import denoise
 
 
@@ -43,10 +41,3 @@ def test_tiny_pictures_keep_their_light(shape):
     result = denoise(flat, albedo=flat, normal=np.broadcast_to(np.float32([0, 0, 1]), flat.shape))
     assert result.shape == flat.shape
     assert result == pytest.approx(0.5, rel=0.15)
-
-
-def test_missing_package_names_the_command(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyoidn", None)
-    image = np.ones((4, 6, 3), np.float32)
-    with pytest.raises(SetupError, match="-m pip install pyoidn"):
-        denoise(image, albedo=image, normal=image)

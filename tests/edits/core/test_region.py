@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_meshes import box_file, floor_scene
+from made_meshes import floor_scene
 
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.insert.insert import insert
-from materialist.edits.insert.meshes import read_model
 from materialist.edits.material.material import edit
 from materialist.edits.select.select import select
 from materialist.errors import InputError
@@ -20,11 +19,10 @@ PLACE = (40.0, 50.0)
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory):
+def scenes(box):
     """A floor, and the same with a box on it."""
-    model = read_model(box_file(tmp_path_factory.mktemp("mesh") / "box.ply"))
     scene = floor_scene(96, 72)
-    return scene, insert(scene, model, PLACE, scale=2, material="#ffffff")
+    return scene, insert(scene, box, PLACE, scale=2, material="#ffffff")
 
 
 def test_a_scene_is_rendered_with_what_was_put_into_it(scenes):

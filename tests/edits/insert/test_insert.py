@@ -4,22 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_meshes import box_file, floor_scene
+from made_meshes import floor_scene
 
 from materialist.camera import project
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.native_layer import native_layer
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.insert.insert import insert, picture_width, put, support_at
-from materialist.edits.insert.meshes import read_model
 from materialist.errors import InputError
 
 UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
-
-
-@pytest.fixture(scope="module")
-def box(tmp_path_factory):
-    return read_model(box_file(tmp_path_factory.mktemp("mesh") / "box.ply"))
 
 
 def test_a_box_stands_upright_on_the_floor_at_the_click(box):

@@ -1,12 +1,9 @@
 """Filling by patches: what repeats is found again, edges cross the hole, nothing comes from what may not be copied."""
 
-import sys
 
 import numpy as np
-import pytest
 
 from materialist.edits.remove.patches import patched
-from materialist.errors import SetupError
 
 
 def hole_in(shape, top=24, left=30, height=20, width=24):
@@ -75,9 +72,3 @@ def test_hdr_values_stay_and_odd_holes_are_filled():
         most[place] = True
         found = filled(stripes(), most)
         assert np.isfinite(found).all() and found[most].min() > 0.1, "black is no colour of the photo"
-
-
-def test_a_missing_library_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "patchmatch", None)
-    with pytest.raises(SetupError, match="pip install --force-reinstall --no-deps PyPatchMatch"):
-        filled(stripes(), hole_in((72, 96)))

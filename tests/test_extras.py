@@ -1,0 +1,41 @@
+"""Packages that are not installed: one sentence names the command that installs them, and nothing is written."""
+
+import sys
+
+import numpy as np
+import pytest
+from edit_scenes import flat_scene
+
+import materialist as mt
+from materialist.edits.remove.patches import patched
+from materialist.io.photo import read_photo
+from materialist.io.video import write_frames
+from materialist.predict import get_predictor
+from materialist.render.denoise import denoise
+
+IMAGE = np.ones((4, 6, 3), np.float32)
+FLAT = np.ones((4, 6), bool)
+
+
+@pytest.mark.parametrize(
+    ("package", "ask", "words"),
+    [
+        ("rawpy", lambda folder: read_photo(folder / "a.CR2"), "pip install rawpy"),
+        ("imageio_ffmpeg", lambda folder: write_frames(folder / "a.mp4", iter([])), "pip install imageio-ffmpeg"),
+        ("pyoidn", lambda _: denoise(IMAGE, albedo=IMAGE, normal=IMAGE), "-m pip install pyoidn"),
+        ("patchmatch", lambda _: patched(IMAGE, FLAT, FLAT, FLAT, FLAT, seed=1),
+         "pip install --force-reinstall --no-deps PyPatchMatch"),
+        ("pxr", lambda folder: mt.export(flat_scene(), folder / "a.usdz"), r"pip install 'materialist\[usd\]'"),
+        ("diffusers", lambda _: get_predictor("constant", normal="marigold"), r"needs diffusers.*materialist\[hub\]"),
+    ],
+)  # fmt: skip
+def test_the_command_is_named(package, ask, words, models, tmp_path, monkeypatch):
+    (tmp_path / "a.CR2").write_bytes(b"II*\0" * 20)
+    (models / "prs-eth--marigold-normals-v1-1").mkdir(parents=True)
+    (models / "prs-eth--marigold-normals-v1-1" / "SHA256SUMS").touch()
+    before = sorted(tmp_path.rglob("*"))
+    monkeypatch.setitem(sys.modules, package, None)
+    monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
+    with pytest.raises(mt.SetupError, match=words):
+        ask(tmp_path)
+    assert sorted(tmp_path.rglob("*")) == before
