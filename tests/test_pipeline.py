@@ -2,9 +2,19 @@
 
 import numpy as np
 import pytest
+from geometry_scenes import room, sphere_depth
 
+import materialist as mt
+from materialist.edits.composite.composite import composite, write_composite
+from materialist.edits.material.material import edit
 from materialist.errors import InputError
+from materialist.io.exr import read_exr, write_exr
+from materialist.io.image import write_png
+from materialist.io.package import load_scene, save_scene
+from materialist.io.photo import read_photo
+from materialist.metrics import psnr
 from materialist.pipeline import invert, render_scene
+from materialist.types import Camera
 
 WIDTH, HEIGHT = 24, 18
 pytestmark = pytest.mark.usefixtures("mitsuba", "one_thread")  # Mitsuba before torch, as in a run
@@ -13,12 +23,6 @@ pytestmark = pytest.mark.usefixtures("mitsuba", "one_thread")  # Mitsuba before 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A photo of a lit corner and its maps, in the project's conventions."""
-    from geometry_scenes import room, sphere_depth
-
-    from materialist.io.exr import write_exr
-    from materialist.io.image import write_png
-    from materialist.types import Camera
-
     folder = tmp_path_factory.mktemp("photo")
     camera = Camera(WIDTH, HEIGHT, 45.0)
     depth, normal, label = room(camera)
@@ -99,8 +103,6 @@ def test_equal_seeds_give_equal_scenes(folder, scene):
 
 def test_rerendering_is_the_scenes_rendering(scene):
     """Rendering the scene afresh gives the re-rendering, up to noise."""
-    from materialist.metrics import psnr
-
     assert psnr(render_scene(scene, spp=64), scene.rerender) > 25
     with pytest.raises(InputError, match="spp"):
         render_scene(scene, spp=0)
@@ -164,8 +166,6 @@ def test_bad_options_are_named(folder, changes, words):
 
 
 def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, tmp_path):
-    from materialist.io.exr import read_exr, write_exr
-
     moge = tmp_path / "moge"
     moge.mkdir()
     write_exr(moge / "depth.exr", read_exr(folder / "depth.exr") * 1.5)
@@ -183,8 +183,6 @@ def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, t
 
 @pytest.mark.parametrize("call", ["invert", "batch"])
 def test_misspelt_options_are_refused(call, tmp_path):
-    import materialist as mt
-
     arguments = ["nothing.png"] if call == "invert" else [str(tmp_path), str(tmp_path / "runs")]
     with pytest.raises(InputError, match=r"no option 'predicter'; it takes predictor, "):
         getattr(mt, call)(*arguments, predicter="maps:x")
@@ -193,12 +191,6 @@ def test_misspelt_options_are_refused(call, tmp_path):
 
 def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
     """Nor in an edit of it, which comes back in the unit of the file, its other pixels bit for bit."""
-    from materialist.edits.composite.composite import composite, write_composite
-    from materialist.edits.material.material import edit
-    from materialist.io.exr import read_exr, write_exr
-    from materialist.io.package import load_scene, save_scene
-    from materialist.io.photo import read_photo
-
     linear = read_photo(folder / "photo.png", size=WIDTH).linear * np.float32(1.01)  # not clipped at 1
     found = {}
     for unit in (1, 2**9):
@@ -225,8 +217,6 @@ def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
 
 def test_depth_in_large_units_is_warned_about(folder, scene, tmp_path):
     """Of which the scene is only a few thousandths deep."""
-    from materialist.io.exr import read_exr, write_exr
-
     for path in folder.glob("*.exr"):
         write_exr(tmp_path / path.name, read_exr(path) * np.float32(0.002 if path.stem == "depth" else 1))
     other = invert(**options(folder, predictor=f"maps:{tmp_path}"))

@@ -8,7 +8,7 @@ import pytest
 from made_batch import photos
 
 import materialist as mt
-from materialist.batches.outcome import COLUMNS, Outcome
+from materialist.batches.outcome import COLUMNS, Outcome, write_summary
 
 
 @pytest.fixture(autouse=True)
@@ -46,8 +46,6 @@ def test_all_done_is_0_and_a_photo_that_failed_is_2(run, tmp_path):
 
 
 def test_a_spreadsheet_cannot_be_made_to_compute(tmp_path):
-    from materialist.batches.outcome import write_summary
-
     write_summary(
         Outcome(tmp_path, ({**dict.fromkeys(COLUMNS), "id": "=1+1.png", "name": "@x", "status": "open"},), 0, 1.0)
     )

@@ -7,6 +7,7 @@ import pytest
 
 from materialist import metrics
 from materialist.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
+from materialist.camera import project
 from materialist.procedural.synthetic import make_sample
 
 
@@ -34,8 +35,6 @@ def test_the_true_cup_stands_where_the_scene_has_it(cases):
     edit = found["insert"]
     scene = true_scene(sample)
     (body,) = edit.change(scene).bodies
-    from materialist.camera import project
-
     place, _ = project(body.vertices.astype(np.float64), scene.camera)
     rows, columns = np.nonzero(edit.mask)
     assert columns.min() >= np.floor(place[:, 0].min()) and columns.max() <= np.ceil(place[:, 0].max())

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 from made_pipeline import install
 from PIL import Image
 
@@ -192,7 +193,6 @@ def test_a_terminated_command_takes_its_unfinished_files_away(tmp_path):
 
 def test_every_command_takes_seed_device_and_json():
     """What scripts pass to all of them, but for those that compute nothing."""
-    import typer
 
     def commands(group, name=""):
         for word, command in getattr(group, "commands", {}).items():

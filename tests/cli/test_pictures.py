@@ -7,8 +7,10 @@ from made_meshes import box_file, floor_scene, textured_obj
 from PIL import Image
 
 from materialist.color import linear_to_srgb
+from materialist.edits.insert.insert import insert
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
+from materialist.render import variant
 
 
 @pytest.fixture(scope="module")
@@ -218,9 +220,6 @@ def test_bad_input_is_one_sentence_with_exit_2_and_nothing_is_written(refused, f
 
 def test_the_device_is_chosen_before_anything_renders(done, folder, tmp_path, monkeypatch):
     """A GPU machine must not begin on its GPU and then be told of the CPU."""
-    from materialist.edits.insert.insert import insert
-    from materialist.render import variant
-
     save_scene(insert(load_scene(folder / "a.scene"), folder / "box.ply", (6, 30), scale=0.3), tmp_path / "c.scene")
     asked, setup = [], variant.setup
     monkeypatch.setattr(variant, "setup", lambda device="auto": asked.append(device) or setup(device))

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from materialist.geometry.build import build_geometry
+from materialist.pipeline import render_scene
 from materialist.types import Body, Camera, Materials, Photo, Prediction, Scene, Surface
 
 
@@ -60,8 +61,6 @@ def flat_scene(height: int = 36, width: int = 48, *, native: int = 1, sky: int =
 @lru_cache(maxsize=4)
 def rendered_scene(native: int = 1, block: float = 2.0) -> Scene:
     """The flat scene with its own rendering as photo (and as re-rendering)."""
-    from materialist.pipeline import render_scene
-
     scene = flat_scene(native=native, block=block)
     picture = np.clip(render_scene(scene, spp=64, seed=11), 0, 1)
     original = np.kron(picture, np.ones((native, native, 1), np.float32))

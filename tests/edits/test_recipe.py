@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from edit_scenes import MASK, flat_scene
+from made_meshes import box_file
 from PIL import Image
 
 from materialist.edits.light.relight import lamp, relight
@@ -43,8 +44,6 @@ def test_steps_are_the_functions_in_order(folder):
 
 
 def test_an_insert_may_have_several_places(folder):
-    from made_meshes import box_file
-
     box_file(folder / "box.ply", (0.1, 0.1, 0.1))
     for places in ("[[8, 30], [40, 30]]", "['8,30', '40,30']"):
         bodies = replay(folder, f"- insert: {{mesh: box.ply, at: {places}}}").bodies

@@ -6,14 +6,20 @@ import os
 import shutil
 import stat
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from export_scenes import CHECKS, renderer, room
 
 import materialist as mt
+from materialist.edits.core.renderer import rendered
+from materialist.edits.core.surfaces import uniform_surface
 from materialist.exporters.blender import run_script
 from materialist.io.exr import read_exr
+from materialist.metrics import psnr
+from materialist.types import Body
 
 BPY = os.environ.get("MATERIALIST_TEST_BPY", "")
 """A Python that has bpy, to build and render with."""
@@ -83,8 +89,6 @@ def by_cycles(scene, tmp_path, *options):
 
 @pytest.mark.slow
 def test_cycles_sees_what_we_see(tmp_path):
-    from materialist.metrics import psnr
-
     ours, theirs = renderer(room()).render(spp=256), by_cycles(room(), tmp_path)
     assert psnr(ours, theirs) > 32
     assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
@@ -94,14 +98,6 @@ def test_cycles_sees_what_we_see(tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["texture", "glass", "rough glass", "coat"])
 def test_cycles_has_our_bodies(tmp_path, kind):
-    from dataclasses import replace
-
-    import trimesh
-
-    from materialist.edits.core.renderer import rendered
-    from materialist.edits.core.surfaces import uniform_surface
-    from materialist.types import Body
-
     surface = {
         "texture": CHECKS, "glass": uniform_surface(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
         "rough glass": uniform_surface(1.0, 0.4, 0.0, transmission=1.0, ior=1.3),

@@ -12,6 +12,7 @@ from materialist.exporters.glb import passing
 from materialist.exporters.parts import body_parts
 from materialist.exporters.run import export
 from materialist.io.exr import read_exr
+from materialist.render.scene import GLASS_DEPTH
 from materialist.types import Body
 
 FROSTED = uniform_surface(1.0, 0.9, 0.0, transmission=1.0, ior=1.5)
@@ -50,8 +51,6 @@ def test_glass_of_a_glb_has_the_mean_way_through_it():
     "surface", [CHECKS, GLASS, GLOW, FROSTED, COATED], ids=["texture", "glass", "glow", "frosted", "coated"]
 )
 def test_mitsuba_renders_the_same_picture(tmp_path, surface):
-    from materialist.render.scene import GLASS_DEPTH
-
     scene = with_bodies(surface)
     target = renderer(scene)
     expected = target.render(spp=64, seed=1, max_depth=GLASS_DEPTH)

@@ -2,11 +2,13 @@
 
 import io
 import json
+import os
 import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -65,8 +67,6 @@ def test_textures_those_of_planes_of_one_pixel(loaded):
 
 
 def test_the_light_beside_it(tmp_path):
-    import cv2
-
     write_hdr(tmp_path / "a.hdr", room().envmap)
     back = cv2.imdecode(np.fromfile(tmp_path / "a.hdr", np.uint8), cv2.IMREAD_UNCHANGED)[..., ::-1]
     assert np.abs(back - room().envmap).max() < room().envmap.max() / 128
@@ -76,8 +76,6 @@ def test_official_validator(tmp_path):
     """Needs node and the npm package gltf-validator, installed globally or where NODE_PATH says."""
     if shutil.which("node") is None:
         pytest.skip("needs node")
-    import os
-
     roots = subprocess.run(["npm", "root", "-g"], capture_output=True, text=True) if shutil.which("npm") else None
     paths = [os.environ.get("NODE_PATH", ""), roots.stdout.strip() if roots else ""]
     if not any((Path(p) / "gltf-validator").is_dir() for path in paths for p in path.split(os.pathsep) if p):

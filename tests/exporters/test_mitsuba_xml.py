@@ -8,6 +8,8 @@ from export_scenes import renderer, room
 
 from materialist.exporters.mitsuba_xml import write_mitsuba
 from materialist.exporters.parts import scene_parts
+from materialist.pipeline import render_scene
+from materialist.render.variant import setup
 from materialist.types import Lamp
 
 OWN = "scene_materialist.xml"
@@ -53,9 +55,6 @@ def test_normals_that_lean_away_from_the_eye_are_ours(tmp_path):
 
 
 def test_lamps_light_it_as_they_light_ours(tmp_path):
-    from materialist.pipeline import render_scene
-    from materialist.render.variant import setup
-
     scene = replace(room(), lamps=(Lamp((0.6, 0.3, -2.5), (30.0, 20.0, 5.0), 0.05),))
     write_mitsuba(tmp_path, scene, scene_parts(scene))
     mi = setup("auto")

@@ -1,12 +1,15 @@
 """The page: nothing foreign in it, and in a browser it works without the network."""
 
 import base64
+import io
 import re
 
 import numpy as np
 import pytest
 from export_scenes import room
+from PIL import Image
 
+from materialist.color import linear_to_srgb
 from materialist.exporters.page import page
 from materialist.exporters.parts import scene_parts
 
@@ -50,8 +53,6 @@ def test_in_a_browser(browser, tmp_path):
     shown = _canvas(tab)
     rows, columns = ((np.arange(n) + 0.5) / n for n in (40, 64))
     pick = shown[np.ix_((rows * shown.shape[0]).astype(int), (columns * shown.shape[1]).astype(int))]
-    from materialist.color import linear_to_srgb
-
     difference = np.abs(pick - 255 * linear_to_srgb(scene.photo.linear)).max(-1)
     assert np.median(difference[scene.depth > 0]) < 8 and np.percentile(difference[scene.depth > 0], 90) < 40
     assert (np.abs(pick[scene.depth == 0] - (29, 31, 34)).max(-1) < 3).mean() > 0.95
@@ -67,9 +68,5 @@ def test_in_a_browser(browser, tmp_path):
 
 def _canvas(tab) -> np.ndarray:
     """[h, w, 3] what the canvas shows."""
-    import io
-
-    from PIL import Image
-
     address = tab.evaluate("document.getElementById('view').toDataURL()")
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(address.split(",")[1]))).convert("RGB")).astype(float)

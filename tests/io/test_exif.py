@@ -5,6 +5,7 @@ import math
 import pytest
 
 from materialist.io.exif import horizontal_fov
+from materialist.io.photo import read_photo
 
 
 def test_35_mm_film_landscape_and_portrait():
@@ -46,7 +47,5 @@ def test_tags_that_cannot_be_believed(tags):
     ],
 )
 def test_real_cameras(real_data, name, fov):
-    from materialist.io.photo import read_photo
-
     photo = read_photo(real_data(f"data/{name}"), size=64)
     assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(fov, abs=0.01)

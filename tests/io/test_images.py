@@ -4,7 +4,9 @@ import os
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
+import tifffile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -99,8 +101,6 @@ def test_overview_of_any_shape(shape):
 
 def write_channels(path, **channels):
     """An EXR of constant channels, float32 unless they have another type."""
-    import OpenEXR
-
     flat = {name: np.full((9, 12), v, getattr(v, "dtype", np.float32)) for name, v in channels.items()}
     with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, flat) as file:
         file.write(str(path))
@@ -130,8 +130,6 @@ def test_the_picture_among_the_channels_of_an_exr(tmp_path, channels, photo, exp
 
 def test_a_depth_is_no_photo(tmp_path):
     """Alone it is refused; before the picture, as a part of its own, it is passed over."""
-    import OpenEXR
-
     with pytest.raises(InputError, match="RGB or Y is needed"):
         read_exr(write_channels(tmp_path / "depth.exr", Z=7), photo=True)
     pixels = lambda value: np.full((9, 12), value, np.float32)  # noqa: E731
@@ -152,8 +150,6 @@ def test_a_depth_is_no_photo(tmp_path):
     ],
 )
 def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words):
-    import tifffile
-
     tifffile.imwrite(tmp_path / "a.tif", pixels, **settings)
     with pytest.raises(InputError, match=words):
         decode(tmp_path / "a.tif")

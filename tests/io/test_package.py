@@ -15,7 +15,7 @@ from made_scene import make_body, make_scene
 from materialist import __version__
 from materialist.errors import OutputError, SceneError
 from materialist.io import atomic
-from materialist.io.atomic import ensure_writable
+from materialist.io.atomic import ensure_writable, whole_folder
 from materialist.io.exr import write_exr
 from materialist.io.meshes import read_ply, write_ply
 from materialist.io.package import load_scene, save_scene
@@ -218,8 +218,6 @@ def test_mesh_file_header_is_what_other_tools_expect(scene, tmp_path):
 
 
 def test_what_comes_to_the_target_in_the_meantime_is_not_replaced(tmp_path):
-    from materialist.io.atomic import whole_folder
-
     with pytest.raises(OutputError, match="exists"), whole_folder(tmp_path / "k.scene") as folder:
         (folder / "scene.json").write_text("{}")
         (tmp_path / "k.scene").mkdir()

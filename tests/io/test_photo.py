@@ -7,12 +7,15 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+import tifffile
 from made_png import chunk, png_header
 from PIL import Image, ImageCms, ImageOps
+from pillow_heif import register_heif_opener
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
+from materialist.io.icc import matrix_profile
 from materialist.io.photo import decode_photo, exposed, read_photo
 from materialist.types import Camera, Photo
 
@@ -48,8 +51,6 @@ def test_lossless_8_bit_files_decode_exactly(tmp_path, suffix):
 
 @pytest.mark.parametrize("suffix", ["jpg", "heic", "avif"])
 def test_lossy_files_decode_closely(tmp_path, suffix):
-    from pillow_heif import register_heif_opener
-
     register_heif_opener()
     pixels = picture(64, 96)
     photo = read_photo(save(tmp_path / f"a.{suffix}", pixels, quality=95))
@@ -166,8 +167,6 @@ def test_alpha_is_laid_over_white(tmp_path, depth):
 )
 def test_orientation_turns_the_photo_upright(tmp_path, orientation, suffix, depth):
     """As Pillow turns it."""
-    import tifffile
-
     pixels, exif = picture(10, 14), Image.Exif()
     exif[274] = orientation
     save(tmp_path / "b.png", pixels, exif=exif)
@@ -194,8 +193,6 @@ def test_shrinking_averages_light_not_codes(tmp_path):
 
 def test_wide_gamut_profile_is_converted(tmp_path):
     """A profile with swapped primaries and gamma 2 must swap the channels back and undo that gamma."""
-    from materialist.io.icc import matrix_profile
-
     srgb = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
     assert matrix_profile(srgb).is_srgb
     swapped = bytearray(srgb)
@@ -292,8 +289,6 @@ def test_odd_inputs_all_work(real_data):
 def test_camera_raw_is_linear_and_knows_its_lens(tmp_path):
     """A grey ramp in a DNG's colour filter array comes back as the same grey ramp, up to one exposure factor."""
     pytest.importorskip("rawpy", reason="needs rawpy")
-    import tifffile
-
     ramp = np.broadcast_to(np.linspace(2000, 60000, 96), (64, 96))
     rational = [part for row in XYZ_TO_SRGB for value in row for part in (round(value * 10000), 10000)]
     tags = [

@@ -1,8 +1,11 @@
 """Videos and folders of frames."""
 
+import subprocess
+
 import numpy as np
 import pytest
 
+from materialist.color import srgb_to_linear
 from materialist.errors import InputError, OutputError
 from materialist.io.video import write_frames
 
@@ -28,10 +31,6 @@ def test_frames_become_a_folder_or_a_video(tmp_path):
 
 def test_films_have_the_colours_that_players_take_them_for(tmp_path):
     """Those of BT.709, which the file says as well."""
-    import subprocess
-
-    from materialist.color import srgb_to_linear
-
     video = pytest.importorskip("imageio_ffmpeg", reason="needs the optional extra 'video'")
     colour = np.array([39, 203, 63])
     frame = np.broadcast_to(srgb_to_linear(colour / 255), (64, 64, 3)).astype(np.float32)

@@ -10,6 +10,7 @@ from materialist.color import linear_to_srgb
 from materialist.errors import WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.protocol import MAPS
+from materialist.predict.weights import sha256
 
 pytestmark = [pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("one_thread", "models")]
 os.environ.setdefault("HF_HUB_OFFLINE", "1")
@@ -41,8 +42,6 @@ def marigold(hub, models):
 
 def list_files(folder):
     """The list of checksums that ends a download."""
-    from materialist.predict.weights import sha256
-
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.name != "SHA256SUMS")
     lines = [f"{sha256(path)}  {path.relative_to(folder).as_posix()}\n" for path in files]
     (folder / "SHA256SUMS").write_text("".join(lines))

@@ -11,8 +11,10 @@ from test_maps import good_maps, write
 from materialist.errors import InputError, WeightsError
 from materialist.io.exr import write_exr
 from materialist.predict import get_predictor
+from materialist.predict.bundled import predictor
 from materialist.predict.normals import normals_from_depth
 from materialist.predict.protocol import MAPS
+from materialist.types import Materials, Prediction
 
 H, W = 20, 32
 
@@ -101,9 +103,6 @@ def test_a_folder_needs_only_the_maps_that_are_wanted(photo, other, tmp_path):
 
 def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeypatch):
     """Where the network saw sky, and the depth is someone else's, it knows no normal, and its note is void."""
-    from materialist.predict.bundled import predictor
-    from materialist.types import Materials, Prediction
-
     spec, theirs = other
     depth, up = theirs["depth"].copy(), np.zeros((H, W, 3), np.float32)
     depth[:8], up[..., 1] = 0, 1

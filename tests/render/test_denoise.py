@@ -1,6 +1,5 @@
 """Denoising: noise goes, edges of the guides and the level of the light stay."""
 
-
 import numpy as np
 import pytest
 

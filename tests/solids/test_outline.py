@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, box, lines, turned, view
+from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, arc, box, lines, turned, view
 
 from materialist.bench.glass_scenes import is_closed
 from materialist.solids.outline import surface_of_revolution
@@ -50,7 +50,9 @@ def test_on_the_ground_it_stands_where_it_stands(vase):
     assert 0 < ((body.body(CAMERA).vertices - FOOT) @ UP).min() < 0.02
 
 
-def test_boxes_and_what_is_cut_lopsided_or_a_line_are_none(vase):
+def test_boxes_rings_and_what_is_cut_lopsided_or_a_line_are_none(vase):
+    front, mask = view(turned(arc((0.45, 0.06), 0.06, -180, 180, 120)))
+    assert surface_of_revolution(front.depth, front.normal, mask, CAMERA, up=UP) is None
     depth, normal, mask, _ = seen_badly(box(), blur=1.0)
     assert surface_of_revolution(depth, normal, mask, CAMERA, up=UP) is None
     depth, normal, mask, _ = vase

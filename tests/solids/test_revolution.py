@@ -74,11 +74,3 @@ def test_a_cylinder_becomes_an_open_pot(pot, ball):
     side = (place[:, 1] > 0.2) & (place[:, 1] < 0.5)
     assert (facing[side & (place[:, 0] > 0.28)] > 0.9).all() and (facing[side & (place[:, 0] < 0.27)] < -0.9).all()
     assert body.vessel(CAMERA, 0.4) is None  # no room inside
-
-
-def test_rings_and_half_balls_are_none(ball):
-    front, mask = view(turned(arc((0.45, 0.06), 0.06, -180, 180, 120)))
-    assert surface_of_revolution(front.depth, front.normal, mask, CAMERA, up=UP) is None
-    front, mask = ball[2:]
-    half = mask & (np.indices(mask.shape)[1] < np.median(np.nonzero(mask)[1]))
-    assert surface_of_revolution(front.depth, front.normal, half, CAMERA, up=UP) is None

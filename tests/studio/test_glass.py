@@ -8,6 +8,7 @@ import studio_glass_task
 from made_tasks import until
 from studio_scenes import block, package, room
 
+from materialist.edits.glass.preview import GlassPreview
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import glass as studio_glass
@@ -78,8 +79,6 @@ class _Report:
 
 
 def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
-    from materialist.edits.glass.preview import GlassPreview
-
     scene, others = str(package(tmp_path)), (Step("relight", {"ambient": "0.5"}, tmp_path),)
     given = {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"}
     first = _Report()

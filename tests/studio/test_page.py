@@ -14,6 +14,8 @@ from studio_browser import READY, click_photo, move, opened, pixels, select_bloc
 from studio_scenes import package
 from studio_server import studio
 
+from materialist.io.photo import example_path
+
 
 def test_select_edit_undo(page):
     first = pixels(page)
@@ -208,8 +210,6 @@ def test_two_people_at_once(browser, tmp_path):
 @pytest.mark.slow
 def test_the_whole_story(page, tmp_path):
     """A dropped photo, cancelled and begun again, reloaded in the middle, edited, traced, taken away."""
-    from materialist.io.photo import example_path
-
     page.set_default_timeout(300_000)
     Image.open(example_path("coffee")).resize((150, 100)).save(tmp_path / "coffee.png")  # nothing is enlarged
     page.get_by_role("tab", name="Open").click()

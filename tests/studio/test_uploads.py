@@ -1,5 +1,6 @@
 """What strangers send."""
 
+import cv2
 import numpy as np
 import pytest
 from made_png import png_header
@@ -35,9 +36,7 @@ def test_pictures_are_refused_by_their_header(tmp_path, name, content, message):
 def test_sizes_of_other_headers(tmp_path):
     write_exr(tmp_path / "a.exr", np.zeros((12, 40, 3), np.float32))
     assert image_size(tmp_path / "a.exr") == (40, 12)
-
-    import cv2  # Pillow does not know the pixels of a float TIFF, and `invert` reads it
-
+    # Pillow does not know the pixels of a float TIFF, and `invert` reads it.
     cv2.imwrite(str(tmp_path / "a.tif"), np.full((20, 30, 3), 0.5, np.float32))
     assert image_size(tmp_path / "a.tif") == (30, 20)
     assert uploads.checked_picture(tmp_path / "a.tif") == ".tif"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from disney_reference import diffuse_coefficients, specular_split
 
+from materialist.edits.light.relight import with_sun
 from materialist.envmap import texel_directions
 from materialist.transport.cache import ROUGHNESS_LEVELS, CacheSettings, TransportCache, point
 from materialist.types import Camera, Geometry, Mesh
@@ -85,8 +86,6 @@ def test_open_plane_under_constant_light_has_the_analytic_diffuse_lobe(open_floo
 
 def test_a_small_sun_is_neither_missed_nor_met_twice():
     """The whole floor sees it through the same directions: an error is that of the picture."""
-    from materialist.edits.light.relight import with_sun
-
     cache = TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA)
     ratio = []
     for azimuth, elevation in np.random.default_rng(2).uniform((-180, 35), (180, 80), (24, 2)):

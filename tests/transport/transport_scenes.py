@@ -1,5 +1,6 @@
 """A furnished room with known maps and light, and pixels far from its depth edges."""
 
+import cv2
 import numpy as np
 from geometry_scenes import room, sphere_depth
 
@@ -47,8 +48,6 @@ def windowed_sky(height: int = 32):
 
 def away_from_edges(depth, pixels: int = 3):
     """[H, W] bool: no surface of another depth, no end of the picture within so many pixels. depth: [H, W]."""
-    import cv2
-
     inverse = np.where(depth > 0, 1 / np.maximum(depth, 1e-9), 0)
     padded = np.pad(inverse, 1, mode="edge")
     curvature = [np.abs(np.diff(padded, 2, axis=k))[s] for k, s in ((0, np.s_[:, 1:-1]), (1, np.s_[1:-1]))]

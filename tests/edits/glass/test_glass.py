@@ -60,6 +60,8 @@ def test_hollow_glass_has_a_cavity_and_the_papers_model_no_body():
     assert not paper.bodies and (paper.photo.linear[MASK] != scene.photo.linear[MASK]).any()
     outside = np.s_[:8]
     np.testing.assert_array_equal(paper.photo.original[outside], scene.photo.original[outside])
+    with pytest.raises(InputError, match="picture in the photo"):
+        composite(scene, paper, full_render=True)
 
 
 def test_thickness_is_given_mirrored_or_predicted():
@@ -150,12 +152,6 @@ def test_the_papers_back_is_the_front():
     same, found = (glass(rendered_scene(), MASK, **PAPER, back=back) for back in ("same", "found"))
     assert (same.photo.linear != found.photo.linear).any()
     assert same.provenance["edits"][-1]["back"] == "same" and found.provenance["edits"][-1]["back"] == "found"
-
-
-def test_the_papers_glass_is_in_no_full_rendering():
-    scene = flat_scene()
-    with pytest.raises(InputError, match="picture in the photo"):
-        composite(scene, glass(scene, MASK, **PAPER), full_render=True)
 
 
 @pytest.mark.parametrize("place", [(35, 47), np.s_[15, 12:24]])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_meshes import floor_scene
+from scipy.spatial import ConvexHull
 
 from materialist.camera import project
 from materialist.edits.composite.composite import composite
@@ -83,8 +84,6 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box):
     edited = insert(scene, box, (24.0, 26.0))
     share = native_layer(EditRenderer(scene), edited, spp=2, seed=0, clean=False).share
     place, _ = project(edited.bodies[0].vertices.astype(np.float64), scene.camera)
-    from scipy.spatial import ConvexHull
-
     area = ConvexHull(place * 4).volume  # native pixels; a box is convex
     np.testing.assert_allclose(share.sum(), area, rtol=0.02)
     soft = (share > 0) & (share < 1)

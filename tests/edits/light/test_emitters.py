@@ -16,6 +16,7 @@ from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.core.surfaces import KEY, emitting
 from materialist.edits.light.emitters import _patch, dimmed, visible_lights
 from materialist.edits.light.relight import relight
+from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.io.package import load_scene, save_scene
 from materialist.pipeline import render_scene
@@ -98,8 +99,6 @@ def test_bad_input_and_files(tmp_path):
 
 def test_edits_before_do_not_change_what_is_found():
     """The lights are those of the photo, whatever has been done to the floor."""
-    from materialist.edits.material.material import edit
-
     _, fit = rooms()
     floor = fit.normal[..., 1] > 0.5
     after = relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5, fitted=fit)

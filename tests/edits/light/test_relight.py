@@ -110,19 +110,16 @@ def test_edited_light_is_noted_and_warned_about():
         ({"envmap": np.zeros((8, 16, 3))}, "black"),
         ({"envmap": np.ones((8, 16, 3)), "gain": "lots"}, "lots"),
         ({"ambient": 0}, "black"),
+        ({"lamps": (100, 10, 2, 3000, 1)}, "outside"),
+        ({"lamps": (10, 10, -2, 3000, 1)}, "depth is -2"),
+        ({"lamps": (10, 10, 2, 100, 1)}, "100 K"),
+        ({"lamps": (10, 10, 2, 3000, 0)}, "power is 0"),
     ],
 )
 def test_impossible_light_is_named(options, words):
     with pytest.raises(InputError) as error:
         relight(SCENE, **options)
     assert words in str(error.value) and str(error.value).endswith(".")
-
-
-def test_impossible_lamps_are_named():
-    for place, words in (((100, 10, 2, 3000, 1), "outside"), ((10, 10, -2, 3000, 1), "depth is -2"),
-                         ((10, 10, 2, 100, 1), "100 K"), ((10, 10, 2, 3000, 0), "power is 0")):  # fmt: skip
-        with pytest.raises(InputError, match=words):
-            lamp(SCENE, *place)
 
 
 def test_envmap_files(tmp_path):

@@ -11,11 +11,10 @@ from materialist.edits.composite.composite import composite
 from materialist.edits.remove.background import inpainter
 from materialist.edits.remove.remove import remove
 from materialist.errors import InputError, WeightsError
+from materialist.io.exr import write_exr
 
 
 def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
-    from materialist.io.exr import write_exr
-
     scene = rendered_scene()
     hdr = replace(scene, photo=replace(scene.photo, hdr=True, stops=7))
     write_exr(tmp_path / "behind.exr", scene.photo.original / 128)

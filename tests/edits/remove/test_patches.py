@@ -1,6 +1,5 @@
 """Filling by patches: what repeats is found again, edges cross the hole, nothing comes from what may not be copied."""
 
-
 import numpy as np
 
 from materialist.edits.remove.patches import patched

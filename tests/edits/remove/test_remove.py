@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from edit_scenes import MASK, flat_scene, rendered_scene, tetrahedron
@@ -14,8 +15,6 @@ from materialist.errors import InputError
 
 
 def far_from(mask, pixels):
-    import cv2
-
     return cv2.dilate(mask.astype(np.uint8), np.ones((2 * pixels + 1,) * 2, np.uint8)) == 0
 
 
