@@ -159,7 +159,7 @@ def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[d
         stages=stages,
         metrics={
             "rerender_psnr_path": metrics.psnr_without_noise(halves[0], halves[1], picture.linear),
-            "rerender_ssim_path": metrics.ssim(rerender, picture.linear),
+            "rerender_ssim_path": metrics.ssim_without_noise(halves[0], halves[1], picture.linear),
             "rerender_psnr_residual": metrics.psnr(
                 rerender * shading_residual(picture.linear, rerender), picture.linear
             ),

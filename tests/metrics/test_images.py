@@ -50,6 +50,19 @@ def test_ssim_is_one_for_equal_pictures_and_falls_with_structure_lost():
     assert flat == pytest.approx((2 * x * y + c1) / (x * x + y * y + c1), abs=1e-4)
 
 
+@pytest.mark.parametrize("name", ["psnr", "ssim"])
+def test_noise_of_two_halves_is_taken_out(name):
+    clean, corrected = getattr(metrics, name), getattr(metrics, f"{name}_without_noise")
+    rng = np.random.default_rng(5)
+    photo = np.clip(0.4 + 0.2 * np.sin(np.indices((96, 96)).sum(0) / 7)[..., None] * [1, 0.5, -1], 0, 1)
+    rendered = photo * [0.9, 1.0, 1.1]
+    halves = [rendered + rng.normal(0, 0.03, photo.shape) for _ in range(2)]
+    wanted, noisy = clean(rendered, photo), clean(sum(halves) / 2, photo)
+    found = corrected(*halves, photo)
+    assert corrected(rendered, rendered, photo) == pytest.approx(wanted, rel=1e-3)
+    assert abs(found - wanted) < 0.1 * abs(noisy - wanted)
+
+
 @pytest.mark.parametrize("axis", [(0, 1, 0), (0, 0, -1), (1, 0, 0), (0.48, -0.6, 0.64)])
 def test_linear_map_is_degree_one_with_norm_of_its_gradient(axis):
     """E(d) = d . a has only degree 1 with norm |a| sqrt(4 pi / 3)."""

@@ -42,7 +42,7 @@ class FitSetup:
     seed: int = 0
     device: str = "auto"
     spp: int | None = None
-    """Paths a pixel of the re-rendering; None: `settings.rerender_spp`."""
+    """Paths a pixel of the re-rendering; None: those of the settings."""
 
     def __post_init__(self) -> None:
         given = self.settings.completion if self.completion == "auto" else self.completion
@@ -215,7 +215,9 @@ def invert(
     found("materials", materials)
     if progress is not None:
         progress("rerender", 0, 1)
-    each = max(1, (setup.spp or setup.settings.rerender_spp) // 2)
+    settings, pixels = setup.settings, setup.photo.linear.shape[0] * setup.photo.linear.shape[1]
+    fewer = min(1.0, settings.rerender_pixels / pixels)
+    each = max(1, (setup.spp or max(8, round(settings.rerender_spp * fewer))) // 2)
     first, second = timed(stages, "rerender", lambda: [
         fit.render(materials, state.envmap, each, seed + k) for k in (1, 2)
     ])  # fmt: skip

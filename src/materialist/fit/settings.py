@@ -76,6 +76,7 @@ class FitSettings:
     photo_light: bool = False  # with cached transport, surfaces light each other as the photo shows them; paper: V L_E
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
+    rerender_pixels: int = 2**62  # pixels of a picture from which they are fewer, in proportion; 8 at the least
 
     def at_most(self, steps: int) -> "FitSettings":
         """The same with no more steps in any stage."""
@@ -127,6 +128,7 @@ DEFAULT = FitSettings(
     photo_light=True,
     light_grid=24,
     rerender_spp=32,
+    rerender_pixels=2**17,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
 
