@@ -19,12 +19,8 @@ def _says(point1, point2, darker, score=1.0):
     return {"point1": point1, "point2": point2, "darker": darker, "darker_score": score}
 
 
-@pytest.fixture
-def albedo():
-    """Three columns: 0.2, 0.4 and 0.42, grey."""
-    return np.array([0.2, 0.4, 0.42], np.float32)[None, :, None] * np.ones((4, 1, 3), np.float32)
-
-
+ALBEDO = np.array([0.2, 0.4, 0.42], np.float32)[None, :, None] * np.ones((4, 1, 3), np.float32)
+"""Three columns, grey."""
 POINTS = _points((0.1, 0.5), (0.5, 0.5), (0.9, 0.5))
 
 
@@ -41,15 +37,15 @@ POINTS = _points((0.1, 0.5), (0.5, 0.5), (0.9, 0.5))
         ([_says(0, 1, "1"), _says(0, 1, "2", 0.0), _says(0, 1, "2", None), _says(0, 1, "?")], 0.0),  # do not count
     ],
 )
-def test_known_answers(albedo, comparisons, expected):
+def test_known_answers(comparisons, expected):
     judged = {"intrinsic_points": POINTS, "intrinsic_comparisons": comparisons}
-    error, count = whdr(albedo, judged)
+    error, count = whdr(ALBEDO, judged)
     assert error == pytest.approx(expected) and count >= 1
     transparent = _points((0.1, 0.5), (0.5, 0.5), (0.9, 0.5), opaque=False)
-    error, count = whdr(albedo, {**judged, "intrinsic_points": transparent})
+    error, count = whdr(ALBEDO, {**judged, "intrinsic_points": transparent})
     assert np.isnan(error) and count == 0
     apart = {**judged, "intrinsic_comparisons": [_says(1, 2, "1")]}
-    assert [whdr(albedo, apart, delta=delta)[0] for delta in (0.04, 0.06)] == [0, 1], "a relative threshold"
+    assert [whdr(ALBEDO, apart, delta=delta)[0] for delta in (0.04, 0.06)] == [0, 1], "a relative threshold"
 
 
 def test_the_benchmark_from_a_folder(tmp_path, measured):

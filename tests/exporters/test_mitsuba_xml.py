@@ -15,19 +15,12 @@ from materialist.types import Lamp
 OWN = "scene_materialist.xml"
 
 
-@pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("mitsuba")
+def test_it_renders_as_ours_does(tmp_path, capfd):
     scene = room()
-    write_mitsuba(folder, scene, scene_parts(scene))
-    return scene, folder
-
-
-def test_it_renders_as_ours_does(written, capfd):
-    scene, folder = written
+    write_mitsuba(tmp_path, scene, scene_parts(scene))
     target = renderer(scene)
     mi = target.mi
-    loaded = mi.load_file(str(folder / OWN), parallel=False, spp=64, max_depth=3)
+    loaded = mi.load_file(str(tmp_path / OWN), parallel=False, spp=64, max_depth=3)
     ours = [target.render(spp=64, seed=seed, max_depth=3) for seed in (0, 1)]
     theirs = [np.array(mi.render(loaded, seed=seed)) for seed in (0, 2)]
     # Not the same random numbers for the same pixels, since shapes have another order: equal within noise.

@@ -75,18 +75,16 @@ def test_missing_maps_are_neutral_and_told(tmp_path):
 
 
 def test_maps_of_other_sizes_are_resampled_and_told(tmp_path):
-    spec = write(tmp_path, **good_maps(2 * H, 2 * W))
-    prediction = get_predictor(spec).predict(made_photo(H, W))
+    maps = good_maps(2 * H, 2 * W)
+    prediction = get_predictor(write(tmp_path, **maps)).predict(made_photo(H, W))
     assert prediction.materials.albedo.shape == (H, W, 3)
     assert prediction.depth.shape == prediction.materials.roughness.shape == (H, W)
     assert np.allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-5)
     assert sum("resampled" in w for w in prediction.warnings) == 5
-    mean = good_maps(2 * H, 2 * W)["albedo"].reshape(H, 2, W, 2, 3).mean((1, 3))
+    mean = maps["albedo"].reshape(H, 2, W, 2, 3).mean((1, 3))
     assert np.allclose(prediction.materials.albedo, mean, atol=1e-5)
 
-
-def test_resampled_depth_makes_no_surface_between_near_and_far(tmp_path):
-    maps = good_maps(2 * H, 2 * W)
+    # No surface is made between near and far.
     depth = np.full((2 * H, 2 * W), 10.0, np.float32)
     depth[7:23, 9:31] = 2.0
     depth[:5] = 0

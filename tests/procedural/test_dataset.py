@@ -160,3 +160,18 @@ def test_a_killed_run_leaves_whole_samples_only(tmp_path):
         with np.load(file) as sample:
             assert set(CONTRACT) <= set(sample.files)
             assert sample["image"].shape == (SIZE, SIZE, 3)
+
+
+def test_the_command_makes_resumes_and_draws(done, refused, tmp_path):
+    folder, sheet = tmp_path / "set", tmp_path / "sheet.png"
+    make = ("train", "data", "-o", folder, "--size", 32, "--spp", 1, "--seed", 5, "--device", "cpu", "--count")
+    for count, resume in ((1, ()), (2, ("--resume",))):
+        told = done(*make, count, *resume)
+        assert (told["rendered"], told["existing"]) == (1, count - 1)
+    draw = ("train", "data", "-o", folder, "--sheet", sheet)
+    done(*draw)
+    drawn = sheet.read_bytes()
+    assert "--force" in refused(*draw) and sheet.read_bytes() == drawn
+    done(*draw, "--force")
+    os.truncate(sample_path(folder, 1), 900)
+    assert "0000001.npz cannot be read" in refused(*draw, "--force")

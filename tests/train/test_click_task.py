@@ -16,11 +16,6 @@ from materialist.procedural.options import DataSetOptions
 from materialist.train.clicks import click_losses, draw_click, load_views, produce_views
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return made_runs.write_click_views(tmp_path_factory.mktemp("views"))
-
-
 def test_clicks_lie_on_what_they_ask_for():
     rng = np.random.default_rng(0)
     view = made_runs.click_view(0)
@@ -63,10 +58,10 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
 
 
-def test_input_that_cannot_be(folder, tmp_path):
+def test_input_that_cannot_be(tmp_path):
     with pytest.raises(InputError, match="no views"):
         made_runs.clicks(tmp_path)
-    shutil.copytree(folder, tmp_path / "views")
+    made_runs.write_click_views(tmp_path / "views")
     os.truncate(tmp_path / "views" / "0000001.npz", 500)
     with pytest.raises(InputError, match=r"0000001\.npz cannot be read .*; delete it"):
         load_views(tmp_path / "views")

@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 from edit_scenes import scene_of
+from geometry_scenes import plane_depth
 
 from materialist import metrics
-from materialist.camera import pixel_rays
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.into_photo import in_photo, into_photo
 from materialist.edits.composite.layers import Layers
@@ -35,8 +35,7 @@ def picture(scene: Scene, seed: int = 0, spp: int = 256) -> np.ndarray:
 def rooms() -> tuple[Scene, Scene]:
     """(the room with a window in its back wall, truly lit; a fit of its photo that has no light but the map's)."""
     camera = Camera(40, 30, 60.0)
-    rays = pixel_rays(camera)
-    floor = np.where(rays[..., 1] < -0.02, 1.0 / np.maximum(-rays[..., 1], 1e-3), 1e6)
+    floor = plane_depth(camera, (0, 1, 0), -1.0)
     depth = np.minimum(floor, 3.5).astype(np.float32)
     normal = np.where((floor < 3.5)[..., None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).astype(np.float32)
     envmap = np.full((8, 16, 3), 0.15, np.float32)

@@ -1,8 +1,8 @@
 """Surfaces behind an object: planes exactly, up to where they are seen to end."""
 
 import numpy as np
+from geometry_scenes import plane_depth
 
-from materialist.camera import pixel_rays
 from materialist.edits.remove.behind import LOOSE, behind
 from materialist.types import Camera
 
@@ -11,8 +11,7 @@ CAMERA = Camera(80, 60, 45.0)
 
 def room():
     """Depth, normal and plane of a floor 0.4 below the camera and a wall at depth 4, which meet in a straight line."""
-    rays = pixel_rays(CAMERA).astype(float)
-    floor = np.where(rays[..., 1] < 0, -0.4 / np.minimum(rays[..., 1], -1e-9), np.inf)
+    floor = plane_depth(CAMERA, (0, 1, 0), -0.4)
     depth = np.minimum(floor, 4.0)
     plane = (floor >= 4).astype(int)
     normal = np.where(plane[..., None] == 1, [0.0, 0, 1], [0.0, 1, 0])
