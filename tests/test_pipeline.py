@@ -71,7 +71,7 @@ def test_scene_has_every_field(scene):
     assert len(scene.geometry.mesh.faces) >= 2 * WIDTH * HEIGHT
 
 
-def test_report_tells_what_happened(scene):
+def test_report_and_provenance_tell_what_happened(scene):
     metrics = scene.report.metrics
     assert metrics["rerender_psnr_path"] > 20
     assert 0 < metrics["rerender_ssim_path"] <= 1
@@ -83,9 +83,6 @@ def test_report_tells_what_happened(scene):
     assert {"predict", "geometry", "light", "albedo", "rerender"} <= set(names)
     assert names[-1] == "rerender"
     assert all(stage["seconds"] >= 0 for stage in scene.report.stages)
-
-
-def test_provenance_names_the_options(scene):
     told = scene.provenance
     assert (told["engine"], told["preset"], told["seed"], told["spp"]) == ("transport", "default", 0, 8)
     assert told["envmap_size"] == [32, 16]

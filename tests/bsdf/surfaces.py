@@ -50,6 +50,12 @@ def directions(count, seed, *, lowest=0.02):
     return np.stack([s * np.cos(phi), s * np.sin(phi), z], -1).astype(np.float32)
 
 
+def draws(count, seed):
+    """The two arguments of `sample` that are random, [N] and [N, 2]."""
+    rng = np.random.default_rng(seed)
+    return mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
+
+
 def pairs(count, seed, roughness):
     """wi, wo [N, 3]: half anywhere, half near the mirror direction, where the specular lobe is."""
     rng = np.random.default_rng(seed + 1)

@@ -3,7 +3,7 @@
 import disney_reference as brdf
 import numpy as np
 import pytest
-from surfaces import ALBEDO, NORMAL, directions, evaluate, interaction, make, mi, pairs, tilted, vector
+from surfaces import ALBEDO, NORMAL, directions, draws, evaluate, interaction, make, mi, pairs, tilted, vector
 
 GRID = [(0.04, 0.0), (0.1, 1.0), (0.2, 0.4), (0.5, 0.0), (0.5, 1.0), (1.0, 0.4)]
 
@@ -23,12 +23,10 @@ def test_eval_is_the_papers_formula(roughness, metallic):
 @pytest.mark.parametrize(("roughness", "metallic"), [(0.02, 0.5), (0.2, 0.4), (0.5, 1.0), (1.0, 0.0)])
 def test_sample_and_eval_pdf_agree(roughness, metallic):
     surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
-    rng = np.random.default_rng(0)
     wi = directions(4000, 5)
     wi[::2, 2] *= -1
     si = interaction(wi)
-    u1, u2 = mi.Float(rng.random(4000).astype(np.float32)), mi.Point2f(rng.random((2, 4000)).astype(np.float32))
-    sample, weight = surface.sample(ctx, si, u1, u2)
+    sample, weight = surface.sample(ctx, si, *draws(4000, 0))
     value, pdf = surface.eval_pdf(ctx, si, sample.wo)
     assert np.array_equal(np.array(value), np.array(surface.eval(ctx, si, sample.wo)))
     assert np.array_equal(np.array(pdf), np.array(surface.pdf(ctx, si, sample.wo)))
@@ -58,17 +56,15 @@ def _leaning(wi, count=1, leans=True):
 def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness, metallic, degrees, side):
     surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
     wi, count = tilted(degrees, side), 1 << 17
-    rng = np.random.default_rng(1)
-    u1, u2 = mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
-    total = []
+    numbers, total = draws(count, 1), []
     for si in (interaction(np.tile(wi, (count, 1))), _leaning(wi, count)):
-        sample, weight = surface.sample(ctx, si, u1, u2)
+        sample, weight = surface.sample(ctx, si, *numbers)
         drawn = np.array(sample.pdf) > 0
         face = np.array(si.n)[:, 0]
         assert ((np.array(sample.wo).T @ face)[drawn] * (wi @ face) > -1e-5).all()
         total.append(np.array(weight).mean(1))
     np.testing.assert_allclose(total[1], total[0], rtol=0.02)
-    without = np.array(surface.sample(ctx, interaction(np.tile(wi, (count, 1))), u1, u2)[0].wo).T @ face
+    without = np.array(surface.sample(ctx, interaction(np.tile(wi, (count, 1))), *numbers)[0].wo).T @ face
     assert (without * (wi @ face) < 0).mean() > 0.01  # which would pass
 
 
@@ -127,10 +123,8 @@ def test_gradients_are_finite_differences_of_the_formula(name, step, roughness, 
 
 def white_furnace(roughness, metallic, degrees, count=200_000):
     """Reflectance (green) of a white surface under constant light from everywhere."""
-    rng = np.random.default_rng(1)
-    wi = np.broadcast_to(tilted(degrees), (count, 3))
-    u1, u2 = mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
-    _, weight = make((1, 1, 1), roughness, metallic).sample(mi.BSDFContext(), interaction(wi), u1, u2)
+    si = interaction(np.broadcast_to(tilted(degrees), (count, 3)))
+    _, weight = make((1, 1, 1), roughness, metallic).sample(mi.BSDFContext(), si, *draws(count, 1))
     return float(np.array(weight)[1].mean())
 
 

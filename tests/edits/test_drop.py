@@ -88,12 +88,11 @@ def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ground = blocks(FLAT, metres=0.2)
     rod = BOX * np.array([1, 0.2, 0.1])
-    spun = lambda turns: fall(  # noqa: E731
-        [RigidBody((rod,), np.array([0, 0, 0.5]), 2 * np.pi * turns * np.array([0.6, 0.0, 0.8]))],
-        ground,
-        frames=48,
-        fps=24,
-    )
+
+    def spun(turns):
+        spin = 2 * np.pi * turns * np.array([0.6, 0.0, 0.8])
+        return fall([RigidBody((rod,), np.array([0, 0, 0.5]), spin)], ground, frames=48, fps=24)
+
     energy = [poses[0].energy for poses in spun(20)]
     assert np.isfinite(energy).all() and max(energy) < 1.02 * energy[0]
     with pytest.raises(InputError, match="smaller spin"):

@@ -215,19 +215,13 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     (session.workspace / "thing-cube.ply").unlink()
 
 
-A, B, C = (
-    Step("edit", {"mask": "mask-1.png", "hue": "20"}),
-    Step("relight", {"rotate": "90"}),
-    Step("edit", {"hue": "1"}),
-)
-
-
 def test_ticking_and_moving_leave_the_current_one():
-    edits = EditList((A, B, C), 2)
+    steps = tuple(Step(kind, {}) for kind in ("edit", "relight", "glass"))
+    edits = EditList(steps, 2)
     assert edits.toggled(0).current == 2 and edits.toggled(0).toggled(0).current == 2
     assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None
     assert edits.moved(0, 1).current == 2 and edits.moved(1, 1).current == 1 and edits.moved(2, -1).current == 1
-    assert EditList((A, B, C)).moved(0, 1).current is None and EditList((A, B, C)).toggled(1).current is None
+    assert EditList(steps).moved(0, 1).current is None and EditList(steps).toggled(1).current is None
 
 
 def test_an_object_falls_and_lies_there(session, monkeypatch):
