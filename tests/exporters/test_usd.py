@@ -7,10 +7,11 @@ import pytest
 from export_scenes import CHECKS, GLASS, GLOW, LAMP, room, with_bodies
 from PIL import Image
 
+pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdValidation
+
 import materialist as mt
 from materialist.exporters.parts import scene_parts
-
-pxr = pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
 
 
 @pytest.fixture(scope="module")
@@ -20,8 +21,6 @@ def written(tmp_path_factory):
 
 
 def test_official_validators(written):
-    from pxr import Usd, UsdGeom, UsdValidation
-
     validators = UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
     assert len(validators) > 20
     for path in written[1]:
@@ -35,8 +34,6 @@ def test_official_validators(written):
 
 
 def test_the_stage_says_what_the_scene_says(written):
-    from pxr import Usd, UsdGeom
-
     scene = room()
     part = scene_parts(scene)[0]
     stage = Usd.Stage.Open(str(written[1][0]))
@@ -54,8 +51,6 @@ def test_the_stage_says_what_the_scene_says(written):
 
 def test_the_centre_of_the_light_lies_ahead(written):
     """OpenEXR's latlong, which a dome light uses, has +Z in its centre and +X at a quarter of its width."""
-    from pxr import Usd, UsdGeom
-
     stage = Usd.Stage.Open(str(written[1][1]))
     turn = np.array(UsdGeom.Xformable(stage.GetPrimAtPath("/Scene/Light")).ComputeLocalToWorldTransform(0))[:3, :3]
     np.testing.assert_allclose(np.array([0, 0, 1]) @ turn, [0, 0, -1], atol=1e-12)
@@ -64,8 +59,6 @@ def test_the_centre_of_the_light_lies_ahead(written):
 
 
 def test_bodies_have_textures_and_it_is_said_that_nothing_refracts(tmp_path):
-    from pxr import Usd, UsdShade
-
     done = mt.export(with_bodies(CHECKS, GLASS), tmp_path / "usd", to="usd")
     assert any("without refraction and tint of glass;" in note for note in done.notes)
     np.testing.assert_array_equal(
@@ -83,8 +76,6 @@ def test_bodies_have_textures_and_it_is_said_that_nothing_refracts(tmp_path):
 
 
 def test_lamps_and_what_glows(tmp_path):
-    from pxr import Usd, UsdGeom, UsdLux, UsdShade
-
     scene = replace(with_bodies(GLOW), lamps=(LAMP,))
     stage = Usd.Stage.Open(str(mt.export(scene, tmp_path / "usd", to="usd").path))
     sphere = UsdLux.SphereLight(stage.GetPrimAtPath("/Scene/lamp0"))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from disney_reference import diffuse_coefficients, hemisphere, specular_split
-from made_worlds import X, Z, plain, reference, room, still
+from made_worlds import X, Y, Z, plain, reference, room, still
 
 from materialist.camera import pixel_rays
 from materialist.envmap import texel_directions
@@ -85,12 +85,9 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
     np.testing.assert_allclose(labels["depth"], -2.0 / (rays @ up), rtol=1e-4)
     np.testing.assert_allclose(labels["albedo"], np.broadcast_to(colour, (SIZE, SIZE, 3)), rtol=1e-5)
     np.testing.assert_allclose(labels["roughness"], 0.7, rtol=1e-5)
-
-
-def test_normals_face_the_viewer_even_from_behind():
-    behind = ScenePart(s.sheet((-1, -1, -2), 2 * Z * 0 + np.array([0, 2.0, 0]), 2 * X), plain((0.5, 0.5, 0.5)))
-    world = World([behind], np.ones((8, 16, 3), np.float32), look((0, 0, 0), (0, 0, -1), 40))
-    labels = sample.labels_of(tracer_of(world).probe())
+    # Normals face the viewer even from behind.
+    behind = ScenePart(s.sheet((-1, -1, -2), 2 * Y, 2 * X), plain(colour))
+    labels = sample.labels_of(tracer_of(replace(world, parts=[behind], view=look((0, 0, 0), (0, 0, -1), 40))).probe())
     np.testing.assert_allclose(labels["normal"][labels["mask"]], np.tile([0, 0, 1], (SIZE * SIZE, 1)), atol=1e-5)
 
 

@@ -20,7 +20,6 @@ def test_one_step_and_its_weights(done, data, tmp_path):
     ("arguments", "said"),
     [
         (["matnet", "-o", "run"], "--data"),
-        (["matnet", "--data", "DATA", "-o", "run"], "either --steps or --minutes"),
         (["matnet", "--data", "nowhere", "-o", "run", "--steps", "1"], "no data folder nowhere"),
         (["matnet", "--data", "DATA", "-o", "run", "--steps", "1", "--init", "x.pth"], "x.pth"),
     ],

@@ -30,14 +30,6 @@ def test_glass_is_a_body_before_the_continued_wall():
     assert not scene.bodies and "edits" not in scene.provenance
 
 
-def test_glass_that_bends_nothing_is_not_there():
-    scene = rendered_scene()
-    edited = glass(scene, MASK, ior=1.0, thickness="symmetry")
-    picture = composite(scene, edited, spp=64, denoise=False)
-    wall = scene.photo.linear[2:8].mean((0, 1))
-    assert np.abs(picture[MASK].mean(0) / wall - 1).max() < 0.08
-
-
 def test_under_even_light_clear_glass_is_as_bright_as_the_wall_and_tint_colours_it():
     scene = rendered_scene()
     white = np.ones_like(scene.materials.albedo)
