@@ -11,6 +11,8 @@ from made_pipeline import scene_of
 from made_scene import make_mesh
 from PIL import Image
 
+from materialist.batches.outcome import Outcome
+from materialist.batches.run import batch
 from materialist.errors import InputError, SetupError
 from materialist.types import Geometry, Photo, Scene
 
@@ -50,6 +52,11 @@ def moody(photo: Photo, **options) -> Scene:
     if "deadly" in name and _again(name):
         os.kill(os.getpid(), signal.SIGKILL)
     return made_up(photo, **options)
+
+
+def run(source: Path, runs: Path, **options) -> Outcome:
+    """A batch with `moody` for the inversion."""
+    return batch(source, runs, **{"function": "made_batch:moody", "workers": 2, "device": "cpu", **options})
 
 
 def _again(name: str) -> bool:

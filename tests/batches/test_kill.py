@@ -8,11 +8,10 @@ import sys
 
 import psutil
 import pytest
-from made_batch import photos
+from made_batch import photos, run
 from made_tasks import until
 
 from materialist.batches.ledger import LEDGER, read_events
-from materialist.batches.run import batch
 
 NAMES = ("slow1", "slow2", "slow3", "slow4", "quick")
 
@@ -37,10 +36,6 @@ def workers_of(process):
     return [c for c in psutil.Process(process.pid).children() if "materialist.jobs.worker" in c.cmdline()]
 
 
-def undisturbed(source, runs):
-    return batch(source, runs, function="made_batch:moody", workers=2, device="cpu")
-
-
 def command(source, runs):
     arguments = ["batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json"]
     return subprocess.Popen(
@@ -62,9 +57,9 @@ def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_res
     before = len(done(runs))
     assert before < len(NAMES)
     monkeypatch.setenv("MADE_SLOW", "0.1")
-    outcome = batch(source, runs, function="made_batch:moody", workers=2, device="cpu", resume=True)
+    outcome = run(source, runs, resume=True)
     assert outcome.kept == before and outcome.exit_code == 0
-    assert outcome.hash == undisturbed(source, tmp_path / "fresh").hash
+    assert outcome.hash == run(source, tmp_path / "fresh").hash
     assert not [p.name for p in runs.iterdir() if "partial" in p.name]
 
 
@@ -78,7 +73,7 @@ def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
     attempts = [entry["attempts"] for entry in done(runs)]
     assert sorted(attempts) in ([1, 1, 1, 1, 2], [1] * 5)  # killed between two photos, it costs nothing
     monkeypatch.setenv("MADE_SLOW", "0")
-    assert json.loads((runs / "summary.json").read_text())["hash"] == undisturbed(source, tmp_path / "fresh").hash
+    assert json.loads((runs / "summary.json").read_text())["hash"] == run(source, tmp_path / "fresh").hash
 
 
 @pytest.mark.parametrize("whole_group", [True, False])

@@ -5,19 +5,14 @@ import os
 
 import numpy as np
 import pytest
-from made_batch import photos
+from made_batch import photos, run
 from PIL import Image
 
 from materialist.batches.ledger import LEDGER, read_events
 from materialist.batches.results import package_hash
-from materialist.batches.run import batch
 from materialist.errors import InputError, SetupError
 
 RECIPE = "- edit:\n    mask: masks/{name}.png\n    hue: 90\n"
-
-
-def run(source, runs, **options):
-    return batch(source, runs, **{"function": "made_batch:moody", "workers": 2, "device": "cpu", **options})
 
 
 def reasons(outcome):
