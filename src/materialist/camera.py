@@ -52,6 +52,13 @@ def project(points: Array, camera: Camera) -> tuple[Array, Array]:
     return np.stack([xs, ys], -1), depth
 
 
+def turn_upright(back: Array) -> Array:
+    """[3, 3] rotation whose columns are right, up and the unit direction `back` [3], with right level."""
+    right = np.cross([0, 1, 0], back)
+    right /= max(np.linalg.norm(right), 1e-9)
+    return np.stack([right, np.cross(back, right), back], -1)
+
+
 def unit(vectors: Array) -> Array:
     """[..., 3] or [..., 2] vectors of length 1; those of no length stay 0."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)

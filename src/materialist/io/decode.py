@@ -9,16 +9,8 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 
 from materialist.errors import InputError, MaterialistError, SetupError
-from materialist.io.bitmap import (
-    FORMATS,
-    Decoded,
-    check_size,
-    light_and_alpha,
-    pixel_limit_lifted,
-    read_bitmap,
-    read_tiff,
-    stored_pixels,
-)  # fmt: skip
+from materialist.io import bitmap
+from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
 from materialist.io.exr import exr_headers, exr_size, read_exr
 
@@ -61,10 +53,10 @@ def image_size(path: Path) -> tuple[int, int]:
 
     register_heif_opener()
     try:
-        with pixel_limit_lifted(), Image.open(path) as image:
+        with bitmap.pixel_limit_lifted(), Image.open(path) as image:
             return image.size
     except UnidentifiedImageError as error:
-        raise InputError(f"{path} is not an image this program can read; give it a {FORMATS} file.") from error
+        raise InputError(f"{path} is not an image this program can read; give it a {bitmap.FORMATS} file.") from error
 
 
 def decode(path: Path) -> Decoded:
@@ -83,14 +75,14 @@ def decode(path: Path) -> Decoded:
     try:
         if path.suffix.lower() in RAW_SUFFIXES:
             return _raw(path)
-        check_size(*image_size(path), path)
+        bitmap.check_size(*image_size(path), path)
         if head.startswith(_EXR):
             return _exr(path)
         if head.startswith(_RADIANCE):
             return _hdr(path)
         if head.startswith(_TIFF):
-            return read_tiff(path)
-        return read_bitmap(path)
+            return bitmap.read_tiff(path)
+        return bitmap.read_bitmap(path)
     except (MaterialistError, MemoryError):
         raise
     except Exception as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
@@ -102,12 +94,13 @@ def _exr(path: Path) -> Decoded:
     pixels = read_exr(path, photo=True)
     if pixels.ndim == 2:
         pixels = np.repeat(pixels[..., None], 3, -1)
-    return light_and_alpha(np.ascontiguousarray(pixels[..., :3]), pixels[..., 3:] if pixels.shape[-1] == 4 else None)
+    alpha = pixels[..., 3:] if pixels.shape[-1] == 4 else None
+    return bitmap.light_and_alpha(np.ascontiguousarray(pixels[..., :3]), alpha)
 
 
 def _hdr(path: Path) -> Decoded:
     """Radiance RGBE."""
-    return Decoded(np.ascontiguousarray(stored_pixels(path)[0]), True)
+    return Decoded(np.ascontiguousarray(bitmap.stored_pixels(path)[0]), True)
 
 
 def _raw(path: Path) -> Decoded:
@@ -121,7 +114,7 @@ def _raw(path: Path) -> Decoded:
         raise SetupError(f"Camera RAW needs one more package to read {path.name}: pip install rawpy") from error
     try:
         with rawpy.imread(str(path)) as raw:
-            check_size(raw.sizes.width, raw.sizes.height, path)
+            bitmap.check_size(raw.sizes.width, raw.sizes.height, path)
             pixels = raw.postprocess(gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16)
     except rawpy.LibRawError as error:
         raise InputError(f"{path} is not a RAW file this program can read ({error}); export it as TIFF.") from error

@@ -160,12 +160,6 @@ def read_arrays(path: Path, *needed: str) -> dict[str, Array]:
     return arrays
 
 
-def write_arrays(path: Path, arrays: dict[str, Array]) -> None:
-    """An .npz of arrays, whole or not at all. Raises OutputError where it cannot be written."""
-    with whole_file(path, force=True) as temporary, open(temporary, "wb") as file:
-        np.savez(file, **arrays)  # type: ignore[arg-type]
-
-
 def complete(
     paths: Sequence[Path], make: Callable[[int], dict[str, Array]], what: str, progress: Progress, workers: int = 1
 ) -> int:
@@ -193,7 +187,9 @@ def _one_thread() -> None:
 
 
 def _write(path: Path, make: Callable[[int], dict[str, Array]], number: int) -> None:
-    write_arrays(path, make(number))
+    """The arrays of that number as an .npz, whole or not at all. Raises OutputError where it cannot be written."""
+    with whole_file(path, force=True) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **make(number))  # type: ignore[arg-type]
 
 
 def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:

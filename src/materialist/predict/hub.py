@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
 
-import cv2
 import numpy as np
 
 from materialist.camera import unit
@@ -175,21 +174,12 @@ class DepthAnything(HubPredictor):
 
 def _run(model, linear: Array, gpu: bool) -> Array:
     """The network's output [H, W] for a linear picture [H, W, 3]: the shorter side is seen at 518 pixels."""
-    import torch
-    from torch.nn import functional as F
+    from materialist.predict.matnet.predictor import at_network_size
 
-    from materialist.predict.matnet.predictor import network_size
-
-    height, width = linear.shape[:2]
-    rows, columns = network_size(height, width)
-    small = cv2.resize(linear_to_srgb(linear), (columns, rows), interpolation=cv2.INTER_CUBIC)
-    pixels = ((small - MEAN) / DEVIATION).astype(np.float32)
-    model = model.to("cuda" if gpu else "cpu", torch.float32).eval()
-    image = torch.from_numpy(pixels).permute(2, 0, 1)[None].to(model.device)
-    with torch.inference_mode():
-        output = model(pixel_values=image).predicted_depth[:, None]
-        full = F.interpolate(output, (height, width), mode="bilinear", align_corners=True)
-    return full[0, 0].float().cpu().numpy()
+    model = model.to("cuda" if gpu else "cpu").float().eval()
+    run = lambda image: {"depth": model(pixel_values=image).predicted_depth[:, None]}  # noqa: E731
+    pixels = ((linear_to_srgb(linear) - MEAN) / DEVIATION).astype(np.float32)
+    return at_network_size(run, pixels, model.device)["depth"]
 
 
 def checked(folder: Path) -> str:

@@ -12,11 +12,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from materialist.camera import turn_upright
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.io.exr import read_exr
 from materialist.procedural import tiles
-from materialist.procedural.objects.shapes import turn_upright
 from materialist.procedural.options import captures
 from materialist.types import Array
 

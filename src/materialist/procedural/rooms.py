@@ -2,34 +2,20 @@
 
 import numpy as np
 
-from materialist.procedural import lights, walls
+from materialist.procedural import lights, walls, world
 from materialist.procedural import materials as m
 from materialist.procedural.objects import furniture as f
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects.things import Meshes
 from materialist.procedural.walls import RoomWall
-from materialist.procedural.world import (
-    Parts,
-    Portal,
-    ScenePart,
-    Viewpoint,
-    World,
-    block,
-    bounds,
-    look,
-    moved,
-    orb,
-    orbit,
-    placed,
-    rod,
-)
+from materialist.procedural.world import Parts, ScenePart, block, moved, placed, rod
 from materialist.types import Array
 
 Size = Array
 """[3] width, depth and height of a room, metres; its floor is centred on the origin."""
 
 
-def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World:
+def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
     """A furnished room seen by somebody who stands or sits in it."""
     size = rng.uniform([2.6, 3.2, 2.3], [6.5, 8.0, 3.3])
     standing = Furniture(size)
@@ -38,11 +24,11 @@ def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World:
     return _world(rng, size, captures, standing.parts, _view(rng, size, standing), "room")
 
 
-def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> World:
+def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
     """Things on a table, a sideboard or a kitchen top, seen from close by, with the room behind them."""
     maker = m.pick(rng, f.TO_LOOK_ON)
     piece = maker(rng, meshes)
-    (low, high), top = bounds(piece), bounds(piece[:1])[1][1]
+    (low, high), top = world.bounds(piece), world.bounds(piece[:1])[1][1]
     size = rng.uniform([2.6, 3.0, 2.3], [5.0, 5.0, 3.0])
     size[:2] = np.maximum(size[:2], (high - low)[[0, 2]] + 0.7)
     at_wall, x = maker is not f.set_table or rng.random() < 0.5, rng.uniform(-0.3, 0.3)
@@ -54,8 +40,8 @@ def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> Wor
     distance, up, turn, fov = rng.uniform([0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60])
     w, d, h = size
     inside = np.array([[-w / 2 + 0.1, 0.2, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
-    eye = np.clip(orbit(target, distance, turn, up, fov).position, *inside)
-    view = look(eye, target, fov, rng.normal() * 0.03)
+    eye = np.clip(world.orbit(target, distance, turn, up, fov).position, *inside)
+    view = world.look(eye, target, fov, rng.normal() * 0.03)
     return _world(rng, size, captures, standing.parts, view, "table")
 
 
@@ -64,7 +50,7 @@ def _some(rng, kinds, low: int, high: int, meshes) -> list[Parts]:
     return [m.pick(rng, kinds)(rng, meshes) for _ in range(int(rng.integers(low, high)))]
 
 
-def _world(rng, size: Size, captures, furniture: Parts, view: Viewpoint, kind: str) -> World:
+def _world(rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, kind: str) -> world.World:
     w, d, _ = size
     parts, portals, envmap = shell(rng, size, captures)
     parts += furniture
@@ -73,7 +59,7 @@ def _world(rng, size: Size, captures, furniture: Parts, view: Viewpoint, kind: s
         rug = m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)
         parts.append(block((a, 0.012, b), (rng.normal() * 0.3, 0, rng.normal() * 0.4), rug, 0.004))
     parts += lamps(rng, size, portals, envmap)
-    return World(parts, envmap, view, portals, kind)
+    return world.World(parts, envmap, view, portals, kind)
 
 
 def _sides(size: Size) -> list[tuple[Array, float, float]]:
@@ -83,12 +69,12 @@ def _sides(size: Size) -> list[tuple[Array, float, float]]:
     return list(zip(corners, (0.0, -np.pi / 2, np.pi, np.pi / 2), (w, d, w, d)))
 
 
-def shell(rng, size: Size, captures) -> tuple[Parts, list[Portal], Array]:
+def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
     """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size
     is_open = rng.random() < 0.25
     parts: Parts = []
-    portals: list[Portal] = []
+    portals: list[world.Portal] = []
     count = int(rng.choice([0, 1, 2], p=[0.1, 0.6, 0.3])) if not is_open else int(rng.random() < 0.3)
     with_windows = rng.permutation(2 if is_open else 4)[:count]
     paint, accent = m.wall_paint(rng), rng.integers(4) if rng.random() < 0.3 else -1
@@ -111,7 +97,7 @@ def shell(rng, size: Size, captures) -> tuple[Parts, list[Portal], Array]:
             up = (0, hole.top - hole.bottom, 0)
             sheet = s.sheet((hole.left, hole.bottom, -0.01), (hole.right - hole.left) * x, up)
             low, up, right, _ = s.moved(sheet, corner, turn).vertices
-            portals.append(Portal(low, right - low, up - low))
+            portals.append(world.Portal(low, right - low, up - low))
     floor = m.one_of(rng, m.floor_boards, m.floor_boards, m.tiled, m.stone, m.fabric)
     ceiling = m.floor_boards(rng) if rng.random() < 0.08 else m.white_paint(rng)
     parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), floor))
@@ -134,7 +120,7 @@ class Furniture:
 
     def add(self, piece: Parts) -> None:
         """Take the piece in, unless it reaches through a wall or into another piece."""
-        low, high = bounds(piece)
+        low, high = world.bounds(piece)
         inside = (np.maximum(-low, high)[[0, 2]] <= self.size[:2] / 2).all()
         if inside and not any((low < b).all() and (high > a).all() for a, b in self.boxes):
             self.parts += piece
@@ -144,7 +130,7 @@ class Furniture:
         """Stand pieces with their backs to a wall, most at the back and the sides."""
         for piece in pieces:
             corner, turn, length = _sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
-            low, high = bounds(piece)
+            low, high = world.bounds(piece)
             at = rng.uniform(0.04, max(0.05, length - (high - low)[0] - 0.04))
             self.add(moved(placed(piece, (at - low[0], 0, 0.04 - low[2])), corner, turn))
 
@@ -162,7 +148,7 @@ def _glow(rng, power: float, area: float) -> m.Material:
     return m.light(rng, tuple(power / area * colour / colour.mean()))
 
 
-def lamps(rng, size: Size, portals: list[Portal], envmap: Array) -> Parts:
+def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
     """Ceiling panels, globes and shades; their power against the windows varies by a factor of a hundred.
 
     At times it is evening: `envmap` is made darker in place.
@@ -195,7 +181,7 @@ def _globes(rng, size, power) -> Parts:
     glow, cord = _glow(rng, power, n * 4 * np.pi * r * r), m.metal(rng)
     x, z = rng.uniform(-0.2, 0.2) * w, rng.uniform(-0.3, 0.2) * d
     row = [x + (k - n / 2) * 4 * r for k in range(n)]
-    balls = [orb((at, h - drop, z), r, glow) for at in row]
+    balls = [world.orb((at, h - drop, z), r, glow) for at in row]
     return balls + [rod([(at, h - drop + r, z), (at, h, z)], 0.006, cord, 5) for at in row]
 
 
@@ -209,7 +195,7 @@ def _shade(rng, size, power) -> Parts:
     return placed([ScenePart(shade, glow), pole, foot], at)
 
 
-def _view(rng, size: Size, standing: Furniture) -> Viewpoint:
+def _view(rng, size: Size, standing: Furniture) -> world.Viewpoint:
     """Somebody in the front half of the room who looks towards its back."""
     w, d, h = size
     for _ in range(30):
@@ -218,4 +204,4 @@ def _view(rng, size: Size, standing: Furniture) -> Viewpoint:
             break
     eye[1] = min(rng.uniform(1.2, 1.75) if rng.random() < 0.7 else rng.uniform(0.5, 2.0), h - 0.3)
     target = np.array([rng.uniform(-0.5, 0.5) * w, rng.uniform(0.3, 1.5), -d / 2 * rng.uniform(0.2, 1.0)])
-    return look(eye, target, rng.uniform(35, 75), rng.normal() * 0.025)
+    return world.look(eye, target, rng.uniform(35, 75), rng.normal() * 0.025)

@@ -73,13 +73,8 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: D
     shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal)
     labels = labels_of(probe)
     gain = exposure(image, rng) * balance(shading, rng)
-    light = tracer.light(
-        probe,
-        rows=LIGHT_ROWS,
-        spp=LIGHT_SPP,
-        seed=int(rng.integers(2**31)),
-        hidden=LIGHT_HIDDEN if world.kind in ("outdoor", "still life") else 0,
-    )
+    hidden = LIGHT_HIDDEN if world.kind in ("outdoor", "still life") else 0
+    light = tracer.light(probe, rows=LIGHT_ROWS, spp=LIGHT_SPP, seed=int(rng.integers(2**31)), hidden=hidden)
     byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
     half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
     return {

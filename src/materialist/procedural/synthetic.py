@@ -52,16 +52,9 @@ class SyntheticSample:
 
 
 def make_sample(
-    scene_index: int,
-    view_index: int,
-    light_index: int,
-    *,
-    size: int | tuple[int, int] = 128,
-    data: Path | None = None,
-    seed: int = 0,
-    spp: int = PHOTO_SPP,
-    unseen: bool = False,
-) -> SyntheticSample:
+    scene_index: int, view_index: int, light_index: int, *, size: int | tuple[int, int] = 128,
+    data: Path | None = None, seed: int = 0, spp: int = PHOTO_SPP, unseen: bool = False,
+) -> SyntheticSample:  # fmt: skip
     """The sample of these three numbers; the same numbers and seed give the same sample.
 
     `size` is the side of a square photo or (height, width), in pixels. With `data`, objects also come from

@@ -5,9 +5,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from materialist.camera import turn_upright
 from materialist.procedural.materials import Material
 from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid, turn_upright
+from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
 
 

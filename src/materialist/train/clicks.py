@@ -70,9 +70,7 @@ def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None
 
     def view(number: int) -> View:
         path = source.paths[number]
-        arrays, rng = read_arrays(path), np.random.default_rng([int(path.stem), 4])
-        if "thing" not in arrays:
-            raise InputError(f"{path} does not say what is one thing; make the set again: train data.")
+        arrays, rng = read_arrays(path, "thing", "fov"), np.random.default_rng([int(path.stem), 4])
         linear, _ = photographic(read_sample(path).image, rng)
         camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
         found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))

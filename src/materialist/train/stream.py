@@ -39,15 +39,11 @@ def epoch(
     order = order[: len(order) // batch * batch]
     keys = [(int(index), (seed, number, k)) for k, index in enumerate(order)]
     random = torch.Generator(device)
+    rest: Any = keys[skip * batch :]
     loader: DataLoader[Any] = DataLoader(
-        keys[skip * batch :],  # type: ignore[arg-type]
-        batch_size=batch,
-        num_workers=workers,
-        worker_init_fn=_init_worker,
-        prefetch_factor=2 if workers else None,
-        collate_fn=partial(_drawn, task, side),
-        pin_memory=random.device.type == "cuda",
-    )
+        rest, batch_size=batch, num_workers=workers, prefetch_factor=2 if workers else None,
+        collate_fn=partial(_drawn, task, side), worker_init_fn=_init_worker, pin_memory=random.device.type == "cuda",
+    )  # fmt: skip
     batches = iter(loader)
     try:
         for k, found in enumerate(batches, skip):

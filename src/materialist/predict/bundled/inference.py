@@ -126,22 +126,14 @@ def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dic
     height, width = photo.shape[:2]
     below, right = -height % STRIDE, -width % STRIDE
     padded = np.pad(photo, ((0, below), (0, right), (0, 0)), mode="edge")
-    # Rays are linear in the pixel, so they go on as such.
-    extended = np.empty((*padded.shape[:2], 2), np.float32)
-    extended[..., 0] = _linear(rays[0, :, 0], right)[None, :]
-    extended[..., 1] = _linear(rays[:, 0, 1], below)[:, None]
+    # Rays are linear in the pixel, and their point reflection at the border goes on as such.
+    extended = np.pad(rays, ((0, below), (0, right), (0, 0)), mode="reflect", reflect_type="odd")
     tensors = [torch.from_numpy(x).permute(2, 0, 1)[None].to(device) for x in (padded, extended)]
     with torch.inference_mode():
         maps = network(tensors[0].contiguous(memory_format=torch.channels_last), tensors[1])
     rows = {name: m[0] if name == "light" else m[0, :, :height, :width] for name, m in maps.items()}
     arrays = {name: m.permute(1, 2, 0).float().cpu().numpy() for name, m in rows.items()}
     return {n: np.ascontiguousarray(a[..., 0] if a.shape[-1] == 1 else a) for n, a in arrays.items()}
-
-
-def _linear(values: Array, more: int) -> Array:
-    """Evenly spaced values [n] and `more` further ones."""
-    step = (values[-1] - values[0]) / max(len(values) - 1, 1)
-    return np.concatenate([values, values[-1] + step * np.arange(1, more + 1)])
 
 
 def _network_size(size: tuple[int, int], side: int) -> tuple[int, int]:

@@ -70,13 +70,9 @@ class MatNet(StoredNetwork):
         features = self.pretrained(image, self.architecture.layers)
         materials = self.material_head(features)
         positive = F.relu(materials[:, :5])
-        return {
-            "depth": F.relu(self.depth_head(features)),
-            "albedo": positive[:, :3],
-            "roughness": positive[:, 3:4],
-            "metallic": positive[:, 4:5],
-            "normal": F.normalize(torch.tanh(materials[:, 5:]), dim=1, eps=1e-6),
-        }
+        depth, normal = F.relu(self.depth_head(features)), F.normalize(torch.tanh(materials[:, 5:]), dim=1, eps=1e-6)
+        albedo, roughness, metallic = positive.split([3, 1, 1], 1)
+        return {"depth": depth, "albedo": albedo, "roughness": roughness, "metallic": metallic, "normal": normal}
 
 
 class Encoder(nn.Module):
@@ -163,14 +159,9 @@ class Head(nn.Module):
     def __init__(self, width: int, pyramid: Sequence[int], fused: int, outputs: int):
         super().__init__()
         self.projects = nn.ModuleList(nn.Conv2d(width, channels, 1) for channels in pyramid)
-        self.resize_layers = nn.ModuleList(
-            [
-                nn.ConvTranspose2d(pyramid[0], pyramid[0], 4, stride=4),
-                nn.ConvTranspose2d(pyramid[1], pyramid[1], 2, stride=2),
-                nn.Identity(),
-                nn.Conv2d(pyramid[3], pyramid[3], 3, stride=2, padding=1),
-            ]
-        )
+        enlarge = [nn.ConvTranspose2d(channels, channels, n, stride=n) for channels, n in zip(pyramid, (4, 2))]
+        shrink = nn.Conv2d(pyramid[3], pyramid[3], 3, stride=2, padding=1)
+        self.resize_layers = nn.ModuleList([*enlarge, nn.Identity(), shrink])
         self.scratch = nn.ModuleDict()  # the name is the checkpoints'
         for k, channels in enumerate(pyramid, 1):
             self.scratch[f"layer{k}_rn"] = nn.Conv2d(channels, fused, 3, padding=1, bias=False)

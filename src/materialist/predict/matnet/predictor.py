@@ -1,11 +1,13 @@
 """The predictor `matnet[:FILE|:HUB_ID]`: the paper's network with published or own weights (docs/predictors.md)."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import torch
+from torch import Tensor
 from torch.nn import functional as F
 
 from materialist.errors import WeightsError
@@ -58,23 +60,29 @@ class MatNetPredictor(Predictor):
 
 def infer(network: MatNet, linear: Array, *, input_size: int = INPUT_SIZE) -> dict[str, Array]:
     """The network's raw outputs for a picture [H, W, 3] float32 linear, about [0, 1], as the published inference has
-    them: albedo, normal [H, W, 3] and roughness, metallic, depth [H, W], float32; see `MatNet.forward` for ranges.
+    them: albedo, normal [H, W, 3] and roughness, metallic, depth [H, W], float32; see `MatNet.forward` for ranges, and
+    `at_network_size`. The normals are not normalised again.
+    """
+    return at_network_size(network.eval(), linear, next(network.parameters()).device, input_size)
+
+
+def at_network_size(
+    run: Callable[[Tensor], dict[str, Tensor]], picture: Array, device: Any, input_size: int = INPUT_SIZE
+) -> dict[str, Array]:
+    """What `run` makes of a picture [H, W, 3] at the size of its encoder, as maps [H, W, C] or [H, W] float32.
 
     The picture is resized (bicubic, aspect kept) so that its shorter side is at least `input_size` >= 14 and both sides
-    are multiples of 14; the outputs are resized back (bilinear, corners aligned), the normals not normalised again.
+    are multiples of 14; the outputs [1, C, h, w] are resized back (bilinear, corners aligned).
     """
-    height, width = linear.shape[:2]
+    height, width = picture.shape[:2]
     rows, columns = network_size(height, width, input_size)
-    small = cv2.resize(linear, (columns, rows), interpolation=cv2.INTER_CUBIC)
-    parameter = next(network.parameters())
-    image = torch.from_numpy(small).permute(2, 0, 1)[None].to(parameter.device, torch.float32)
+    small = cv2.resize(picture, (columns, rows), interpolation=cv2.INTER_CUBIC)
+    image = torch.from_numpy(small).permute(2, 0, 1)[None].to(device, torch.float32)
     with torch.inference_mode():
-        outputs = network.eval()(image)
-        full = {
-            name: F.interpolate(x, (height, width), mode="bilinear", align_corners=True)[0]
-            for name, x in outputs.items()
-        }
-    return {name: np.ascontiguousarray(x.permute(1, 2, 0).squeeze(-1).cpu().numpy()) for name, x in full.items()}
+        outputs = run(image)
+        full = [F.interpolate(x, (height, width), mode="bilinear", align_corners=True)[0] for x in outputs.values()]
+    maps = (np.ascontiguousarray(x.permute(1, 2, 0).squeeze(-1).float().cpu().numpy()) for x in full)
+    return dict(zip(outputs, maps))
 
 
 def network_size(height: int, width: int, input_size: int = INPUT_SIZE) -> tuple[int, int]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from materialist.camera import unit
+from materialist.camera import turn_upright, unit
 from materialist.color import linear_to_srgb
 from materialist.geometry.silhouette import border_distance, object_size, spacing, window
 from materialist.solids.symmetry import mirrored
@@ -144,10 +144,7 @@ ANSWERS = 5
 def to_window(rays: Array) -> Array:
     """[3, 3] rotation of camera directions into the network's frame: level, -Z along the middle of rays [S, S, 3]."""
     forward = rays[len(rays) // 2, rays.shape[1] // 2].astype(np.float64)
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 1, 0])
-    right /= max(np.linalg.norm(right), 1e-9)
-    return np.stack([right, np.cross(right, forward), -forward])
+    return turn_upright(-forward / np.linalg.norm(forward)).T
 
 
 def _like(weight: Array, values: Array) -> Array:

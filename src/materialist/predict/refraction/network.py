@@ -8,6 +8,7 @@ thickness says little about which way the back leans.
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from materialist.predict.network import UNet, UNetArchitecture
 from materialist.predict.refraction.crop import ANSWERS, CHANNELS, MASK, MIRROR, NORMAL_X
@@ -34,10 +35,5 @@ class RefractionNet(UNet):
         inside = maps[:, MASK : MASK + 1]
         solid = (maps[:, MIRROR : MIRROR + 1] + LEAST) * (3 * torch.tanh(raw[:, :1] / 3)).exp()
         normal = maps[:, NORMAL_X : NORMAL_X + 3]
-        mirrored = torch.cat([normal[:, :2], -normal[:, 2:]], 1)
-        return torch.cat([solid, solid * raw[:, 1:2].sigmoid(), unit(mirrored + raw[:, 2:])], 1) * inside
-
-
-def unit(vectors: Tensor) -> Tensor:
-    """Vectors [B, 3, S, S] of length 1; none stay none."""
-    return vectors / vectors.square().sum(1, keepdim=True).clamp(min=1e-8).sqrt()
+        back = F.normalize(torch.cat([normal[:, :2], -normal[:, 2:]], 1) + raw[:, 2:], dim=1, eps=1e-4)
+        return torch.cat([solid, solid * raw[:, 1:2].sigmoid(), back], 1) * inside

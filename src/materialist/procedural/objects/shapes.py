@@ -302,13 +302,6 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
 
-def turn_upright(back: Array) -> Array:
-    """[3, 3] rotation whose columns are right, up and the unit direction `back` [3], with right level."""
-    right = np.cross([0, 1, 0], back)
-    right /= max(np.linalg.norm(right), 1e-9)
-    return np.stack([right, np.cross(back, right), back], -1)
-
-
 def leaves(rng: np.random.Generator, roots: Array, directions: Array, length: float, width: float) -> Solid:
     """Bent leaves of six triangles each, from roots [N, 3] along unit directions [N, 3]."""
     n = len(roots)
