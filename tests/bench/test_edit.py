@@ -19,7 +19,7 @@ def cases(mitsuba):
 
 def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
     sample, found = cases
-    before = sample.render(sample.envmap, spp=64, seed=3)
+    before = sample.scene.render(sample.envmap, spp=64, seed=3)
     for kind in ("hue", "metal", "glass", "remove"):
         edit = found[kind]
         after = edit.truth.render(edit.envmap, spp=64, seed=3)

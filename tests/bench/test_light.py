@@ -14,8 +14,8 @@ def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
     grey = np.full_like(found, sample.envmap.mean())
     assert metrics.sh_error(found, sample.envmap) < 0.7 * metrics.sh_error(grey, sample.envmap)
     photo = sample.photo.linear
-    better = metrics.psnr(sample.render(found, spp=64), photo)
-    assert better > 3 + metrics.psnr(sample.render(grey, spp=64), photo)
+    better = metrics.psnr(sample.scene.render(found, spp=64), photo)
+    assert better > 3 + metrics.psnr(sample.scene.render(grey, spp=64), photo)
 
 
 def test_maps_are_given_as_the_method_says(sample):

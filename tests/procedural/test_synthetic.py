@@ -32,9 +32,9 @@ def test_the_sky_of_the_photo_is_the_envmap(sample):
 
 
 def test_render_repeats_the_photo_and_is_linear_in_the_light(sample):
-    again = sample.render(sample.envmap, spp=64, seed=5)
+    again = sample.scene.render(sample.envmap, spp=64, seed=5)
     assert metrics.psnr(again, sample.photo.linear) > 25
-    twice = sample.render(2 * sample.envmap, spp=64, seed=5)
+    twice = sample.scene.render(2 * sample.envmap, spp=64, seed=5)
     assert np.allclose(twice, 2 * again, rtol=1e-3, atol=1e-4)
 
 

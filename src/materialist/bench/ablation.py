@@ -199,7 +199,7 @@ def _fov(photo: _Photo) -> Iterator[Row]:
         scene = true_scene(seen, completion="planes", seed=bench.seed)
         how: dict[str, Any] = {"spp": bench.spp, "seed": bench.seed + 1, "device": bench.device}
         row, relit = photo.against_photo(name, rendered(scene, **how)), rendered(replace(scene, envmap=other), **how)
-        truth = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
+        truth = sample.scene.render(other, spp=bench.spp, seed=bench.seed + 3)
         yield {**row, "relit_psnr": metrics.psnr(relit, truth)}
 
 

@@ -71,7 +71,7 @@ class EditBench(Benchmark):
         self, edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: tuple[Scene, float], report: Report
     ) -> Iterator[Row]:
         """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet."""
-        before = sample.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
+        before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
         caustics = self.caustics if edit.kind == "glass cup" else 1
         after = edit.truth.render(edit.envmap, spp=caustics * self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)

@@ -134,8 +134,8 @@ class _Stage:
     def __init__(self, bench: LightBench, sample: SyntheticSample, other: Array):
         """`other` [h, 2h, 3] is the light of the relit pictures."""
         self.bench, self.sample, self.other = bench, sample, other
-        self.photo = sample.render(sample.envmap, spp=bench.spp, seed=bench.seed + 2)
-        self.relit_photo = sample.render(other, spp=bench.spp, seed=bench.seed + 3)
+        self.photo = sample.scene.render(sample.envmap, spp=bench.spp, seed=bench.seed + 2)
+        self.relit_photo = sample.scene.render(other, spp=bench.spp, seed=bench.seed + 3)
 
     def relit(self) -> Iterator[Row]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
@@ -162,7 +162,7 @@ class _Stage:
 
     def _of_light(self, envmap: Array) -> dict[str, float]:
         """The map against the true one, and the true scene under it against the photo."""
-        picture = self.sample.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
+        picture = self.sample.scene.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
         of_map = metrics.envmap_metrics(envmap, self.sample.envmap)
         for part, mask in (("render", None), ("surface", self.sample.truth.depth > 0)):
             for name in ("ssim", "psnr", "mse") if mask is None else ("ssim", "psnr"):

@@ -88,7 +88,7 @@ class PhotoAloneBench(Benchmark):
                     "method": f"maps: {name}", "sample": sample.name, **map_figures(maps, sample),
                     "light": light_error(fitted.envmap, sample.envmap), **cost,
                 }  # fmt: skip
-            before = sample.render(sample.envmap, spp=self.truth_spp, seed=5)
+            before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=5)
             for edit in edits(sample, light, kinds):
                 for row in self._compared(edit, sample, before, scenes, report):
                     yield {**row, "sample": sample.name}

@@ -1,5 +1,6 @@
 """`materialist train ...`: the sub-commands that make training data and train networks."""
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,13 +61,12 @@ def data(
         return
     from materialist.procedural.dataset import produce
 
+    start = time.monotonic()
     with stage_progress(quiet=computing.as_json) as progress:
         made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
-    lines = [f"{made.existing + made.rendered} samples in {output} ({made.rendered} new, {made.seconds:.0f} s)"]
-    report_success(
-        "train data", computing.as_json, lines, output=str(output), rendered=made.rendered, existing=made.existing,
-        seconds=made.seconds,
-    )  # fmt: skip
+    facts = {"output": str(output), "rendered": made, "existing": count - made, "seconds": time.monotonic() - start}
+    lines = [f"{count} samples in {output} ({made} new, {facts['seconds']:.0f} s)"]
+    report_success("train data", computing.as_json, lines, **facts)
 
 
 def matnet(

@@ -1,7 +1,5 @@
 """The procedural data set on disk: whole samples only, made by one process or several, resumable."""
 
-import time
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,23 +23,14 @@ _IDENTITY = ("format", "size", "seed", "split", "options", "content")
 """What decides what the samples of a set hold."""
 
 
-@dataclass(frozen=True)
-class Made:
-    """What a call of `produce` did."""
-
-    rendered: int
-    existing: int
-    seconds: float
-
-
 def produce(
     folder: str | Path, options: DataSetOptions, *, count: int, workers: int = 1, resume: bool = False,
     progress: Progress = lambda *_: None,
-) -> Made:  # fmt: skip
+) -> int:  # fmt: skip
     """Render the samples 0 .. count - 1 that `folder` lacks; sample i depends on the options and i alone.
 
     Raises InputError for bad numbers, a mesh that is damaged, a folder that holds something and no `resume`, or one
-    begun with other options; OutputError when the folder cannot be written.
+    begun with other options; OutputError when the folder cannot be written. Returns how many were rendered.
     """
     folder = Path(folder)
     if count < 1 or workers < 1:
@@ -53,9 +42,8 @@ def produce(
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)
-    start, paths = time.monotonic(), [sample_path(folder, k) for k in range(count)]
-    made = complete(paths, partial(make_sample, options=options), "samples", progress, workers)
-    return Made(made, count - made, time.monotonic() - start)
+    paths = [sample_path(folder, k) for k in range(count)]
+    return complete(paths, partial(make_sample, options=options), "samples", progress, workers)
 
 
 def sample_path(folder: Path, index: int) -> Path:

@@ -45,7 +45,7 @@ def developed(image: Tensor, random: torch.Generator) -> tuple[Tensor, Tensor]:
 
 
 class _Draw:
-    """Random numbers of pictures, [B, channels, 1, 1]."""
+    """Random numbers of pictures, [B, channels, 1, 1] or as large as pictures."""
 
     def __init__(self, count: int, device: torch.device, random: torch.Generator):
         self.count, self.device, self.random = count, device, random
@@ -54,14 +54,12 @@ class _Draw:
         shape = self.count, channels, 1, 1
         return low + (high - low) * torch.rand(shape, generator=self.random, device=self.device)
 
-    def normal(self, channels: int = 1) -> Tensor:
-        return torch.randn((self.count, channels, 1, 1), generator=self.random, device=self.device)
+    def normal(self, channels: int = 1, height: int = 1, width: int = 1) -> Tensor:
+        shape = self.count, channels, height, width
+        return torch.randn(shape, generator=self.random, device=self.device)
 
     def chance(self, probability: float) -> Tensor:
         return self.uniform() < probability
-
-    def noise(self, like: Tensor) -> Tensor:
-        return torch.randn(like.shape, generator=self.random, device=self.device)
 
 
 def _gains(image: Tensor, draw: _Draw) -> Tensor:
@@ -104,7 +102,7 @@ def _vignetted(image: Tensor, draw: _Draw) -> Tensor:
 
 def _noisy(image: Tensor, draw: _Draw) -> Tensor:
     shot, read = 10 ** draw.uniform(-4.8, -2.9), 10 ** draw.uniform(-4, -2.2)
-    noise = draw.noise(image)
+    noise = draw.normal(*image.shape[1:])
     blotched = _smoothed(noise, draw.uniform(0.4, 0.8), 2) * 1.6
     noise = torch.where(draw.chance(0.4), blotched, noise)
     deviation = (shot * image.clamp(max=1) + (read * 0.3) ** 2).sqrt()

@@ -46,10 +46,6 @@ class SyntheticSample:
     scene: TrueScene
     name: str = ""
 
-    def render(self, envmap: Array, spp: int = PHOTO_SPP, seed: int = 0) -> Array:
-        """[H, W, 3] float32 linear, unclipped: the true scene under another light [h, 2h, 3]."""
-        return self.scene.render(envmap, spp, seed)
-
 
 def make_sample(
     scene_index: int, view_index: int, light_index: int, *, size: int | tuple[int, int] = 128,

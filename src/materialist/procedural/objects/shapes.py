@@ -59,10 +59,7 @@ def lathe(profile: Array, n: int = 96) -> Solid:
     """Surface of revolution of a profile [P, 2] (radius, height), walked upwards on the outside, y up."""
     phi = np.linspace(0, 2 * np.pi, n + 1)
     radius, height = profile[:, :1], profile[:, 1:]
-    points = np.stack(
-        [radius * np.cos(phi), np.broadcast_to(height, (len(profile), n + 1)), radius * np.sin(phi)], axis=-1
-    )
-    return _grid(points)
+    return _grid(np.stack(np.broadcast_arrays(radius * np.cos(phi), height, radius * np.sin(phi)), axis=-1))
 
 
 def capsule(radius: float, length: float) -> Solid:
