@@ -13,13 +13,9 @@ from materialist.batches.remote import is_url, list_url, shown
 from materialist.errors import InputError
 from materialist.io.atomic import MARKER
 from materialist.io.bitmap import FORMATS
-from materialist.io.decode import RAW_SUFFIXES
+from materialist.io.decode import SUFFIXES
 from materialist.io.photo import PREFIX
 
-SUFFIXES = RAW_SUFFIXES | frozenset(
-    (".png", ".jpg", ".jpeg", ".heic", ".heif", ".tif", ".tiff", ".webp", ".exr", ".hdr", ".bmp", ".avif", ".mpo")
-)
-"""Suffixes of the photos of a folder; a list may name others."""
 LONGEST_NAME = 100
 """Bytes of a name; file systems take 255, and temporaries add to it."""
 

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
 def batch(
     source: Annotated[
-        str,
-        typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL."),
+        str, typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL.")
     ],
     output: Annotated[Path, output_option("RUNS", "Folder of the results.")],
     how: BatchOptions,

@@ -14,10 +14,7 @@ from materialist.errors import InputError
 
 def bench(
     context: typer.Context,
-    name: Annotated[
-        str,
-        typer.Argument(metavar="NAME", help=f"{', '.join(BENCHMARKS)}."),
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help=f"{', '.join(BENCHMARKS)}.")],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],
     run: Run,
     data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,

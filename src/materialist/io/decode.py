@@ -22,7 +22,10 @@ RAW_SUFFIXES = frozenset(
     )
 )
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
-
+SUFFIXES = RAW_SUFFIXES | {
+    ".png", ".jpg", ".jpeg", ".mpo", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr",
+}  # fmt: skip
+"""Usual file names of photos; `decode` reads others, too."""
 
 _EXR, _RADIANCE = b"\x76\x2f\x31\x01", (b"#?RADIANCE", b"#?RGBE")
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")

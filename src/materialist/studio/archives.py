@@ -108,11 +108,6 @@ def _extract(given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder
 def _named(steps: Iterable[Step]) -> set[str]:
     """The files that steps name. Raises InputError for a name that is a path."""
     names: set[str] = set()
-
-    def noted(option: str, name: str) -> str:
-        names.add(name)
-        return name
-
     for step in steps:
-        with_plain_files(step, noted)
+        with_plain_files(step, lambda _, name: names.add(name))
     return names

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -96,6 +96,11 @@ def slider(name: str, label: str, step: float, **narrower: Any) -> Any:
     declared = declarations(control.operation)[control.option][0]
     given = {"minimum": declared.low, "maximum": declared.high, "value": control.default, "elem_id": name, **narrower}
     return gr.Slider(step=step, label=label, buttons=[], **given)
+
+
+def file_field(name: str, label: str, suffixes: Iterable[str]) -> Any:
+    """A field for one file, its name its id on the page."""
+    return gr.File(label=label, type="filepath", height=150, file_types=sorted(suffixes), elem_id=name)
 
 
 def set_option(name: str, session: Session, value: Any) -> None:

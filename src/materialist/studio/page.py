@@ -8,17 +8,8 @@ import gradio as gr
 
 from materialist.edits.select import sam
 from materialist.errors import InputError
-from materialist.studio import (
-    SETTINGS,
-    asset,
-    objects,
-    tab_light,
-    tab_look,
-    tab_material,
-    tab_object,
-    tab_open,
-    tab_take,
-)
+from materialist.studio import SETTINGS, asset, tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
+from materialist.studio.objects import place
 from materialist.studio.selection import read_pick
 from materialist.studio.session import Session
 from materialist.studio.stage import stage
@@ -112,7 +103,7 @@ def _pick(session: Session, data: Any, sam: bool, kelvin: float, power: float, b
         x, y = wanted["at"]
         tab_light.place_lamp(session, x, y, kelvin, power, before)
     elif wanted["tool"] == "place":
-        objects.place(session, *wanted["at"])
+        place(session, *wanted["at"])
     else:
         session.pick(wanted, "sam2" if sam else "network")
 

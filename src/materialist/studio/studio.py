@@ -142,10 +142,6 @@ class Studio:
             del session
             free_memory()
 
-    def final_file(self, session: Session) -> Path:
-        """Where a page's path-traced pictures lie, without the suffix; they go when the studio ends."""
-        return self.work.cache / f"final-{session.mark}"
-
     def public_copy(self, file: Path, name: str = "") -> str:
         """A copy of a result in the cache, the only place of served files, in a folder with a random name.
 

@@ -10,7 +10,7 @@ import numpy as np
 from materialist.edits.light import presets
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.controls import SUN, number_text, slider
+from materialist.studio.controls import SUN, file_field, number_text, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
 from materialist.types import Array
@@ -25,10 +25,8 @@ def layout(context: PageContext) -> None:
             _gallery(), label="Light from all around", columns=3, height="auto", allow_preview=False,
             object_fit="cover", interactive=False, buttons=[], elem_id="lights", format="jpeg",
         )  # fmt: skip
-        parts["own_map"] = gr.File(
-            label="Your own environment map (2:1; HDR or EXR)", type="filepath", height=150, elem_id="own_map",
-            file_types=[".exr", ".hdr", ".png", ".jpg"],
-        )  # fmt: skip
+        suffixes = (".exr", ".hdr", ".png", ".jpg")
+        parts["own_map"] = file_field("own_map", "Your own environment map (2:1; HDR or EXR)", suffixes)
         parts["rotate"] = slider("rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
         parts["ambient"] = slider("ambient", "Dim or brighten", 0.02, maximum=2)
         with gr.Accordion("Sun", open=False):

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import gradio as gr
 
+from materialist.io.decode import RAW_SUFFIXES, SUFFIXES
 from materialist.studio import uploads
-from materialist.studio.controls import hex_colour, slider
+from materialist.studio.controls import file_field, hex_colour, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
 
@@ -26,9 +27,7 @@ def layout(context: PageContext) -> None:
             parts["colour"] = gr.ColorPicker("#808080", label="One colour instead", min_width=120)
             parts["own"] = gr.Button("Own colours again", size="sm", min_width=120)
         with gr.Accordion("Texture", open=False):
-            parts["texture"] = gr.File(
-                label="A picture to lay on the surface", type="filepath", height=150, file_types=sorted(uploads.PHOTOS)
-            )
+            parts["texture"] = file_field("texture", "A picture to lay on the surface", SUFFIXES - RAW_SUFFIXES)
             parts["texture_scale"] = slider("texture_scale", "Size of the texture", 0.05, minimum=0.1, maximum=4)
         parts["as_fitted"] = gr.Button("Roughness and metallic as they were found", size="sm")
 

@@ -8,7 +8,7 @@ from typing import Any
 import gradio as gr
 
 from materialist.studio import objects, uploads
-from materialist.studio.controls import hex_colour, slider
+from materialist.studio.controls import file_field, hex_colour, slider
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext, Updates, box
 
@@ -20,10 +20,7 @@ def layout(context: PageContext) -> None:
     with gr.Tab("Objects", id="object"):
         gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
         parts["thing"] = gr.Dropdown([*objects.LIBRARY], value=None, label="Object", elem_id="thing")
-        parts["own_mesh"] = gr.File(
-            elem_id="own_mesh", label="Your own: one GLB, PLY, OBJ or STL file", type="filepath", height=150,
-            file_types=[".glb", ".ply", ".obj", ".stl"],
-        )  # fmt: skip
+        parts["own_mesh"] = file_field("own_mesh", "Your own: one GLB, PLY, OBJ or STL file", uploads.MESHES)
         parts["scale"] = slider("scale", "Size", 0.05, minimum=0.1, maximum=5)
         parts["turn"] = slider("turn", "Turn, degrees", 1, minimum=-180, maximum=180)
         with gr.Row():

@@ -11,9 +11,11 @@ import numpy as np
 
 import materialist as mt
 from materialist.errors import InputError
+from materialist.io.decode import SUFFIXES
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, archives, tasks, uploads
+from materialist.studio.controls import file_field
 from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
 from materialist.studio.widgets import LONG, PREDICTORS, PageContext, Updates, box
@@ -27,10 +29,7 @@ _READY = "Ready: click an object, then move a slider."
 def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Open", id="open"):
-        parts["file"] = gr.File(
-            label="Drop a photo, or a zipped scene (up to 60 MB)", type="filepath", height=140, elem_id="file",
-            file_types=[*sorted(uploads.PHOTOS), *sorted(uploads.RAW_SUFFIXES), ".zip"],
-        )  # fmt: skip
+        parts["file"] = file_field("file", "Drop a photo, or a zipped scene (up to 60 MB)", SUFFIXES | {".zip"})
         parts["facts"] = gr.HTML("", elem_id="facts", js_on_load=None)
         with gr.Row():
             parts["predictor"] = gr.Dropdown(
@@ -73,13 +72,10 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
 
     def start(session: Session, file: str | None, predictor: str, size: int, fov: str) -> Iterator[Updates]:
         if file is not None and Path(file).suffix.lower() == ".zip":
-            project = _unpack(context, session, Path(file))
+            yield from _show_project(context, session, _unpack(context, session, Path(file)))
         else:
             project, job = _start_inversion(context, session, file, predictor, size, fov)
             yield from _follow_inversion(context, session, project, job)
-            if not project.ready:
-                return
-        yield from _show_project(context, session, project)
 
     def arrive(session: Session) -> Iterator[Updates]:
         known, last = _projects(context, session), studio.last.get(session.person)
@@ -142,7 +138,7 @@ def _unpack(context: PageContext, session: Session, file: Path) -> Project:
 
 
 def _follow_inversion(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[Updates]:
-    """Progress and first pictures of an inversion until it is over."""
+    """Progress and first pictures of an inversion until it is over; then the project, if it is done."""
     studio = context.studio
     session.note_job(job)
     studio.last[session.person] = project.name
@@ -163,6 +159,8 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
         shutil.rmtree(project.folder, ignore_errors=True)
     before = {"found": gr.update(visible=False, value=[]), "stage": stage(session)} if failed else {}
     yield {"start": gr.update(interactive=True), **before}  # at last: a click before the event's end is lost
+    if project.ready:
+        yield from _show_project(context, session, project)
 
 
 def _resume(context: PageContext, session: Session, name: str | None) -> Iterator[Updates]:
@@ -174,9 +172,9 @@ def _resume(context: PageContext, session: Session, name: str | None) -> Iterato
     running = [j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder]
     if running:
         yield from _follow_inversion(context, session, project, running[0])
-    if project.ready:
+    elif project.ready:
         yield from _show_project(context, session, project)
-    elif not running:
+    else:
         raise InputError("That photo was not taken apart to the end; start again.")
 
 

@@ -8,6 +8,7 @@ import gradio as gr
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.archives import pack
+from materialist.studio.controls import file_field
 from materialist.studio.session import EDITS, Session
 from materialist.studio.stage import stage
 from materialist.studio.widgets import PageContext, Updates, box
@@ -34,10 +35,8 @@ def layout(context: PageContext) -> None:
         parts["what"] = gr.Radio(choices, value="png", label="What to take", elem_id="what")
         parts["make"] = gr.Button("Prepare the file", variant="primary", elem_id="make")
         parts["download"] = gr.DownloadButton("Download", visible=False, elem_id="download")
-        parts["recipe"] = gr.File(
-            label="Load an edits.yaml, or the zip with its masks", type="filepath", height=150, elem_id="recipe",
-            file_types=[".zip", ".yaml", ".yml"],
-        )  # fmt: skip
+        label = "Load an edits.yaml, or the zip with its masks"
+        parts["recipe"] = file_field("recipe", label, (".zip", ".yaml", ".yml"))
         parts["commands"] = gr.Textbox(
             "", label="The same on the command line", lines=4, interactive=False, buttons=["copy"], elem_id="commands"
         )

@@ -5,13 +5,11 @@ from pathlib import Path
 
 from materialist.errors import InputError
 from materialist.io.bitmap import check_size
-from materialist.io.decode import RAW_SUFFIXES, image_size
+from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, image_size
 from materialist.studio import SETTINGS
 from materialist.studio.workspace import store
 
-PHOTOS = frozenset(
-    (".png", ".jpg", ".jpeg", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr")
-)
+MESHES = (".glb", ".ply", ".obj", ".stl")
 
 
 def stored(workspace: Path, file: Path, option: str) -> str:
@@ -23,7 +21,7 @@ def stored(workspace: Path, file: Path, option: str) -> str:
 def checked_picture(path: Path) -> str:
     """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large."""
     suffix, shown = path.suffix.lower(), shown_name(path)
-    if suffix not in PHOTOS and suffix not in RAW_SUFFIXES:
+    if suffix not in SUFFIXES:
         raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
     check_bytes(path, shown)
     if suffix not in RAW_SUFFIXES:
@@ -50,7 +48,7 @@ def checked_mesh(path: Path) -> str:
     PLY, STL and binary glTF hold everything in one file; OBJ is taken without its material library.
     """
     suffix, shown = path.suffix.lower(), shown_name(path)
-    if suffix not in (".ply", ".obj", ".stl", ".glb"):
+    if suffix not in MESHES:
         raise InputError(f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file.")
     check_bytes(path, shown)
     content = path.read_bytes()

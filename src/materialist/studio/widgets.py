@@ -166,7 +166,7 @@ class PageContext:
         steps, known = session.edits.active, session.final
         if known is not None and known.of(steps) and known.spp >= spp:
             return known
-        target = self.studio.final_file(session)
+        target = self.studio.work.cache / f"final-{session.mark}"  # goes when the studio ends
         if not (yield from self.work(session, tasks.final, target, steps=steps, spp=spp)):
             return None
         session.final = FinalPicture(steps, target, spp)

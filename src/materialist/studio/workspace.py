@@ -136,22 +136,17 @@ def store(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
 
 
 def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:
-    """The steps of a list of edits, which may name files of this workspace only. Raises InputError."""
-    return tuple(confined(step, workspace) for step in read_recipe(file))
-
-
-def confined(step: Step, workspace: Path) -> Step:
-    """The step with its files in the workspace. Raises InputError where a file lies elsewhere or is missing."""
+    """The steps of a list of edits. Raises InputError where one names a file that is not in this workspace."""
 
     def here(option: str, name: str) -> str:
         if not (workspace / name).is_file():
             raise InputError(f"The {option} {name} of the list of edits is not here; load the zip that has its files.")
         return name
 
-    return replace(with_plain_files(step, here), folder=workspace)
+    return tuple(replace(with_plain_files(step, here), folder=workspace) for step in read_recipe(file))
 
 
-def with_plain_files(step: Step, use: Callable[[str, str], str]) -> Step:
+def with_plain_files(step: Step, use: Callable[[str, str], Any]) -> Step:
     """`with_files`, where every file is named without a folder. Raises InputError for other names."""
     if step.options.get("inpaint", "sd") != "sd":
         raise InputError("The studio takes no inpainter but 'sd'; change the inpaint of the list of edits.")
