@@ -23,7 +23,7 @@ RAW_SUFFIXES = frozenset(
 )
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
 SUFFIXES = RAW_SUFFIXES | {
-    ".png", ".jpg", ".jpeg", ".mpo", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr",
+    ".png", ".jpg", ".jpeg", ".mpo", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr"
 }  # fmt: skip
 """Usual file names of photos; `decode` reads others, too."""
 
