@@ -82,7 +82,7 @@ def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
         removed = remove(replace(scene, materials=photo.maps.materials), stage.mask)
         return Background(removed.photo.linear, Prediction(removed.materials, removed.normal, removed.depth))
     hole, maps = grown(stage.mask, 1), stage.room.truth
-    return Background(patched(scene.photo.linear, hole, ~hole, maps.depth, np.zeros(hole.shape, int)), maps)
+    return Background(patched(scene.photo.linear, hole, ~hole, np.zeros(hole.shape, int)), maps)
 
 
 def two_interface(case: Case, found: Thickness, behind: Background, *, papers_back: bool = False) -> Array:

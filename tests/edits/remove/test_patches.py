@@ -17,11 +17,10 @@ def stripes(height=72, width=96, period=8):
     return np.stack([0.2 + 0.6 * one, 0.5 - 0.3 * one, 0.3 + 0 * one], -1)
 
 
-def filled(picture, hole, usable=None, depth=None, label=None):
+def filled(picture, hole, usable=None, label=None):
     """What was in the hole is spoiled first."""
-    depth = np.ones(hole.shape) if depth is None else depth
     usable, label = ~hole if usable is None else usable, 0 * hole if label is None else label
-    return patched(np.where(hole[..., None], 0.9, picture), hole, usable, depth, label, seed=1)
+    return patched(np.where(hole[..., None], 0.9, picture), hole, usable, label, seed=1)
 
 
 def test_stripes_go_on_through_the_hole():

@@ -40,7 +40,7 @@ def picture_behind(
             inpaint = inpainter(inpaint, seed=options.seed, device=options.device)
         return np.asarray(inpaint(scene.photo.linear, hole), np.float32), "inpainter", []
     if background is None:
-        return patched(scene.photo.original, hole, usable, found.depth, found.label, options.seed), "patches", []
+        return patched(scene.photo.original, hole, usable, found.label, options.seed), "patches", []
     notes: list[str] = []
     if isinstance(background, str | Path):
         from materialist.io.photo import decode_photo

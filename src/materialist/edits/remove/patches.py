@@ -2,7 +2,7 @@
 
 Patches are matched from a small size of the whole picture to its full one, so that borders of things and of surfaces
 go on through the hole. They come from the surfaces that go on there or from nearby, not from other things, and a
-guide prefers those of the same surface, as far away.
+guide prefers those of the same surface.
 """
 
 import sys
@@ -27,7 +27,6 @@ class PatchSettings:
     radius: float = 1 / 150  # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
     near: float = 0.4  # distance to the hole, in its sizes, up to which anything may be copied; more: other things
     guide: float = 0.25  # weight of the guide beside the patches' colours; more: less from other surfaces
-    inverse: float = 0.3  # guide: of inverse depth, relative to that of the nearest things
     surface: float = 0.1  # guide: from one surface to another
     floor: float = 0.05  # radiance below which HDR values are compared by difference, above by ratio; by eye
 
@@ -37,11 +36,11 @@ _LOCK = threading.Lock()
 """The library has one seed for all threads."""
 
 
-def patched(photo: Array, hole: Array, usable: Array, depth: Array, label: Array, seed: int = 0) -> Array:
+def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 0) -> Array:
     """[h, w, 3] float32 linear: a photo [H0, W0, 3] with the hole [H, W] bool filled, at its size or `longest`.
 
-    usable [H, W] bool: what may be copied. depth: [H, W] planar, 0 = sky. label: [H, W] int: the surface of a pixel,
-    as `behind.HiddenGeometry`; both are what is hidden in the hole. Raises SetupError without a working library.
+    usable [H, W] bool: what may be copied. label: [H, W] int: the surface of a pixel, as `behind.HiddenGeometry`, in
+    the hole that which is hidden. Raises SetupError without a working library.
     """
     native = photo.shape[:2]
     scale = min(1.0, SETTINGS.longest / max(native))
@@ -55,18 +54,13 @@ def patched(photo: Array, hole: Array, usable: Array, depth: Array, label: Array
     kept &= ~gap
     top = max(1.0, float(picture.max()))
     levels = np.round(255 * _encoded(picture, top)).astype(np.uint8)
-    filled = _inpainted(levels, gap, kept, resample.values(_guide(depth, label), shape), seed).astype(np.float32) / 255
+    surface = resample.values((SETTINGS.surface * label).astype(np.float32), shape)
+    guide = np.stack([surface, 0 * surface, 0 * surface], -1)
+    filled = _inpainted(levels, gap, kept, guide, seed).astype(np.float32) / 255
     plain = gap & (filled == 0).all(-1)  # where no patch fitted at all
     if plain.any():
         filled = np.where(plain[..., None], membrane(filled, ~gap & ~kept), filled)
     return np.where(gap[..., None], _decoded(filled, top), picture).astype(np.float32)
-
-
-def _guide(depth: Array, label: Array) -> Array:
-    """[H, W, 3] float32: inverse depth, relative to that of the nearest things, and surface; the third is not used."""
-    inverse = np.where(depth > 0, 1 / np.maximum(depth, 1e-9), 0)
-    relative = np.minimum(inverse / max(float(np.quantile(inverse, 0.98)), 1e-9), 2)
-    return np.stack([SETTINGS.inverse * relative, SETTINGS.surface * label, 0 * inverse], -1).astype(np.float32)
 
 
 def _encoded(linear: Array, top: float) -> Array:
