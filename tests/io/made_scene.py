@@ -35,18 +35,10 @@ def make_scene(height: int = 24, width: int = 33) -> Scene:
     )
     label = rng.integers(-1, 3, (height, width)).astype(np.int8)
     return Scene(
-        camera,
-        photo,
-        prior,
-        materials,
-        normal,
-        depth,
-        Geometry(make_mesh(depth, normal, camera), label),
-        random(8, 16, 3) * 1e4,
-        random(height, width, 3) * 2,
-        report,
+        camera, photo, prior, materials, normal, depth, Geometry(make_mesh(depth, normal, camera), label),
+        random(8, 16, 3) * 1e4, random(height, width, 3) * 2, report,
         {"tool": "test", "seed": 3, "options": {"engine": "transport", "tau": 6.0, "mask": None}},
-    )
+    )  # fmt: skip
 
 
 def make_mesh(depth: np.ndarray, normal: np.ndarray, camera: Camera) -> Mesh:

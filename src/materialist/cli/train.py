@@ -162,7 +162,7 @@ def _train(
     options = RunOptions(checkpoint_seconds=training.every, workers=workers, seed=training.seed)
     device = "cuda" if on_gpu(training.device) else "cpu"
     note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
-    checkpoint.resumed(output, kind, resume=training.resume)
+    checkpoint.load(output, kind, resume=training.resume)
     with stage_progress(quiet=training.as_json) as progress:
         trainer = Trainer(
             make_task(init, progress), output, budget=budget, options=options, device=device, resume=training.resume,

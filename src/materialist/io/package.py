@@ -57,20 +57,14 @@ def _read(folder: Path, most: float) -> Scene:
     before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
     label = read_map(folder / "plane_label.png", shape).astype(np.int16) - 1
     return Scene(
-        camera=camera,
-        photo=_read_photo(folder, photo, shape),
+        camera=camera, photo=_read_photo(folder, photo, shape), materials=materials, normal=normal, depth=depth,
         prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {})),
-        materials=materials,
-        normal=normal,
-        depth=depth,
         geometry=Geometry(read_ply(folder / "mesh.ply"), label.astype(np.int8)),
-        envmap=read_map(folder / "envmap.exr"),
-        rerender=read_map(folder / "rerender.exr", (*shape, 3)),
-        report=_read_report(folder),
-        provenance=meta["provenance"],
+        envmap=read_map(folder / "envmap.exr"), rerender=read_map(folder / "rerender.exr", (*shape, 3)),
+        report=_read_report(folder), provenance=meta["provenance"],
         lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
         bodies=read_bodies(folder, meta.get("bodies", [])),
-    )
+    )  # fmt: skip
 
 
 def _write(scene: Scene, folder: Path) -> None:

@@ -28,12 +28,6 @@ class Architecture:
         """As JSON gives them back."""
         return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
 
-    @classmethod
-    def from_dict(cls, values: dict[str, Any]) -> Self:
-        """The inverse of `as_dict`; raises TypeError for unknown names."""
-        found: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}
-        return cls(**found)
-
 
 class StoredNetwork(nn.Module):
     """A network with an architecture, kept in one .safetensors file (float16) that names its kind."""
@@ -68,7 +62,8 @@ class StoredNetwork(nn.Module):
                 f"{path} has format {header.get('format')!r}, not {cls.FORMAT!r}; make it with: {cls.COMMAND}."
             )
         try:
-            network = cls(cls.ARCHITECTURE.from_dict(json.loads(header["architecture"])))
+            stored = json.loads(header["architecture"]).items()
+            network = cls(cls.ARCHITECTURE(**{k: tuple(v) if isinstance(v, list) else v for k, v in stored}))
             facts = json.loads(header.get("facts", "{}"))
         except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
             raise WeightsError(f"{path} describes no usable network ({error}); make it with: {cls.COMMAND}.") from error

@@ -9,6 +9,12 @@ EDGE_RATIO = 1.1
 """Neighbouring depths further apart than this ratio are on two surfaces and are not mixed."""
 
 
+def with_longer_side(size: tuple[int, ...], side: int) -> tuple[int, int]:
+    """A size (height, width) with that longer side."""
+    factor = side / max(size)
+    return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
+
+
 def values(array: Array, size: tuple[int, ...]) -> Array:
     """[H, W] or [H, W, 3] float32 brought to `size` (height, width): area means down, bilinear up."""
     shrinks = array.shape[0] > size[0] or array.shape[1] > size[1]

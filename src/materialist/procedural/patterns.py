@@ -62,11 +62,7 @@ def _spots(rng: np.random.Generator) -> Array:
 
 
 _KINDS = {
-    "plain": lambda rng: np.zeros((SIZE, SIZE)),
-    "checker": _checker,
-    "noise": lambda rng: noise(rng, 1.6),
-    "stripes": _stripes,
-    "wood": _wood,
-    "spots": _spots,
-}
+    "plain": lambda rng: np.zeros((SIZE, SIZE)), "checker": _checker, "noise": lambda rng: noise(rng, 1.6),
+    "stripes": _stripes, "wood": _wood, "spots": _spots,
+}  # fmt: skip
 KINDS = tuple(_KINDS)

@@ -70,6 +70,7 @@ class Shading:
         texture: Any = mi.Texture2f
         self.env = texture(tensor(mi, packed.env), wrap_mode=dr.WrapMode.Repeat)
         self.rows = dr.opaque(mi.Float, float(len(packed.env)))
+        self.portal_count = dr.opaque(mi.Float, float((packed.portals[:, 12] > 0).sum()))
         self.shares = [dr.opaque(mi.Float, float(share)) for share in packed.shares]
         self.turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
         """Three rows of the rotation from camera to scene directions."""
@@ -171,7 +172,7 @@ class Shading:
         d_sky = self._texel_direction(dr.gather(mi.UInt32, self.env_table, entry), draws.light)
         # A portal: a uniform point on it.
         count = dr.maximum(mi.Float(0), draws.which - s0) / dr.maximum(s1, 1e-6)
-        k = mi.UInt32(dr.clip(count, 0, 0.999999) * self._portal_count())
+        k = mi.UInt32(dr.clip(count, 0, 0.999999) * self.portal_count)
         corner, right, up, _, _ = self._portal(dr.minimum(k, MAX_PORTALS - 1))
         d_portal = dr.normalize(corner + right * draws.light.x + up * draws.light.y - hit.p + 1e-9)
         # A luminous face: a uniform point on it.
@@ -190,11 +191,6 @@ class Shading:
         pdf = dr.select(to_portal, self._sky_density(hit.p, d), dr.select(towards < 0, lamp_pdf, 0))
         radiance = dr.select(to_portal, self.sky(d), look.emission)
         return ToLight(d, dr.select(to_portal, 1e8, distance * 0.999), radiance, pdf)
-
-    def _portal_count(self):
-        """Number of portals, from the rows in use."""
-        used = [dr.gather(mi.Float, self.portals, mi.UInt32(k * PORTAL + 12)) > 0 for k in range(MAX_PORTALS)]
-        return sum((dr.select(u, mi.Float(1), 0) for u in used), mi.Float(0))
 
     def _texel_direction(self, texel, u):
         row, column = texel // (2 * ENV_ROWS), texel % (2 * ENV_ROWS)

@@ -17,6 +17,7 @@ import numpy as np
 
 from materialist.buffers import floats, tensor
 from materialist.color import luminance
+from materialist.envmap import bilinear
 from materialist.procedural import arrangements as scenes
 from materialist.procedural import lights
 from materialist.procedural.world import Viewpoint
@@ -155,7 +156,9 @@ class TrueScene:
         albedo = np.zeros((*seen["item"].shape, 3))
         for k, item in enumerate(self.items):
             here = seen["item"] == k
-            albedo[here] = _bilinear(item.albedo, seen["uv"][here])
+            around = np.pad(item.albedo, ((1, 1), (1, 1), (0, 0)), mode="wrap")
+            place = seen["uv"][here].astype(np.float64) % 1 * item.albedo.shape[1::-1]
+            albedo[here] = bilinear(around, place + 1)
         return albedo
 
     @cached_property
@@ -175,16 +178,6 @@ class TrueScene:
         picture = lambda v: np.moveaxis(np.array(v, np.float32).reshape(-1, height, width), 0, -1)  # noqa: E731
         item = self._item_of_shape[np.array(dr.reinterpret_array(mi.UInt32, si.shape))].reshape(height, width)
         return {"item": item, "depth": picture(depth)[..., 0], "normal": picture(normal), "uv": picture(si.uv)}
-
-
-def _bilinear(picture: Array, uv: Array) -> Array:
-    """[n, 3] values of picture [h, w, 3] at texture coordinates [n, 2], repeated outside [0, 1]."""
-    h, w = picture.shape[:2]
-    x, y = uv[:, 0] * w - 0.5, uv[:, 1] * h - 0.5
-    x0, y0 = np.floor(x).astype(int), np.floor(y).astype(int)
-    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
-    row = lambda yy: picture[yy % h, x0 % w] * (1 - fx) + picture[yy % h, (x0 + 1) % w] * fx  # noqa: E731
-    return row(y0) * (1 - fy) + row(y0 + 1) * fy
 
 
 @lru_cache(maxsize=1)

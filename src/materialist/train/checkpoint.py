@@ -32,21 +32,17 @@ def save(folder: Path, state: dict[str, Any]) -> None:
         raise OutputError(f"The checkpoint cannot be written to {folder}: {error}.") from error
 
 
-def resumed(folder: Path, kind: str, *, resume: bool, device: Any = "cpu") -> dict[str, Any] | None:
-    """The state to go on from; None where FOLDER holds no run.
+def load(folder: Path, kind: str, *, resume: bool = True, device: Any = "cpu") -> dict[str, Any] | None:
+    """The state in FOLDER/checkpoint.pt to go on from; None where FOLDER holds no run.
 
-    Raises OutputError when it holds one and `resume` is off, else as `load` does.
+    Raises OutputError when it holds one and `resume` is off, WeightsError when that is damaged, InputError when it is
+    of another kind.
     """
-    if not (folder / NAME).is_file():
+    path = folder / NAME
+    if not path.is_file():
         return None
     if not resume:
         raise OutputError(f"{folder} holds a run already; add --resume to go on with it, or choose another folder.")
-    return load(folder, kind, device)
-
-
-def load(folder: Path, kind: str, device: Any = "cpu") -> dict[str, Any]:
-    """The state in FOLDER/checkpoint.pt. Raises WeightsError when it is damaged, InputError for another kind of run."""
-    path = folder / NAME
     try:
         state = torch.load(path, map_location=device, weights_only=True)
     except Exception as error:  # torch raises whatever its unpickler or zip reader raises

@@ -55,7 +55,7 @@ class Trainer:
         """
         self.task, self.recipe, self.folder, self.note = task, task.recipe, folder, note
         self.options, self.device = options or RunOptions(), torch.device(device)
-        state = checkpoint.resumed(folder, task.kind, resume=resume, device=self.device)
+        state = checkpoint.load(folder, task.kind, resume=resume, device=self.device)
         torch.manual_seed(self.options.seed)
         torch.backends.cudnn.benchmark = self.device.type == "cuda"
         self.network = task.network().to(self.device)

@@ -7,7 +7,7 @@ import torch
 from materialist.camera import pixel_rays
 from materialist.predict.clicks.features import CHANNELS, NORMAL_X, features
 from materialist.predict.clicks.network import ClickNet
-from materialist.predict.clicks.segment import ClickMaps, object_at
+from materialist.predict.clicks.segment import object_at
 from materialist.predict.network import UNetArchitecture
 from materialist.types import Camera
 
@@ -32,7 +32,7 @@ def scene(size=(120, 160), at=(80, 66), radius=30):
     shade = (normal @ np.array([0.3, 0.8, 0.5])).clip(0.15)
     rgb = np.where(ball[..., None], [0.75, 0.2, 0.15], [0.55, 0.55, 0.52]) * shade[..., None] ** 0.5
     rgb = rgb + np.random.default_rng(0).normal(0, 0.01, rgb.shape)
-    return ClickMaps(rgb.clip(0, 1).astype(np.float32), normal.astype(np.float32), depth.astype(np.float32)), ball
+    return (rgb.clip(0, 1).astype(np.float32), normal.astype(np.float32), depth.astype(np.float32)), ball
 
 
 @pytest.fixture(scope="module")
@@ -53,28 +53,28 @@ def test_features_have_closed_forms():
     y, x = np.indices((120, 160))
     np.testing.assert_allclose(maps[DISTANCE], np.hypot(x - 80, y - 66) / 160, atol=1e-6)
     assert maps[SPOT, 66, 80] == 1 and maps[SPOT, 66, 90] < 0.01
-    np.testing.assert_allclose(maps[:3], np.moveaxis(photo.rgb, -1, 0) - 0.5, atol=1e-6)
+    np.testing.assert_allclose(maps[:3], np.moveaxis(photo[0], -1, 0) - 0.5, atol=1e-6)
     assert maps[COLOUR, 66, 80].max() < 0.03 < maps[COLOUR, 110, 20].max()
     assert maps[COSINE, 66, 80] > 0.99
 
 
 def test_a_mirrored_photo_has_mirrored_features():
-    photo, _ = scene()
-    other = ClickMaps(photo.rgb[:, ::-1], photo.normal[:, ::-1] * [-1, 1, 1], photo.depth[:, ::-1])
+    (rgb, normal, depth), _ = scene()
+    other = rgb[:, ::-1], normal[:, ::-1] * [-1, 1, 1], depth[:, ::-1]
     there = features(*other, [(159 - 70, 50)])[..., ::-1].copy()
     there[NORMAL_X] *= -1
-    np.testing.assert_allclose(there, features(*photo, [(70, 50)]), atol=1e-6)
+    np.testing.assert_allclose(there, features(rgb, normal, depth, [(70, 50)]), atol=1e-6)
 
 
 @pytest.mark.parametrize("size", [(40, 300), (9, 9)])
 def test_photos_of_any_shape(untrained, size):
     rng = np.random.default_rng(0)
-    photo = ClickMaps(*(rng.random((*size, *more), np.float32) for more in ((3,), (3,), ())))
-    assert object_at(photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape == size
+    photo = [rng.random((*size, *more), np.float32) for more in ((3,), (3,), ())]
+    assert object_at(*photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape == size
 
 
 @pytest.mark.parametrize("click", [(80, 66), (92, 80)])
 def test_the_weights_that_ship_find_a_ball(click):
     photo, ball = scene()
-    found = object_at(photo, [click]) > 0.5
+    found = object_at(*photo, [click]) > 0.5
     assert (found & ball).sum() / (found | ball).sum() > 0.6

@@ -87,8 +87,7 @@ def clicknet(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] in [0, 1]: ClickNet's likelihood that a pixel is of the object that all (column, row) points lie on."""
     from materialist.predict.clicks import segment
 
-    photo = segment.ClickMaps(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth)
-    return segment.object_at(photo, points)
+    return segment.object_at(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth, points)
 
 
 def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:

@@ -72,7 +72,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     rays: [H, W, 2] x and y of the photo's rays at z = -1.
     """
     size = linear.shape[:2]
-    middle = _network_size(size, min(SETTINGS.edge_side, max(size)))
+    middle = resample.with_longer_side(size, min(SETTINGS.edge_side, max(size)))
     photo = linear_to_srgb(resample.values(linear, middle))
     reach = max(2, round(SETTINGS.edge_reach * max(middle)))
     guide = GuidedFilter(photo, radius=reach)
@@ -105,7 +105,7 @@ def _mean_answer(
 ) -> tuple[dict[str, Array], Array | None]:
     """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes; and
     of its logarithms of the light, as `Prediction.light`."""
-    sizes = sorted({_network_size(linear.shape[:2], side) for side in SETTINGS.sides})
+    sizes = sorted({resample.with_longer_side(linear.shape[:2], side) for side in SETTINGS.sides})
     answers = []
     for size in sizes:
         photo = resample.values(linear, size)
@@ -134,12 +134,6 @@ def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dic
     rows = {name: m[0] if name == "light" else m[0, :, :height, :width] for name, m in maps.items()}
     arrays = {name: m.permute(1, 2, 0).float().cpu().numpy() for name, m in rows.items()}
     return {n: np.ascontiguousarray(a[..., 0] if a.shape[-1] == 1 else a) for n, a in arrays.items()}
-
-
-def _network_size(size: tuple[int, int], side: int) -> tuple[int, int]:
-    """A photo's size (height, width) with that longest side."""
-    factor = side / max(size)
-    return max(1, round(size[0] * factor)), max(1, round(size[1] * factor))
 
 
 def _scaled(log_depth: Array, surface: Array) -> Array:
