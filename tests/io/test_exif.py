@@ -24,16 +24,9 @@ def test_focal_plane_resolution_in_every_unit():
 
 @pytest.mark.parametrize(
     "tags",
-    [
-        {},
-        {"FocalLengthIn35mmFilm": 0},
-        {"FocalLengthIn35mmFilm": "fifty"},
-        {"FocalLengthIn35mmFilm": float("nan")},
-        {"FocalLengthIn35mmFilm": 100000},
-        {"FocalLength": 35.0},
-        {"FocalLength": 35.0, "FocalPlaneXResolution": 72.0, "FocalPlaneResolutionUnit": 2},
-    ],
-)
+    [{}, *({"FocalLengthIn35mmFilm": value} for value in (0, "fifty", float("nan"), 100000)), {"FocalLength": 35.0},
+     {"FocalLength": 35.0, "FocalPlaneXResolution": 72.0, "FocalPlaneResolutionUnit": 2}],
+)  # fmt: skip
 def test_tags_that_cannot_be_believed(tags):
     assert horizontal_fov(tags, 4000, 3000) is None
 

@@ -108,11 +108,8 @@ def parts(folder: Path) -> list[Path]:
 
 def field_of_view(path: Path) -> float:
     """Horizontal field of view, degrees: the number in the name of the part that the picture lies in, else 85."""
-    for parent in path.parents:
-        found = re.fullmatch(r"(?:dataset|scenes)_(\d+)", parent.name)
-        if found:
-            return float(found[1])
-    return 85.0
+    named = (re.fullmatch(r"(?:dataset|scenes)_(\d+)", parent.name) for parent in path.parents)
+    return next((float(found[1]) for found in named if found), 85.0)
 
 
 def _sample(maps: dict[str, Array], camera: Camera) -> Sample:

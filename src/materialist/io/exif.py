@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +20,9 @@ _UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
 
 def image_tags(image: Image.Image) -> dict[str, Any]:
     """EXIF tags of an image by name; {} where they are damaged."""
-    try:
+    with suppress(Exception):  # damaged EXIF does not make a photo unreadable
         return _named(image.getexif())
-    except Exception:  # damaged EXIF does not make a photo unreadable
-        return {}
+    return {}
 
 
 def file_tags(path: Path) -> dict[str, Any]:
@@ -30,12 +30,10 @@ def file_tags(path: Path) -> dict[str, Any]:
     from PIL import Image
 
     exif = Image.Exif()
-    try:
-        with path.open("rb") as file:
-            exif.load_from_fp(file)
-            return _named(exif)
-    except Exception:  # no EXIF is no error: the field of view then falls back
-        return {}
+    with suppress(Exception), path.open("rb") as file:  # no EXIF is no error: the field of view then falls back
+        exif.load_from_fp(file)
+        return _named(exif)
+    return {}
 
 
 def horizontal_fov(tags: Mapping[str, Any], width: int, height: int) -> float | None:

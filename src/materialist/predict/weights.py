@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -122,11 +123,9 @@ def metadata(path: Path) -> dict[str, str]:
     """The texts in the header of a .safetensors file; empty for other files."""
     from safetensors import SafetensorError, safe_open
 
-    try:
-        with safe_open(str(path), framework="pt") as file:
-            return file.metadata() or {}
-    except (SafetensorError, OSError, ValueError):
-        return {}
+    with suppress(SafetensorError, OSError, ValueError), safe_open(str(path), framework="pt") as file:
+        return file.metadata() or {}
+    return {}
 
 
 def reason(error: Exception) -> str:

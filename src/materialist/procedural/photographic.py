@@ -11,6 +11,7 @@ from torch.nn import functional as F
 
 from materialist.color import LUMINANCE
 from materialist.io.samples import Sample
+from materialist.predict.bundled.network import srgb
 from materialist.types import Array
 
 
@@ -116,8 +117,7 @@ def _tone(image: Tensor, draw: _Draw) -> Tensor:
     image = torch.where((kind >= 0.35) & (image > knee), bent, image)
     weight = image.new_tensor(LUMINANCE).view(1, 3, 1, 1)
     grey = (image * weight).sum(1, keepdim=True)
-    image = (grey + (image - grey) * draw.uniform(0.8, 1.3)).clamp(0, 1)
-    encoded = torch.where(image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
+    encoded = srgb(grey + (image - grey) * draw.uniform(0.8, 1.3))
     curve = encoded * encoded * (3 - 2 * encoded)
     encoded = torch.where(kind >= 0.5, encoded + draw.uniform(-0.25, 0.8) * (curve - encoded), encoded)
     gamma = torch.exp(draw.normal() * 0.12)

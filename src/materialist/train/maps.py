@@ -1,6 +1,7 @@
 """What the networks that predict all maps have in common: pictures with true maps, scores and a sheet."""
 
 from abc import abstractmethod
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -94,8 +95,6 @@ def held_out(source: Source, most: int) -> tuple[str, list[Sample]]:
         what, chosen = TRAINED_ON, list(range(min(len(source), most)))
     found = []
     for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int)):
-        try:
+        with suppress(InputError):
             found.append(source.read(chosen[k]))
-        except InputError:
-            continue
     return what, found
