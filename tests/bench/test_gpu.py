@@ -14,7 +14,7 @@ def test_each_device_is_a_column(tmp_path, monkeypatch):
         Path(given[3], "report.json").write_text(json.dumps({"rows": rows}))
 
     monkeypatch.setattr(gpu.torch, "cuda", SimpleNamespace(is_available=lambda: True, get_device_name=lambda: "a card"))
-    monkeypatch.setattr(gpu, "cuda_usable", lambda: True)
+    monkeypatch.setattr(gpu, "usable_gpus", lambda: 1)
     monkeypatch.setattr(gpu, "materialist", measured)
     report = (bench.run("gpu", output=tmp_path / "both") / "report.md").read_text()
     assert "| edit | 2 | 3.000 | 4.000 |" in report and "card a card" in report

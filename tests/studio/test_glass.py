@@ -11,6 +11,7 @@ from studio_scenes import block, package, room
 from materialist.edits.glass.preview import GlassPreview
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
+from materialist.jobs.worker import Reporter
 from materialist.studio import glass as studio_glass
 from materialist.studio.glass import GlassClient
 from materialist.studio.workspace import write_mask
@@ -68,30 +69,25 @@ def test_failures_are_told_and_the_next_value_is_tried(tracer):
     assert not tracer.state.bad and tracer.pane(glass(1.4)) is not None
 
 
-class _Report:
-    """Notes the stages."""
-
-    def __init__(self, outdated=False):
-        self.stages, self.outdated = [], outdated
-
-    def __call__(self, stage, done, total):
-        self.stages.append(stage)
+def report(stages, outdated=False):
+    """A task's report that notes its stages."""
+    return Reporter(lambda kind, facts: stages.append(facts["stage"]), lambda: outdated)
 
 
 def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
     scene, others = str(package(tmp_path)), (Step("relight", {"ambient": "0.5"}, tmp_path),)
     given = {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"}
-    first = _Report()
-    pane = studio_glass.trace(first, scene, others, Step("glass", given, tmp_path))
-    assert first.stages == ["build", "trace"]
+    first, late = [], []
+    pane = studio_glass.trace(report(first), scene, others, Step("glass", given, tmp_path))
+    assert first == ["build", "trace"]
     dim = replace(room(), envmap=room().envmap * 0.5)
     truth = GlassPreview(dim, block(), thickness="symmetry").picture(ior=1.2, tint=(1, 0.5, 0.5))
     np.testing.assert_allclose(pane.picture, truth, rtol=2e-3, atol=1e-4)
     outside = (pane.share == 0) & ~pane.filled
     assert outside.any() and np.array_equal(truth[outside], room().photo.linear[outside])
     assert pane.share.max() == 1 and (pane.share > 0.5).sum() > 0.8 * block().sum()
-    late = _Report(outdated=True)
-    assert studio_glass.trace(late, scene, others, Step("glass", {**given, "ior": "1.4"}, tmp_path)) is None
-    assert late.stages == ["build"]  # the body is kept, and nothing is traced
+    newer = Step("glass", {**given, "ior": "1.4"}, tmp_path)
+    assert studio_glass.trace(report(late, outdated=True), scene, others, newer) is None
+    assert late == ["build"]  # the body is kept, and nothing is traced
     with pytest.raises(InputError, match="must be 4 numbers"):
-        studio_glass.trace(_Report(), scene, others, Step("glass", {"ior": "1.4", "box": "0,0,9"}, tmp_path))
+        studio_glass.trace(report([]), scene, others, Step("glass", {"ior": "1.4", "box": "0,0,9"}, tmp_path))

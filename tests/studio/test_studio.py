@@ -15,7 +15,7 @@ from materialist.errors import InputError
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, StudioSettings, widgets
-from materialist.studio.server import check_host, new_studio
+from materialist.studio.server import check_host
 from materialist.studio.studio import LOCAL_PERSON
 from materialist.studio.widgets import PageContext
 
@@ -72,13 +72,11 @@ def test_bad_options_end_with_2(refused, arguments, tmp_path):
     refused("studio", *arguments, *work, *port)
 
 
-def test_files_are_handed_over_under_names_nobody_guesses(tmp_path):
-    studio = new_studio(tmp_path / "work", single_user=True)
-    file = studio.work.root / "result.png"
+def test_files_are_handed_over_under_names_nobody_guesses(shared):
+    file = shared.work.root / "result.png"
     file.write_bytes(b"x")
-    first, second = studio.public_copy(file), studio.public_copy(file)
-    assert first != second and first.startswith(str(studio.work.cache)) and len(first.split("/")[-2]) == 32
-    studio.jobs.close()
+    first, second = shared.public_copy(file), shared.public_copy(file)
+    assert first != second and first.startswith(str(shared.work.cache)) and len(first.split("/")[-2]) == 32
 
 
 def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):

@@ -100,18 +100,13 @@ def default_workers(device: str = "auto", size: int = 512) -> int:
 
 def visible_gpus(device: str = "auto") -> list[str]:
     """Names by which CUDA can be told to use one GPU; none for the device "cpu", or where no driver answers."""
-    from materialist.render.variant import cuda_usable
+    from materialist.render.variant import usable_gpus
 
-    if device == "cpu" or not cuda_usable():
-        return []
+    count = 0 if device == "cpu" else usable_gpus()
     chosen = os.environ.get("CUDA_VISIBLE_DEVICES")
-    if chosen is not None:
+    if count and chosen is not None:
         return [name.strip() for name in chosen.split(",") if name.strip()]
-    import ctypes
-
-    count = ctypes.c_int()
-    ctypes.CDLL("libcuda.so.1").cuDeviceGetCount(ctypes.byref(count))
-    return [str(k) for k in range(count.value)]
+    return [str(k) for k in range(count)]
 
 
 def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:

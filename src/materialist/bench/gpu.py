@@ -24,7 +24,7 @@ from materialist.edits.glass.glass import glass
 from materialist.edits.material.material import edit
 from materialist.edits.select.select import select
 from materialist.option_kinds import option
-from materialist.render.variant import cuda_usable
+from materialist.render.variant import usable_gpus
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class GpuBench(Benchmark):
     runs: int = option(50, "Forward passes; a tenth of it more do not count.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        there = cuda_usable() and torch.cuda.is_available()
+        there = usable_gpus() and torch.cuda.is_available()
         report.settings["card"] = torch.cuda.get_device_name() if there else "none that Mitsuba and PyTorch can use"
         if self.device != "auto":
             yield from ({"method": k, "sample": self.photo, self.device: s} for k, s in self._measured(report))

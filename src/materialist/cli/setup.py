@@ -23,28 +23,21 @@ def doctor(computing: Computing) -> None:
 
     findings, as_json = examine(computing.device), computing.as_json
     broken = [finding for finding in findings if finding.state == "broken"]
-    if not as_json:
-        _show(findings)
     verdict = (
         "The main job cannot run yet; run the commands above." if broken else "Ready: materialist invert PHOTO -o SCENE"
     )
     found = [vars(finding) for finding in findings]
-    report_success("doctor", as_json, [verdict], ok=not broken, findings=found, exit_code=BAD_INPUT if broken else 0)
+    lines = [*map(_line, findings), verdict]
+    report_success("doctor", as_json, lines, ok=not broken, findings=found, exit_code=BAD_INPUT if broken else 0)
     if broken:
         raise typer.Exit(BAD_INPUT)
 
 
-def _show(findings: list[Finding]) -> None:
-    """The table, and under each failing line the command that mends it."""
-    from rich.console import Console
-    from rich.text import Text
-
-    console = Console(highlight=False, soft_wrap=True)
-    for finding in findings:
-        mark, colour = _MARK[finding.state]
-        console.print(Text.assemble((f"{mark:>3} ", f"bold {colour}"), f"{finding.name:<22}", finding.detail))
-        if finding.remedy:
-            console.print(Text.assemble(" " * 26, ("mend with: ", "dim"), (finding.remedy, "bold")))
+def _line(finding: Finding) -> str:
+    """A line of the table, and under it the command that mends what fails."""
+    mark, colour = _MARK[finding.state]
+    line = f"{typer.style(f'{mark:>3}', fg=colour, bold=True)} {finding.name:<22}{finding.detail}"
+    return line + (f"\n{'mend with: ':>37}{typer.style(finding.remedy, bold=True)}" if finding.remedy else "")
 
 
 def list_models(as_json: Json = False) -> None:

@@ -15,6 +15,8 @@ from materialist.errors import Interrupted
 from materialist.option_kinds import OperationOptions, option
 from materialist.procedural.options import DataSetOptions
 
+SETS = "A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
+
 # fmt: off
 
 
@@ -70,12 +72,7 @@ def data(
 
 
 def matnet(
-    data: Annotated[
-        list[Path],
-        typer.Option(
-            help="A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
-        ),
-    ],
+    data: Annotated[list[Path], typer.Option(help=SETS)],
     output: Annotated[Path, output_option("RUN", "Folder of the run.")],
     learning: MapsLearning,
     training: Training = Training(every=300),  # noqa: B008

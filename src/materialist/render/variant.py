@@ -85,17 +85,18 @@ def package_of(library: str) -> str:
     return library.replace(".so.", "").replace(".so", "").lower()
 
 
-def cuda_usable() -> bool:
-    """Whether an NVIDIA driver answers and has OptiX, which traces Mitsuba's rays; Mitsuba itself is not started."""
+def usable_gpus() -> int:
+    """How many GPUs an NVIDIA driver offers; 0 without OptiX, which traces Mitsuba's rays. Mitsuba is not started."""
     import ctypes
 
     try:
         driver = ctypes.CDLL("libcuda.so.1")
         ctypes.CDLL(os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1"))
     except OSError:
-        return False
+        return 0
     count = ctypes.c_int()
-    return driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0 and count.value > 0
+    answers = driver.cuInit(0) == 0 and driver.cuDeviceGetCount(ctypes.byref(count)) == 0
+    return count.value if answers else 0
 
 
 _VARIANTS = {"cpu": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
@@ -121,7 +122,7 @@ def setup(device: str = "auto"):
     current = mi.variant()
     if device == "auto":
         running = {variant: name for name, variant in _VARIANTS.items()}.get(current or "")
-        device = running or ("cuda" if cuda_usable() else "cpu")
+        device = running or ("cuda" if usable_gpus() else "cpu")
     wanted = _VARIANTS[device]
     if current != wanted:
         if current in _VARIANTS.values():
@@ -138,14 +139,14 @@ def _point_to_llvm(device: str) -> None:
     try:
         os.environ["DRJIT_LIBLLVM_PATH"] = find_llvm().path
     except SetupError:
-        if device == "cpu" or not cuda_usable():
+        if device == "cpu" or not usable_gpus():
             raise
 
 
 def _start(mi, device: str) -> None:
     import drjit as dr
 
-    if device == "cuda" and not cuda_usable():
+    if device == "cuda" and not usable_gpus():
         raise SetupError("No CUDA driver with OptiX answers; use --device cpu, or install the NVIDIA driver.")
     if device == "cpu":
         loaded = dr.detail.llvm_version()[0] if dr.has_backend(dr.JitBackend.LLVM) else 0

@@ -175,10 +175,8 @@ class Session:
         """Set or clear (None) options of the light (`EditList.light`); it is made when the first is set."""
         with self.lock:
             _, place = self.scene, self.edits.light
-            self.put(
-                self.edits.add(Step("relight", {}, self.workspace)) if place is None else self.edits.chosen(place),
-                **options,
-            )
+            new = Step("relight", {}, self.workspace)
+            self.put(self.edits.add(new) if place is None else self.edits.chosen(place), **options)
 
     def put(self, edits: EditList, **options: Any) -> None:
         """Take over a list of edits, with options of the current step set or cleared (None). Raises InputError.
@@ -188,9 +186,8 @@ class Session:
         index, step = edits.current, edits.current_step
         assert index is not None and step is not None
         new = with_options(step, **options)
-        after = (
-            edits.without(index) if new.kind == "relight" and not {*new.options} - {"skip"} else edits.put(index, new)
-        )
+        empty = new.kind == "relight" and not {*new.options} - {"skip"}
+        after = edits.without(index) if empty else edits.put(index, new)
         if after.steps != self.edits.steps:
             changed = [name for name in options if new.options.get(name) != step.options.get(name)]
             moving = all(_slides(one.options.get(name)) for one in (step, new) for name in changed)
