@@ -9,7 +9,7 @@ from studio_scenes import block, click, package, zipped
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
-from materialist.io.image import write_png_bytes
+from materialist.io.image import write_png
 from materialist.studio import StudioSettings, objects, tasks, uploads
 from materialist.studio.archives import pack, unpack
 from materialist.studio.edit_list import EditList
@@ -20,7 +20,7 @@ from materialist.studio.session import Session
 @pytest.fixture
 def packed(session, tmp_path):
     """A session with edits that name files of each kind, and the zip of them."""
-    write_png_bytes(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
+    write_png(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
     write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
     click(session)
     session.set("edit", texture=uploads.stored(session.workspace, tmp_path / "wood.png", "texture"), roughness="0.3")
@@ -122,7 +122,7 @@ def test_lists_and_zips_that_are_refused_leave_nothing(studio, session, tmp_path
 
 
 def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path):
-    write_png_bytes(tmp_path / "m.png", block().astype(np.uint8) * 255)
+    write_png(tmp_path / "m.png", block().astype(np.uint8) * 255)
     members = {"room/edits.yaml": LIST, "room/m.png": (tmp_path / "m.png").read_bytes(), "room/x.py": "x", "../e": "x"}
     desk = tmp_path / "desk"
     desk.mkdir()

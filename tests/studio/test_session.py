@@ -11,7 +11,7 @@ from studio_scenes import block, click, room
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
-from materialist.io.image import write_png_bytes
+from materialist.io.image import write_png
 from materialist.studio import objects
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
@@ -54,7 +54,7 @@ def test_a_slider_without_a_number_writes_nothing(session):
 
 def test_undo_takes_a_whole_drag_back_and_choices_one_by_one(session):
     for name in ("a.png", "b.png"):
-        write_png_bytes(session.workspace / name, np.full((8, 8, 3), 90, np.uint8))
+        write_png(session.workspace / name, np.full((8, 8, 3), 90, np.uint8))
     for name in ("a.exr", "b.exr"):
         write_exr(session.workspace / name, np.ones((32, 64, 3), np.float32))
     click(session)

@@ -15,17 +15,15 @@ COLOURED = 0.2
 """Share of coloured pixels, neither black nor bright, from which a picture is a photo and no mask."""
 
 
-def write_png(path: str | Path, linear: Array) -> None:
-    """Write linear RGB [H, W, 3] (or grey [H, W]), clipped to [0, 1], as an 8-bit sRGB PNG."""
-    write_png_bytes(path, srgb_levels(linear))
+def write_png(path: str | Path, picture: Array) -> None:
+    """Write RGB [H, W, 3] or grey [H, W] as an 8-bit PNG: uint8 as it is, linear values clipped and sRGB-encoded.
 
-
-def write_png_bytes(path: str | Path, pixels: Array) -> None:
-    """Write [H, W, 3] or [H, W] uint8 as they are. Raises OutputError when the file cannot be written."""
+    Raises OutputError when the file cannot be written.
+    """
     from PIL import Image
 
     with writing(path):
-        Image.fromarray(pixels).save(path, format="PNG")
+        Image.fromarray(picture if picture.dtype == np.uint8 else srgb_levels(picture)).save(path, format="PNG")
 
 
 def write_image(path: str | Path, linear: Array, *, deep: bool = False, force: bool = False) -> None:

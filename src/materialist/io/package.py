@@ -12,7 +12,7 @@ from materialist import __version__
 from materialist.errors import SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
-from materialist.io.image import write_png, write_png_bytes
+from materialist.io.image import write_png
 from materialist.io.manifest import MAPS, MOST, check_files, inside, read_map
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
@@ -80,10 +80,10 @@ def _write(scene: Scene, folder: Path) -> None:
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)
     # Labels -1 .. 126 become 0 .. 127, so that an image viewer shows them as grey levels.
-    write_png_bytes(folder / "plane_label.png", (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8))
+    write_png(folder / "plane_label.png", (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8))
     write_exr(folder / "rerender.exr", scene.rerender)
     write_png(folder / "rerender.png", scene.rerender)
-    write_png_bytes(folder / "overview.png", overview(scene))
+    write_png(folder / "overview.png", overview(scene))
     report = scene.report  # its metrics lie flat beside `stages` and `warnings`
     warnings = list(dict.fromkeys(report.warnings))
     _write_json(folder / "report.json", {**report.metrics, "stages": list(report.stages), "warnings": warnings})

@@ -9,7 +9,7 @@ from typing import Any
 from materialist.color import srgb_levels
 from materialist.errors import InputError, SetupError
 from materialist.io.atomic import FRAMES, ensure_writable, whole_file, whole_folder
-from materialist.io.image import write_png_bytes
+from materialist.io.image import write_png
 from materialist.types import Array
 
 BT709 = (
@@ -46,7 +46,7 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
     with whole_folder(path, force, FRAMES) as folder:
         count = 0
         for count, picture in enumerate(pictures, 1):
-            write_png_bytes(folder / f"{count - 1:04d}.png", srgb_levels(picture))
+            write_png(folder / f"{count - 1:04d}.png", picture)
         return count
 
 

@@ -50,16 +50,6 @@ class Look:
     emission: Any
 
 
-@dataclass
-class ToLight:
-    """A direction that was aimed at a light; `pdf` is per solid angle, over all ways of aiming."""
-
-    d: Any
-    distance: Any
-    radiance: Any
-    pdf: Any
-
-
 class Shading:
     """A packed world on the device: surfaces with their materials, light from afar, and luminous faces."""
 
@@ -163,8 +153,11 @@ class Shading:
         corner, right = mi.Point3f(r[0].x, r[0].y, r[0].z), mi.Vector3f(r[0].w, r[1].x, r[1].y)
         return corner, right, mi.Vector3f(r[1].z, r[1].w, r[2].x), mi.Vector3f(r[2].y, r[2].z, r[2].w), r[3].x
 
-    def aim(self, hit: Hit, draws) -> ToLight:
-        """One direction from each hit towards a light, chosen by `draws.which` and `draws.light`."""
+    def aim(self, hit: Hit, draws) -> tuple[Any, Any, Any, Any]:
+        """One direction from each hit towards a light, chosen by `draws.which` and `draws.light`.
+
+        Returns direction, distance, radiance, and density per solid angle, over all ways of aiming.
+        """
         s0, s1, s2 = self.shares
         to_sky, to_portal = draws.which < s0, draws.which < s0 + s1
         # The envmap: a texel from the table, a uniform direction within it.
@@ -190,7 +183,7 @@ class Shading:
         d = dr.select(to_sky, d_sky, dr.select(to_portal, d_portal, d_lamp))
         pdf = dr.select(to_portal, self._sky_density(hit.p, d), dr.select(towards < 0, lamp_pdf, 0))
         radiance = dr.select(to_portal, self.sky(d), look.emission)
-        return ToLight(d, dr.select(to_portal, 1e8, distance * 0.999), radiance, pdf)
+        return d, dr.select(to_portal, 1e8, distance * 0.999), radiance, pdf
 
     def _texel_direction(self, texel, u):
         row, column = texel // (2 * ENV_ROWS), texel % (2 * ENV_ROWS)

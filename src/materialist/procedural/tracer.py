@@ -175,17 +175,17 @@ class SampleTracer:
             white = white + beta_white * glow
             active = active & hit.valid & (depth < MAX_DEPTH)
             # Aim at a light.
-            to_light = self.shading.aim(hit, draws)
+            to_light, distance, radiance, chance = self.shading.aim(hit, draws)
             start = hit.p + hit.ng * self.offset
-            wo = hit.frame.to_local(to_light.d)
-            above = dr.dot(hit.ng, to_light.d) > 0
-            wanted = active & above & (wo.z > 0) & (to_light.pdf > 0)
-            shadow = mi.Ray3f(start, to_light.d)
-            shadow.maxt = to_light.distance
+            wo = hit.frame.to_local(to_light)
+            above = dr.dot(hit.ng, to_light) > 0
+            wanted = active & above & (wo.z > 0) & (chance > 0)
+            shadow = mi.Ray3f(start, to_light)
+            shadow.maxt = distance
             wanted &= ~self.scene.ray_test(shadow, coherent=False, active=wanted)
             wi = hit.frame.to_local(-ray.d)
             diffuse, specular, density = shading.value(wi, wo, look)
-            share = to_light.radiance / dr.maximum(to_light.pdf + density, 1e-20)
+            share = radiance / dr.maximum(chance + density, 1e-20)
             share = dr.select(wanted, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
             first = depth == 0
             full = look.albedo * (1 - look.metallic) * diffuse + specular
