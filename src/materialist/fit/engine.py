@@ -18,7 +18,7 @@ from materialist.transport.light import bilinear, light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
 
-LIGHT_PIXELS, LEAST_PIXELS = 4096, 256
+LIGHT_PIXELS, LEAST_PIXELS = 2048, 256
 """Pixels of a whole picture that the light is fitted to, of which a surface before the sky gets its share; and how many
 it gets at least, where it has them."""
 
