@@ -91,7 +91,8 @@ def test_finished_rows_are_kept_until_the_commit_or_the_settings_change(stubs, t
 
 def test_a_name_that_is_no_measure_is_refused(tmp_path):
     with pytest.raises(InputError, match="'glas' is unknown; choose from light"):
-        bench.run("paper", output=tmp_path, only="glas")
+        bench.run("paper", output=tmp_path / "out", only="glas")
+    assert not (tmp_path / "out" / "rows").exists()
 
 
 def test_one_row_from_end_to_end(mitsuba, tmp_path, monkeypatch):

@@ -105,10 +105,11 @@ class PaperBench(OperationOptions):
     def run(self, data: Path | None, output: Path) -> None:
         """Measure one row after the other; a row that cannot be says why. Raises InputError, OutputError."""
         measures, tables = published()
+        wanted = names("measures", self.only or ",".join(measures), measures)
         make_folder(output / "rows")
         there = (output / "rows").glob("*.json") if self.resume else ()
         rows: dict[str, dict[str, Any]] = {path.stem: json.loads(path.read_text("utf-8")) for path in there}
-        for name in names("measures", self.only or ",".join(measures), measures):
+        for name in wanted:
             try:
                 rows[name] = self._row(name, measures[name], data, output, rows.get(name, {}))
             except MaterialistError as error:
