@@ -12,6 +12,7 @@ import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -91,23 +92,21 @@ def _llvm() -> tuple[Finding, str | None]:
 
 
 def _renderer(llvm: str | None) -> Finding:
+    broken = partial(Finding, "renderer (CPU)", "broken")
     command = [sys.executable, "-c", _PROBE, *([llvm] if llvm else [])]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
-        return Finding("renderer (CPU)", "broken", f"the probe did not finish: {error}", "materialist doctor")
+        return broken(f"the probe did not finish: {error}", "materialist doctor")
     if child.returncode == 0:
         return Finding("renderer (CPU)", "ok", f"variants {child.stdout.strip()}")
     absent = re.search(r"(lib\S+\.so\S*): cannot open shared object", child.stderr)
     if absent:
         from materialist.render.variant import package_of
 
-        remedy = f"sudo apt-get install -y {package_of(absent[1])}"
-        return Finding("renderer (CPU)", "broken", f"{absent[1]} is missing", remedy)
+        return broken(f"{absent[1]} is missing", f"sudo apt-get install -y {package_of(absent[1])}")
     last = (child.stderr.strip().splitlines() or ["no message"])[-1]
-    return Finding(
-        "renderer (CPU)", "broken", f"exit {child.returncode}: {last[:160]}", "sudo apt-get install -y libllvm19"
-    )
+    return broken(f"exit {child.returncode}: {last[:160]}", "sudo apt-get install -y libllvm19")
 
 
 def _cuda(needed: bool = False) -> Finding:

@@ -172,10 +172,8 @@ def _number(declared: Option, called: str, value: Any) -> Any:
     except (TypeError, ValueError) as error:
         or_else = "".join(f", or {word}" for word in declared.choices)
         raise InputError(f"The {called} must be a number{or_else}, not {value!r}.") from error
-    inside = (low <= number if ends[0] == "[" else low < number) and (
-        number <= high if ends[1] == "]" else number < high
-    )
-    if not (math.isfinite(number) and inside):
+    excluded = [end for end, mark in zip((low, high), ends) if mark in "()"]
+    if not (math.isfinite(number) and low <= number <= high) or number in excluded:
         span = f"it must lie in {ends[0]}{_text(low)}, {_text(high)}{ends[1]} {declared.unit}".rstrip()
         tail = f"{span} {declared.hint}".rstrip() if math.isfinite(low) else "give a finite number"
         raise InputError(f"The {called} is {_text(number)}; {tail}.")

@@ -7,6 +7,7 @@ import typer
 
 import materialist as mt
 from materialist.cli.options import (
+    At,
     FramesPerSecond,
     MovingLight,
     PictureOutput,
@@ -89,9 +90,7 @@ def insert(
     scene: SceneArgument,
     mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
     output: PictureOutput,
-    at: Annotated[
-        list[str], typer.Option("--at", metavar="X,Y", help="Where it stands, at working size; several: one each.")
-    ],
+    at: At,
     options: Insertion,
     how: Rendering,
 ) -> None:
@@ -174,9 +173,7 @@ def drop(
     scene: SceneArgument,
     meshes: Annotated[list[Path], typer.Argument(metavar="MESH...", help=MESH_FILES)],
     output: Annotated[Path, output_option("OUT", "A .mp4, or a folder of frames.")],
-    at: Annotated[
-        list[str], typer.Option("--at", metavar="X,Y", help="Over which pixel of the working size; one, or one each.")
-    ],
+    at: At,
     options: Drop,
     frames: Annotated[int, typer.Option(metavar="N", help="Length of the film.")] = 48,
     fps: FramesPerSecond = FPS,

@@ -18,6 +18,7 @@ def output_option(metavar: str, help: str) -> Any:
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
 PictureOutput = Annotated[Path, output_option("OUT", "A .png (as deep as the photo) or .exr (linear, HDR).")]
+At = Annotated[list[str], typer.Option("--at", metavar="X,Y", help="A pixel at working size; several: one each.")]
 FramesPerSecond = Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")]
 
 # fmt: off

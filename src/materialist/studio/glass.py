@@ -143,9 +143,8 @@ class GlassClient:
             self._worker = None
             if self.state.waiting:
                 self._asked = None
-                self.state = GlassState(
-                    False, "The tracing of glass ended by itself; move a slider to start it again.", True
-                )
+                words = "The tracing of glass ended by itself; move a slider to start it again."
+                self.state = GlassState(False, words, True)
         elif not self.state.waiting or message.number != self._number:
             return  # a newer request is under way
         elif message.kind == PROGRESS:

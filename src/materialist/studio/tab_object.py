@@ -92,9 +92,8 @@ def _follow(context: PageContext, session: Session) -> Iterator[Updates]:
     while client is not None and client is session.glass:
         state = client.state
         if not state.waiting:
-            yield context.picture(session) | {
-                "progress": box(session.shown(state.words), bad=True) if state.bad else ""
-            }
+            told = box(session.shown(state.words), bad=True) if state.bad else ""
+            yield context.picture(session) | {"progress": told}
             return
         if state.words != said:
             said = state.words
