@@ -61,12 +61,10 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
         template = PhotoTask("", "", "", folder.resolve(), asked, how)
-        tasks = plan(photos, ledger, template)
-        run = _Run(
-            folder, photos, ledger, {task.id: task for task in tasks}, asked, progress or (lambda _: None), start
-        )
+        tasks = {task.id: task for task in plan(photos, ledger, template)}
+        run = _Run(folder, photos, ledger, tasks, asked, progress or (lambda _: None), start)
         try:
-            if how.recipe is not None and (notice := _lacking(how.recipe, tasks)):
+            if how.recipe is not None and (notice := _lacking(how.recipe, [*tasks.values()])):
                 run.tell(notice)
             if tasks:
                 run.work(_pool(how, len(tasks), asked["device"], asked["size"]))

@@ -1,31 +1,32 @@
 """`materialist select`, `edit`, `glass`, `remove`, `insert`, `apply`, `relight` and `drop`: pictures and films."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 import materialist as mt
-from materialist.cli.options import (
-    At,
-    FramesPerSecond,
-    MovingLight,
-    PictureOutput,
-    Place,
-    Region,
-    Rendering,
-    Run,
-    SceneArgument,
-    output_option,
-)  # fmt: skip
+from materialist.cli.options import PictureOutput, Place, Region, Rendering, Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.picture import check_before, chosen_region, opened, write_film, write_result
 from materialist.errors import InputError
-from materialist.option_kinds import numbers
+from materialist.option_kinds import numbers, option
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
 FPS = 24
+At = Annotated[list[str], typer.Option("--at", metavar="X,Y", help="A pixel at working size; several: one each.")]
+FramesPerSecond = Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingLight(Relight):
+    """Other light, which goes from one sun to the next in a film."""
+
+    sun: tuple[tuple[float, float], ...] = option(  # type: ignore[assignment]
+        (), "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, many=True, metavar="AZ,EL"
+    )
 
 
 def select(

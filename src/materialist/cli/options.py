@@ -7,7 +7,6 @@ from typing import Annotated, Any
 import typer
 
 from materialist.option_kinds import OperationOptions, option
-from materialist.options import Relight
 
 
 def output_option(metavar: str, help: str) -> Any:
@@ -18,8 +17,6 @@ def output_option(metavar: str, help: str) -> Any:
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
 PictureOutput = Annotated[Path, output_option("OUT", "A .png (as deep as the photo) or .exr (linear, HDR).")]
-At = Annotated[list[str], typer.Option("--at", metavar="X,Y", help="A pixel at working size; several: one each.")]
-FramesPerSecond = Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")]
 
 # fmt: off
 
@@ -82,15 +79,6 @@ class Rendering(Run):
         None, "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.", kind="function",
         needs="full_render", metavar="FILE.py:FUNCTION")
     save: Path | None = option(None, "Write the edited scene as well.", kind="file", metavar="SCENE2")
-
-
-@dataclass(frozen=True, kw_only=True)
-class MovingLight(Relight):
-    """Other light, which goes from one sun to the next in a film."""
-
-    sun: tuple[tuple[float, float], ...] = option(  # type: ignore[assignment]
-        (), "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, many=True,
-        metavar="AZ,EL")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,9 +30,7 @@ def checked_picture(path: Path) -> str:
         except InputError:
             raise
         except Exception as error:  # decoders raise anything
-            raise InputError(
-                f"{shown} is not an image this program can read; export it again as PNG or JPEG."
-            ) from error
+            raise InputError(f"{shown} is not an image that can be read; export it as PNG or JPEG.") from error
         if width * height > SETTINGS.upload_pixels:
             raise InputError(
                 f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the studio takes up to "
