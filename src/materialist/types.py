@@ -78,7 +78,7 @@ class Photo:
 
 @dataclass(frozen=True)
 class Materials:
-    """Per-pixel parameters of the simplified Disney BRDF."""
+    """Maps of the parameters of the simplified Disney BRDF."""
 
     albedo: Array
     """[H, W, 3] float32 linear, in [0, 1]."""
@@ -105,18 +105,28 @@ class Prediction:
     """[h, 2h, 4] float32 environment map: linear radiance, and the scale of the error of its logarithm."""
 
 
-@dataclass(frozen=True)
-class Mesh:
-    """Triangles of the scene: the depth surface, and the planes that continue it beyond what the picture shows."""
+@dataclass(frozen=True, eq=False)
+class Triangles:
+    """A surface of triangles, float32, camera frame, scene units."""
 
     vertices: Array
-    """[V, 3] float32, camera frame, scene units."""
+    """[V, 3]."""
     faces: Array
-    """[F, 3] int32, counter-clockwise seen from the camera."""
+    """[F, 3] int32, counter-clockwise seen from outside (a cavity's from within the cavity)."""
     normals: Array
-    """[V, 3] float32 unit shading normals."""
+    """[V, 3] unit shading normals, to the outside."""
     uv: Array
-    """[V, 2] float32 in [0, 1]: u to the right, v DOWN; pixel (row i, column j) is centred at ((j+.5)/W, (i+.5)/H)."""
+    """[V, 2] u to the right, v DOWN."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh(Triangles):
+    """The scene's: the depth surface, and the planes that continue it beyond what the picture shows.
+
+    Outside is where the camera is; uv is the place in the picture, with pixel (row i, column j) centred at
+    ((j+.5)/W, (i+.5)/H).
+    """
+
     face_pixel: Array
     """[F] int32 row-major index of the pixel whose surface (or nearest surface) the face carries."""
     face_plane: Array
@@ -162,15 +172,10 @@ class Lamp:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """The material of a body: the scene's BRDF, and a share of light that enters instead."""
+class Surface(Materials):
+    """The material of a body: maps of the scene's BRDF, repeated over the texture coordinates, and a share of light
+    that enters instead."""
 
-    albedo: Array
-    """[h, w, 3] float32 linear, in [0, 1]; repeated over the texture coordinates."""
-    roughness: Array
-    """[h, w] float32 perceptual roughness r (alpha = r**2), in [0, 1]."""
-    metallic: Array
-    """[h, w] float32, in [0, 1]."""
     transmission: float = 0.0
     """Share T of a dielectric interface in place of the opaque surface, in [0, 1]."""
     ior: float = 1.5
@@ -189,17 +194,9 @@ class Surface:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class Body(Triangles):
     """A thing with a material of its own beside the depth surface: inserted, dropped, or turned to glass."""
 
-    vertices: Array
-    """[V, 3] float32, camera frame, scene units."""
-    faces: Array
-    """[F, 3] int32, counter-clockwise seen from outside (a cavity's from within the cavity)."""
-    normals: Array
-    """[V, 3] float32 unit shading normals, to the outside."""
-    uv: Array
-    """[V, 2] float32: u to the right, v DOWN."""
     surface: Surface
     name: str = "body"
 

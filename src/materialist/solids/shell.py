@@ -1,26 +1,19 @@
 """Closed surfaces of triangles, made of two sheets over one region of the picture and the wall between them."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from materialist.camera import rays_through, unit
 from materialist.geometry.boundary import grid_faces, joined_faces
-from materialist.types import Array, Camera
+from materialist.types import Array, Camera, Triangles
 
 
-class Shell(NamedTuple):
-    """A closed surface."""
+@dataclass(frozen=True, eq=False)
+class Shell(Triangles):
+    """A closed surface; uv is the place in the picture, in [0, 1]."""
 
-    vertices: Array
-    """[V, 3] float32, camera frame, scene units."""
-    faces: Array
-    """[F, 3] int32, counter-clockwise seen from outside."""
-    normals: Array
-    """[V, 3] float32 unit, outwards."""
-    uv: Array
-    """[V, 2] float32 in [0, 1]: the place in the picture, u to the right, v DOWN."""
     hollow: bool = False
     """Whether one of its parts bounds a cavity."""
 

@@ -1,6 +1,6 @@
 """Procedural triangle meshes with texture coordinates: closed solids, and sheets, tubes and leaves."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -13,21 +13,14 @@ from materialist.camera import unit
 from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.render.variant import setup
-from materialist.types import Array
+from materialist.types import Array, Triangles
 
 
-@dataclass(frozen=True)
-class Solid:
-    """A triangle mesh in the frame of its scene (+Y up, metres); the closed ones stand on y = 0."""
+class Solid(Triangles):
+    """A surface in the frame of its scene (+Y up, metres), float64; the closed ones stand on y = 0.
 
-    vertices: Array
-    """[V, 3] float64."""
-    faces: Array
-    """[F, 3] int32, counter-clockwise from outside."""
-    normals: Array
-    """[V, 3] float64 unit shading normals, outwards."""
-    uv: Array
-    """[V, 2] float64; textures repeat outside [0, 1]."""
+    Textures repeat outside [0, 1].
+    """
 
 
 def box(size: Array) -> Solid:
