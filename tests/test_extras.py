@@ -23,7 +23,7 @@ FLAT = np.ones((4, 6), bool)
         ("rawpy", lambda folder: read_photo(folder / "a.CR2"), "pip install rawpy"),
         ("imageio_ffmpeg", lambda folder: write_frames(folder / "a.mp4", iter([])), "pip install imageio-ffmpeg"),
         ("pyoidn", lambda _: denoise(IMAGE, albedo=IMAGE, normal=IMAGE), "-m pip install pyoidn"),
-        ("patchmatch", lambda _: patched(IMAGE, FLAT, FLAT, FLAT, FLAT, seed=1),
+        ("patchmatch", lambda _: patched(IMAGE, FLAT, FLAT, FLAT, seed=1),
          "pip install --force-reinstall --no-deps PyPatchMatch"),
         ("pxr", lambda folder: mt.export(flat_scene(), folder / "a.usdz"), r"pip install 'materialist\[usd\]'"),
         ("diffusers", lambda _: get_predictor("constant", normal="marigold"), r"needs diffusers.*materialist\[hub\]"),

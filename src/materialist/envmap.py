@@ -1,6 +1,7 @@
 """The texels of an equirectangular environment map, in the project's convention (docs/conventions.md)."""
 
 import numpy as np
+from scipy.special import sph_harm_y
 
 from materialist.camera import pixel_rays, project, unit
 from materialist.types import Array, Camera
@@ -22,8 +23,6 @@ def texel_directions(height: int, width: int, kind: type = np.float32) -> Array:
 
 def sh_basis(direction: Array, degree: int) -> Array:
     """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
-    from scipy.special import sph_harm_y
-
     x, y, z = direction[..., 2], direction[..., 0], direction[..., 1]
     theta, phi = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
     columns = []

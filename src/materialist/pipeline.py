@@ -15,6 +15,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
+from materialist.io.image import read_mask
 from materialist.io.photo import HDR_CLIP, exposed, read_photo
 from materialist.metrics.residual import shading_residual
 from materialist.options import InvertOptions
@@ -198,8 +199,6 @@ def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
         return None
     shape = picture.linear.shape[:2]
     if isinstance(given, str | Path):
-        from materialist.io.image import read_mask
-
         given = read_mask(given, shape, picture.original.shape[:2])
     if given.shape != shape:
         raise InputError(f"Mask is {given.shape}, the photo at working size is {shape} (rows, columns).")

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from materialist import __version__, errors
 from materialist.batches.edits import missing_files
 from materialist.batches.ledger import Ledger, open_ledger
@@ -89,8 +91,6 @@ def default_workers(device: str = "auto", size: int = 512) -> int:
     """One for each GPU that may be used, else one for each processor as far as memory reaches."""
     if gpus := visible_gpus(device):
         return len(gpus)
-    import psutil
-
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     worker = 720 + 2.9e-3 * size**2  # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
     return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker)))

@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 import materialist as mt
@@ -138,8 +139,6 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
 
 def _thumbnails(pictures: list[Array]) -> bytes:
     """A JPEG of pictures, linear [H, W, 3] of about one shape, small and side by side."""
-    import cv2
-
     height, width = pictures[0].shape[:2]
     scale = min(1, THUMBNAIL[0] / width, THUMBNAIL[1] / height)
     size = (max(1, round(width * scale)), max(1, round(height * scale)))

@@ -10,7 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+import trimesh
+from PIL import Image
+from trimesh import Trimesh
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual.material import PBRMaterial
 
 from materialist import __version__
 from materialist.color import srgb_levels
@@ -31,9 +37,6 @@ _LAMPS = "KHR_lights_punctual"
 
 def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
     """One self-contained file."""
-    import trimesh
-    from trimesh.exchange.gltf import export_glb
-
     made = trimesh.Scene()
     for part in parts:
         mesh = part.mesh
@@ -45,16 +48,11 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
 
 def write_hdr(path: Path, envmap: Array) -> None:
     """The light [h, 2h, 3] as a Radiance picture (8 bits of mantissa and a shared exponent), rows and columns as is."""
-    import cv2
-
     path.write_bytes(cv2.imencode(".hdr", np.ascontiguousarray(envmap[..., ::-1], np.float32))[1].tobytes())
 
 
 def _material(part: Part) -> Any:
     """trimesh's material of a part, but for its `_extensions`."""
-    from PIL import Image
-    from trimesh.visual.material import PBRMaterial
-
     m = passing(part)
     packed = to_bytes(np.stack([np.zeros_like(m.roughness), m.roughness, m.metallic], -1))
     textures = {"baseColorTexture": srgb_levels(m.albedo), "metallicRoughnessTexture": packed}
@@ -124,8 +122,6 @@ def _thickness(part: Part) -> float:
 
     Without a thickness glass is a thin wall by the specification, and bends nothing.
     """
-    from trimesh import Trimesh
-
     if part.surface is None or part.surface.transmission == 0:
         return 0.0
     open_edges, _ = edge_faults(part.mesh.vertices, part.mesh.faces)

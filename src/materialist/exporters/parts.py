@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.geometry.build import part
+from materialist.geometry.build import part, rebuilt
 from materialist.types import Array, Camera, Geometry, Materials, Mesh, Scene, Surface
 
 _NEUTRAL = ((0.5, 0.5, 0.5), 0.5, 0.0)
@@ -98,8 +98,6 @@ def _mean(materials: Materials, members: Array) -> Materials:
 
 def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
     """Geometry of a coarser depth map with at most `most` triangles, and the maps at its size."""
-    from materialist.geometry.build import rebuilt
-
     camera, factor = scene.camera, np.sqrt(most / len(scene.geometry.mesh.faces))
     for _ in range(12):
         width, height = (max(2, round(size * factor)) for size in (camera.width, camera.height))

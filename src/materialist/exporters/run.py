@@ -9,6 +9,7 @@ from typing import Any
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
+from materialist.exporters.glb import glb_bytes, write_hdr
 from materialist.exporters.parts import Part, body_parts, scene_parts
 from materialist.io.atomic import whole_file, write_whole
 from materialist.options import ExportOptions
@@ -97,8 +98,6 @@ def check_format(path: Path, to: str | None) -> str:
 
 
 def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
-    from materialist.exporters.glb import glb_bytes, write_hdr
-
     light = path.with_suffix(".light.hdr")
     with whole_file(path, force) as mesh_file, whole_file(light, force) as light_file:
         mesh_file.write_bytes(glb_bytes(scene, parts))

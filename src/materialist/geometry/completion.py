@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 from skimage.morphology import convex_hull_image
+from trimesh.intersections import slice_faces_plane
 
 from materialist.camera import rays_through, unproject
 from materialist.geometry.boundary import grid_faces, joined_faces
@@ -190,8 +191,6 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
 
 def _cut(surface: tuple[Array, Array], half_space: Array) -> tuple[Array, Array]:
     """The part of a surface (points [V, 3], faces [F, 3]) in a half-space [4], a . p + b >= 0."""
-    from trimesh.intersections import slice_faces_plane
-
     normal, offset = half_space[:3], half_space[3]
     points, faces, _ = slice_faces_plane(*surface, normal, -offset / (normal @ normal) * normal)
     return points, faces

@@ -1,6 +1,7 @@
 """Values carried smoothly into places where they are not known."""
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from materialist.geometry.silhouette import window
 from materialist.types import Array
@@ -11,8 +12,6 @@ _SWEEPS = 14
 
 def nearest(known: Array) -> tuple[Array, Array]:
     """[H, W] row and column of the nearest known place; known [H, W] bool, somewhere true."""
-    from scipy.ndimage import distance_transform_edt
-
     rows, columns = distance_transform_edt(~known, return_distances=False, return_indices=True)
     return rows, columns
 

@@ -1,6 +1,8 @@
 """The silhouette of one object in a picture: its pixels, their distance to it, the object's size."""
 
+import cv2
 import numpy as np
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from materialist.errors import InputError
 from materialist.types import Array, Camera
@@ -37,22 +39,16 @@ def area(box: tuple[slice, slice]) -> int:
 
 def disc(radius: int) -> Array:
     """[2 r + 1, 2 r + 1] uint8: the pixels within a radius, for `cv2.erode` and its like."""
-    import cv2
-
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1,) * 2))
 
 
 def grown(mask: Array, radius: int) -> Array:
     """[H, W] bool: a mask grown by a disc of `radius` pixels."""
-    import cv2
-
     return np.asarray(cv2.dilate(mask.astype(np.uint8), disc(radius)) > 0)
 
 
 def border_distance(inside: Array) -> Array:
     """[H, W] pixels from each pixel's centre to the silhouette, 0 outside; the picture's border is no silhouette."""
-    from scipy.ndimage import distance_transform_edt
-
     # An object that the border cuts goes on beyond it.
     padded = np.pad(inside, 1, mode="edge")
     if padded.all():
@@ -62,8 +58,6 @@ def border_distance(inside: Array) -> Array:
 
 def silhouette_field(inside: Array) -> Array:
     """[H, W] pixels to the silhouette, > 0 inside: the pixels' stairs are smoothed, straight edges keep their place."""
-    from scipy.ndimage import distance_transform_edt, gaussian_filter
-
     framed = np.pad(inside, 1)
     signed = distance_transform_edt(framed) - distance_transform_edt(~framed)
     signed = signed - 0.5 * np.sign(signed)  # pixel centres lie half a pixel from the border between pixels

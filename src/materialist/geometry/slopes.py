@@ -1,6 +1,7 @@
 """Slopes of a map, its values between pixels, and the normals of a surface that is seen from within."""
 
 import numpy as np
+from scipy.ndimage import correlate, gaussian_filter, map_coordinates
 
 from materialist.camera import unit
 from materialist.geometry.membrane import nearest
@@ -17,8 +18,6 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     Least squares over a window with Gaussian weights of `sigma` pixels, of known [H, W] bool pixels alone: next to
     the end of the map the window is one-sided.
     """
-    from scipy.ndimage import correlate
-
     reach = int(np.ceil(2 * max(sigma, SHARP)))
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
     weight = np.exp(-(x**2 + y**2) / (2 * max(sigma, SHARP) ** 2))
@@ -64,8 +63,6 @@ def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -
 
 def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
     """[H, W, 3] unit: the Gaussian mean (`sigma` pixels) of the normals inside [H, W] bool."""
-    from scipy.ndimage import gaussian_filter
-
     mean = np.where(inside[..., None], normal, 0).astype(np.float64)
     if sigma > 0.1:
         mean = gaussian_filter(mean, (sigma, sigma, 0))
@@ -74,8 +71,6 @@ def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
 
 def sampled(values: Array, place: Array, order: int = 3) -> Array:
     """[V, ...] of a map [H, W, ...] at places [V, 2] (x, y), by splines: with cubic ones normals turn evenly."""
-    from scipy.ndimage import map_coordinates
-
     flat = np.asarray(values, np.float64).reshape(*values.shape[:2], -1)
     read = [map_coordinates(flat[..., k], place.T[::-1], order=order, mode="nearest") for k in range(flat.shape[-1])]
     return np.stack(read, -1).reshape(len(place), *values.shape[2:])

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from PIL import Image, ImageCms
+from tifffile import TiffFile
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
@@ -86,8 +88,6 @@ def read_bitmap(path: Path) -> Decoded:
 
 def read_tiff(path: Path) -> Decoded:
     """A TIFF: scene-linear where it holds floats. What is deeper than 8 bits OpenCV reads, and turns upright itself."""
-    from tifffile import TiffFile
-
     with TiffFile(path) as file:
         page: Any = file.pages[0]
         bits, planar, meaning, extra = (page.tags.valueof(name, usual) for name, usual in _LAYOUT.items())
@@ -166,8 +166,6 @@ def stored_pixels(path: Path) -> tuple[Array, Array | None]:
 
     They are uint8, uint16, float32 or float64. Raises InputError for other pixels, and for none.
     """
-    import cv2
-
     try:
         decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:  # an empty file, or a header that promises more pixels than any picture has

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image, UnidentifiedImageError
+from tifffile import TiffFile
 
 from materialist.errors import InputError, MaterialistError, SetupError
 from materialist.io import bitmap
@@ -47,8 +48,6 @@ def image_size(path: Path) -> tuple[int, int]:
             raise InputError(f"{path} has no size in its Radiance header; export it again.")
         return int(size[2]), int(size[1])
     if head.startswith(_TIFF):  # Pillow does not know some layouts, such as float RGB
-        from tifffile import TiffFile
-
         with TiffFile(path) as tiff:
             page: Any = tiff.pages[0]
             return int(page.imagewidth), int(page.imagelength)
@@ -82,7 +81,7 @@ def decode(path: Path) -> Decoded:
         if head.startswith(_EXR):
             return _exr(path)
         if head.startswith(_RADIANCE):
-            return _hdr(path)
+            return Decoded(np.ascontiguousarray(bitmap.stored_pixels(path)[0]), True)  # RGBE
         if head.startswith(_TIFF):
             return bitmap.read_tiff(path)
         return bitmap.read_bitmap(path)
@@ -99,11 +98,6 @@ def _exr(path: Path) -> Decoded:
         pixels = np.repeat(pixels[..., None], 3, -1)
     alpha = pixels[..., 3:] if pixels.shape[-1] == 4 else None
     return bitmap.light_and_alpha(np.ascontiguousarray(pixels[..., :3]), alpha)
-
-
-def _hdr(path: Path) -> Decoded:
-    """Radiance RGBE."""
-    return Decoded(np.ascontiguousarray(bitmap.stored_pixels(path)[0]), True)
 
 
 def _raw(path: Path) -> Decoded:

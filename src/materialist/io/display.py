@@ -3,7 +3,9 @@
 import io
 from pathlib import Path
 
+import cv2
 import numpy as np
+from PIL import Image
 
 from materialist.color import linear_to_srgb, luminance, srgb_levels
 from materialist.io.atomic import write_whole
@@ -27,8 +29,6 @@ def grey(values: Array) -> Array:
 
 def ramp(values: Array) -> Array:
     """A map [H, W] in [0, 1] by a perceptually even ramp from black to pale yellow."""
-    import cv2
-
     return cv2.applyColorMap(to_bytes(values), cv2.COLORMAP_INFERNO)[..., ::-1]
 
 
@@ -74,8 +74,6 @@ def maps(of: Prediction | Scene) -> dict[str, Array]:
 
 def strip(image: Array, *predictions: Prediction) -> Array:
     """The linear picture and, under each other, the maps of each prediction: one row of a sheet, uint8 RGB."""
-    import cv2
-
     rows = [np.concatenate([srgb_levels(image), *maps(p).values()], 1) for p in predictions]
     joined = np.concatenate(rows, 0)
     factor = _SIDE / max(image.shape[:2])
@@ -94,8 +92,6 @@ def write_sheet(strips: list[Array], path: Path) -> None:
 
 def encoded(pixels: Array, kind: str = "PNG", **settings: int) -> bytes:
     """A PNG or JPEG file of [H, W, 3] or [H, W] uint8; `settings` are Pillow's."""
-    from PIL import Image
-
     buffer = io.BytesIO()
     Image.fromarray(np.ascontiguousarray(pixels)).save(buffer, kind, **settings)
     return buffer.getvalue()

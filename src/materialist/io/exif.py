@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from PIL import Image
+from PIL import ExifTags, Image
 
 FILM_WIDTH = 36.0
 """Long side of a 35 mm film frame, millimetres."""
@@ -27,8 +26,6 @@ def image_tags(image: Image.Image) -> dict[str, Any]:
 
 def file_tags(path: Path) -> dict[str, Any]:
     """EXIF of a RAW file; most are TIFF inside, the others give none."""
-    from PIL import Image
-
     exif = Image.Exif()
     with suppress(Exception), path.open("rb") as file:  # no EXIF is no error: the field of view then falls back
         exif.load_from_fp(file)
@@ -79,7 +76,5 @@ def _number(value: Any) -> float | None:
 
 def _named(exif: Image.Exif) -> dict[str, Any]:
     """Tags by name, of the main and the Exif directory."""
-    from PIL import ExifTags
-
     tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
     return {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}

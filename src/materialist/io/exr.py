@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenEXR
 
 from materialist.errors import InputError, OutputError
 from materialist.plain import is_utf8
@@ -39,8 +40,6 @@ def read_exr(path: str | Path, *, photo: bool = False) -> Array:
 @contextmanager
 def _opened(path: Path, **how: bool) -> Iterator[Any]:
     """An open EXR. Raises InputError, also for what goes wrong within."""
-    import OpenEXR
-
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
     if not is_utf8(str(path)):
@@ -69,8 +68,6 @@ def write_exr(path: str | Path, array: Array) -> None:
 
     Raises InputError for another shape, OutputError when the file cannot be written.
     """
-    import OpenEXR
-
     array = np.asarray(array)
     names = {2: "Y"}.get(array.ndim) or {(3, 3): "RGB", (3, 4): "RGBA"}.get((array.ndim, array.shape[-1]))
     if names is None:

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
+from PIL import Image
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError
@@ -20,8 +22,6 @@ def write_png(path: str | Path, picture: Array) -> None:
 
     Raises OutputError when the file cannot be written.
     """
-    from PIL import Image
-
     with writing(path):
         Image.fromarray(picture if picture.dtype == np.uint8 else srgb_levels(picture)).save(path, format="PNG")
 
@@ -35,8 +35,6 @@ def write_image(path: str | Path, linear: Array, *, deep: bool = False, force: b
     ensure_image_writable(path, force=force)
     with whole_file(path, force) as temporary:
         if deep and temporary.suffix == ".png":
-            import cv2
-
             temporary.write_bytes(cv2.imencode(".png", srgb_levels(linear, np.uint16)[..., ::-1])[1].tobytes())
         else:
             (write_exr if temporary.suffix == ".exr" else write_png)(temporary, linear)
@@ -86,8 +84,6 @@ def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] 
     The file may have the working size `shape`, or the photo's `native` (H0, W0), or any size of that aspect ratio;
     it is area-averaged to `shape`. Raises InputError for another aspect ratio, an empty mask, or a colour photo.
     """
-    import cv2
-
     mask, alpha = _with_alpha(path)
     if mask.ndim == 3 and ((np.ptp(mask, axis=-1) > 0.05) & (np.abs(mask.max(-1) - 0.5) < 0.4)).mean() > COLOURED:
         raise InputError(f"{path} is a colour picture, not a mask; paint what is inside white, and all else black.")

@@ -3,6 +3,7 @@
 import textwrap
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont, ImageOps
 
@@ -129,8 +130,6 @@ def _font(size: int) -> ImageFont.FreeTypeFont:
 
 def _labels(label: Array, linear: Array) -> Array:
     """Each plane [H, W] in a colour of its own over a dim grey photo [H, W, 3]."""
-    import cv2
-
     hue = (label.astype(np.int32) * 67 + 100) % 180
     colour = cv2.cvtColor(np.stack([hue, hue * 0 + 130, hue * 0 + 255], -1).astype(np.uint8), cv2.COLOR_HSV2RGB)
     dim = 0.25 + 0.6 * srgb_levels(linear).mean(-1, keepdims=True) / 255

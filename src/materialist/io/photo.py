@@ -4,6 +4,7 @@ from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from materialist.errors import InputError, SetupError
@@ -127,8 +128,6 @@ def _working(original: Array, size: int) -> Array:
 
     Pixels stay square: of a long photo the shorter side has MIN_SIDE pixels, and the longer one more than `size`.
     """
-    import cv2
-
     height, width = original.shape[:2]
     scale = max(size / max(height, width), MIN_SIDE / min(height, width))
     if scale >= 1:

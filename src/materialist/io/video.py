@@ -6,6 +6,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from imageio.v2 import get_writer
+
 from materialist.color import srgb_levels
 from materialist.errors import InputError, SetupError
 from materialist.io.atomic import FRAMES, ensure_writable, whole_file, whole_folder
@@ -51,8 +53,6 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
 
 
 def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
-    from imageio.v2 import get_writer
-
     count = 0
     writer: Any = get_writer(
         path, "FFMPEG", fps=fps, codec="libx264", quality=8, macro_block_size=2, output_params=list(BT709)

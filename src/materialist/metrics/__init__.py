@@ -5,6 +5,8 @@ name of the function says otherwise.
 """
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
+from skimage.metrics import structural_similarity
 
 from materialist.color import linear_to_srgb
 from materialist.envmap import row_solid_angle, sh_basis, texel_directions
@@ -57,8 +59,6 @@ def ssim_without_noise(first: Array, second: Array, b: Array) -> float:
 
     Their variance in a window is their covariance, to which the noise of neither adds.
     """
-    from scipy.ndimage import gaussian_filter
-
     one, other, b = (linear_to_srgb(v).astype(np.float64) for v in (_checked(first, b), _checked(second, b), b))
     smooth = lambda v: gaussian_filter(v, (1.5, 1.5, 0), truncate=3.5)  # noqa: E731
     mean_one, mean_other, mean_b = smooth(one), smooth(other), smooth(b)
@@ -72,8 +72,6 @@ def ssim_without_noise(first: Array, second: Array, b: Array) -> float:
 
 def ssim_of_values(a: Array, b: Array, *, mask: Array | None = None) -> float:
     """As `ssim`, of maps [H, W] or [H, W, C] in [0, 1] as they are, without encoding."""
-    from skimage.metrics import structural_similarity
-
     smallest = min(a.shape[:2])
     if smallest < 3:
         raise InputError(f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}.")

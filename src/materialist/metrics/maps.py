@@ -1,10 +1,6 @@
 """How good predicted maps are: the figures of the paper's Table 1, raw and after one scale where scale is ambiguous.
 
-Protocol. Only pixels with a true surface count. Albedo is compared sRGB-encoded and clipped to [0, 1], as it is and
-after one factor for the whole picture (least squares of linear values): the light's brightness cannot be told from the
-surface's. Roughness and metallic are compared as they are. Depth counts where both depths are positive: MAE and RMSE
-in units of the true depth, as it is and after one factor (least squares); the scale-invariant log RMSE is the standard
-deviation of log predicted - log true. Normals are compared by their angle.
+The protocol is that of `bench materials`: the light's brightness cannot be told from the albedo's, nor a depth's unit.
 """
 
 import numpy as np

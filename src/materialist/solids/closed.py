@@ -8,6 +8,7 @@ of planes fitted to its depth.
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 
 from materialist.camera import rays_through, unit
@@ -135,8 +136,6 @@ def _cavity(view: _View, wall: float, camera: Camera) -> Shell | None:
 
 def _closed(view: _View, camera: Camera) -> Shell:
     """Front and back over one triangulated region."""
-    import cv2
-
     known, length, front, thick = view.inside, view.length, view.depth, view.thickness
     edge = silhouette_field(known)  # [h, w] pixels
     factor = int(np.clip(round(DEFAULT.grid / max(known.shape)), 1, DEFAULT.finest))

@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import binary_fill_holes
+from scipy.interpolate import splev, splprep
+from scipy.ndimage import binary_fill_holes, map_coordinates
+from scipy.optimize import minimize_scalar
+from skimage.measure import find_contours
 
 from materialist.camera import pixel_rays, project, unit
 from materialist.geometry.silhouette import silhouette_field, surface_in
@@ -130,8 +133,6 @@ def _stepped(own: Array, other: Array) -> float:
 
 def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
     """[3] unit: across the upright plane through the camera in which the mask is its own image best, and how well."""
-    from scipy.optimize import minimize_scalar
-
     own = rays[inside]
     middle = own.mean(0)
     first = unit(np.cross(up, -middle))  # across the plane through the middle of the mask
@@ -188,8 +189,6 @@ def _border(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | N
 
     None where nothing stays inside the outline.
     """
-    from skimage.measure import find_contours
-
     far = float(np.linalg.norm(axis.foot))
     pixel = far / camera.focal
     rows, columns = np.nonzero(field > 0)
@@ -216,8 +215,6 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
 
     The mean of what the left and what the right half of the outline say: a mask is never quite its own image.
     """
-    from scipy.ndimage import map_coordinates
-
     first = unit(np.cross(axis.up, axis.foot))
     halves = []
     for half in (0.0, np.pi):
@@ -238,8 +235,6 @@ def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: boo
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
-    from scipy.interpolate import splev, splprep
-
     spline, along = splprep(line.T, s=len(line) * (DEFAULT.stairs * far / camera.focal) ** 2)
     smooth = np.stack(splev(along, spline), -1)
     step = unit(np.stack(splev(along, spline, der=1), -1))

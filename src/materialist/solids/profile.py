@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
+from skimage.measure import find_contours, grid_points_in_poly
 
 from materialist.camera import unit
 from materialist.geometry.slopes import sampled
@@ -29,10 +32,6 @@ class Profile:
     @classmethod
     def of(cls, line: Array, cell: float, floor: float) -> Self:
         """The profile inside a line [K, 2] (distance from the axis, height) that runs from its foot up to the axis."""
-        from scipy.ndimage import gaussian_filter
-        from scipy.spatial import cKDTree
-        from skimage.measure import grid_points_in_poly
-
         low = min(float(line[:, 1].min()), floor) - MARGIN * cell
         corners = (line - [0, low]) / cell  # (column, row)
         shape = tuple(int(np.ceil(n)) + MARGIN for n in corners.max(0)[::-1])
@@ -70,8 +69,6 @@ class Profile:
 
         The body is to the left. Lines begin and end at the axis, or are closed.
         """
-        from skimage.measure import find_contours
-
         bottom = (self.floor + level - self.low) / self.cell  # rows
         rows = np.arange(self.values.shape[0])[:, None]
         cut = np.maximum(self.values + level / self.cell, bottom - rows)

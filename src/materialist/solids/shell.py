@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from trimesh import Trimesh
+from trimesh.intersections import slice_faces_plane
 
 from materialist.camera import rays_through, unit
 from materialist.geometry.boundary import grid_faces, joined_faces
@@ -36,9 +38,6 @@ def region(field: Array) -> tuple[Array, Array]:
     Faces are counter-clockwise seen with y up. No value of the field is 0. Values beyond the grid count as negative at
     once: a caller who wants a smooth end there leaves a margin.
     """
-    from trimesh import Trimesh
-    from trimesh.intersections import slice_faces_plane
-
     y, x = np.indices(field.shape)
     grid = np.stack([x, y, field], -1).reshape(-1, 3)
     # Both triangles of a cut side have points of their own there, which Trimesh merges.

@@ -10,6 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 import materialist as mt
 from materialist.edits.recipe import REGION, Step, apply, options_of, region_of
 from materialist.errors import InputError
@@ -113,8 +115,6 @@ class GlassClient:
 
     def _send(self, others: tuple[Step, ...], step: Step) -> None:
         """Send a request to the process; start one where none runs."""
-        import psutil
-
         try:
             if self._worker is None:
                 if psutil.virtual_memory().available < SETTINGS.free_for_glass:

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from typing import Any
 
+from trimesh import creation, transformations
+
 from materialist.edits.recipe import KINDS as STEPS
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
@@ -84,7 +86,6 @@ def library_name(file: Any) -> str | None:
 def library_file(session: Session, name: str) -> str:
     """A computed mesh as a file in the workspace: +Y up, longest side 1."""
     import numpy as np
-    from trimesh import creation, transformations
 
     file = session.workspace / file_of(name)
     if not file.is_file():

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.camera import project
@@ -155,8 +156,6 @@ def draw_bodies(picture: Array, scene: Scene) -> Array:
 
 def sketch_glass(picture: Array, region: Array, tint: Colour) -> Array:
     """[H, W, 3] with the object under a region [H, W] bool blurred and tinted, until its glass is traced."""
-    import cv2
-
     spread = 1 + int(1.5 * np.sqrt(region.sum()))  # pixels
     blurred = cv2.blur(picture, (spread, spread))
     return np.where(region[..., None], blurred * np.asarray(tint, np.float32), picture)
@@ -169,8 +168,6 @@ def lay_over(picture: Array, piece: Array, share: Array) -> Array:
 
 def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
     """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
-    import cv2
-
     colour = np.zeros((*scene.depth.shape, 3), np.float32)
     depth = np.zeros(scene.depth.shape, np.float32)
     stride = -(-len(body.faces) // SETTINGS.triangles)

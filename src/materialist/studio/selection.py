@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.edits.select.select import select
@@ -35,8 +36,6 @@ class Selection:
     @cached_property
     def pictures(self) -> dict[str, str]:
         """The mask as data URLs of two see-through pictures, `fill` and `outline`; empty texts for none."""
-        import cv2
-
         mask = self.mask
         if mask is None:
             return {"fill": "", "outline": ""}
@@ -70,8 +69,6 @@ class Selection:
 
     def brush(self, scene: Scene, points: list[list[float]], radius: float, mode: str) -> Selection:
         """With a stroke through pixels (x, y): added, or rubbed out."""
-        import cv2
-
         if not points or len(points) > 20_000 or not 0.5 <= radius <= 500:
             raise InputError("The brush stroke could not be read; paint again.")
         stroke = np.zeros(scene.depth.shape, np.uint8)

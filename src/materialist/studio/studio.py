@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from materialist.errors import InputError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
@@ -108,8 +110,6 @@ class Studio:
 
     def open(self, session: Session, name: str) -> None:
         """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
-        import psutil
-
         project = self.project(name, session.person)
         session.close()
         free_memory().result()

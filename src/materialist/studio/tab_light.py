@@ -9,6 +9,8 @@ import numpy as np
 
 from materialist.edits.light import presets
 from materialist.errors import InputError
+from materialist.io.display import light
+from materialist.io.exr import write_exr
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.controls import SUN, file_field, number_text, slider
 from materialist.studio.session import Session
@@ -88,8 +90,6 @@ def place_lamp(
 
 def _written(session: Session, name: str) -> str:
     """A computed light as a file in the workspace, so that the recipe can be replayed anywhere."""
-    from materialist.io.exr import write_exr
-
     file = session.workspace / f"light-{name.lower()}.exr"
     if not file.is_file():
         write_exr(file, presets.light(name))
@@ -98,7 +98,5 @@ def _written(session: Session, name: str) -> str:
 
 @cache
 def _gallery() -> list[tuple[Array, str]]:
-    from materialist.io.display import light
-
     own = np.full((64, 128, 3), 225, np.uint8)
     return [(own, OWN), *((light(presets.light(name, 64)), name) for name in presets.LIGHTS)]

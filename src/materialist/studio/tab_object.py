@@ -7,6 +7,7 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.edits.insert.meshes import read_model
 from materialist.studio import objects, uploads
 from materialist.studio.controls import file_field, hex_colour, slider
 from materialist.studio.session import Session
@@ -70,8 +71,6 @@ def _choose(session: Session, name: str | None) -> Updates:
 
 
 def _uploaded(session: Session, file: Path) -> Updates:
-    from materialist.edits.insert.meshes import read_model
-
     stored = uploads.stored(session.workspace, file, "mesh")
     read_model(session.workspace / stored)
     objects.set_option(session, "mesh", stored)

@@ -6,6 +6,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import cv2
 import gradio as gr
 import numpy as np
 
@@ -98,8 +99,6 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
 @cache
 def _examples() -> list[tuple[Array, str]]:
     """Small pictures of the example photos, with their names."""
-    import cv2
-
     photos = {name: np.asarray(cv2.imread(str(example_path(name))))[..., ::-1] for name in EXAMPLES}
     small = lambda photo: cv2.resize(photo, None, fx=(s := 240 / photo.shape[1]), fy=s, interpolation=cv2.INTER_AREA)  # noqa: E731
     return [(small(photo), name.capitalize()) for name, photo in photos.items()]

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 import materialist as mt
@@ -157,8 +158,6 @@ def _zipped(output: Path) -> Iterator[Path]:
 
 def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
     """A linear picture [H, W, 3] as a JPEG of at most `longest` pixels a side."""
-    import cv2
-
     scale = min(1.0, longest / max(linear.shape[:2]))
     size = (max(1, round(linear.shape[1] * scale)), max(1, round(linear.shape[0] * scale)))
     small = np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear

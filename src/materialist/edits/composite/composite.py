@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from materialist import metrics
@@ -138,8 +139,6 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
 
     Edits of it start there.
     """
-    import cv2
-
     size = (scene.camera.width, scene.camera.height)
     same = picture.shape[:2] == size[::-1]
     linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))

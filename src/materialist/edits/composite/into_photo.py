@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
@@ -142,8 +143,6 @@ def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
 
     Pixels beside a body look up values under its rim when they are enlarged, where the layers show the body itself.
     """
-    from scipy import ndimage
-
     clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside == 0
     if clear.all() or not clear.any():
         return stack, clear

@@ -3,7 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
+from scipy.ndimage import rank_filter
+from skimage.morphology import remove_small_objects
 
 from materialist.color import linear_to_srgb, luminance
 from materialist.edits.composite.native_layer import NativeLayer, native_layer
@@ -148,15 +151,11 @@ def _halves(
 
 def _large(mask: Array) -> Array:
     """The mask [H, W] bool without parts that chance makes: those of a window or two."""
-    from skimage.morphology import remove_small_objects
-
     return remove_small_objects(mask, max_size=2 * DEFAULT.window**2)
 
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
     """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
-    import cv2
-
     mean = lambda v: cv2.blur(v, (DEFAULT.window,) * 2, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     base, edited = (np.maximum(mean(((one + other) / 2).astype(np.float32)), 0) for one, other in ((b0, b1), (e0, e1)))
     white = np.maximum(np.maximum(base, edited), 1)
@@ -172,8 +171,6 @@ def significance(d0: Array, d1: Array) -> Array:
     of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise. It is the larger one of the sum of
     the channels, where a change is seen first, and of the three together, among which another hue cancels in the sum.
     """
-    import cv2
-
     size = (DEFAULT.window, DEFAULT.window)
     box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), size, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     gain = np.zeros(d0.shape[:2])
@@ -192,8 +189,6 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
     They come from single paths, as where glass focuses small lights. `where` [H, W] bool: pixels that may change, all
     by default.
     """
-    from scipy.ndimage import rank_filter
-
     light = luminance(picture)
     around = np.ones((3, 3), bool)
     around[1, 1] = False

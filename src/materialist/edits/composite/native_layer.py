@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.edits.composite.upsample import matte
@@ -49,8 +50,6 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     Bodies that take the place of a surface of the photo are left to the photo's own outlines. Under another light
     every lamp counts as new: it stays as bright as it was, and what changes beside it must not colour its rim.
     """
-    import cv2
-
     from materialist.render.pixels import first_hits, only, radiance
 
     scene = renderer.scene
@@ -101,8 +100,6 @@ def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Bo
 
 
 def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Array:
-    import cv2
-
     return np.asarray(cv2.resize(values, shape[1::-1], interpolation=getattr(cv2, f"INTER_{how}")))
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb
@@ -90,8 +91,6 @@ def matte(mask: Array, large: Array) -> Array:
     inside and well outside nearby; its place on the line between them is its share. Where both sides look alike, and
     where the pixel is no mixture of the two, the enlarged mask decides. Exactly 0 and 1 further away.
     """
-    import cv2
-
     height, width = large.shape[:2]
     scale = max(height / mask.shape[0], width / mask.shape[1])
     soft = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
@@ -117,8 +116,6 @@ def matte(mask: Array, large: Array) -> Array:
 
 def _shares(soft: Array, large: Array, scale: float) -> Array:
     """[h, w] float32: `matte` of a window, of `scale` native pixels a working pixel; `soft` the enlarged mask."""
-    import cv2
-
     reach = 2 * int(np.ceil(1.5 * scale)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
     sure_in, sure_out = cv2.erode(soft, kernel) >= 0.999, cv2.dilate(soft, kernel) <= 0.001
@@ -145,8 +142,6 @@ def _ramp(values: Array, low: float, high: float) -> Array:
 
 def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array, Array]:
     """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
-    import cv2
-
     blurred = lambda values: cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     weight = members.astype(np.float32)
     norm = np.maximum(blurred(weight), 1e-12)

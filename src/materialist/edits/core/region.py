@@ -1,5 +1,6 @@
 """The region of an edit: a mask at working size that has been checked."""
 
+import cv2
 import numpy as np
 
 from materialist.edits.core.renderer import EditRenderer
@@ -48,8 +49,6 @@ def reshaped(weight: Array, grow: float, feather: float) -> Array:
 
     Raises InputError when nothing is left of it.
     """
-    import cv2
-
     longer = max(weight.shape)
     if radius := round(abs(grow) * longer):
         weight = (cv2.dilate if grow > 0 else cv2.erode)(weight, disc(radius))

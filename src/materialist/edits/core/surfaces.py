@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from trimesh import Trimesh
 
 from materialist.types import Array, Body, Scene, Surface
 
@@ -67,8 +68,6 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
 
     Vertices within a millionth of the mesh's size of each other count as one.
     """
-    from trimesh import Trimesh
-
     extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
     mesh = Trimesh(np.round((vertices - vertices.min(0)) / extent * 1e6), faces)  # merges vertices
     mesh.update_faces((np.diff(np.sort(mesh.faces, 1), axis=1) > 0).all(1))

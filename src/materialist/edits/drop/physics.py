@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+from trimesh import Trimesh
 
 from materialist.errors import InputError, SetupError
 from materialist.types import Array
@@ -128,8 +130,6 @@ def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
 
 def hull(points: Array) -> Array:
     """[n, 3] corners of the convex hull of points [m, 3], m >= 4; flat ones are given a thickness."""
-    from scipy.spatial import ConvexHull, QhullError
-
     try:
         return points[ConvexHull(points).vertices]
     except QhullError:
@@ -143,9 +143,6 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
 
     Raises SetupError where coacd is not installed and the mesh is not nearly convex.
     """
-    from scipy.spatial import ConvexHull
-    from trimesh import Trimesh
-
     vertices = np.asarray(vertices, np.float64)
     outer, mesh = hull(vertices), Trimesh(vertices, faces, validate=True)
     if mesh.is_watertight and ConvexHull(outer).volume <= DEFAULT.same * abs(mesh.volume):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import label
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
@@ -37,8 +38,6 @@ def objects_in(mask: Array) -> list[Array]:
 
     Specks count to the nearest object.
     """
-    from scipy.ndimage import label
-
     number, _ = label(mask, np.ones((3, 3)))
     area = np.bincount(number.ravel())
     area[0] = 0

@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+from trimesh import Trimesh, sample
 
 from materialist.camera import rays_through, unit, unproject
 from materialist.edits.core.notes import noted, warned
@@ -81,8 +83,6 @@ def put(
 
     The side is the model's own, in scene units; see `insert`.
     """
-    from scipy.spatial.transform import Rotation
-
     low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
     first = support_at(scene, at)
@@ -177,7 +177,5 @@ def moved(body: Body, linear: Array, shift: Array) -> Body:
 
 def surface_points(body: Body) -> Array:
     """[n, 3] points evenly over the body's surface, always the same ones."""
-    from trimesh import Trimesh, sample
-
     mesh = Trimesh(body.vertices, body.faces, process=False)
     return np.asarray(sample.sample_surface(mesh, SETTINGS.samples, seed=0)[0])

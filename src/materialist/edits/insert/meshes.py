@@ -12,6 +12,8 @@ from typing import Any, cast
 from urllib.parse import unquote
 
 import numpy as np
+import trimesh
+from trimesh import Trimesh
 
 from materialist.camera import unit
 from materialist.color import srgb_to_linear
@@ -185,8 +187,6 @@ def _bytes(path: Path) -> bytes:
 
 
 def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
-    import trimesh
-
     quiet = logging.getLogger("trimesh")
     level = quiet.level
     quiet.setLevel(logging.CRITICAL)  # its messages end in the sentences of this module
@@ -314,8 +314,6 @@ class _Reader:
 
 def creased_normals(vertices: Array, faces: Array, degrees: float) -> Array:
     """[F, 3, 3] unit normals of the corners of faces [F, 3]; faces that meet at a sharper angle keep an edge."""
-    import trimesh
-
     mesh = trimesh.Trimesh(vertices, faces, process=False, validate=False)
     mesh.merge_vertices()
     smooth = trimesh.graph.smooth_shade(mesh, angle=np.radians(degrees), facet_minarea=None)
@@ -328,8 +326,6 @@ def creased_normals(vertices: Array, faces: Array, degrees: float) -> Array:
 
 def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
     """The model with its base at the origin, its faces to the outside, and warnings of what is wrong with it."""
-    from trimesh import Trimesh
-
     vertices, faces = joined_faces(parts)
     open_edges, crowded = edge_faults(vertices, faces)
     if crowded:

@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
+from scipy import ndimage
+from scipy.optimize import lsq_linear
 
 from materialist.edits.core.notes import is_edited, warned
 from materialist.edits.core.region import checked_region
@@ -39,9 +42,6 @@ def visible_lights(scene: Scene) -> list[Array]:
 
     They are connected regions of clipped pixels with the bright ones beside them, and do not face up.
     """
-    import cv2
-    from scipy import ndimage
-
     photo, surface = scene.photo, scene.depth > 0
     least = DEFAULT.clipped
     if photo.hdr and surface.any():
@@ -108,8 +108,6 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
 
 def _parts(mask: Array) -> list[Array]:
     """[H, W] bool each: the connected parts of a mask."""
-    from scipy import ndimage
-
     label, count = ndimage.label(mask)
     return [label == k for k in range(1, count + 1)]
 
@@ -139,8 +137,6 @@ def _estimated(
     least 1, over unclipped pixels off the emitters `masked` [H, W] bool. The share is the light of the emitters on the
     surfaces of the photo, relative to that of the whole environment map.
     """
-    from scipy.optimize import lsq_linear
-
     from materialist.render.scene import RenderScene
 
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters))

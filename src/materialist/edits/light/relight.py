@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.camera import pixel_rays
@@ -14,6 +15,7 @@ from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
+from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
 from materialist.options import Relight
 from materialist.render.envmap import check_envmap, is_peaked
@@ -137,10 +139,6 @@ def checked_envmap(envmap: Array) -> Array:
 
 def read_envmap(path: str | Path) -> Array:
     """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `map_rows` rows. Raises InputError."""
-    import cv2
-
-    from materialist.io.photo import decode_photo
-
     envmap = checked_envmap(decode_photo(Path(path)).linear)
     if len(envmap) > (rows := SETTINGS.map_rows):
         envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.camera import unit, unproject
@@ -11,6 +12,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
 from materialist.errors import InputError
+from materialist.io.photo import decode_photo
 from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
 
@@ -49,8 +51,6 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     Value and saturation move towards their ends instead of being added to, so that no texture is cut off: with v > 0
     V becomes V + v (1 - V), else V (1 + v); with s > 0 S becomes S (1 + s (1 - S)), else S (1 + s).
     """
-    import cv2
-
     shape = albedo.shape
     encoded = linear_to_srgb(albedo).reshape(-1, 1, 3)
     hsv = cv2.cvtColor(np.ascontiguousarray(encoded), cv2.COLOR_RGB2HSV)  # float: H in [0, 360), S and V in [0, 1]
@@ -69,8 +69,6 @@ def _base_colour(scene: Scene, weight: Array, wanted: MaterialEdit) -> tuple[Arr
     if wanted.texture is not None:
         picture = wanted.texture
         if isinstance(picture, str | Path):
-            from materialist.io.photo import decode_photo
-
             picture = np.clip(decode_photo(Path(picture)).exposed(), 0, 1)
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
         return projected(scene, region, picture, wanted.texture_scale), list(np.shape(picture))
@@ -125,8 +123,6 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
 
 def _repeated(picture: Array, u: Array, v: Array) -> Array:
     """[H, W, 3] bilinear lookup at (u, v) in pictures, repeated; a large picture is first shrunk to what is seen."""
-    import cv2
-
     h, w = picture.shape[:2]
     x = (u - np.floor(u)) * w - 0.5
     y = (v - np.floor(v)) * h - 0.5

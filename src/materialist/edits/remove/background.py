@@ -6,14 +6,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edits.remove.behind import HiddenGeometry
 from materialist.edits.remove.patches import patched
 from materialist.errors import InputError
 from materialist.io.image import same_aspect
+from materialist.io.photo import decode_photo
 from materialist.options import Removal
-from materialist.predict import resample
+from materialist.predict import hub, resample
+from materialist.predict.models import locate
+from materialist.predict.protocol import on_gpu
 from materialist.types import Array, Scene
 
 Inpaint = Callable[[Array, Array], Array]
@@ -43,8 +47,6 @@ def picture_behind(
         return patched(scene.photo.original, hole, usable, found.label, options.seed), "patches", []
     notes: list[str] = []
     if isinstance(background, str | Path):
-        from materialist.io.photo import decode_photo
-
         decoded = decode_photo(Path(background))
         notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
         background = decoded.exposed() * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
@@ -67,10 +69,6 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     kind, _, where = text.partition(":")
     if kind != "sd":
         raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
-    from materialist.predict import hub
-    from materialist.predict.models import locate
-    from materialist.predict.protocol import on_gpu
-
     gpu = on_gpu(device)
     with hub.advice("leave --inpaint out"):
         folder = locate(where, DEFAULT)
@@ -84,7 +82,6 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
 def _diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int) -> Array:
     """[H, W, 3] linear: a photo [H, W, 3] with the hole [H, W] bool filled by an inpainting pipeline of diffusers."""
     import torch
-    from PIL import Image
 
     height, width = hole.shape
     unit = 8 * max(1, getattr(pipeline, "vae_scale_factor", 8) // 8)

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
+from scipy.optimize import minimize
+from scipy.special import log_softmax
 
 from materialist.camera import pixel_rays, unit
 from materialist.geometry.membrane import membrane
@@ -99,8 +102,6 @@ class _Surroundings:
 
         Pixels count less the farther from the hole they are. None where lines do not sort them well.
         """
-        from scipy.ndimage import distance_transform_edt
-
         size = float(np.sqrt(self.hole.sum()))
         rows, columns = np.nonzero(np.isin(self.known, kinds) & _ring(self.hole, SETTINGS.window))
         if not len(rows):
@@ -142,9 +143,6 @@ def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:
 
     Nearly without a penalty, and converged: where lines part the samples, they run in the middle of the gap.
     """
-    from scipy.optimize import minimize
-    from scipy.special import log_softmax
-
     shape, slack = (basis.shape[1], wanted.shape[1]), 1e-7
 
     def loss(flat: Array) -> tuple[float, Array]:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_erosion
+from skimage.morphology import remove_small_holes
 
 from materialist.edits.core.region import checked_region
 from materialist.errors import InputError
@@ -42,8 +44,6 @@ def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, b
     `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay.
     Raises InputError for a mask that is empty, of another size, all sky, or (nearly) all of the photo.
     """
-    from skimage.morphology import remove_small_holes
-
     own = checked_region(scene, mask) > 0.5
     if not own.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
@@ -63,8 +63,6 @@ def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, b
 
 def evidence_notes(hole: Hole) -> list[str]:
     """What to say of a hole whose surroundings tell little of what was hidden."""
-    from scipy.ndimage import binary_erosion
-
     here = hole.painted
     frame = np.pad(np.zeros(tuple(n - 2 for n in here.shape), bool), 1, constant_values=True)
     outline = here & ~binary_erosion(here)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import cv2
 import numpy as np
 
 from materialist.edits.core.notes import noted, warned
@@ -11,6 +12,7 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import picture_behind
 from materialist.edits.remove.behind import behind
 from materialist.edits.remove.hole import evidence_notes, make_hole
+from materialist.geometry.build import rebuilt
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import window
 from materialist.options import Removal
@@ -34,8 +36,6 @@ def remove(
     Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
     of the photo; a background of another aspect. SetupError, WeightsError: a library or model that is not there.
     """
-    from materialist.geometry.build import rebuilt
-
     options, fitted = Removal.given(options, **values), fitted or scene
     photographed = replace(scene, bodies=fitted.bodies)
     bodies = body_coverage(photographed) > 0 if photographed.bodies else np.zeros(scene.depth.shape, bool)
@@ -84,8 +84,6 @@ def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
 
 def _outline(mask: Array, native: tuple[int, ...]) -> Array:
     """[H0, W0] float32 share of a mask at native size: nothing outside, rising from its smoothed outline inwards."""
-    import cv2
-
     hard = cv2.resize(mask.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
     if native == mask.shape:
         return hard.astype(np.float32)

@@ -4,11 +4,16 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
+from scipy import ndimage
+from skimage.morphology import remove_small_holes
+from skimage.segmentation import random_walker
 
 from materialist.color import linear_to_srgb, srgb_levels
 from materialist.geometry.silhouette import disc, window
 from materialist.predict.bundled.edges import GuidedFilter
+from materialist.predict.clicks import segment
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
@@ -85,15 +90,11 @@ def box_overlap(mask: Array, box: Box) -> float:
 
 def clicknet(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] in [0, 1]: ClickNet's likelihood that a pixel is of the object that all (column, row) points lie on."""
-    from materialist.predict.clicks import segment
-
     return segment.object_at(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth, points)
 
 
 def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] uint8 labels for GrabCut: discs around the clicks."""
-    import cv2
-
     label = np.zeros(scene.depth.shape, np.uint8)
     shares = (DEFAULT.possible, DEFAULT.probable, DEFAULT.core)
     for share, value in zip(shares, (POSSIBLE, PROBABLE, CERTAIN), strict=True):
@@ -130,9 +131,6 @@ def outlined(scene: Scene, likely: Array, points: Sequence[tuple[int, int]]) -> 
 
 def _divided(photo: Array, likely: Array) -> Array:
     """[H, W] float32 in [0, 1]: likelihoods with unsure pixels given to what they lie with in the photo [H, W, 3]."""
-    import cv2
-    from skimage.segmentation import random_walker
-
     height, width = likely.shape
     scale = min(1.0, DEFAULT.side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
@@ -149,8 +147,6 @@ def _divided(photo: Array, likely: Array) -> Array:
 
 def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
     """[H, W] bool from labels [H, W] uint8 (POSSIBLE, PROBABLE, CERTAIN or 0)."""
-    import cv2
-
     ours = (label == CERTAIN) | (label == PROBABLE)
     if not ours.any() or (label != CERTAIN).sum() < 16:
         return ours
@@ -170,10 +166,6 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
 
     Without points, or where no part holds one, all parts are kept that are not crumbs.
     """
-    import cv2
-    from scipy import ndimage
-    from skimage.morphology import remove_small_holes
-
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
     # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
     wide = disc(max(2, round(DEFAULT.gap * max(mask.shape))))

@@ -5,6 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.predict import hub
+from materialist.predict.models import hub_model, is_complete, locate
+from materialist.predict.protocol import on_gpu
 from materialist.types import Array
 
 REPO = "facebook/sam2.1-hiera-tiny"
@@ -21,10 +24,6 @@ def segment(
     Raises SetupError where transformers is missing, WeightsError where the weights are not there, or damaged.
     """
     import torch
-
-    from materialist.predict import hub
-    from materialist.predict.models import locate
-    from materialist.predict.protocol import on_gpu
 
     with hub.advice("leave --with sam2 out"):
         model = hub.load(hub.library("transformers").Sam2Model, locate(where, REPO))
@@ -52,8 +51,6 @@ def segment(
 def missing() -> str | None:
     """Why SAM 2 cannot select here, in a sentence that says what to do; None where it can. Imports nothing large."""
     from importlib.util import find_spec
-
-    from materialist.predict.models import hub_model, is_complete
 
     if find_spec("transformers") is None:
         return "Not installed: pip install 'materialist[hub]', then materialist models download sam2."

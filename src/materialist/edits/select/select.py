@@ -8,6 +8,7 @@ import numpy as np
 from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
 from materialist.edits.select.objects import Box, object_at, object_in
 from materialist.errors import InputError
+from materialist.io.image import read_mask
 from materialist.option_kinds import numbers, several
 from materialist.types import Array, Scene
 
@@ -35,8 +36,6 @@ def select(
     if method not in METHODS:
         raise InputError(f"The method is '{method}'; choose one of {', '.join(METHODS)}.")
     if isinstance(mask, str | Path):
-        from materialist.io.image import read_mask
-
         mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
     if mask is not None:
         return checked_region(scene, mask) > 0.5

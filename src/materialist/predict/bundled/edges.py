@@ -12,6 +12,8 @@ from typing import Any
 
 import cv2
 import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import cg
 
 from materialist.types import Array
 
@@ -127,9 +129,6 @@ def least_squares_change(
     Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say. first, second: [P] which
     of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
     """
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import cg
-
     rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
     entries = (np.concatenate([-root, root]), (rows, np.concatenate([first, second])))
     step = coo_matrix(entries, (len(first), len(pull))).tocsr()

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from materialist.camera import unit
@@ -26,7 +27,6 @@ def object_at(
     planar, 0 = no surface. clicks: (column, row), at least one. weights: a file of `materialist train clicks`, or ""
     for those in the package. Raises InputError for no click or one outside, WeightsError.
     """
-    import cv2
     import torch
 
     from materialist.predict.clicks.network import ClickNet

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from materialist.camera import turn_upright, unit
@@ -81,8 +82,6 @@ class Window:
 
     def _cut(self, values: Array) -> Array:
         """[SIDE, SIDE, ...] of values [H, W, ...], 0 beyond the border: means down, bilinear up."""
-        import cv2
-
         fine = SIDE * max(1, int(np.ceil(self.side / SIDE)))  # a whole number of places in every pixel
         places = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
         large = cv2.warpAffine(np.ascontiguousarray(values, np.float32), self._map(fine), (fine, fine), flags=places)
@@ -90,8 +89,6 @@ class Window:
 
     def _spread(self, values: Array, shape: tuple[int, ...]) -> Array:
         """[H, W] of values [S, S]; 0 beyond the window."""
-        import cv2
-
         return cv2.warpAffine(values, self._map(SIDE), (shape[1], shape[0]), flags=cv2.INTER_LINEAR)
 
     def _map(self, side: int) -> Array:
