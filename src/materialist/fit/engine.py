@@ -82,7 +82,9 @@ class TransportEngine:
         return filter_tables(self.cache, self.cache.gather(envmap, self.radiance), self.guide)
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
-        tables = self.tables(envmap)
+        gathered = self.cache.gather(envmap, self.radiance)
+        self.cache.forget()  # a fit asks once, as a rule
+        tables = filter_tables(self.cache, gathered, self.guide)
         return lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
 
 

@@ -153,6 +153,11 @@ class TransportCache:
             pass
         return self._hits
 
+    def forget(self) -> None:
+        """Free what the rays meet; the next `trace` finds it anew."""
+        self._hits.clear()
+        dr.flush_malloc_cache()
+
     def gather(self, envmap: Array, radiance: Array | None) -> Tables:
         """Tables for one light, an envmap [h, 2h, 3] of linear radiance.
 
