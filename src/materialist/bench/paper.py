@@ -114,7 +114,7 @@ class PaperBench(OperationOptions):
                 rows[name] = self._row(name, measures[name], data, output, rows.get(name, {}))
             except MaterialistError as error:
                 rows[name] = {"absent": str(error)}
-            write_page(output, tables, measures, rows, quick=self.quick)
+            write_page(output, tables, measures, rows)
 
     def _row(
         self, name: str, measure: Measure, data: Path | None, output: Path, kept: dict[str, Any]
@@ -129,7 +129,7 @@ class PaperBench(OperationOptions):
         make_folder(folder)
         _, cost = timed(benchmark_class(measure.bench).given(**options).run, place, folder)
         report = json.loads((folder / "report.json").read_text("utf-8"))
-        row = {**key, **cost, "machine": report["machine"], "means": report["means"]}
+        row = {**key, **cost, "quick": self.quick, "machine": report["machine"], "means": report["means"]}
         write_whole(output / "rows" / f"{name}.json", json.dumps(row, indent=1))
         return row
 
@@ -148,7 +148,7 @@ def commit() -> str:
 
 
 def write_page(
-    output: Path, tables: list[Table], measures: dict[str, Measure], rows: dict[str, dict[str, Any]], *, quick: bool
+    output: Path, tables: list[Table], measures: dict[str, Measure], rows: dict[str, dict[str, Any]]
 ) -> None:
     """Write report.html, which opens without a server or other files, and report.md. Raises OutputError."""
     parts: list[dict[str, Any]] = []
@@ -160,7 +160,7 @@ def write_page(
         picture = _picture(output / "runs" / table.measure / "sheet.png") if first and "means" in row else ""
         parts.append({"table": table, "row": row, "grid": list(table.grid(columns, row)) if table.measure else [],
                       "settings": settings, "picture": picture})  # fmt: skip
-    told = {"parts": parts, "quick": quick, "cores": os.cpu_count(), "commit": commit(),
+    told = {"parts": parts, "cores": os.cpu_count(), "commit": commit(),
             "minutes": sum(row.get("seconds", 0) for row in rows.values()) / 60}  # fmt: skip
     assets = files("materialist.bench") / "assets"
     for kind in ("html", "md"):
