@@ -4,6 +4,7 @@ Conventions (see docs/conventions.md): linear Rec.709 RGB float32; camera at the
 +X right; pixel (0, 0) is top left with its centre at (0.5, 0.5); depth is planar along -Z, 0 where there is no surface.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,6 +13,8 @@ import numpy as np
 from materialist.errors import InputError
 
 Array = np.ndarray
+Progress = Callable[[str, int, int], None]
+"""Called as progress(stage, done, total)."""
 
 
 def _numbers(value: Any, count: int) -> tuple[float, ...]:

@@ -21,8 +21,7 @@ from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable, write_whole
 from materialist.io.display import encoded
-from materialist.io.samples import Progress
-from materialist.types import Array, Scene
+from materialist.types import Array, Progress, Scene
 
 SINGLE_THREAD = {
     **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OIDN_NUM_THREADS"), "1"),

@@ -16,9 +16,9 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
     from rich.console import Console
 
     console, tasks = Console(stderr=True), dict[str, rich.TaskID]()
-    columns = rich.BarColumn(bar_width=32), rich.MofNCompleteColumn(), rich.TimeElapsedColumn()
-    name = rich.TextColumn("{task.description:<24}")
-    with rich.Progress(name, *columns, console=console, disable=quiet or not console.is_terminal) as bars:
+    name, left = rich.TextColumn("{task.description:<24}"), rich.TimeRemainingColumn(elapsed_when_finished=True)
+    columns = name, rich.BarColumn(bar_width=32), rich.MofNCompleteColumn(), left
+    with rich.Progress(*columns, console=console, disable=quiet or not console.is_terminal) as bars:
 
         def told(stage: str, done: int, total: int) -> None:
             if stage not in tasks:

@@ -14,12 +14,11 @@ from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared
 from materialist.fit.light import envmap_field, fit_light, start_light
 from materialist.fit.losses import CLIPPED
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
-from materialist.fit.optimise import Progress
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import SYNONYMS, build_geometry
 from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
-from materialist.types import Array, Geometry, Materials, Photo, Prediction
+from materialist.types import Array, Geometry, Materials, Photo, Prediction, Progress
 
 
 @dataclass(frozen=True)

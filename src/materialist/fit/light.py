@@ -13,9 +13,9 @@ from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
 from materialist.fit.losses import CLIPPED, log_chroma, log_total_variation, rendering_loss, residual
-from materialist.fit.optimise import Progress, StageResult, optimise
+from materialist.fit.optimise import StageResult, optimise
 from materialist.fit.settings import LightSettings
-from materialist.types import Array
+from materialist.types import Array, Progress
 
 
 @dataclass(frozen=True)

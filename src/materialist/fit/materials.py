@@ -9,9 +9,9 @@ from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
 from materialist.fit.losses import consistency, rendering_loss, residual
-from materialist.fit.optimise import Progress, StageResult, optimise
+from materialist.fit.optimise import StageResult, optimise
 from materialist.fit.settings import MaterialSettings
-from materialist.types import Camera
+from materialist.types import Camera, Progress
 
 COLUMNS = {"albedo": slice(0, 3), "roughness": slice(3, 4), "metallic": slice(4, 5)}
 

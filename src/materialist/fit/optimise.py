@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 import torch
 
 from materialist.fit.settings import Schedule
-
-Progress = Callable[[str, int, int], None]
-"""Called as progress(stage, done, total)."""
+from materialist.types import Progress
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,7 @@ from materialist.camera import pixel_rays
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
 from materialist.io.atomic import whole_file, write_whole, writing
-from materialist.types import Array, Camera, Materials, Prediction
-
-Progress = Callable[[str, int, int], None]
-"""Told (what, how many are done, how many there are)."""
-
+from materialist.types import Array, Camera, Materials, Prediction, Progress
 
 LIGHT_ROWS = 16
 """Rows of the map of the light around a sample."""

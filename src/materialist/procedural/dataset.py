@@ -9,11 +9,12 @@ import numpy as np
 from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import Progress, SampleFolder, claim, complete, described
+from materialist.io.samples import SampleFolder, claim, complete, described
 from materialist.procedural.objects import shapes
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
 from materialist.render.variant import setup
+from materialist.types import Progress
 
 FORMAT = 1
 CONTENT = 9

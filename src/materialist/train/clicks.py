@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.samples import Progress, SampleFolder, claim, complete, read_arrays, read_sample
+from materialist.io.samples import SampleFolder, claim, complete, read_arrays, read_sample
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import features
 from materialist.predict.clicks.network import ClickNet
@@ -22,7 +22,7 @@ from materialist.predict.network import UNetArchitecture
 from materialist.procedural.dataset import identity
 from materialist.procedural.photographic import photographic
 from materialist.train.task import Batch, Recipe, Task
-from materialist.types import Array, Camera, Photo
+from materialist.types import Array, Camera, Photo, Progress
 
 DESCRIPTION = "views.json"
 """Of which data set the views beside it are."""
