@@ -130,14 +130,6 @@ def test_updates_give_the_picture_of_a_fresh_scene():
     np.testing.assert_array_equal(used.render(spp=16, seed=9), fresh)
 
 
-def test_a_pixel_has_its_paths_whatever_else_is_traced():
-    scene = scene_of(wall(CAMERA), random_maps(3, SIZE), np.random.default_rng(1).random((8, 16, 3)).astype(np.float32))
-    whole, some = scene.render(spp=9, seed=4), np.random.default_rng(2).random(SIZE) < 0.3
-    part = scene.render(spp=9, seed=4, where=some)
-    np.testing.assert_array_equal(part[some], whole[some])
-    assert not part[~some].any()
-
-
 def test_bad_light_maps_and_options_are_refused():
     scene = RenderScene(wall(CAMERA), CAMERA, device="cpu")
     for envmap, says in (
