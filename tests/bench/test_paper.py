@@ -104,6 +104,13 @@ def test_one_row_from_end_to_end(mitsuba, tmp_path, monkeypatch):
     assert f"| 35 degrees | fov x 1 | {row['means']['fov x 1']['psnr']:.2f} |" in (out / "report.md").read_text("utf-8")
 
 
+def test_quick_and_full_rows_stand_on_one_page_each_marked(stubs, tmp_path):
+    for quick, resume, only in ((True, False, "light,mirrors"), (False, True, "light")):
+        out = bench.run("paper", output=tmp_path / "out", quick=quick, resume=resume, only=only)
+    runs = [line for line in (out / "report.md").read_text("utf-8").splitlines() if "s of one core)" in line]
+    assert 0 < sum("one core), quick;" in line for line in runs) < len(runs)
+
+
 def test_the_page_can_be_read_without_other_files(stubs, tmp_path, browser):
     out = bench.run("paper", output=tmp_path / "out", only="light")
     page = browser.new_page(viewport={"width": 900, "height": 900})
