@@ -207,7 +207,7 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     inverse = np.minimum(inverse, limit - 2 * DEFAULT.overlap * slope * loose)
     torn = (shared & ~tip).any(1)  # a cut whose both ends are tips has not opened, so there is no gap to close
     screen = np.stack([front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1)
-    straight = ~offset.all(1)  # diagonally, such a corner would come out beside the front pixel
+    straight = (offset == 0).any(1)  # diagonally, such a corner would come out beside the front pixel
     screen = screen - DEFAULT.overlap * (loose & straight[:, None])[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
