@@ -67,17 +67,21 @@ def test_a_cup_of_glass_is_where_the_blue_one_is(cases):
     assert body.surface.ior == clear.truth.items[-1].ior == 1.5
 
 
+FINALS = ("material", "light", "insertion", "removal", "glass")
+
+
 def test_a_run_writes_rows_with_their_ceilings_and_what_people_wait_for(measured, monkeypatch):
     from materialist import pipeline
 
     sample = make_sample(0, 0, 0, size=32)
     monkeypatch.setattr(pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo))
-    options = {"scenes": 1, "size": 32, "spp": 8, "truth_spp": 16, "kinds": "hue", "latency": 64, "large": 300}
+    options = {"scenes": 1, "size": 32, "spp": 8, "truth_spp": 16, "kinds": "hue"}
+    options |= {"latency": 64, "large": 300, "frames": 2}
     report = measured("edit", device="cpu", **options)
     rows = report.rows
     edited = ["hue: untouched", "ceiling hue", "ceiling hue, composite", "hue: edit"]
-    waited = ["preview: built once", "preview: material", "preview: light", "final: material",
-              "final: into a large photo"]  # fmt: skip
+    waited = ["preview: built once", "preview: material", "preview: light"]
+    waited += [*(f"final: {name}" for name in FINALS), "drop: 2 frames", "final: into a large photo"]
     assert list(dict.fromkeys(row["method"] for row in rows)) == edited + waited
     assert all(row["seconds"] > 0 for row in rows[4:]) and rows[-1]["sample"] == "300 x 300"
     scored = [row["inside"] for row in rows[:4]]

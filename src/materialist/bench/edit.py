@@ -3,12 +3,12 @@
 Synthetic photographs are fitted, edited and compared with the true scene, rendered after the same edit; PSNR on
 sRGB-encoded, clipped pictures; docs/benchmarks.md says what the edits and rows are. Inside is the edited object; for
 `insert` the cup and every pixel in which the true picture changes by more than 0.02; for `relight` all. `preview` rows:
-seconds of one preview by cached transport, `final` those of the composite, both at the latency size, and
-of bringing it into a photo of 24 megapixels (without the paths); CPU seconds hardly depend on what else the computer
-does. sheet.png, from the left: photo, truth, ceiling, edit.
+seconds of one preview by cached transport, `final` those of an edit and its composite, `drop` those of a film, at the
+latency size, and of bringing it into a photo of 24 megapixels (without the paths); CPU seconds hardly depend on what
+else the computer does. sheet.png, from the left: photo, truth, ceiling, edit.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,15 +18,19 @@ import numpy as np
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import KINDS, Edit, awaited, edits, sample_and_light, true_scene
+from materialist.bench.edits import KINDS, Edit, awaited, cup, edits, free_place, sample_and_light, true_scene
 from materialist.bench.report import CEILING, Column, Report, strip
-from materialist.edits.composite.composite import composite
+from materialist.edits.composite.composite import composite, pictures
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.drop.drop import drop
+from materialist.edits.glass.glass import glass
+from materialist.edits.insert.insert import insert
 from materialist.edits.light.relight import relight
 from materialist.edits.material import material
 from materialist.edits.preview import Preview
+from materialist.edits.remove.remove import remove
 from materialist.option_kinds import option
 from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Scene
@@ -53,6 +57,7 @@ class EditBench(Benchmark):
     truth_spp: int = option(576, "Paths a pixel of the truth.", **COUNT)
     caustics: int = option(16, "Times as many of the truth where light comes through glass: few find it.", **COUNT)
     latency: int = option(512, "Size of the timed previews and final edit; 0: none.", **COUNT_OR_0)
+    frames: int = option(36, "Frames of the timed film (extra physics); 0: none.", **COUNT_OR_0)
     large: int = option(4900, "Side of the large photo that an edit is brought into.", **SIZE)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
@@ -88,7 +93,6 @@ class EditBench(Benchmark):
         report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
-        shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
         scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(Preview, scene)
         yield {"method": "preview: built once", "sample": sample, **cost}
@@ -100,8 +104,7 @@ class EditBench(Benchmark):
             preview.render(edited[0])  # the first one compiles
             for one in edited[1:]:
                 yield {"method": name, "sample": sample, **timed(preview.render, one)[1]}
-        _, cost = timed(composite, scene, changes[0], **shared)
-        yield {"method": "final: material", "sample": sample, **cost}
+        yield from self._finals(scene, mask, {"material": lambda: changes[0], "light": lambda: turns[0]}, sample)
         layers = render_layers(EditRenderer(scene, device=self.device), changes[0], spp=16, seed=self.seed)
         side = (self.large, self.large)
         large = np.asarray(cv2.resize(scene.photo.original, side, interpolation=cv2.INTER_CUBIC))
@@ -109,6 +112,23 @@ class EditBench(Benchmark):
         photo = replace(scene.photo, original=np.clip(large * (1 + grain), 0, 1))
         _, cost = timed(into_photo, photo, layers)
         yield {"method": "final: into a large photo", "sample": f"{self.large} x {self.large}", **cost}
+
+    def _finals(self, scene: Scene, mask: Array, given: dict[str, Callable[[], Scene]], sample: str) -> Iterator[Row]:
+        """Seconds of edits from their options to their pictures, and of a film."""
+        shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
+        made, floor = cup()[1], (scene.normal[..., 1] > 0.9) & (scene.depth > 0)
+        place = free_place(floor) or (self.latency / 2, self.latency / 2)
+        kinds = given | {
+            "insertion": lambda: insert(scene, made, place),
+            "removal": lambda: remove(scene, mask),
+            "glass": lambda: glass(scene, mask),
+        }
+        for name, change in kinds.items():
+            _, cost = timed(lambda change=change: composite(scene, change(), **shared))
+            yield {"method": f"final: {name}", "sample": sample, **cost}
+        if self.frames:
+            film = lambda: list(pictures(scene, drop(scene, made, place, frames=self.frames), **shared))  # noqa: E731
+            yield {"method": f"drop: {self.frames} frames", "sample": sample, **timed(film)[1]}
 
 
 def scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:

@@ -21,6 +21,7 @@ from materialist.geometry.build import build_geometry
 from materialist.options import Glass
 from materialist.procedural.arrangements import Item
 from materialist.procedural.objects import shapes
+from materialist.procedural.objects.shapes import Solid
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 from materialist.types import Array, Body, Prediction, Scene
 
@@ -31,7 +32,7 @@ ROOM = 0.25
 KINDS = ("hue", "metal", "relight", "insert", "glass", "remove", "glass cup", *SHIFTS)
 INSERTIONS = ("insert", "glass cup")
 SHADOW = 0.02
-"""Change of the sRGB value from which a pixel counts as part of an insertion's shadow or reflection."""
+"""Change of the sRGB value from which a pixel counts as part of a shadow or reflection."""
 COPPER = (0.85, 0.45, 0.3)
 LIFT = 0.002
 """Metres of air under true glass: where two surfaces are one, either may be met first."""
@@ -53,9 +54,11 @@ class Edit:
 
     def region(self, before: Array, after: Array) -> Array:
         """[H, W] bool: inside. For an insertion also where the true picture changes visibly."""
-        if self.kind not in INSERTIONS:
-            return self.mask
-        return self.mask | (np.abs(linear_to_srgb(after) - linear_to_srgb(before)).max(-1) > SHADOW)
+        return self.mask | self.traces(before, after) if self.kind in INSERTIONS else self.mask
+
+    def traces(self, before: Array, after: Array) -> Array:
+        """[H, W] bool: where the true picture changes visibly outside: in shadows and reflections."""
+        return ~self.mask & (np.abs(linear_to_srgb(after) - linear_to_srgb(before)).max(-1) > SHADOW)
 
 
 def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[Edit]:
@@ -117,24 +120,33 @@ def staged(stage: TrueScene, items: list[Item]) -> TrueScene:
     return TrueScene(items, stage.view, stage.camera.height, stage.camera.width)
 
 
-def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator[Edit]:
-    """A cup, blue or of glass, in a free place of the floor, if any; the true one has the vertices of the other one."""
-    floor = np.pad((stage.seen == 0).astype(np.uint8), 1)
-    free = cv2.distanceTransform(floor, cv2.DIST_L2, 5)[1:-1, 1:-1]
+def free_place(floor: Array) -> tuple[float, float] | None:
+    """Column and row farthest from what is no floor [H, W] bool; None where there is hardly any."""
+    free = cv2.distanceTransform(np.pad(floor.astype(np.uint8), 1), cv2.DIST_L2, 5)[1:-1, 1:-1]
     row, column = np.unravel_index(int(np.argmax(free)), free.shape)
-    if free[row, column] < 2:
-        return
-    at = (float(column) + 0.5, float(row) + 0.5)
+    return (float(column) + 0.5, float(row) + 0.5) if free[row, column] >= 2 else None
+
+
+def cup() -> tuple[Solid, MeshModel]:
+    """A blue cup, as a solid and as a mesh."""
     solid = shapes.vessel(np.array([(0.35, 0), (0.45, 0.3), (0.5, 0.8), (0.48, 1.0)]), thickness=0.08)
     vertices, normals, uv = (np.ascontiguousarray(x, np.float32) for x in (solid.vertices, solid.normals, solid.uv))
     surface = uniform_surface(np.array([0.15, 0.35, 0.6], np.float32), 0.4, 0.0)
-    model = MeshModel((Body(vertices, solid.faces, normals, uv, surface),), "cup")
+    return solid, MeshModel((Body(vertices, solid.faces, normals, uv, surface),), "cup")
+
+
+def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator[Edit]:
+    """A cup, blue or of glass, in a free place of the floor, if any; the true one has the vertices of the other one."""
+    at = free_place(stage.seen == 0)
+    if at is None:
+        return
+    solid, model = cup()
     material = "as-is" if kind == "insert" else "glass"
     (body,) = insert(true_scene(sample), model, at, material=material).bodies
     placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
     ior = Glass().ior if kind == "glass cup" else None
-    cup = Item(placed, np.tile(surface.albedo, (2, 2, 1)), float(surface.roughness.mean()), 0.0, ior)
-    truth = staged(stage, [*stage.items, cup])
+    albedo, roughness = body.surface.albedo, float(body.surface.roughness.mean())
+    truth = staged(stage, [*stage.items, Item(placed, np.tile(albedo, (2, 2, 1)), roughness, 0.0, ior)])
     mask = truth.seen == len(stage.items)
     yield Edit(kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask)
 

@@ -10,10 +10,10 @@ was predicted (the true light replaces the fitted one); `ceiling` is the edit wi
 `maps` rows compare `prior` and `fitted` maps with the truth: albedo after one factor (sRGB PSNR), roughness, normals
 (degrees), log depth (RMSE), and the light's spherical harmonics after one factor (relative error, 1 is as bad as
 darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` and `metal` (copper) after one factor on
-the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also in the true `shadow`
-and reflection alone, and with `screen space` shadows of the fitted light; `glass` is the largest object turned to
-glass, `remove` the picture without it. sheet.png: photo, truth, and the pictures of the rows after `untouched`. An edit
-that the program refuses has no row.
+the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also with `screen space`
+shadows of the fitted light; `glass` is the largest object turned to glass, `remove` the picture without it. `shadow` is
+the PSNR where the true picture changes outside: in shadows and reflections. sheet.png: photo, truth, and the pictures
+of the rows after `untouched`. An edit that the program refuses has no row.
 """
 
 from collections.abc import Iterator
@@ -40,6 +40,8 @@ SCENE_SEED = 38_000
 """Of the arrangements, apart from the seeds of all other benchmarks."""
 SCALED = ("relight", "metal")
 """Edits whose picture is compared after one factor."""
+TRACED = ("insert", "glass", "remove")
+"""Edits that change shadows and reflections outside."""
 GIVEN = ("light", "albedo", "geometry", "albedo, geometry")
 """What of the truth a row may be given."""
 
@@ -121,9 +123,9 @@ class PhotoAloneBench(Benchmark):
     ) -> Iterator[Row]:
         """Rows of one edit, and its strip of the sheet; `before` is the true picture of the photo."""
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
-        inside = edit.region(before, after)
+        region = edit.region(before, after), edit.traces(before, after)
         shown = [sample.photo.linear, after]
-        yield {"method": f"{edit.kind}: untouched", **self._scores(edit, sample.photo.linear, after, inside)}
+        yield {"method": f"{edit.kind}: untouched", **self._scores(edit, sample.photo.linear, after, *region)}
         for name, scene in scenes.items():
             try:
                 edited = edit.change(scene)
@@ -133,19 +135,18 @@ class PhotoAloneBench(Benchmark):
             if (edit.kind, name) == ("insert", "fitted"):
                 flat = screen_space(sample.photo.linear, edited, picture, device=self.device)
                 shown.append(flat)
-                yield {"method": "insert: screen space", **self._scores(edit, flat, after, inside)}
+                yield {"method": "insert: screen space", **self._scores(edit, flat, after, *region)}
             shown.append(picture)
             method = f"{CEILING} {edit.kind}" if name == CEILING else f"{edit.kind}: {name}"
-            yield {"method": method, **self._scores(edit, picture, after, inside)}
+            yield {"method": method, **self._scores(edit, picture, after, *region)}
         report.sheet.append(strip(*shown))
 
-    def _scores(self, edit: Edit, picture: Array, truth: Array, inside: Array) -> dict[str, float]:
+    def _scores(self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array) -> dict[str, float]:
         if edit.kind in SCALED:
             picture = picture * np.float32(best_scale(np.minimum(picture, 1), np.minimum(truth, 1), inside))
         found = {"inside": metrics.psnr(picture, truth, mask=inside)}
-        shadow = inside & ~edit.mask
-        if edit.kind == "insert" and shadow.any():
-            found["shadow"] = metrics.psnr(picture, truth, mask=shadow)
+        if edit.kind in TRACED and traces.any():
+            found["shadow"] = metrics.psnr(picture, truth, mask=traces)
         return found
 
 
