@@ -1,6 +1,9 @@
 """The Mitsuba scene says what the project's conventions say: camera, maps, light, planes, seeds."""
 
+import gc
+
 import disney_reference as brdf
+import drjit as dr
 import numpy as np
 import pytest
 from render_scenes import empty, random_maps, uniform, wall, with_floor
@@ -46,6 +49,14 @@ def test_rays_go_through_the_pixels_of_the_camera_model(camera):
     row, col = np.indices((camera.height, camera.width)).reshape(2, -1)
     direction = np.array(camera_rays(scene, col + 0.5, row + 0.5).d).T
     np.testing.assert_allclose(direction / -direction[:, 2:], pixel_rays(camera).reshape(-1, 3), atol=2e-5)
+
+
+def test_no_garbage_is_collected_while_a_rendering_is_recorded(monkeypatch):
+    """A scene that goes meanwhile would end the process."""
+    scene, seen, select = scene_of(wall(CAMERA), uniform(CAMERA)), [], dr.select
+    monkeypatch.setattr(dr, "select", lambda *a: seen.append(gc.isenabled()) or select(*a))
+    scene.render(spp=1)
+    assert seen and not any(seen) and gc.isenabled()
 
 
 def test_every_pixel_shows_its_own_material():
@@ -128,6 +139,14 @@ def test_updates_give_the_picture_of_a_fresh_scene():
     used.set_envmap(envmap)
     used.set_materials(maps)
     np.testing.assert_array_equal(used.render(spp=16, seed=9), fresh)
+
+
+def test_a_pixel_has_its_paths_whatever_else_is_traced():
+    scene = scene_of(wall(CAMERA), random_maps(3, SIZE), np.random.default_rng(1).random((8, 16, 3)).astype(np.float32))
+    whole, some = scene.render(spp=9, seed=4), np.random.default_rng(2).random(SIZE) < 0.3
+    part = scene.render(spp=9, seed=4, where=some)
+    np.testing.assert_array_equal(part[some], whole[some])
+    assert not part[~some].any()
 
 
 def test_bad_light_maps_and_options_are_refused():

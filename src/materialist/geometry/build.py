@@ -54,6 +54,20 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
     )  # fmt: skip
 
 
+def continued_as(geometry: Geometry, other: Geometry) -> Geometry:
+    """The depth surface of one geometry with the continued planes of another, of the same picture size."""
+    own, far = geometry.mesh, other.mesh
+    surface, planes = own.face_plane == -1, far.face_plane >= 0
+    both = lambda a, b: np.concatenate([a, b])  # noqa: E731
+    mesh = Mesh(
+        vertices=both(own.vertices, far.vertices), normals=both(own.normals, far.normals), uv=both(own.uv, far.uv),
+        faces=both(own.faces[surface], far.faces[planes] + len(own.vertices)).astype(np.int32),
+        face_pixel=both(own.face_pixel[surface], far.face_pixel[planes]),
+        face_plane=both(own.face_plane[surface], far.face_plane[planes]),
+    )  # fmt: skip
+    return Geometry(_tidy(mesh), other.plane_label)
+
+
 def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     """The mesh with a vertex for each normal where pixels of different normals meet; its points stay where they are.
 

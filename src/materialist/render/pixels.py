@@ -1,21 +1,22 @@
 """Pixels of a picture, at the camera's resolution or another: what is met first there, and radiance, path traced."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from materialist.buffers import integers
+from materialist.buffers import floats, integers
 from materialist.camera import project
 from materialist.geometry.silhouette import area
+from materialist.render.variant import recording
 from materialist.types import Array, Body, Camera
 
 GRID = 4
 """Rays along each side of a pixel."""
-_RAYS = 2**20
-"""Pixels looked at together: bounds the memory."""
+_RAYS = 2**21
+"""Rays that look for bodies together: bounds the memory."""
 _PATHS = 2**23
 """Paths traced together, likewise."""
 Box = tuple[slice, slice]
@@ -56,7 +57,7 @@ def first_hits(
     rows, columns = _around(scene, camera, bodies, size, whole)
     found = np.zeros((*(side.stop - side.start for side in whole), 8))
     inside = found[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))]
-    step = max(1, _RAYS // max(columns.stop - columns.start, 1))
+    step = max(1, _RAYS // GRID**2 // max(columns.stop - columns.start, 1))
     for first in range(rows.start, rows.stop, step) if area((rows, columns)) else ():
         strip = slice(first, min(first + step, rows.stop))
         inside[first - rows.start : strip.stop - rows.start] = _strip(scene, camera, bodies, size, (strip, columns))
@@ -83,33 +84,25 @@ def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...]
 
 def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box) -> Array:
     """[h, w, 8] share, albedo, normal and depth of a few rows."""
-    import mitsuba as mi
-
-    h, w = (side.stop - side.start for side in box)
-    shapes = {shape.id(): shape for shape in scene.shapes()}
-    total = np.zeros((h * w, 8))
-    for direction in _grid(camera, size, box):
-        si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), direction))
-        normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
-        for name, body in bodies.items():
-            if name in shapes:
-                hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
-                albedo = np.ones((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
-                total[hit] += np.concatenate([np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1)
-    total[:, 1:] /= np.maximum(total[:, :1], 1)
-    total[:, 0] /= GRID**2
-    return total.reshape(h, w, 8)
-
-
-def _grid(camera: Camera, size: tuple[int, ...], box: Box) -> Iterator:
-    """Unit directions through GRID x GRID points of every pixel of a box, one point of all pixels at a time."""
     import drjit as dr
     import mitsuba as mi
 
-    pixel = integers(mi, pixel_numbers(size, box))
-    for k in range(GRID * GRID):
-        x, y = (dr.opaque(mi.Float, (n + 0.5) / GRID) for n in (k % GRID, k // GRID))
-        yield directions(camera, size, pixel, x, y)
+    pixel = pixel_numbers(size, box)
+    row, column, _ = np.indices((GRID, GRID, pixel.size)).reshape(3, -1)
+    x, y = (floats(mi, (place + 0.5) / GRID) for place in (column, row))
+    way = directions(camera, size, integers(mi, np.tile(pixel.ravel(), GRID**2)), x, y)
+    si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), way))
+    dr.eval(si)  # or each of the following would trace the rays again
+    normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
+    shapes, found = {shape.id(): shape for shape in scene.shapes()}, np.zeros((len(depth), 8))
+    for name in bodies.keys() & shapes:
+        body, hit = bodies[name], np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
+        albedo = np.ones((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
+        found[hit] = np.concatenate([np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1)
+    total = found.reshape(GRID**2, pixel.size, 8).sum(0)
+    total[:, 1:] /= np.maximum(total[:, :1], 1)
+    total[:, 0] /= GRID**2
+    return total.reshape(*pixel.shape, 8)
 
 
 def pixel_numbers(size: tuple[int, ...], where: Box | Array) -> Array:
@@ -146,28 +139,38 @@ def radiance(
 ) -> Array:  # fmt: skip
     """[..., 3] float32 linear radiance of pixels of a `RenderScene`, path traced, with at least `spp` paths each.
 
-    size: (H, W) of the whole picture. where: the pixels, in the order of the result, as of `pixel_numbers`.
+    size: (H, W) of the whole picture. where: a box, or a mask [H, W] bool, whose pixels come in rows [N, 3]. Paths have
+    random numbers by seed and pixel, whatever else of the picture is traced.
     names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
     """
-    mi, pixels = target.mi, pixel_numbers(size, where)
-    # Bounded wavefronts, and whole squares of samples, which suit the sampler.
-    passes = max(1, -(-spp * pixels.size // _PATHS))
-    each = int(np.ceil(np.sqrt(spp / passes))) ** 2
+    mi, masked = target.mi, isinstance(where, np.ndarray)
+    pixels = pixel_numbers(size, np.s_[:, :] if masked else where)
+    wanted = np.asarray(where if masked else np.ones(pixels.shape, bool)).ravel()
+    each, total = stratified(spp), np.zeros((pixels.size, 4))
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
     sampler = mi.load_dict({"type": "multijitter", "sample_count": each})
     sampler.set_samples_per_wavefront(each)
-    total = np.zeros((pixels.size, 4))
-    for k in range(passes):
-        sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, pixels.size * each)
-        total += _sums(target, size, pixels.ravel(), integrator, sampler, each, names)
-    mean = total[:, :3] / np.maximum(total[:, 3:], 1)
-    return np.ascontiguousarray(mean.reshape(*pixels.shape, 3), np.float32)
+    step = max(1, _PATHS // each)  # bounded wavefronts
+    for k, first in enumerate(range(0, pixels.size, step)):
+        strip = slice(first, min(first + step, pixels.size))
+        if wanted[strip].any():
+            sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, (strip.stop - first) * each)
+            total[strip] = _sums(target, size, pixels.ravel()[strip], wanted[strip], integrator, sampler, each, names)
+    mean = (total[:, :3] / np.maximum(total[:, 3:], 1)).astype(np.float32)
+    return mean[wanted] if masked else mean.reshape(*pixels.shape, 3)
+
+
+def stratified(spp: int) -> int:
+    """The least number of samples >= `spp` that the multijitter sampler can lay out in a grid, as it would round."""
+    rows = int(np.sqrt(spp))
+    return rows * -(-spp // rows)
 
 
 def _sums(
-    target, size: tuple[int, ...], pixels: Array, integrator, sampler, each: int, names: Sequence[str] | None
+    target, size: tuple[int, ...], pixels: Array, wanted: Array, integrator, sampler, each: int,
+    names: Sequence[str] | None,
 ) -> Array:  # fmt: skip
-    """[n, 4]: of each pixel's rays that count, the sum of what they bring, and their number."""
+    """[n, 4]: of the wanted pixels' rays that count, the sum of what they bring, and their number."""
     import drjit as dr
 
     mi, scene = target.mi, target.mi_scene
@@ -175,13 +178,15 @@ def _sums(
     slot = dr.arange(mi.UInt32, len(pixels) * each) // dr.opaque(mi.UInt32, each)
     inside = sampler.next_2d()
     way = directions(target.camera, size, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y)
-    ray, counts = mi.RayDifferential3f(mi.Point3f(0), way), mi.Bool(True)
+    ray, counts = mi.RayDifferential3f(mi.Point3f(0), way), dr.gather(mi.UInt32, integers(mi, wanted), slot) != 0
     if names is not None:
-        first, counts = scene.ray_intersect_preliminary(ray), mi.Bool(False)
+        first, known = scene.ray_intersect_preliminary(ray), mi.Bool(False)
         for one in scene.shapes():
             if one.id() in names:
-                counts |= first.shape == mi.ShapePtr(one)
-    light = integrator.sample(scene, sampler, ray, None, counts)[0]
+                known |= first.shape == mi.ShapePtr(one)
+        counts &= known
+    with recording():
+        light = integrator.sample(scene, sampler, ray, None, counts)[0]
     sums = [dr.zeros(mi.Float, len(pixels)) for _ in range(4)]
     for total, value in zip(sums, (light.x, light.y, light.z, mi.Float(1)), strict=True):
         dr.scatter_reduce(dr.ReduceOp.Add, total, value, slot, counts)

@@ -10,8 +10,8 @@ from materialist.errors import InputError, SetupError
 from materialist.geometry.build import part
 from materialist.render.bodies import body_bsdf, body_emitter, opaque_bsdf
 from materialist.render.envmap import check_envmap, emitter, on_mitsuba_grid
-from materialist.render.pixels import radiance
-from materialist.render.variant import setup
+from materialist.render.pixels import radiance, stratified
+from materialist.render.variant import recording, setup
 from materialist.types import Array, Body, Camera, Geometry, Lamp, Materials, Mesh
 
 MAX_DEPTH = 4
@@ -19,9 +19,6 @@ MAX_DEPTH = 4
 
 GLASS_DEPTH = 16
 """Path length with transparent bodies: through two of them, with reflections inside, and on by three surfaces."""
-
-_WAVEFRONT = 2**24
-"""Camera paths traced at a time: bounds the memory."""
 
 
 class RenderScene:
@@ -93,20 +90,10 @@ class RenderScene:
         where: [H, W] bool: the pixels that are traced, at a cost in proportion; the others are 0. None: all.
         """
         _check_options(spp, max_depth)
-        mi = self.mi
-        if where is not None:
-            picture = np.zeros((*where.shape, 3), np.float32)
-            picture[where] = radiance(self, where.shape, where, spp=spp, seed=seed, max_depth=max_depth)
-            return picture
-        integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
-        # Bounded wavefronts, all of one size: memory stays the same for any number of samples.
-        passes = min(spp, -(-spp * self.camera.width * self.camera.height // _WAVEFRONT))
-        each = _stratified(-(-spp // passes))
-        total = np.zeros((self.camera.height, self.camera.width, 3), np.float64)
-        for k in range(passes):
-            image = mi.render(self.mi_scene, integrator=integrator, spp=each, seed=(seed * 9973 + k) & 0xFFFFFFFF)
-            total += np.array(image)[..., :3]
-        return (total / passes).astype(np.float32)
+        where = np.ones((self.camera.height, self.camera.width), bool) if where is None else where
+        picture = np.zeros((*where.shape, 3), np.float32)
+        picture[where] = radiance(self, where.shape, where, spp=spp, seed=seed, max_depth=max_depth)
+        return picture
 
     def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH):
         """[H, W, 3] linear, differentiable by path replay backpropagation (paper, section Implementation Details).
@@ -129,9 +116,9 @@ class RenderScene:
             self._assign(a, r, m)
             self.params["light.data"] = e
             self.params.update()
-            return self.mi.render(
-                self.mi_scene, self.params, integrator=integrator, spp=_stratified(spp), seed=seed, seed_grad=seed + 1
-            )
+            how = {"integrator": integrator, "spp": stratified(spp), "seed": seed, "seed_grad": seed + 1}
+            with recording():
+                return self.mi.render(self.mi_scene, self.params, **how)
 
         return run(albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch))
 
@@ -157,12 +144,6 @@ def _check_options(spp: int, max_depth: int) -> None:
         raise InputError(f"spp is {spp}; give at least 1 sample per pixel.")
     if max_depth < 1:
         raise InputError(f"max_depth is {max_depth}; give at least 1 (2 for direct light).")
-
-
-def _stratified(spp: int) -> int:
-    """The least number of samples >= `spp` that the multijitter sampler can lay out in a grid, as it would round."""
-    rows = int(np.sqrt(spp))
-    return rows * -(-spp // rows)
 
 
 def look_along(mi) -> Any:

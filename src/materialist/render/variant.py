@@ -1,8 +1,11 @@
 """LLVM and the Mitsuba variant: the only place that chooses either."""
 
+import gc
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from glob import glob
@@ -162,6 +165,21 @@ def _start(mi, device: str) -> None:
     asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
     if device == "cpu" and asked.isdigit() and 0 < int(asked) < dr.thread_count():
         dr.set_thread_count(int(asked))
+
+
+@contextmanager
+def recording() -> Iterator[None]:
+    """No garbage is collected while Mitsuba records a rendering.
+
+    It records the materials of all scenes there are, partly by Python: to free one of them meanwhile ends the process.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @lru_cache(maxsize=2)

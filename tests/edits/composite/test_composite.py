@@ -1,5 +1,7 @@
 """What the composite keeps, to the bit, and what it shows, against closed forms."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import cv2
@@ -231,3 +233,16 @@ def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):
     assert again.photo.source is None and is_deep(again.photo)
     save_scene(developed(FLAT, FLAT, FLAT.photo.original), tmp_path / "c.scene")
     assert not is_deep(load_scene(tmp_path / "c.scene").photo)
+
+
+def test_a_renderer_goes_with_its_last_user():
+    """Mitsuba would compile the materials of scenes that are left over for every new rendering."""
+    renderer = EditRenderer(flat_scene())
+    base, _ = renderer.pair(renderer.scene)
+    base(1, 0)
+    there = weakref.ref(renderer)
+    gc.disable()
+    del renderer, base, _
+    gone = there() is None
+    gc.enable()
+    assert gone

@@ -8,15 +8,16 @@ import cv2
 import numpy as np
 
 from materialist import metrics
+from materialist.edits.composite.disclosed import compared, without_traces
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.edits.core.renderer import EditRenderer, denoised, paths_for, rendered
-from materialist.edits.core.surfaces import base_of, dimmed_emitters
+from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
 from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.image import write_image
-from materialist.types import Array, Materials, Photo, Scene
+from materialist.types import Array, Photo, Scene
 
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
@@ -43,7 +44,7 @@ def composite(
     Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
-    renderer = EditRenderer(compared(scene, edited), device=device)
+    renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device), device=device)
     return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
 
@@ -65,35 +66,21 @@ def pictures(
         tick("frames", k, total)
         if edited is not before:
             if before is None or not _same_base(scene, before, edited):
-                renderer = EditRenderer(compared(scene, edited), device=device)
+                base = _base(scene, edited, spp, seed, full_render, denoise, device)
+                renderer = EditRenderer(base, device=device)
             picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale)
         before = edited
         yield picture
     tick("frames", total, total)
 
 
-def compared(scene: Scene, edited: Scene) -> Scene:
-    """The scene that an edit is compared with, which shows what the composite's photo shows.
-
-    It is the fitted scene; with in-photo emitters as surfaces where the edit has them (`core.surfaces`). Where the
-    edit discloses hidden places, it carries a photo that is filled there (`remove`): that photo stands in for the
-    photo, and the fitted scene without the removed object for the fitted scene.
-    """
-    base = base_of(scene, edited)
-    if edited.photo is scene.photo:
-        return base
-    hole = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
-    hole |= (edited.rerender != scene.rerender).any(-1)  # white may be filled with white
-    old, new = scene.materials, edited.materials
-    materials = Materials(
-        np.where(hole[..., None], new.albedo, old.albedo),
-        np.where(hole, new.roughness, old.roughness),
-        np.where(hole, new.metallic, old.metallic),
-    )
-    return replace(
-        base, photo=edited.photo, rerender=edited.rerender, materials=materials, depth=edited.depth,
-        normal=edited.normal, geometry=edited.geometry,
-    )  # fmt: skip
+def _base(
+    scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool, device: str
+) -> Scene:
+    """What the edit is compared with."""
+    if full_render:
+        return compared(scene, edited)
+    return without_traces(scene, edited, spp=spp, seed=seed, denoise=denoise, device=device)
 
 
 def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:

@@ -1,7 +1,7 @@
 """The base and the edited picture, rendered with the same random numbers, and what truly differs between them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import count
 
 import cv2
 import numpy as np
@@ -11,9 +11,9 @@ from skimage.morphology import remove_small_objects
 from materialist.color import linear_to_srgb, luminance
 from materialist.edits.composite.native_layer import NativeLayer, native_layer
 from materialist.edits.core.region import body_coverage
-from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit
+from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit, same_shapes
 from materialist.errors import InputError
-from materialist.geometry.silhouette import grown
+from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Scene
 
 
@@ -23,10 +23,12 @@ class LayerSettings:
 
     first: int = 16  # one in so many of all paths, in each half, finds out where the edit reaches
     least_first: int = 8  # paths of each half that do so at the least; decides below 256 paths
+    lattice: int = 256  # pixels along the longer side that do so
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
     visible: float = 1 / 255  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
     sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
     least_gain: float = 0.25  # gain below which a difference is none
+    margin: int = 16  # pixels around them that the denoiser sees
     bright: float = 1.0  # radiance up to which nothing is a firefly: below white a sparkle does no harm; derived
     times: float = 3.0  # multiple of the second brightest of the eight neighbours from which a pixel is a firefly
 
@@ -68,6 +70,9 @@ def render_layers(
     base, other = renderer.pair(edited)
     relit = is_relit(scene, edited)
     changed = changed_pixels(scene, edited)
+    if not changed.any() and same_shapes(scene, edited):
+        nothing = np.zeros_like(scene.photo.linear)
+        return Layers(nothing, nothing, changed, changed)
     guides = [(one.materials.albedo, one.normal) for one in (scene, edited)]
     alone, covered = None, None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
@@ -101,8 +106,8 @@ def difference(
 
     Outside `changed` the edit arrives by way of a few paths only, and their noise would dust the whole photo. There
     the difference counts where its mean over a neighbourhood can be seen and stands out from what two half renderings
-    disagree on (a shrinkage by the estimated noise, as of Wiener); elsewhere it is exactly zero. Few paths find out
-    where that is; the others are traced there.
+    disagree on (a shrinkage by the estimated noise, as of Wiener); elsewhere it is exactly zero. Few paths on a lattice
+    of pixels find out where that is; the edit is traced there alone.
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
@@ -111,47 +116,47 @@ def difference(
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
-    tick = progress or (lambda *_: None)
+    tick, seeds, done = progress or (lambda *_: None), (2 * seed, 2 * seed + 1), count()
     half = -(-spp // 2)
     first = min(half, max(DEFAULT.least_first, spp // DEFAULT.first))
-    b0, e0, b1, e1 = _halves(base, edited, first, 2 * seed, None, tick)
-    near = changed | _large(_gain(b0, e0, b1, e1) > 0)
-    differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
-    if not (near & differs).any():
-        b = (b0 + b1) / 2
-        return Layers(b, b, differs & False, changed & False)
-    rest = half - first
-    if rest > 0:
+
+    def traced(paths: int, seed: int, of_base: Array | None, of_edited: Array) -> tuple[Array, Array]:
+        tick("render", next(done), 6)
+        return base(paths, seed, of_base), edited(paths, seed, of_edited)
+
+    near = changed
+    if not changed.all():
+        step = max(1, round(max(changed.shape) / DEFAULT.lattice))
+        lattice = np.zeros_like(changed)
+        lattice[::step, ::step] = True
+        few = [p[::step, ::step] for k in seeds for p in traced(first, k, None, lattice)]
+        # Parts that chance makes are as large as a window or two.
+        large = remove_small_objects(_gain(*few) > 0, max_size=2 * DEFAULT.window**2 // step**2)
+        near = changed | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
+    if half > first:
         near = grown(near, DEFAULT.window)
-        more = _halves(base, edited, rest, 2 * seed + 2, near, tick)
-        share = np.where(near, rest / (first + rest), 0)[..., None]
-        b0, e0, b1, e1 = ((1 - share) * old + share * new for old, new in zip((b0, e0, b1, e1), more, strict=True))
-        differs = ((e0 != b0) | (e1 != b1)).any(-1)
-    tick("render", 8, 8)
+    pairs = []
+    for k in seeds:
+        pair = traced(first, k, None, near)
+        if half > first:
+            more = traced(half - first, k + 2, near, near)
+            mixed = [(first * old + (half - first) * new) / half for old, new in zip(pair, more, strict=True)]
+            pair = np.where(near[..., None], mixed[0], pair[0]), np.where(near[..., None], mixed[1], pair[1])
+        pairs.append((pair[0], np.where(near[..., None], pair[1], pair[0])))
+    tick("render", 6, 6)
+    (b0, e0), (b1, e1) = pairs
+    differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
     b, e = ((one + other) / 2 for one, other in ((b0, b1), (e0, e1)))
+    if not differs.any():
+        return Layers(b, b, differs, differs)
     gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
     if guides is not None:
-        b, e = denoised(b, *guides[0]), denoised(without_fireflies(e, changed), *guides[1])
+        box = window(near, margin=DEFAULT.margin)
+        for picture, noisy, maps in zip((b, e), (b, without_fireflies(e, changed)), guides, strict=True):
+            picture[box] = denoised(noisy[box], *(one[box] for one in maps))
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
-
-
-def _halves(
-    base: Render, edited: Render, spp: int, seed: int, where: Array | None, tick: Callable[..., object]
-) -> list[Array]:  # fmt: skip
-    """Base and edited picture with one seed, and again with the next."""
-    pictures: list[Array] = []
-    for k in range(2):
-        for render in (base, edited):
-            tick("render", len(pictures) + (0 if where is None else 4), 8)
-            pictures.append(render(spp, seed + k, where))
-    return pictures
-
-
-def _large(mask: Array) -> Array:
-    """The mask [H, W] bool without parts that chance makes: those of a window or two."""
-    return remove_small_objects(mask, max_size=2 * DEFAULT.window**2)
 
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,46 +14,61 @@ from materialist.geometry.silhouette import window
 from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
-Render = Callable[..., Array]
-"""render(spp, seed, where=None) -> [H, W, 3] float32 linear, `spp` paths a pixel, random numbers by the seed.
-
-where: [H, W] bool: pixels that are traced, the others are 0; None: all.
-"""
 SKY_ROWS = 768
 """Rows of the largest map with the photo's sky (derived: memory)."""
 CLIPPED = 0.98
 """Channel of an ordinary photo from which its value is a lower bound (derived: 8 bits)."""
 
 
+Made = dict[tuple[int, int], tuple[Array, Array]]
+"""Pictures [H, W, 3], and where they are traced [H, W] bool, by paths a pixel and seed."""
+
+
+class Render:
+    """render(spp, seed, where) -> [H, W, 3] float32 linear, of one scene: each pixel is traced when first asked for.
+
+    spp: paths a pixel. seed: of their random numbers. where: [H, W] bool: pixels that are wanted, others may be 0;
+    None: all. Later calls complete the same array.
+    """
+
+    def __init__(self, traced: Callable[..., Array], shape: tuple[int, ...], made: Made | None = None):
+        self._traced, self._shape = traced, shape
+        self._made: Made = {} if made is None else made
+
+    def __call__(self, spp: int, seed: int, where: Array | None = None) -> Array:
+        if (spp, seed) not in self._made:
+            self._made[spp, seed] = np.zeros((*self._shape, 3), np.float32), np.zeros(self._shape, bool)
+        picture, known = self._made[spp, seed]
+        missing = ~known if where is None else where & ~known
+        if missing.any():
+            picture[missing] = self._traced(spp=spp, seed=seed, where=missing)[missing]
+            known |= missing
+        return picture
+
+
 class EditRenderer:
     """Renderings of one fitted scene and of its edits, with common random numbers, so that their noise cancels.
 
     Under another light other directions are sampled, and less of the noise cancels. Scenes of one geometry, with the
-    same bodies and lamps, share a Mitsuba scene; a whole picture of the base is rendered once for each number of paths
-    and seed.
+    same bodies and lamps, share a Mitsuba scene; all edits share what of the base is traced.
     """
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
         self.scene, self.device = scene, device
         self._built: dict[bool, tuple[Scene, Any]] = {}
         """The base's (True) and those of the last edit of other shapes."""
-        self._base: dict[tuple, Array] = {}
+        self._base: dict[tuple, Made] = {}
         self._sky: Array | None = None
 
     def pair(self, edited: Scene) -> tuple[Render, Render]:
-        """render(spp, seed) of the base and of `edited`, with paths of equal length; `spp` counts paths a pixel."""
+        """The renderings of the base and of `edited`, with paths of equal length."""
         scene, edited = self.lit(self.scene, edited), self.lit(edited, edited)
-        depth = max(path_depth(s) for s in (scene, edited))
-
-        def base(spp: int, seed: int, where: Array | None = None) -> Array:
-            if where is not None:
-                return self._render(scene, depth, spp, seed, where)
-            key = (scene is self.scene, depth, spp, seed)
-            if key not in self._base:
-                self._base[key] = self._render(scene, depth, spp, seed)
-            return self._base[key]
-
-        return base, lambda spp, seed, where=None: self._render(edited, depth, spp, seed, where)
+        depth, shape = max(path_depth(s) for s in (scene, edited)), self.scene.depth.shape
+        key = (scene is self.scene, depth)
+        made = self._base.setdefault(key, {})  # alone: a `Render` of its own would keep this renderer alive
+        return Render(partial(self._render, scene, depth), shape, made), Render(
+            partial(self._render, edited, depth), shape
+        )
 
     def lit(self, shown: Scene, edited: Scene) -> Scene:
         """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
@@ -107,8 +123,8 @@ class EditRenderer:
         target.set_envmap(scene.envmap)
         return target
 
-    def _render(self, scene: Scene, depth: int, spp: int, seed: int, where: Array | None = None) -> Array:
-        return self.render_scene(scene).render(spp=spp, seed=seed, max_depth=depth, where=where)
+    def _render(self, scene: Scene, depth: int, **how: Any) -> Array:
+        return self.render_scene(scene).render(max_depth=depth, **how)
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
@@ -120,9 +136,9 @@ class EditRenderer:
 
     def _target(self, scene: Scene):
         """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of its last use."""
-        of_base = _same_shapes(scene, self.scene)
+        of_base = same_shapes(scene, self.scene)
         known = self._built.get(of_base)
-        if known is None or not _same_shapes(known[0], scene):
+        if known is None or not same_shapes(known[0], scene):
             from materialist.render.scene import RenderScene
 
             target = RenderScene(
@@ -132,7 +148,8 @@ class EditRenderer:
         return known[1]
 
 
-def _same_shapes(one: Scene, other: Scene) -> bool:
+def same_shapes(one: Scene, other: Scene) -> bool:
+    """Whether the two scenes have the same geometry, bodies and lamps."""
     return one.geometry is other.geometry and (one.lamps, one.bodies) == (other.lamps, other.bodies)
 
 

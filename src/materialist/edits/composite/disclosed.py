@@ -1,0 +1,74 @@
+"""The scene that an edit is compared with, where it takes an object of the photo away: without the object's shadow."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from materialist.edits.composite.into_photo import DEFAULT, into_photo, onto_working
+from materialist.edits.composite.layers import difference
+from materialist.edits.core.renderer import EditRenderer, paths_for
+from materialist.edits.core.surfaces import base_of
+from materialist.geometry.build import continued_as
+from materialist.geometry.membrane import membrane
+from materialist.geometry.silhouette import grown
+from materialist.types import Array, Materials, Scene
+
+LEAST = 1e-3
+"""Relative change of the radiance below which a filled pixel stays as it was filled."""
+
+RIM = 3
+"""Pixels around filled ones that change as those do: there the two renderings show edges of what is gone."""
+
+
+def compared(scene: Scene, edited: Scene) -> Scene:
+    """The scene that an edit is compared with, which shows what the composite's photo shows.
+
+    It is the fitted scene; with in-photo emitters as surfaces where the edit has them (`core.surfaces`). Where the
+    edit discloses hidden places, it carries a photo that is filled there (`remove`): that photo stands in for the
+    photo, and the fitted scene without the removed object for the fitted scene.
+    """
+    base = base_of(scene, edited)
+    if edited.photo is scene.photo:
+        return base
+    hole = _disclosed(scene, edited)
+    old, new = scene.materials, edited.materials
+    materials = Materials(
+        np.where(hole[..., None], new.albedo, old.albedo),
+        np.where(hole, new.roughness, old.roughness),
+        np.where(hole, new.metallic, old.metallic),
+    )
+    return replace(
+        base, photo=edited.photo, rerender=edited.rerender, materials=materials, depth=edited.depth,
+        normal=edited.normal, geometry=edited.geometry,
+    )  # fmt: skip
+
+
+def without_traces(
+    scene: Scene, edited: Scene, *, spp: int | None, seed: int, denoise: bool, device: str = "auto"
+) -> Scene:
+    """`compared`, and its photo changes around the hole as the rendering does when the object goes.
+
+    Its shadow and its reflection go, and the light that it shed on other things. Filled pixels, which are like their
+    surroundings, change by the factor of the surroundings. spp, seed, denoise, device: as of `composite`.
+    """
+    base = compared(scene, edited)
+    if base.photo is scene.photo:
+        return base
+    hole, photo = _disclosed(scene, edited), base.photo
+    # Planes that the rest of the picture suggests when the object is gone were there before.
+    before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
+    guides = [(one.materials.albedo, one.normal) for one in (before, base)] if denoise else None
+    pair = EditRenderer(before, device=device).pair(base)
+    layers = difference(*pair, np.zeros_like(hole), guides, spp=spp or paths_for(before, base), seed=seed)
+    factor = np.log((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor))
+    hole = grown(hole, RIM)
+    factor = np.where(hole[..., None], membrane(factor, ~hole), factor)
+    reached = np.where(hole, np.abs(factor).max(-1) > LEAST, layers.reached)
+    layers = replace(layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached)
+    return replace(base, photo=replace(photo, original=into_photo(photo, layers), linear=onto_working(photo, layers)))
+
+
+def _disclosed(scene: Scene, edited: Scene) -> Array:
+    """[H, W] bool: where the edit shows what was hidden."""
+    hole = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
+    return hole | (edited.rerender != scene.rerender).any(-1)  # white may be filled with white
