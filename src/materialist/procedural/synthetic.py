@@ -23,6 +23,7 @@ from materialist.procedural import lights
 from materialist.procedural.world import Viewpoint
 from materialist.render.envmap import emitter, on_mitsuba_grid
 from materialist.render.scene import look_along, sensor, shape
+from materialist.render.variant import recording
 from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
@@ -121,9 +122,9 @@ class TrueScene:
         # Whole squares suit the stratified sampler; batches bound the memory.
         total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
         for k, part in enumerate(batches):
-            picture = mi.render(
-                self._scene, integrator=path_tracer, spp=part, seed=mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
-            )
+            number = mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
+            with recording():
+                picture = mi.render(self._scene, integrator=path_tracer, spp=part, seed=number)
             total += np.array(picture)[..., :3] * part
         return (total / sum(batches)).astype(np.float32)
 

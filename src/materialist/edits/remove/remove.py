@@ -29,7 +29,7 @@ def remove(
     """The scene without the object under a mask: photo, surfaces and materials go on behind it.
 
     In the result `photo` and `rerender` are filled alike: their difference is what the fit misses of the
-    surroundings. `composite` takes both as they are, so that outside the hole the photo stays bit for bit.
+    surroundings. Outside the hole both are as before; `composite` takes the object's shadow and reflection away there.
 
     mask: [H, W] bool, or weights in [0, 1], at working size. options, values: `Removal`, or single fields of it.
     fitted: the scene before its edits: the photo does not show what they put there.
