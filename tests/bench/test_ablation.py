@@ -6,6 +6,7 @@ import pytest
 
 from materialist import bench
 from materialist.bench import ablation
+from materialist.fit.settings import PAPER
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +37,7 @@ def test_what_matters_does_and_first_weights_hardly(rows):
 
 
 def test_real_photos_need_no_truth(measured, monkeypatch):
+    monkeypatch.setattr(ablation, "PAPER", PAPER.at_most(20))
     monkeypatch.setattr(ablation.AblationBench, "short", 3)
     monkeypatch.setattr(ablation.AblationBench, "deltas", (3.0,))
     rows = measured("ablation", photos=True, scenes=1, size=24, spp=4, tables="delta,fov", device="cpu").rows

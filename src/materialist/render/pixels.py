@@ -119,9 +119,13 @@ def directions(camera: Camera, size: tuple[int, ...], pixel: Any, x: Any, y: Any
     import mitsuba as mi
 
     half = float(np.tan(np.radians(camera.fov) / 2))
-    across = (mi.Float(pixel % size[1]) + x) / size[1] * 2 - 1
-    up = 1 - (mi.Float(pixel // size[1]) + y) / size[0] * 2
-    return dr.normalize(mi.Vector3f(across * half, up * (half * camera.height / camera.width), -1))
+    # Numbers of one photo or call are data: as literals they would have the kernel compiled anew.
+    width, columns = dr.opaque(mi.UInt32, size[1]), dr.opaque(mi.Float, size[1])
+    rows, half_width = dr.opaque(mi.Float, size[0]), dr.opaque(mi.Float, half)
+    half_height = dr.opaque(mi.Float, half * camera.height / camera.width)
+    across = (mi.Float(pixel % width) + x) / columns * 2 - 1
+    up = 1 - (mi.Float(pixel // width) + y) / rows * 2
+    return dr.normalize(mi.Vector3f(across * half_width, up * half_height, -1))
 
 
 def _albedo(body: Body, uv: Array) -> Array:
@@ -187,8 +191,6 @@ def _sums(
         counts &= known
     with recording():
         light = integrator.sample(scene, sampler, ray, None, counts)[0]
-    sums = [dr.zeros(mi.Float, len(pixels)) for _ in range(4)]
-    for total, value in zip(sums, (light.x, light.y, light.z, mi.Float(1)), strict=True):
-        dr.scatter_reduce(dr.ReduceOp.Add, total, value, slot, counts)
-    dr.eval(*sums)
-    return np.stack([np.array(total) for total in sums], -1).astype(np.float64)
+        values = [dr.select(counts, value, 0) for value in (light.x, light.y, light.z, mi.Float(1))]
+    dr.eval(values)  # together, or each sum would trace the paths again
+    return np.stack([np.array(dr.block_sum(value, each)) for value in values], -1).astype(np.float64)

@@ -103,15 +103,13 @@ class TransportCache:
 
     def _primary(self) -> None:
         cam = self.camera
-        index = dr.arange(mi.UInt32, cam.width * cam.height)
-        row, col = index // cam.width, index % cam.width
-        d = mi.Vector3f(
-            (mi.Float(col) + 0.5 + _OFF_DIAGONAL[0] - cam.width / 2) / cam.focal,
-            -(mi.Float(row) + 0.5 + _OFF_DIAGONAL[1] - cam.height / 2) / cam.focal,
-            -1,
-        )
-        d = dr.normalize(d)
+        index, columns = dr.arange(mi.UInt32, cam.width * cam.height), dr.opaque(mi.UInt32, cam.width)
+        # Numbers of one photo are data: as literals they would have the kernel compiled anew.
+        middle = [dr.opaque(mi.Float, side / 2 - 0.5 - off) for side, off in zip((cam.width, cam.height), _OFF_DIAGONAL)]
+        across, up = mi.Float(index % columns) - middle[0], middle[1] - mi.Float(index // columns)
+        d = dr.normalize(mi.Vector3f(across, up, -dr.opaque(mi.Float, cam.focal)))
         si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
+        dr.eval(d, si)  # together, or each part of it would trace the rays again
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
         take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
