@@ -12,6 +12,7 @@ from materialist.fit.settings import PAPER
 @pytest.fixture(scope="module")
 def rows(mitsuba, tmp_path_factory):
     patch = pytest.MonkeyPatch()
+    patch.setattr(ablation, "PAPER", PAPER.at_most(60))
     patch.setattr(ablation.AblationBench, "deltas", (0.0, 50.0))
     patch.setattr(ablation.AblationBench, "steps", (2, 30))
     patch.setattr(ablation.AblationBench, "inits", 2)

@@ -53,10 +53,11 @@ class Profile:
         return columns * self.cell, self.low + (rows - MARGIN) * self.cell - self.floor
 
     def at(self, places: Array) -> Array:
-        """[...] the function at places [..., 2]: below 0 in the body."""
+        """[...] the function at places [..., 2]: below 0 in the body, outside at most the cells to its border."""
         own = ((places - [0, self.low]) / self.cell).reshape(-1, 2)
         flat = sampled(self.values, own, order=1).reshape(places.shape[:-1])
-        return np.maximum(flat, (self.floor - places[..., 1]) / self.cell)
+        under = (self.floor - places[..., 1]) / self.cell  # below the base the distance to the line is no bound
+        return np.where(under > 0, under, np.maximum(flat, under))
 
     def slope(self, places: Array) -> Array:
         """[N, 2] how the function rises at places [N, 2]; at the floor straight down."""

@@ -15,7 +15,7 @@ from materialist.types import Array, Camera
 class RevolutionSettings:
     """How a profile is swept."""
 
-    block: int = 4096  # rays that are followed at once: a bound on memory
+    step: float = 0.5  # least step along a ray, cells
     around: int = 256  # corners of the swept circles
     side: float = 0.5  # least outward part of the normals of a side; above the last of it is the lid
     under: float = 3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
@@ -86,27 +86,30 @@ class Revolution:
 
     def _chords(self, rays: Array) -> tuple[Array, Array]:
         """[N] planar depths of the first and of the last point of rays [N, 3] in the body, NaN where they pass it."""
-        profile, step = self.profile, 0.5 * self.profile.cell
+        wide, high = self.profile.size
+        middle = self.axis.foot + (self.profile.floor + high / 2) * self.axis.up
         length = np.linalg.norm(rays, axis=-1)
-        wide, high = profile.size
-        middle = self.axis.foot + (profile.floor + high / 2) * self.axis.up
-        reach = float(np.hypot(wide, high / 2))
-        steps = np.arange(-reach, reach, step)
-        found = np.full((2, len(rays)), np.nan)
-        for k in range(0, len(rays), DEFAULT.block):
-            part = slice(k, k + DEFAULT.block)
-            at = ((rays[part] @ middle) / length[part] ** 2)[:, None] + steps / length[part, None]  # [n, S]
-            values = profile.at(self.axis.of(rays[part, None] * at[..., None]))
-            row, inner = np.arange(len(at)), values < 0
-            for end, flipped in enumerate((inner, inner[:, ::-1])):
-                column = flipped.argmax(1)
-                column = column if end == 0 else inner.shape[1] - 1 - column
-                beyond = np.clip(column + (2 * end - 1), 0, inner.shape[1] - 1)
-                own, other = values[row, column], values[row, beyond]
-                share = np.clip(-own / np.maximum(other - own, 1e-12), 0, 1)
-                place = at[row, column] + share * (at[row, beyond] - at[row, column])
-                found[end, part] = np.where(inner.any(1), place, np.nan)
-        return found[0], found[1]
+        nearest, reach = rays @ middle / length**2, np.hypot(wide, high / 2) / length
+        return self._met(rays, nearest - reach, 2 * reach), self._met(rays, nearest + reach, -2 * reach)
+
+    def _met(self, rays: Array, start: Array, way: Array) -> Array:
+        """[N] planar depth of the first point in the body from `start` [N] on, up to start + way; NaN where none is.
+
+        The function is a bound on the distance to the body: it tells the next step (sphere tracing, Hart 1996).
+        """
+        found, at = np.full(len(rays), np.nan), start
+        length, along = np.linalg.norm(rays, axis=-1), np.sign(way)
+        left = np.arange(len(rays))
+        last, before = at, np.ones(len(rays))
+        while len(left):
+            value = self.profile.at(self.axis.of(rays[left] * at[:, None]))
+            inner = value < 0
+            share = before / np.maximum(before - value, 1e-12)
+            found[left[inner]] = (last + np.clip(share, 0, 1) * (at - last))[inner]
+            step = along[left] * np.maximum(value, DEFAULT.step) * self.profile.cell / length[left]
+            on = ~inner & (np.abs(at + step - start[left]) < np.abs(way[left]))
+            last, before, at, left = at[on], value[on], (at + step)[on], left[on]
+        return found
 
 
 def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:

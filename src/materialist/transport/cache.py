@@ -105,8 +105,9 @@ class TransportCache:
         cam = self.camera
         index, columns = dr.arange(mi.UInt32, cam.width * cam.height), dr.opaque(mi.UInt32, cam.width)
         # Numbers of one photo are data: as literals they would have the kernel compiled anew.
-        middle = [dr.opaque(mi.Float, side / 2 - 0.5 - off) for side, off in zip((cam.width, cam.height), _OFF_DIAGONAL)]
-        across, up = mi.Float(index % columns) - middle[0], middle[1] - mi.Float(index // columns)
+        middle, centre = (dr.opaque(mi.Float, (side - 1) / 2) for side in (cam.width, cam.height))
+        across = mi.Float(index % columns) - middle + _OFF_DIAGONAL[0]
+        up = centre - mi.Float(index // columns) - _OFF_DIAGONAL[1]
         d = dr.normalize(mi.Vector3f(across, up, -dr.opaque(mi.Float, cam.focal)))
         si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
         dr.eval(d, si)  # together, or each part of it would trace the rays again
