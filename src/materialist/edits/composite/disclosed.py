@@ -6,7 +6,7 @@ import numpy as np
 
 from materialist.edits.composite.into_photo import DEFAULT, into_photo, onto_working
 from materialist.edits.composite.layers import difference
-from materialist.edits.core.renderer import EditRenderer, paths_for
+from materialist.edits.core.renderer import PATHS, EditRenderer
 from materialist.edits.core.surfaces import base_of
 from materialist.geometry.build import continued_as
 from materialist.geometry.membrane import membrane
@@ -59,7 +59,7 @@ def without_traces(
     before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
     guides = [(one.materials.albedo, one.normal) for one in (before, base)] if denoise else None
     pair = EditRenderer(before, device=device).pair(base)
-    layers = difference(*pair, np.zeros_like(hole), guides, spp=spp or paths_for(before, base), seed=seed)
+    layers = difference(*pair, np.zeros_like(hole), guides, spp=spp or PATHS, seed=seed)
     factor = np.log((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor))
     hole = grown(hole, RIM)
     factor = np.where(hole[..., None], membrane(factor, ~hole), factor)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from itertools import count
+from typing import Any
 
 import cv2
 import numpy as np
@@ -59,12 +60,13 @@ class Layers:
 
 
 def render_layers(
-    renderer: EditRenderer, edited: Scene, *, spp: int = 128, seed: int = 0, clean: bool = True, progress=None
-) -> Layers:
+    renderer: EditRenderer, edited: Scene, *, spp: int = 128, elsewhere: int | None = None, seed: int = 0,
+    clean: bool = True, progress=None,
+) -> Layers:  # fmt: skip
     """Render a fitted scene and an edit of it, and separate the edit from the noise.
 
-    `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
-    noise. See `difference`.
+    `spp` counts paths a pixel of what is edited, `elsewhere` of what it only lights. Both pictures come in two halves
+    with different seeds: what the halves disagree on is noise. See `difference`.
     """
     scene = renderer.scene
     base, other = renderer.pair(edited)
@@ -83,7 +85,8 @@ def render_layers(
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
         if clean:
             guides[1] = renderer.guides(edited, anything)
-    layers = difference(base, other, changed, guides if clean else None, spp=spp, seed=seed, progress=progress)
+    how: dict[str, Any] = {"spp": spp, "elsewhere": elsewhere, "seed": seed, "progress": progress}
+    layers = difference(base, other, changed, guides if clean else None, **how)
     old, new = (np.maximum(1 - one.materials.metallic, 1e-3) for one in (scene, edited))
     return replace(layers, relit=relit, native=alone, covered=covered, diffuse=np.minimum(new / old, 1))
 
@@ -99,10 +102,10 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 
 def difference(
-    base: Render, edited: Render, changed: Array, guides: list[tuple[Array, Array]] | None, *, spp: int, seed: int,
-    progress=None,
+    base: Render, edited: Render, changed: Array, guides: list[tuple[Array, Array]] | None, *, spp: int,
+    elsewhere: int | None = None, seed: int, progress=None,
 ) -> Layers:  # fmt: skip
-    """Layers of any two renderings of one view.
+    """Layers of any two renderings of one view, 0 where they are not traced.
 
     Outside `changed` the edit arrives by way of a few paths only, and their noise would dust the whole photo. There
     the difference counts where its mean over a neighbourhood can be seen and stands out from what two half renderings
@@ -111,17 +114,20 @@ def difference(
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
+        spp: paths a pixel of those, in each picture. elsewhere: of the others, at most spp; None: as many.
         guides: albedo and normal [H, W, 3] of the base, and of the edited scene, with which both pictures are denoised
             before they are compared, where the denoiser is installed; None: as they are.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
+    elsewhere = elsewhere or spp
+    half, whole = -(-elsewhere // 2), -(-spp // 2)  # of either half, outside `changed` and in it
+    first = min(half, max(DEFAULT.least_first, elsewhere // DEFAULT.first))
     tick, seeds, done = progress or (lambda *_: None), (2 * seed, 2 * seed + 1), count()
-    half = -(-spp // 2)
-    first = min(half, max(DEFAULT.least_first, spp // DEFAULT.first))
+    steps = 2 * (1 + (not changed.all()) + (half > first) + (whole > half))
 
-    def traced(paths: int, seed: int, of_base: Array | None, of_edited: Array) -> tuple[Array, Array]:
-        tick("render", next(done), 6)
+    def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
+        tick("render", next(done), steps)
         return base(paths, seed, of_base), edited(paths, seed, of_edited)
 
     near = changed
@@ -129,21 +135,24 @@ def difference(
         step = max(1, round(max(changed.shape) / DEFAULT.lattice))
         lattice = np.zeros_like(changed)
         lattice[::step, ::step] = True
-        few = [p[::step, ::step] for k in seeds for p in traced(first, k, None, lattice)]
+        few = [p[::step, ::step] for k in seeds for p in traced(first, k, lattice, lattice)]
         # Parts that chance makes are as large as a window or two.
         large = remove_small_objects(_gain(*few) > 0, max_size=2 * DEFAULT.window**2 // step**2)
         near = changed | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
     if half > first:
         near = grown(near, DEFAULT.window)
+    shown, own = grown(near, DEFAULT.margin), grown(changed, DEFAULT.window)
+    more = [(first, half, near), (half, whole, own)]  # paths before and after, and where
     pairs = []
     for k in seeds:
-        pair = traced(first, k, None, near)
-        if half > first:
-            more = traced(half - first, k + 2, near, near)
-            mixed = [(first * old + (half - first) * new) / half for old, new in zip(pair, more, strict=True)]
-            pair = np.where(near[..., None], mixed[0], pair[0]), np.where(near[..., None], mixed[1], pair[1])
+        pair = [np.where(shown[..., None], one, 0) for one in traced(first, k, shown, near)]
+        for j, (before, after, where) in enumerate(more, start=1):
+            if after > before:
+                added = traced(after - before, k + 2 * j, where, where)
+                share = (after - before) / after * where[..., None]
+                pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
         pairs.append((pair[0], np.where(near[..., None], pair[1], pair[0])))
-    tick("render", 6, 6)
+    tick("render", steps, steps)
     (b0, e0), (b1, e1) = pairs
     differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
     b, e = ((one + other) / 2 for one, other in ((b0, b1), (e0, e1)))
