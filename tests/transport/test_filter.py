@@ -13,9 +13,9 @@ H, W = 12, 10
 
 def flat_guide() -> Guide:
     """A plane that faces the camera, a pixel one unit wide."""
-    ys, xs = torch.meshgrid(torch.arange(H).float(), torch.arange(W).float(), indexing="ij")
-    position = torch.stack([xs, -ys, torch.full((H, W), -5.0)], -1)
-    return Guide(position, torch.tensor([0.0, 0, 1]).expand(H, W, 3).clone(), torch.ones(H, W))
+    ys, xs = np.indices((H, W), np.float32)
+    position = np.stack([xs, -ys, np.full((H, W), -5, np.float32)], -1)
+    return Guide(position, np.tile(np.float32([0, 0, 1]), (H, W, 1)), np.ones((H, W), np.float32))
 
 
 def noise(channels: int = 2):

@@ -142,6 +142,5 @@ def _subset(rng, size: int, share: float) -> Array:
 
 def _guide(cache: TransportCache, camera: Camera) -> Guide:
     position = np.array(cache.position).T
-    image = lambda v: placed(cache.image(v))  # noqa: E731
-    scale = image(-position[:, 2:] / camera.focal)[..., 0]
-    return Guide(image(position), image(np.array(cache.normal).T), scale.clamp_min(1e-9))
+    scale = cache.image(-position[:, 2:] / camera.focal)[..., 0]
+    return Guide(cache.image(position), cache.image(np.array(cache.normal).T), np.maximum(scale, 1e-9))

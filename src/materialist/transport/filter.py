@@ -8,56 +8,64 @@ levels keep their detail.
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 import torch
+from scipy.sparse import csr_array
 
 from materialist.buffers import placed
 from materialist.transport.cache import Tables, TransportCache
+from materialist.types import Array
 
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
-_SHARPNESS = 32.0
+_SHARPNESS = 32
 """Power of the cosine between normals (by eye)."""
 _SMOOTHED = 0.2
 """Least roughness of a level that is filtered (by eye)."""
+_LEAST = 1e-4
+"""Weight of a neighbour below which it is left out (derived: time)."""
 
 
 @dataclass(frozen=True)
 class Guide:
-    """Surface of each pixel of the image grid; torch float32."""
+    """Surface of each pixel of the image grid; float32."""
 
-    position: torch.Tensor
+    position: Array
     """[H, W, 3] camera frame."""
-    normal: torch.Tensor
+    normal: Array
     """[H, W, 3] unit shading normal; zero where there is no surface."""
-    scale: torch.Tensor
+    scale: Array
     """[H, W] size of a pixel on the surface, scene units."""
 
-    def alike(self, dy: int, dx: int) -> torch.Tensor:
+    def alike(self, dy: int, dx: int) -> Array:
         """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
         normal, position = _shifted(self.normal, dy, dx), _shifted(self.position, dy, dx)
-        cosine = (self.normal * normal).sum(-1).clamp(0, 1)
-        away = (self.normal * (position - self.position)).sum(-1).abs() / (self.scale * (1 + dy * dy + dx * dx) ** 0.5)
-        return cosine.pow(_SHARPNESS) * torch.exp(-0.5 * away * away)
+        cosine = np.clip((self.normal * normal).sum(-1), 0, 1)
+        away = (self.normal * (position - self.position)).sum(-1) / (self.scale * np.sqrt(1 + dy * dy + dx * dx))
+        return cosine**_SHARPNESS * np.exp(-0.5 * away * away)
 
     @cached_property
-    def taps(self) -> list[tuple[int, int, torch.Tensor]]:
-        """(rows, columns) to the 5 x 5 neighbours, and the weight [H, W] that each has for each pixel."""
-        offsets = list(enumerate(_TAPS, -2))
-        return [(dy, dx, wy * wx * self.alike(dy, dx)) for dy, wy in offsets for dx, wx in offsets]
+    def mean(self) -> csr_array:
+        """[H W, H W]: times values of all pixels, their means over the 5 x 5 neighbours on the same surface."""
+        h, w = self.scale.shape
+        taps = [(dy, dx, wy * wx) for dy, wy in enumerate(_TAPS, -2) for dx, wx in enumerate(_TAPS, -2)]
+        weight = np.stack([share * self.alike(dy, dx).ravel() for dy, dx, share in taps], -1).astype(np.float32)
+        weight /= np.maximum(weight.sum(-1, keepdims=True), 1e-6)
+        column = np.arange(h * w, dtype=np.int32)[:, None] + np.array([dy * w + dx for dy, dx, _ in taps], np.int32)
+        some = weight > _LEAST
+        rows = np.concatenate([[0], some.sum(-1).cumsum()]).astype(np.int32)
+        return csr_array((weight[some], column[some], rows), shape=(h * w, h * w))
 
 
 def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
     """Average `values` [H, W, C] over neighbours that lie on the same surface."""
-    total, norm = torch.zeros_like(values), values.new_zeros(values.shape[:2])
-    for dy, dx, weight in guide.taps:
-        total.addcmul_(_shifted(values, dy, dx), weight[..., None])
-        norm += weight
-    return total / norm.clamp_min(1e-6)[..., None]
+    flat = values.flatten(0, 1).cpu().numpy()
+    return placed(guide.mean @ flat).view(values.shape)
 
 
-def _shifted(image: torch.Tensor, dy: int, dx: int) -> torch.Tensor:
+def _shifted(image: Array, dy: int, dx: int) -> Array:
     """`image` [H, W, ...] with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
-    out = torch.zeros_like(image)
+    out = np.zeros_like(image)
     h, w = image.shape[:2]
     if abs(dy) >= h or abs(dx) >= w:
         return out
@@ -73,7 +81,7 @@ def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables
     wide = [roughness[:, None] >= _SMOOTHED for roughness in cache.roughness]
     some = [k for k, pixels in enumerate(wide) if pixels.any()]
     stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in some)], -1)
-    grid = stack.new_zeros(guide.scale.numel(), stack.shape[1])
+    grid = stack.new_zeros(guide.scale.size, stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
     smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
