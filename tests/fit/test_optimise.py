@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from materialist.fit.optimise import StageResult, optimise
+from materialist.fit.optimise import Adam, StageResult, optimise
 from materialist.fit.settings import Schedule
 
 
@@ -23,6 +23,21 @@ def test_learning_rate_falls_in_steps():
     )  # fmt: skip
     moves = [b - a for a, b in zip([0.0, *seen], seen, strict=False)]
     assert moves == pytest.approx([0.1, 0.1, 0.1, 0.05, 0.05, 0.05, 0.025], rel=1e-4)
+
+
+def test_adam_is_torchs():
+    start = torch.rand(2, 5, generator=torch.Generator().manual_seed(0))
+    pairs = [[torch.nn.Parameter(start[k].clone()) for k in range(2)] for _ in range(2)]
+    own, known = Adam(pairs[0]), torch.optim.Adam(pairs[1], lr=0.03)
+    for step in range(30):
+        for some in pairs:
+            (some[0] * (step % 3 - some[1]) ** 2).sum().backward()
+        own.step(0.03)
+        known.step()
+        known.zero_grad()
+    for mine, theirs in zip(*pairs, strict=True):
+        assert mine.grad is None
+        torch.testing.assert_close(mine, theirs)
 
 
 @pytest.mark.parametrize(("fall", "stops"), [(0.99995, True), (0.9998, False)])

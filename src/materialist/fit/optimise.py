@@ -1,5 +1,6 @@
 """The one optimisation loop: Adam, a step-wise falling learning rate, early stopping, progress."""
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -32,6 +33,28 @@ class StageResult:
         }
 
 
+class Adam:
+    """Adam (Kingma and Ba 2015), step for step `torch.optim.Adam`, which first imports a compiler for seconds."""
+
+    def __init__(self, tensors: list[torch.Tensor], betas: tuple[float, float] = (0.9, 0.999), eps: float = 1e-8):
+        self.tensors, self.betas, self.eps, self.steps = tensors, betas, eps, 0
+        self.means, self.squares = ([torch.zeros_like(t) for t in tensors] for _ in range(2))
+
+    @torch.no_grad()
+    def step(self, rate: float) -> None:
+        """Move the tensors along their gradients, and forget those."""
+        self.steps += 1
+        first, second = self.betas
+        rate, root = rate / (1 - first**self.steps), math.sqrt(1 - second**self.steps)
+        for tensor, mean, square in zip(self.tensors, self.means, self.squares, strict=True):
+            if tensor.grad is None:
+                continue
+            mean.lerp_(tensor.grad, 1 - first)
+            square.mul_(second).addcmul_(tensor.grad, tensor.grad, value=1 - second)
+            tensor.addcdiv_(mean, (square.sqrt() / root).add_(self.eps), value=-rate)
+            tensor.grad = None
+
+
 def optimise(
     name: str, parameters: Iterable[torch.Tensor], loss: Callable[[int], torch.Tensor], schedule: Schedule, *,
     after_step: Callable[[], None] | None = None, progress: Progress | None = None,
@@ -41,18 +64,15 @@ def optimise(
     The loss that counts for early stopping is the best of each window of `patience` steps.
     """
     tensors = list(parameters)
-    optimiser = torch.optim.Adam(tensors, lr=schedule.learning_rate)
-    scheduler = torch.optim.lr_scheduler.StepLR(optimiser, schedule.decay_every, schedule.decay)
+    adam = Adam(tensors)
     best, kept = float("inf"), [t.detach().clone() for t in tensors] if schedule.keep_best else []
     start, losses = time.perf_counter(), []
     for step in range(schedule.max_steps):
-        optimiser.zero_grad(set_to_none=True)
         value = loss(step)
         value.backward()
         if schedule.keep_best and value.item() < best:
             best, kept = value.item(), [t.detach().clone() for t in tensors]
-        optimiser.step()
-        scheduler.step()
+        adam.step(schedule.learning_rate * schedule.decay ** (step // schedule.decay_every))
         if after_step is not None:
             with torch.no_grad():
                 after_step()
