@@ -32,7 +32,7 @@ _WORDS = {
     "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
     "geometry": "Building the surface", "trace": "Tracing light paths", "light": "Finding the light",
     "albedo": "Finding the materials", "materials": "Finding the materials", "rerender": "Rendering the result",
-    "save": "Saving", "load": "Loading",
+    "save": "Saving", "load": "Loading", "shadow": "Taking its shadow away",
     "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
 }  # fmt: skip
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))

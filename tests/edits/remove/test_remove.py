@@ -73,7 +73,9 @@ def test_its_shadow_on_the_wall_goes_with_it():
     after = without_the_block(scene)
     shadow = far_from(MASK, 4) & ((after - before).max(-1) > 0.1 * after.max(-1))
     assert shadow.sum() > 20
-    picture = composite(scene, remove(scene, MASK), spp=64)
+    told = []
+    picture = composite(scene, remove(scene, MASK), spp=64, progress=lambda *event: told.append(event))
+    assert told[0][:2] == ("shadow", 0) and told[-1][1] == told[-1][2]
     assert np.abs(picture - after)[shadow].mean() < 0.3 * np.abs(before - after)[shadow].mean()
     still = far_from(MASK, 4) & (np.abs(after - before).max(-1) < 0.005 * after.max(-1))
     assert np.abs(picture - before)[still].mean() < 0.004

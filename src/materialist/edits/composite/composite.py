@@ -45,7 +45,7 @@ def composite(
     Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
-    renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device), device=device)
+    renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device)
     return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
 
@@ -76,12 +76,13 @@ def pictures(
 
 
 def _base(
-    scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool, device: str
-) -> Scene:
+    scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool, device: str,
+    progress=None,
+) -> Scene:  # fmt: skip
     """What the edit is compared with."""
     if full_render:
         return compared(scene, edited)
-    return without_traces(scene, edited, spp=spp, seed=seed, denoise=denoise, device=device)
+    return without_traces(scene, edited, spp=spp, seed=seed, denoise=denoise, device=device, progress=progress)
 
 
 def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:

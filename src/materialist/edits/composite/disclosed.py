@@ -44,12 +44,12 @@ def compared(scene: Scene, edited: Scene) -> Scene:
 
 
 def without_traces(
-    scene: Scene, edited: Scene, *, spp: int | None, seed: int, denoise: bool, device: str = "auto"
+    scene: Scene, edited: Scene, *, spp: int | None, seed: int, denoise: bool, device: str = "auto", progress=None
 ) -> Scene:
     """`compared`, and its photo changes around the hole as the rendering does when the object goes.
 
     Its shadow and its reflection go, and the light that it shed on other things. Filled pixels, which are like their
-    surroundings, change by the factor of the surroundings. spp, seed, denoise, device: as of `composite`.
+    surroundings, change by the factor of the surroundings. spp, seed, denoise, device, progress: as of `composite`.
     """
     base = compared(scene, edited)
     if base.photo is scene.photo:
@@ -59,7 +59,8 @@ def without_traces(
     before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
     guides = [(one.materials.albedo, one.normal) for one in (before, base)] if denoise else None
     pair = EditRenderer(before, device=device).pair(base)
-    layers = difference(*pair, np.zeros_like(hole), guides, spp=spp or PATHS, seed=seed)
+    tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
+    layers = difference(*pair, np.zeros_like(hole), guides, spp=spp or PATHS, seed=seed, progress=tick)
     factor = np.log((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor))
     hole = grown(hole, RIM)
     factor = np.where(hole[..., None], membrane(factor, ~hole), factor)
