@@ -88,16 +88,10 @@ def test_a_run_writes_rows_with_their_ceilings(measured, fitted):
     assert all((report.folder / name).stat().st_size > 1000 for name in ("plot.png", "sheet.png"))
 
 
-def test_what_people_wait_for_is_timed(measured, fitted):
-    rows = measured("edit", device="cpu", scenes=0, latency=32, large=300, frames=0).rows
-    waited = ["preview: built once", "preview: material", "preview: light"]
-    waited += [*(f"final: {name}" for name in FINALS), "final: into a large photo"]
-    assert list(dict.fromkeys(row["method"] for row in rows)) == waited
-    assert all(row["seconds"] > 0 for row in rows) and rows[-1]["sample"] == "300 x 300"
-
-
 @pytest.mark.slow
-def test_a_film_is_timed(measured, fitted):
-    rows = measured("edit", device="cpu", scenes=0, latency=32, large=64, frames=2).rows
-    (film,) = (row for row in rows if row["method"] == "drop: 2 frames")
-    assert film["seconds"] > 0 and film["cpu_seconds"] > 0
+def test_what_people_wait_for_is_timed(measured, fitted):
+    rows = measured("edit", device="cpu", scenes=0, latency=32, large=300, frames=2).rows
+    waited = ["preview: built once", "preview: material", "preview: light", *(f"final: {name}" for name in FINALS)]
+    waited += ["drop: 2 frames", "final: into a large photo"]
+    assert list(dict.fromkeys(row["method"] for row in rows)) == waited
+    assert all(min(row["seconds"], row["cpu_seconds"]) > 0 for row in rows) and rows[-1]["sample"] == "300 x 300"

@@ -52,7 +52,7 @@ def test_progress_is_at_the_picture_and_stop_never_under_the_cursor(page):
     for part in ("#progress", "#stop"):
         box = page.locator(part).bounding_box()
         assert box["y"] + box["height"] <= 720, part
-    page.wait_for_selector("#stage .badge >> text=Path traced, 256")
+    page.wait_for_selector("#stage .badge >> text=Path traced, 128")
     page.wait_for_selector("#stop", state="hidden")
 
 

@@ -35,9 +35,8 @@ class StudioSettings:
     triangles: int = 12_000  # of a body in a sketch; of a finer mesh every n-th, and the gaps are closed
     jpeg_quality: int = 88  # of live pictures
     draft_spp: int = 16  # paths a pixel of a quick look at the final picture
-    final_spp: int = 256  # paths a pixel of the final picture
+    final_spp: int = 128  # paths a pixel of the final picture
     video_frames: int = 24  # of the turning light
-    video_spp: int = 32  # paths a pixel of its frames
     message_seconds: float = 12  # a message stays on the page
     poll_seconds: float = 0.3  # between two looks at a job
     lamp_share: float = 0.75  # a new lamp hangs at this share of the way from the camera to the clicked surface

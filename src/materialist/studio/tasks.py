@@ -139,7 +139,7 @@ def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> 
 
     ensure_video_writable(output, force=True)
     scenes = list(moving_light(edited, SETTINGS.video_frames, rotate=360.0))
-    film = pictures(loaded, scenes, spp=SETTINGS.video_spp, progress=report)
+    film = pictures(loaded, scenes, progress=report)
     write_frames(output, film, fps=12, force=True)
 
 

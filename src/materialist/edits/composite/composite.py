@@ -20,6 +20,8 @@ from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.image import write_image
 from materialist.types import Array, Photo, Scene
 
+FRAME_PATHS = 32
+"""Paths a pixel of a film's frames where none are asked for; by eye, denoised."""
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
 RERENDERED = 64
@@ -50,16 +52,18 @@ def composite(
 
 
 def pictures(
-    scene: Scene, edits: Iterable[Scene], *, spp: int | None = 64, seed: int = 0, full_render: bool = False,
+    scene: Scene, edits: Iterable[Scene], *, spp: int | None = None, seed: int = 0, full_render: bool = False,
     denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
     count: int | None = None,
 ) -> Iterator[Array]:  # fmt: skip
     """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
 
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
+    spp: paths per pixel; None: `FRAME_PATHS`.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
     tick = progress or (lambda *_: None)
+    spp = spp or FRAME_PATHS
     total = len(edits) if isinstance(edits, Sequence) else count or 0
     before: Scene | None = None
     renderer, picture = EditRenderer(scene, device=device), scene.photo.original

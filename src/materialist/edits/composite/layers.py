@@ -170,8 +170,7 @@ def difference(
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
     """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
-    mean = lambda v: cv2.blur(v, (DEFAULT.window,) * 2, borderType=cv2.BORDER_REFLECT)  # noqa: E731
-    base, edited = (np.maximum(mean(((one + other) / 2).astype(np.float32)), 0) for one, other in ((b0, b1), (e0, e1)))
+    base, edited = (np.maximum(_mean(((one + other) / 2).astype(np.float32)), 0) for one, other in ((b0, b1), (e0, e1)))
     white = np.maximum(np.maximum(base, edited), 1)
     seen = np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1) >= DEFAULT.visible
     return np.where(seen, significance(e0 - b0, e1 - b1), 0)
@@ -185,16 +184,19 @@ def significance(d0: Array, d1: Array) -> Array:
     of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise. It is the larger one of the sum of
     the channels, where a change is seen first, and of the three together, among which another hue cancels in the sum.
     """
-    size = (DEFAULT.window, DEFAULT.window)
-    box = lambda v: cv2.blur(np.ascontiguousarray(v, np.float64), size, borderType=cv2.BORDER_REFLECT)  # noqa: E731
     gain = np.zeros(d0.shape[:2])
     for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
         m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
         for k in range(first.shape[-1]):
-            m2 += box((first[..., k] + second[..., k]) / 2) ** 2
-            variance += box(((first[..., k] - second[..., k]) / 2) ** 2) / DEFAULT.window**2
+            m2 += _mean((first[..., k] + second[..., k]) / 2) ** 2
+            variance += _mean(((first[..., k] - second[..., k]) / 2) ** 2) / DEFAULT.window**2
         gain = np.maximum(gain, 1 - DEFAULT.sigmas**2 * variance / np.maximum(m2, 1e-30))
     return np.where(gain > DEFAULT.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
+
+
+def _mean(values: Array) -> Array:
+    """Means over a window: Gaussian ones, as of a box of `window` pixels, which would show its corners in the gain."""
+    return cv2.GaussianBlur(values, (0, 0), DEFAULT.window / np.sqrt(4 * np.pi), borderType=cv2.BORDER_REFLECT)
 
 
 def without_fireflies(picture: Array, where: Array | None = None) -> Array:
