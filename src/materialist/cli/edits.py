@@ -181,7 +181,7 @@ def drop(
     rotate: Annotated[
         str | None, typer.Option(metavar="DEG|A..B", help="Meanwhile the light turns to the right, from A to B.")
     ] = None,
-    how: Rendering = Rendering(spp=32),  # noqa: B008
+    how: Rendering = Rendering(),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
     from materialist.edits.insert.meshes import read_model

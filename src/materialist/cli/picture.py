@@ -61,7 +61,7 @@ def write_result(
     start, spp = time.monotonic(), how.spp or paths_for(scene, edited)
     with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
-            scene, edited, spp=spp, seed=how.seed, full_render=how.full_render,
+            scene, edited, spp=how.spp, seed=how.seed, full_render=how.full_render,
             upscale=how.upscale, denoise=how.denoise, device=how.device, progress=progress,
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=how.force)
