@@ -201,3 +201,18 @@ def test_a_change_of_the_original_does_not_reach_dr_jit():
     copy = floats(mi, given)
     given[:] = 2
     np.testing.assert_array_equal(np.array(copy), 1)
+
+
+def test_another_photo_needs_no_other_kernel():
+    """Its size and field of view are data: as literals they would have every photo compile the path tracer."""
+
+    def kernels(camera):
+        gc.collect()  # scenes that are left over are in kernels, too
+        scene = scene_of(wall(camera), random_maps(0, (camera.height, camera.width)), camera=camera)
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            scene.render(spp=4)
+            return {k["hash"] for k in dr.kernel_history() if k.get("ir") and len(k["ir"].getvalue()) > 50_000}
+
+    first = kernels(CAMERA)
+    assert first and kernels(Camera(CAMERA.width + 3, CAMERA.height + 2, CAMERA.fov + 7)) == first
