@@ -12,7 +12,6 @@ from made_scene import make_mesh
 from PIL import Image
 
 from materialist.batches.outcome import Outcome
-from materialist.batches.run import batch
 from materialist.errors import InputError, SetupError
 from materialist.types import Geometry, Photo, Scene
 
@@ -56,6 +55,8 @@ def moody(photo: Photo, **options) -> Scene:
 
 def run(source: Path, runs: Path, **options) -> Outcome:
     """A batch with `moody` for the inversion."""
+    from materialist.batches.run import batch  # not at the top: workers load this file, too
+
     return batch(source, runs, **{"function": "made_batch:moody", "workers": 2, "device": "cpu", **options})
 
 

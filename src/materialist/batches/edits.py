@@ -3,17 +3,22 @@
 import hashlib
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from materialist.batches.results import file_hash
-from materialist.edits.insert.meshes import files_beside
-from materialist.edits.recipe import Step, read_recipe, with_files
+
+if TYPE_CHECKING:
+    from materialist.edits.recipe import Step
+# The editing packages take seconds to import; a batch without edits does without.
 
 
-def edits_for(path: str | Path, name: str) -> list[Step]:
+def edits_for(path: str | Path, name: str) -> "list[Step]":
     """The steps of a file (see docs/editing.md) with the photo's name for `{name}` in the names of files.
 
     Raises InputError as `read_recipe`.
     """
+    from materialist.edits.recipe import read_recipe, with_files
+
     put = lambda _, value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
     return [with_files(step, put) for step in read_recipe(path)]
 
@@ -32,7 +37,9 @@ def missing_files(path: str | Path, name: str) -> list[str]:
     return [str(file) for file in found if not file.is_file()]
 
 
-def _files(step: Step) -> list[tuple[str, Path]]:
+def _files(step: "Step") -> list[tuple[str, Path]]:
+    from materialist.edits.recipe import with_files
+
     named: list[tuple[str, str]] = []
     with_files(step, lambda option, name: named.append((option, name)))
     return [(option, step.folder / name) for option, name in named if isinstance(name, str)]
@@ -40,6 +47,8 @@ def _files(step: Step) -> list[tuple[str, Path]]:
 
 def _content(file: Path, key: str) -> list[str] | None:
     """Hashes of a file and, of a mesh, of its materials and textures; None where it cannot be read."""
+    from materialist.edits.insert.meshes import files_beside
+
     try:
         return [file_hash(file), *(file_hash(other) for other in (files_beside(file) if key == "mesh" else ()))]
     except OSError:

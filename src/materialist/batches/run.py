@@ -11,14 +11,13 @@ from typing import Any
 import psutil
 
 from materialist import __version__, errors
-from materialist.batches.edits import missing_files
+from materialist.batches.edits import edits_for, missing_files
 from materialist.batches.ledger import Ledger, open_ledger
 from materialist.batches.options import BatchOptions
 from materialist.batches.outcome import COLUMNS, Outcome, Row, Status, write_page, write_summary
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
 from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
-from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
 from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
@@ -58,7 +57,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     asked |= {name: value for name, value in options.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
-        read_recipe(how.recipe)
+        edits_for(how.recipe, "")
     photos, folder = list_photos(source, runs=runs), Path(runs)
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:

@@ -4,6 +4,8 @@ Images go in as linear Rec.709 and are compared as a viewer sees them: sRGB-enco
 name of the function says otherwise.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.ndimage import gaussian_filter
 from skimage.metrics import structural_similarity
@@ -92,8 +94,13 @@ def sh_coefficients(envmap: Array) -> Array:
     envmap = np.asarray(envmap, np.float64)
     if envmap.ndim != 3 or envmap.shape[2] != 3 or envmap.shape[1] != 2 * envmap.shape[0]:
         raise InputError(f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}.")
-    basis = sh_basis(texel_directions(*envmap.shape[:2]), 3)
-    return np.tensordot(basis * row_solid_angle(len(envmap))[:, None, None], envmap, ([0, 1], [0, 1]))
+    return np.tensordot(_weighted_basis(len(envmap)), envmap, ([0, 1], [0, 1]))
+
+
+@lru_cache(maxsize=4)
+def _weighted_basis(height: int) -> Array:
+    """[h, 2h, 16] spherical harmonics at the texels of a map, times their solid angles."""
+    return sh_basis(texel_directions(height, 2 * height), 3) * row_solid_angle(height)[:, None, None]
 
 
 def sh_error(a: Array, b: Array) -> float:

@@ -74,6 +74,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     size, part = _traced_size(native, there)
     # As many paths as a picture of working size has, on the part that the bodies take.
     paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // area(part)))
+    paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
     picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names))
     if clean:
