@@ -43,7 +43,7 @@ def folder(tmp_path_factory):
 
 def test_edit_writes_the_photo_with_only_the_block_changed(done, folder, tmp_path):
     scene, out = folder / "a.scene", tmp_path / "out.exr"
-    options = "--value -0.5 --roughness +0.2 --spp 6 --seed 2"
+    options = "--value -0.5 --roughness +0.2 --spp 4 --seed 2"
     told = done(
         "edit", scene, "--mask", folder / "block.png", *options.split(), "-o", out, "--save", tmp_path / "b.scene"
     )
@@ -82,7 +82,7 @@ def test_relight_dims_the_lights_that_are_meant(done, folder, tmp_path):
         ["relight", scene, "--dim", 0.2, "--mask", folder / "block.png"],
         ["apply", scene, folder / "dim.yaml"],
     ):
-        done(*command, "--spp", 8, "--no-denoise", "-o", tmp_path / f"{command[0]}.exr")
+        done(*command, "--spp", 4, "--no-denoise", "-o", tmp_path / f"{command[0]}.exr")
     one, other = (read_exr(tmp_path / name) for name in ("relight.exr", "apply.exr"))
     inner = tuple(np.argwhere(MASK).mean(0).astype(int))
     np.testing.assert_allclose(one[inner], 0.2 * load_scene(scene).photo.original[inner], rtol=0.02)
@@ -126,7 +126,7 @@ def test_glass_is_written_saved_and_loaded_again(done, folder, tmp_path):
     np.testing.assert_array_equal(scene.photo.original, picture)
     (body,) = scene.bodies
     assert body.surface.ior == pytest.approx(1.4) and body.surface.tint[1] == pytest.approx(1)
-    told = done("apply", folder / "a.scene", folder / "glass.yaml", "--spp", 2, "-o", tmp_path / "1.exr")
+    told = done("apply", folder / "a.scene", folder / "glass.yaml", "--spp", 4, "-o", tmp_path / "1.exr")
     assert told["edits"][-1]["hollow"] is True
 
 
@@ -141,7 +141,7 @@ def test_remove_with_a_background_shows_it(done, folder, tmp_path):
 def test_insert_writes_picture_and_scene(done, folder, tmp_path):
     scene, out = folder / "floor.scene", tmp_path / "out.exr"
     told = done(
-        "insert", scene, folder / "box.ply", "--at", "12,28", "--at", "36,28", "--material", "0.1,0.2,0.7", "--spp", 6,
+        "insert", scene, folder / "box.ply", "--at", "12,28", "--at", "36,28", "--material", "0.1,0.2,0.7", "--spp", 4,
         "-o", out, "--save", tmp_path / "b.scene",
     )  # fmt: skip
     assert [edit["at"] for edit in told["edits"]] == [[12, 28], [36, 28]]
@@ -163,7 +163,7 @@ def test_drop_films_into_a_folder(done, folder, tmp_path):
     assert np.abs(first - last).max() > 20
     assert len(load_scene(tmp_path / "end.scene").bodies) == 1
     told = done(
-        "drop", folder / "floor.scene", folder / "box.ply", "--at", "24,28", "--frames", 2, "--spp", 2, "--rotate",
+        "drop", folder / "floor.scene", folder / "box.ply", "--at", "24,28", "--frames", 2, "--spp", 4, "--rotate",
         "-90..90", "-o", tmp_path / "turned",
     )  # fmt: skip
     assert [edit.get("rotate") for edit in told["edits"]] == [None, 90]
@@ -223,6 +223,6 @@ def test_the_device_is_chosen_before_anything_renders(done, folder, tmp_path, mo
     save_scene(insert(load_scene(folder / "a.scene"), folder / "box.ply", (6, 30), scale=0.3), tmp_path / "c.scene")
     asked, setup = [], variant.setup
     monkeypatch.setattr(variant, "setup", lambda device="auto": asked.append(device) or setup(device))
-    options = ["--spp", "2", "--device", "cpu", "-o", tmp_path / "out.png"]
+    options = ["--spp", "4", "--device", "cpu", "-o", tmp_path / "out.png"]
     done("edit", tmp_path / "c.scene", "--mask", folder / "block.png", "--value", "0.1", *options)
     assert asked[:1] == ["cpu"]
