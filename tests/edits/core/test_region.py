@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_meshes import floor_scene
 
-from materialist.edits.core.region import body_coverage
+from materialist.edits.core.region import body_coverage, checked_pixel
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.insert.insert import insert
 from materialist.edits.material.material import edit
@@ -56,3 +56,13 @@ def test_what_was_put_there_is_not_edited_as_the_photo(scenes):
         edit(with_box, share > 0.5, hue=90)
     wide = np.ones(share.shape, bool)  # the floor around it, of which it hides a little
     assert edit(with_box, wide, hue=90) is not with_box
+
+
+def test_a_pixel_of_the_file_is_told_as_one_of_working_size():
+    scene = floor_scene()
+    height, width = scene.depth.shape
+    large = replace(scene, photo=replace(scene.photo, original=np.zeros((3 * height, 3 * width, 3), np.float32)))
+    with pytest.raises(InputError, match=f"outside the photo.* is {width - 1},4 here"):
+        checked_pixel(large, (3 * width - 3, 12))
+    with pytest.raises(InputError, match="working size.$"):
+        checked_pixel(large, (3 * width, 12))

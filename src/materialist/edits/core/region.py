@@ -69,7 +69,11 @@ def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click")
     width, height = scene.camera.width, scene.camera.height
     x, y = numbers(point, 2, name)
     if not (0 <= x < width and 0 <= y < height):
+        rows, columns = scene.photo.original.shape[:2]
+        small = f"{x * width / columns:.0f},{y * height / rows:.0f}"
+        native = f" In the file's own {columns} x {rows} pixels that point is {small} here: give this."
         raise InputError(
             f"The {name} {x:g},{y:g} lies outside the photo, which is {width} x {height} pixels at working size."
+            + native * (columns > width and 0 <= x < columns and 0 <= y < rows)
         )
     return int(x), int(y)
