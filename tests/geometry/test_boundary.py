@@ -50,6 +50,9 @@ def corners_by_loop(depth, cuts):
             k, m = (i, j + sign) if axis == 0 else (i + sign, j)
             if 0 <= k < height and 0 <= m < width and depth[k, m] > 0 and linked((i, j), (k, m)):
                 steps.append(sign * (1 / depth[k, m] - 1 / depth[i, j]))
+        if len(steps) == 2:
+            least = min(map(abs, steps)) if steps[0] * steps[1] > 0 else 0.0
+            return min(max(sum(steps) / 2, -2 * least), 2 * least)
         return sum(steps) / len(steps) if steps else 0.0
 
     count = 0
@@ -172,3 +175,14 @@ def test_planes_are_reproduced_exactly(x, y, distance, width, height):
     mesh = depth_to_mesh(depth, np.broadcast_to(normal, (*depth.shape, 3)), camera)
     assert len(mesh.vertices) == (width + 1) * (height + 1)  # one sheet
     np.testing.assert_allclose(mesh.vertices @ normal, -distance, rtol=2e-5)
+
+
+def test_beside_a_smeared_outline_the_surface_has_no_lip():
+    """A receding side whose outline the depth smears over some pixels: nothing there comes back to the camera."""
+    side = np.concatenate([np.linspace(2.6, 2.75, 16), [3.11, 4.13, 4.7], np.full(13, 4.86)])
+    depth, camera = np.tile(side, (8, 1)), Camera(32, 8, 35.0)
+    normal = np.tile(np.array([0, 0, 1], np.float32), (8, 32, 1))
+    mesh = depth_to_mesh(depth, normal, camera)
+    front = mesh.faces[: 2 * depth.size].reshape(8, 32, 6)
+    nearest = -mesh.vertices[front][..., 2].max(-1).max(0)  # [32] of each column of pixels
+    assert (np.diff(nearest) > -1e-6).all()

@@ -120,7 +120,7 @@ def corner_vertices(surface: Array, cuts: Cuts) -> Array:
 def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
     """[H, W, 4] inverse depth at the corners of each pixel, extrapolated from its centre with its own gradient.
 
-    inverse: [H, W] 1 / scene unit. The gradient is the mean of the steps to linked neighbours (exact on planes), and
+    inverse: [H, W] 1 / scene unit. The gradient is that of `_half_step` (exact on planes), and
     the result stays within a factor of the centre's value.
     """
     half_x = _half_step(inverse, cuts.link_x)  # [H, W] change over half a pixel to the right
@@ -130,14 +130,17 @@ def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
 
 
 def _half_step(inverse: Array, link: Array) -> Array:
-    """[H, W] half the mean step to the linked horizontal neighbours; 0 without any."""
+    """[H, W] half the mean step to the linked horizontal neighbours; 0 without any.
+
+    Where the two steps differ, the mean is at most twice the smaller one, and 0 if one goes up and the other down
+    (van Leer's monotonized central slope): beside a steep step the corner would stick out towards the camera.
+    """
     step = np.where(link, np.diff(inverse, axis=1), 0)
-    total, count = np.zeros_like(inverse), np.zeros_like(inverse)
-    total[:, :-1] += step
-    total[:, 1:] += step
-    count[:, :-1] += link
-    count[:, 1:] += link
-    return 0.5 * total / np.maximum(count, 1)
+    left, right = (np.pad(step, ((0, 0), side)) for side in ((1, 0), (0, 1)))
+    count = np.pad(link, ((0, 0), (1, 0))).astype(int) + np.pad(link, ((0, 0), (0, 1)))
+    least = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), 0)
+    mean = (left + right) / np.maximum(count, 1)
+    return 0.5 * np.where(count == 2, np.clip(mean, -2 * least, 2 * least), mean)
 
 
 def _assemble(inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex: Array, reach: Array) -> Mesh:
