@@ -70,7 +70,7 @@ class Rendering(Run):
     """How an edited scene becomes a picture or a film."""
 
     spp: int | None = option(
-        None, "Paths per pixel, of both renderings; else 128 in new glass, 64 elsewhere, 32 of films.",
+        None, "Paths per pixel, of both renderings; else 64, or 32 of films.",
         kind="whole", low=2, high=1_000_000, called="--spp")
     denoise: bool = option(
         True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")

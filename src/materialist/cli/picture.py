@@ -56,9 +56,9 @@ def write_result(
     command: str, scene: Any, edited: Any, output: Path, how: Rendering, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
     from materialist.edits.composite.composite import write_composite
-    from materialist.edits.core.renderer import paths_for
+    from materialist.edits.core.renderer import PATHS
 
-    start, spp = time.monotonic(), how.spp or paths_for(scene, edited)
+    start, spp = time.monotonic(), how.spp or PATHS
     with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
             scene, edited, spp=how.spp, seed=how.seed, full_render=how.full_render,

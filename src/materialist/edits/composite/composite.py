@@ -13,7 +13,7 @@ from materialist.edits.composite.disclosed import compared, without_traces
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured
-from materialist.edits.core.renderer import PATHS, EditRenderer, denoised, paths_for, rendered
+from materialist.edits.core.renderer import PATHS, EditRenderer, denoised, rendered
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
 from materialist.io.decode import RAW_SUFFIXES
@@ -38,7 +38,7 @@ def composite(
 
     Args:
         scene: the fitted scene; its photo is what stays. edited: the same scene after `edit`, `relight`, ...
-        spp: paths per pixel, of each of the two renderings; None: 128 in new glass, else 64.
+        spp: paths per pixel, of each of the two renderings; None: `PATHS`.
         full_render: the plain rendering of the edited scene [H, W, 3], as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
         upscale: with `full_render`, a super-resolution of yours that enlarges the rendering, by as much as it does
@@ -100,7 +100,7 @@ def _picture(
     upscale: Upscale | None, progress=None,
 ) -> Array:  # fmt: skip
     """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
-    elsewhere, spp = spp or PATHS, spp or paths_for(scene, edited)
+    spp = spp or PATHS
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     if full_render:
@@ -110,7 +110,7 @@ def _picture(
         picture = denoised(picture, *renderer.guides(edited)) if denoise else picture
         return picture if upscale is None else _enlarged(picture, upscale)
     shared: dict[str, Any] = {"seed": seed, "clean": denoise, "progress": progress}
-    layers = render_layers(renderer, edited, spp=spp, elsewhere=elsewhere, **shared)
+    layers = render_layers(renderer, edited, spp=spp, **shared)
     dimmed = dimmed_emitters(scene, edited)
     lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
     return into_photo(renderer.scene.photo, layers, lights)

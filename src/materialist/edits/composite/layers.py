@@ -60,13 +60,12 @@ class Layers:
 
 
 def render_layers(
-    renderer: EditRenderer, edited: Scene, *, spp: int = 128, elsewhere: int | None = None, seed: int = 0,
-    clean: bool = True, progress=None,
+    renderer: EditRenderer, edited: Scene, *, spp: int = 128, seed: int = 0, clean: bool = True, progress=None,
 ) -> Layers:  # fmt: skip
     """Render a fitted scene and an edit of it, and separate the edit from the noise.
 
-    `spp` counts paths a pixel of what is edited, `elsewhere` of what it only lights. Both pictures come in two halves
-    with different seeds: what the halves disagree on is noise. See `difference`.
+    `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
+    noise. See `difference`.
     """
     scene = renderer.scene
     base, other = renderer.pair(edited)
@@ -76,16 +75,18 @@ def render_layers(
         nothing = np.zeros_like(scene.photo.linear)
         return Layers(nothing, nothing, changed, changed)
     guides = [(one.materials.albedo, one.normal) for one in (scene, edited)]
-    alone, covered = None, None
+    alone, covered, hidden = None, None, None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
         alone = native_layer(renderer, edited, spp=spp, seed=seed, clean=clean)
         anything = renderer.covered(edited)
         covered = anything if alone is None else anything & (alone.inside == 0)
         changed = changed | covered
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
+        if alone is not None:
+            hidden = ~grown(alone.inside < 1, DEFAULT.window)
         if clean:
             guides[1] = renderer.guides(edited, anything)
-    how: dict[str, Any] = {"spp": spp, "elsewhere": elsewhere, "seed": seed, "progress": progress}
+    how: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
     layers = difference(base, other, changed, guides if clean else None, **how)
     old, new = (np.maximum(1 - one.materials.metallic, 1e-3) for one in (scene, edited))
     return replace(layers, relit=relit, native=alone, covered=covered, diffuse=np.minimum(new / old, 1))
@@ -102,8 +103,8 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 
 def difference(
-    base: Render, edited: Render, changed: Array, guides: list[tuple[Array, Array]] | None, *, spp: int,
-    elsewhere: int | None = None, seed: int, progress=None,
+    base: Render, edited: Render, changed: Array, guides: list[tuple[Array, Array]] | None, *,
+    hidden: Array | None = None, spp: int, seed: int, progress=None,
 ) -> Layers:  # fmt: skip
     """Layers of any two renderings of one view, 0 where they are not traced.
 
@@ -114,21 +115,21 @@ def difference(
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
-        spp: paths a pixel of those, in each picture. elsewhere: of the others, at most spp; None: as many.
+        hidden: [H, W] bool: pixels that nothing shows of either picture. spp: paths a pixel, in each.
         guides: albedo and normal [H, W, 3] of the base, and of the edited scene, with which both pictures are denoised
             before they are compared, where the denoiser is installed; None: as they are.
     """
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
-    elsewhere = elsewhere or spp
-    half, whole = -(-elsewhere // 2), -(-spp // 2)  # of either half, outside `changed` and in it
-    first = min(half, max(DEFAULT.least_first, elsewhere // DEFAULT.first))
+    half = -(-spp // 2)
+    first = min(half, max(DEFAULT.least_first, spp // DEFAULT.first))
     tick, seeds, done = progress or (lambda *_: None), (2 * seed, 2 * seed + 1), count()
-    steps = 2 * (1 + (not changed.all()) + (half > first) + (whole > half))
+    steps = 2 * (1 + (not changed.all()) + (half > first))
+    wanted = np.ones_like(changed) if hidden is None else ~hidden
 
     def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
         tick("render", next(done), steps)
-        return base(paths, seed, of_base), edited(paths, seed, of_edited)
+        return base(paths, seed, of_base & wanted), edited(paths, seed, of_edited & wanted)
 
     near = changed
     if not changed.all():
@@ -141,16 +142,14 @@ def difference(
         near = changed | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
     if half > first:
         near = grown(near, DEFAULT.window)
-    shown, own = grown(near, DEFAULT.margin), grown(changed, DEFAULT.window)
-    more = [(first, half, near), (half, whole, own)]  # paths before and after, and where
+    shown = grown(near, DEFAULT.margin)
     pairs = []
     for k in seeds:
         pair = [np.where(shown[..., None], one, 0) for one in traced(first, k, shown, near)]
-        for j, (before, after, where) in enumerate(more, start=1):
-            if after > before:
-                added = traced(after - before, k + 2 * j, where, where)
-                share = (after - before) / after * where[..., None]
-                pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
+        if half > first:
+            added = traced(half - first, k + 2, near, near)
+            share = (half - first) / half * near[..., None]
+            pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
         pairs.append((pair[0], np.where(near[..., None], pair[1], pair[0])))
     tick("render", steps, steps)
     (b0, e0), (b1, e1) = pairs

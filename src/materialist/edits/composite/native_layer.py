@@ -8,9 +8,10 @@ import numpy as np
 
 from materialist.edits.composite.upsample import matte
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, path_depth
-from materialist.edits.core.surfaces import PHOTO_GLASS, PHOTO_LIGHT
+from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import area, grown, window
+from materialist.render.bodies import is_transparent
 from materialist.types import Array, Scene
 
 Box = tuple[slice, slice]
@@ -23,7 +24,10 @@ class NativeSettings:
 
     pixels: int = 1_500_000  # most that are traced; a larger layer is traced smaller, and enlarged; derived: time
     fewest_paths: int = 32  # paths a native pixel, at least, as the denoiser needs
-    most_paths: int = 4  # paths a native pixel, at most, in multiples of those of the picture; derived: time
+    most_paths: int = (
+        4  # paths a native pixel, at most, in multiples of those of the picture, twice in glass; derived: time
+    )
+    budget: float = 0.5  # all paths, of those of a whole picture of working size; derived: time
     margin: int = 3  # working pixels around the bodies that the denoiser sees
     contact: float = 0.05  # share of a body's extent up to which a surface before it is the ground it stands on
     lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
@@ -47,16 +51,16 @@ class NativeLayer:
 def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, clean: bool) -> NativeLayer | None:
     """Trace the bodies and lamps that are new in `edited` at native size; None where the camera sees none of them.
 
-    Bodies that take the place of a surface of the photo are left to the photo's own outlines. Under another light
-    every lamp counts as new: it stays as bright as it was, and what changes beside it must not colour its rim.
+    The photo's own lights are left to its outlines. Under another light every lamp counts as new: it stays as bright as
+    it was, and what changes beside it must not colour its rim.
     """
     from materialist.render.pixels import first_hits, only, radiance
 
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps)) if is_relit(scene, edited)]
     bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
-    # The photo's own lights and what is turned to glass in it have the outline that the photo shows.
-    own = (name for name, body in bodies.items() if not body.name.startswith((PHOTO_LIGHT, PHOTO_GLASS)))
+    # The photo's own lights have the outline that the photo shows.
+    own = (name for name, body in bodies.items() if not body.name.startswith(PHOTO_LIGHT))
     names = [name for name in own if bodies[name] not in scene.bodies] + lamps
     if not names:
         return None
@@ -72,8 +76,8 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     gap = (SETTINGS.lamp_contact if names == lamps else SETTINGS.contact) * _extent(alone)
     size, part = _traced_size(native, there)
-    # As many paths as a picture of working size has, on the part that the bodies take.
-    paths = max(SETTINGS.fewest_paths, min(SETTINGS.most_paths * spp, spp * small.size // area(part)))
+    most = SETTINGS.most_paths * (1 + any(body and is_transparent(body.surface) for body in chosen.values()))
+    paths = max(SETTINGS.fewest_paths, min(most * spp, int(SETTINGS.budget * spp * small.size / area(part))))
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
     picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names))

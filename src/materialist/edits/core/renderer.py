@@ -178,12 +178,6 @@ PATHS = 64
 """Paths a pixel of a composite where none are asked for; by eye, denoised."""
 
 
-def paths_for(scene: Scene, edited: Scene) -> int:
-    """The same of what is edited: twice as many for new glass."""
-    new = any(is_transparent(body.surface) and body not in scene.bodies for body in edited.bodies)
-    return 2 * PATHS if new else PATHS
-
-
 def path_depth(scene: Scene) -> int:
     """Length of the paths that the scene needs: longer ones through glass."""
     from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
