@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from materialist.edits.composite.into_photo import DEFAULT, into_photo, onto_working
-from materialist.edits.composite.layers import difference
+from materialist.edits.composite.layers import difference, inner
 from materialist.edits.core.renderer import PATHS, EditRenderer
 from materialist.edits.core.surfaces import base_of
 from materialist.geometry.build import continued_as
@@ -60,11 +60,13 @@ def without_traces(
     guides = [(one.materials.albedo, one.normal) for one in (before, base)] if denoise else None
     pair = EditRenderer(before, device=device).pair(base)
     tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
-    layers = difference(*pair, np.zeros_like(hole), guides, spp=spp or PATHS, seed=seed, progress=tick)
+    spanned = grown(hole, RIM)
+    layers = difference(
+        *pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp or PATHS, seed=seed, progress=tick
+    )
     factor = np.log((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor))
-    hole = grown(hole, RIM)
-    factor = np.where(hole[..., None], membrane(factor, ~hole), factor)
-    reached = np.where(hole, np.abs(factor).max(-1) > LEAST, layers.reached)
+    factor = np.where(spanned[..., None], membrane(factor, ~spanned), factor)
+    reached = np.where(spanned, np.abs(factor).max(-1) > LEAST, layers.reached)
     layers = replace(layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached)
     return replace(base, photo=replace(photo, original=into_photo(photo, layers), linear=onto_working(photo, layers)))
 

@@ -83,7 +83,7 @@ def render_layers(
         changed = changed | covered
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
         if alone is not None:
-            hidden = ~grown(alone.inside < 1, DEFAULT.window)
+            hidden = inner(alone.inside == 1)
         if clean:
             guides[1] = renderer.guides(edited, anything)
     how: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
@@ -165,6 +165,11 @@ def difference(
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
+
+
+def inner(hidden: Array) -> Array:
+    """[H, W] bool: those of the hidden pixels on which nothing beside them depends, as `difference` averages."""
+    return ~grown(~hidden, DEFAULT.window)
 
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
