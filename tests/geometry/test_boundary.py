@@ -51,7 +51,7 @@ def corners_by_loop(depth, cuts):
             if 0 <= k < height and 0 <= m < width and depth[k, m] > 0 and linked((i, j), (k, m)):
                 steps.append(sign * (1 / depth[k, m] - 1 / depth[i, j]))
         if len(steps) == 2:
-            least = min(map(abs, steps)) if steps[0] * steps[1] > 0 else 0.0
+            least = min(map(abs, steps)) if steps[0] * steps[1] > 0 else float("inf")
             return min(max(sum(steps) / 2, -2 * least), 2 * least)
         return sum(steps) / len(steps) if steps else 0.0
 

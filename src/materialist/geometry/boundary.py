@@ -132,13 +132,13 @@ def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
 def _half_step(inverse: Array, link: Array) -> Array:
     """[H, W] half the mean step to the linked horizontal neighbours; 0 without any.
 
-    Where the two steps differ, the mean is at most twice the smaller one, and 0 if one goes up and the other down
-    (van Leer's monotonized central slope): beside a steep step the corner would stick out towards the camera.
+    Where both go one way, it is at most twice the smaller one (van Leer's monotonized central slope): beside a steep
+    step the corner would stick out towards the camera.
     """
     step = np.where(link, np.diff(inverse, axis=1), 0)
     left, right = (np.pad(step, ((0, 0), side)) for side in ((1, 0), (0, 1)))
     count = np.pad(link, ((0, 0), (1, 0))).astype(int) + np.pad(link, ((0, 0), (0, 1)))
-    least = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), 0)
+    least = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), np.inf)
     mean = (left + right) / np.maximum(count, 1)
     return 0.5 * np.where(count == 2, np.clip(mean, -2 * least, 2 * least), mean)
 
