@@ -57,7 +57,7 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     asked |= {name: value for name, value in options.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
-        edits_for(how.recipe, "")
+        edits_for(how.recipe, "")  # a list that cannot be read is told before anything is written
     photos, folder = list_photos(source, runs=runs), Path(runs)
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:

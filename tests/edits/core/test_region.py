@@ -63,6 +63,6 @@ def test_a_pixel_of_the_file_is_told_as_one_of_working_size():
     height, width = scene.depth.shape
     large = replace(scene, photo=replace(scene.photo, original=np.zeros((3 * height, 3 * width, 3), np.float32)))
     with pytest.raises(InputError, match=f"outside the photo.* is {width - 1},4 here"):
-        checked_pixel(large, (3 * width - 3, 12))
+        checked_pixel(large, (3 * width - 1, 12))
     with pytest.raises(InputError, match=r"working size\.$"):
         checked_pixel(large, (3 * width, 12))

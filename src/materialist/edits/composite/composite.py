@@ -47,6 +47,7 @@ def composite(
     Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
+    spp = spp or PATHS
     renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device)
     return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
@@ -80,7 +81,7 @@ def pictures(
 
 
 def _base(
-    scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool, device: str,
+    scene: Scene, edited: Scene, spp: int, seed: int, full_render: bool, denoise: bool, device: str,
     progress=None,
 ) -> Scene:  # fmt: skip
     """What the edit is compared with."""
@@ -96,11 +97,10 @@ def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
 
 
 def _picture(
-    renderer: EditRenderer, scene: Scene, edited: Scene, spp: int | None, seed: int, full_render: bool, denoise: bool,
+    renderer: EditRenderer, scene: Scene, edited: Scene, spp: int, seed: int, full_render: bool, denoise: bool,
     upscale: Upscale | None, progress=None,
 ) -> Array:  # fmt: skip
     """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
-    spp = spp or PATHS
     if upscale is not None and not full_render:
         raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     if full_render:

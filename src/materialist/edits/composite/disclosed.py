@@ -6,7 +6,7 @@ import numpy as np
 
 from materialist.edits.composite.into_photo import DEFAULT, into_photo, onto_working
 from materialist.edits.composite.layers import difference, inner
-from materialist.edits.core.renderer import PATHS, EditRenderer
+from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.core.surfaces import base_of
 from materialist.geometry.build import continued_as
 from materialist.geometry.membrane import membrane
@@ -44,7 +44,7 @@ def compared(scene: Scene, edited: Scene) -> Scene:
 
 
 def without_traces(
-    scene: Scene, edited: Scene, *, spp: int | None, seed: int, denoise: bool, device: str = "auto", progress=None
+    scene: Scene, edited: Scene, *, spp: int, seed: int, denoise: bool, device: str = "auto", progress=None
 ) -> Scene:
     """`compared`, and its photo changes around the hole as the rendering does when the object goes.
 
@@ -61,9 +61,7 @@ def without_traces(
     pair = EditRenderer(before, device=device).pair(base)
     tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
     spanned = grown(hole, RIM)
-    layers = difference(
-        *pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp or PATHS, seed=seed, progress=tick
-    )
+    layers = difference(*pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp, seed=seed, progress=tick)
     factor = np.log((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor))
     factor = np.where(spanned[..., None], membrane(factor, ~spanned), factor)
     reached = np.where(spanned, np.abs(factor).max(-1) > LEAST, layers.reached)

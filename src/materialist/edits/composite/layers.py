@@ -56,7 +56,7 @@ class Layers:
     diffuse: Array | None = None
     """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
     covered: Array | None = None
-    """[H, W] bool: glass in place of a surface of the photo: the rendering alone is seen; part of `changed`."""
+    """[H, W] bool: bodies that only one scene has and `native` has not: the rendering alone is seen; in `changed`."""
 
 
 def render_layers(

@@ -24,9 +24,7 @@ class NativeSettings:
 
     pixels: int = 1_500_000  # most that are traced; a larger layer is traced smaller, and enlarged; derived: time
     fewest_paths: int = 32  # paths a native pixel, at least, as the denoiser needs
-    most_paths: int = (
-        4  # paths a native pixel, at most, in multiples of those of the picture, twice in glass; derived: time
-    )
+    most_paths: int = 4  # most paths a native pixel, times those of the picture, and twice that in glass; derived: time
     budget: float = 0.5  # all paths, of those of a whole picture of working size; derived: time
     margin: int = 3  # working pixels around the bodies that the denoiser sees
     contact: float = 0.05  # share of a body's extent up to which a surface before it is the ground it stands on

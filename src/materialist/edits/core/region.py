@@ -70,7 +70,7 @@ def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click")
     x, y = numbers(point, 2, name)
     if not (0 <= x < width and 0 <= y < height):
         rows, columns = scene.photo.original.shape[:2]
-        small = f"{x * width / columns:.0f},{y * height / rows:.0f}"
+        small = f"{int(x * width / columns)},{int(y * height / rows)}"
         native = f" In the file's own {columns} x {rows} pixels that point is {small} here: give this."
         raise InputError(
             f"The {name} {x:g},{y:g} lies outside the photo, which is {width} x {height} pixels at working size."
