@@ -63,6 +63,7 @@ def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_res
     assert not [p.name for p in runs.iterdir() if "partial" in p.name]
 
 
+@pytest.mark.slow
 def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
     monkeypatch.setenv("MADE_SLOW", "1")
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"

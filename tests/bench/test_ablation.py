@@ -8,6 +8,8 @@ from materialist import bench
 from materialist.bench import ablation
 from materialist.fit.settings import PAPER
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def rows(mitsuba, tmp_path_factory):

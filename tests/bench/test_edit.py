@@ -79,6 +79,7 @@ def fitted(mitsuba, monkeypatch):
     monkeypatch.setattr(pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo))
 
 
+@pytest.mark.slow
 def test_a_run_writes_rows_with_their_ceilings(measured, fitted):
     report = measured("edit", device="cpu", scenes=1, size=32, spp=8, truth_spp=16, kinds="hue", latency=0)
     rows = report.rows

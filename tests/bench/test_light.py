@@ -47,6 +47,7 @@ def test_mirrors_are_photographed_under_the_same_light(sample):
     assert changed[things].mean() > 0.5 > changed[~things].mean()
 
 
+@pytest.mark.slow
 def test_a_run_writes_a_row_for_every_method(measured):
     options = {"scenes": 1, "lights": 1, "size": 24, "spp": 16, "methods": "default", "relight": False}
     report = measured("light", device="cpu", **options)

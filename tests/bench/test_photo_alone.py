@@ -63,6 +63,7 @@ def test_the_error_of_a_light_knows_no_brightness():
     assert 0.1 < light_error(np.roll(light, 16, 1) ** 4, light**4) <= 1
 
 
+@pytest.mark.slow
 def test_a_run_has_maps_and_edits(measured, monkeypatch):
     from materialist import pipeline
 

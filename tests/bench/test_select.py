@@ -1,8 +1,10 @@
 """The benchmark of clicks: every click has its rows, and they say how much of the object was found."""
 
 import numpy as np
+import pytest
 
 
+@pytest.mark.slow
 def test_both_maps_are_scored(measured):
     rows = measured("select", scenes=1, size=96, seed=3).rows
     assert {row["method"] for row in rows} == {
