@@ -25,6 +25,9 @@ _UP: dict[str, Any] = {"kind": "word", "choices": ("auto", "y", "z"), "called": 
 _SCALE: dict[str, Any] = {"low": 0, "high": 1e3, "ends": "(]"}
 _PREDICTOR: dict[str, Any] = {"kind": "any", "metavar": "PREDICTOR"}
 
+PATHS = 32
+"""Paths a pixel of final pictures, denoised; more of them cannot be told from these by eye."""
+
 # fmt: off
 
 

@@ -1,5 +1,8 @@
 """Denoising: noise goes, edges of the guides and the level of the light stay."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -40,3 +43,16 @@ def test_tiny_pictures_keep_their_light(shape):
     result = denoise(flat, albedo=flat, normal=np.broadcast_to(np.float32([0, 0, 1]), flat.shape))
     assert result.shape == flat.shape
     assert result == pytest.approx(0.5, rel=0.15)
+
+
+def test_pytorch_is_not_loaded_for_it():
+    """It would take seconds of every edit. PyTorch can be loaded afterwards."""
+    pytest.importorskip("pyoidn")
+    script = """
+import sys, numpy as np
+from materialist.render.denoise import denoise
+denoise(*np.ones((3, 40, 40, 3), np.float32))
+assert "torch" not in sys.modules
+import torch
+"""
+    subprocess.run([sys.executable, "-c", script], check=True)

@@ -52,7 +52,7 @@ def test_progress_is_at_the_picture_and_stop_never_under_the_cursor(page):
     for part in ("#progress", "#stop"):
         box = page.locator(part).bounding_box()
         assert box["y"] + box["height"] <= 720, part
-    page.wait_for_selector("#stage .badge >> text=Path traced, 128")
+    page.wait_for_selector("#stage .badge >> text=Path traced")
     page.wait_for_selector("#stop", state="hidden")
 
 
@@ -232,8 +232,8 @@ def test_the_whole_story(page, tmp_path):
     click_photo(page, 0.3, 0.8)
     page.wait_for_selector("#stage .view[data-selected=yes]")
     slide(page, "hue", 100)
-    page.get_by_role("button", name="Quick look").click()
-    page.wait_for_selector("#stage .badge >> text=Path traced, 16")
+    page.get_by_role("button", name="Final picture").click()
+    page.wait_for_selector("#stage .badge >> text=Path traced")
     page.get_by_role("tab", name="Look").click()
     page.get_by_role("button", name="Show the mesh").click()
     page.wait_for_selector("#mesh canvas")

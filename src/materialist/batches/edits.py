@@ -23,7 +23,7 @@ def edits_for(path: str | Path, name: str) -> "list[Step]":
     return [with_files(step, put) for step in read_recipe(path)]
 
 
-def edits_key(path: str | Path, name: str, spp: int | None) -> str:
+def edits_key(path: str | Path, name: str, spp: int) -> str:
     """SHA-256 (hex) of what the edited photo depends on beside the scene: steps, the files they name, samples."""
     described = [
         [step.kind, step.options, [_content(file, key) for key, file in _files(step)]] for step in edits_for(path, name)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from materialist.option_kinds import OperationOptions, option
+from materialist.options import PATHS
 
 INVERSION = "materialist.pipeline:invert"
 """The function that a worker calls on a photo, as module:function."""
@@ -18,10 +19,9 @@ class BatchOptions(OperationOptions):
     apply: str | Path | None = option(
         None, "Edits for every photo; {name} in a mask's file name is the photo's.", kind="file", metavar="EDITS"
     )
-    spp: int | None = option(
-        None, "Paths per pixel of the edits; else 128 for new glass, 64.", kind="whole", low=2,
-        high=1_000_000, called="number of paths (spp)",
-    )  # fmt: skip
+    spp: int = option(
+        PATHS, "Paths per pixel of the edits.", kind="whole", low=2, high=1_000_000, called="number of paths (spp)"
+    )
     workers: int | None = option(
         None, "Worker processes; else one a GPU, or one a processor as far as memory reaches.", kind="whole", low=1,
         high=1024, called="number of workers",

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from materialist.option_kinds import OperationOptions, option
+from materialist.options import PATHS
 
 
 def output_option(metavar: str, help: str) -> Any:
@@ -69,9 +70,8 @@ class Region(Place):
 class Rendering(Run):
     """How an edited scene becomes a picture or a film."""
 
-    spp: int | None = option(
-        None, "Paths per pixel, of both renderings; else 64, or 32 of films.",
-        kind="whole", low=2, high=1_000_000, called="--spp")
+    spp: int = option(
+        PATHS, "Paths per pixel, of both renderings.", kind="whole", low=2, high=1_000_000, called="--spp")
     denoise: bool = option(
         True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")

@@ -56,16 +56,15 @@ def write_result(
     command: str, scene: Any, edited: Any, output: Path, how: Rendering, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
     from materialist.edits.composite.composite import write_composite
-    from materialist.edits.core.renderer import PATHS
 
-    start, spp = time.monotonic(), how.spp or PATHS
+    start = time.monotonic()
     with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
             scene, edited, spp=how.spp, seed=how.seed, full_render=how.full_render,
             upscale=how.upscale, denoise=how.denoise, device=how.device, progress=progress,
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=how.force)
-    told = {"image": str(output), "spp": spp, "seconds": time.monotonic() - start}
+    told = {"image": str(output), "spp": how.spp, "seconds": time.monotonic() - start}
     finish(command, scene, edited, picture, how, [*lines, f"Look at {output}"], told)
 
 

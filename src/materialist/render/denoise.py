@@ -22,8 +22,9 @@ def denoise(image: Array, albedo: Array, normal: Array) -> Array:
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide.shape != image.shape:
             raise InputError(f"The {name} guide is {guide.shape}, the image is {image.shape}; they must be equal.")
+    on_card = torch_device() == "cuda"
     try:
-        import pyoidn
+        pyoidn = _pyoidn(with_torch=on_card)
     except (ImportError, OSError) as error:
         raise SetupError(
             f"Denoising needs the package pyoidn ({error}); install it with: {sys.executable} -m pip install pyoidn, "
@@ -32,11 +33,24 @@ def denoise(image: Array, albedo: Array, normal: Array) -> Array:
     height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
     pictures: list[Any] = [_padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
-    if on_card := torch_device() == "cuda":
+    if on_card:
         pictures = [placed(p) for p in pictures]
     clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True)
     clean = clean.cpu().numpy() if on_card else clean
     return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
+
+
+def _pyoidn(with_torch: bool) -> Any:
+    """The module. It imports PyTorch if it can: seconds, and only a GPU needs it. Raises ImportError, OSError."""
+    hidden = not with_torch and "torch" not in sys.modules
+    if hidden:
+        sys.modules["torch"] = None  # type: ignore[assignment]
+    try:
+        import pyoidn
+    finally:
+        if hidden:
+            del sys.modules["torch"]
+    return pyoidn
 
 
 _SMALLEST = 32

@@ -34,8 +34,6 @@ class StudioSettings:
     scenes_kept: int = 24  # edited scenes that a preview keeps: moving the last step must not replay those before
     triangles: int = 12_000  # of a body in a sketch; of a finer mesh every n-th, and the gaps are closed
     jpeg_quality: int = 88  # of live pictures
-    draft_spp: int = 16  # paths a pixel of a quick look at the final picture
-    final_spp: int = 128  # paths a pixel of the final picture
     video_frames: int = 24  # of the turning light
     message_seconds: float = 12  # a message stays on the page
     poll_seconds: float = 0.3  # between two looks at a job

@@ -119,8 +119,8 @@ class GlassClient:
             if self._worker is None:
                 if psutil.virtual_memory().available < SETTINGS.free_for_glass:
                     raise InputError(
-                        "This machine has too little memory free to trace glass while sliders move; press Quick look "
-                        "instead."
+                        "This machine has too little memory free to trace glass while sliders move; press Final "
+                        "picture instead."
                     )
                 self._worker = Worker(niceness=SETTINGS.glass_niceness, idle=SETTINGS.glass_idle)
                 threading.Thread(target=self._listen, args=(self._worker,), name="glass", daemon=True).start()

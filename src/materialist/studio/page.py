@@ -8,7 +8,7 @@ import gradio as gr
 
 from materialist.edits.select import sam
 from materialist.errors import InputError
-from materialist.studio import SETTINGS, asset, tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
+from materialist.studio import asset, tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
 from materialist.studio.objects import place
 from materialist.studio.selection import read_pick
 from materialist.studio.session import Session
@@ -75,7 +75,6 @@ def _left(parts: dict[str, Any]) -> None:
         parts["undo"] = gr.Button("Undo", size="sm", min_width=70, elem_id="undo")
         parts["redo"] = gr.Button("Redo", size="sm", min_width=70, elem_id="redo")
         parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
-        parts["draft"] = gr.Button("Quick look, path traced", size="sm", min_width=150)
         parts["final"] = gr.Button("Final picture", size="sm", variant="primary", min_width=120)
     parts["steps"] = gr.HTML([], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps")
 
@@ -92,8 +91,7 @@ def _wire(context: PageContext) -> None:
     for name, change in (("undo", Session.undo), ("redo", partial(Session.undo, again=True))):
         context.live(parts[name].click, change, **every)
     context.live(parts["deselect"].click, Session.deselect, everything=True, trigger_mode="once")
-    for name, spp in (("final", SETTINGS.final_spp), ("draft", SETTINGS.draft_spp)):
-        context.long(parts[name].click, partial(_render, context, spp=spp))
+    context.long(parts["final"].click, partial(_render, context))
     context.long(parts["stop"].click, partial(_stop, context))
 
 
@@ -124,10 +122,10 @@ def _stop(context: PageContext, session: Session) -> Iterator[Updates]:
     yield {}
 
 
-def _render(context: PageContext, session: Session, spp: int) -> Iterator[Updates]:
+def _render(context: PageContext, session: Session) -> Iterator[Updates]:
     """A path-traced picture."""
     _ = session.scene
     if not session.edits.active:
         raise InputError("There is no edit to render yet: change something first.")
-    if (yield from context.traced(session, spp)) is not None:
+    if (yield from context.traced(session)) is not None:
         yield {"stage": stage(session), "steps": steps(session)}

@@ -33,7 +33,6 @@ class FinalPicture:
     steps: tuple[Step, ...]
     path: Path
     """Its files (.png, .exr, .jpg), without the ending."""
-    spp: int
 
     def of(self, steps: tuple[Step, ...]) -> bool:
         return bool(steps) and self.steps == steps

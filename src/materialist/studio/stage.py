@@ -46,7 +46,7 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     current = edits.current_step
     off = "; the current edit is switched off" if current is not None and current.skipped else ""
     if final is not None and final.of(steps):
-        badge = f"Path traced, {final.spp} paths a pixel{off}"
+        badge = f"Path traced{off}"
         picture, before = (jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path)))
         return {**shown, "picture": picture, "before": before, "badge": badge}
     if current is not None and client is not None and current in steps and glass.is_traced(current):

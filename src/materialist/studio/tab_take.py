@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import gradio as gr
 
 from materialist.errors import InputError
-from materialist.studio import SETTINGS, tasks
+from materialist.studio import tasks
 from materialist.studio.archives import pack
 from materialist.studio.controls import file_field
 from materialist.studio.session import EDITS, Session
@@ -54,7 +54,7 @@ def wire(context: PageContext) -> None:
                 raise InputError("There is no edit to take away yet: change something first.")
             pack(session.edits.steps, session.workspace / EDITS, file)
         elif what in ("png", "exr"):
-            final = yield from context.traced(session, SETTINGS.final_spp)
+            final = yield from context.traced(session)
             if final is None:
                 return
             shutil.copyfile(final.path.with_suffix(file.suffix), file)

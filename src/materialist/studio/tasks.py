@@ -65,12 +65,12 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
         report.found(name=title, file=file.name)
 
 
-def final(report: Reporter, scene: str, steps: Steps, output: str, spp: int) -> None:
+def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg; the photo so."""
     from materialist.edits.composite.composite import write_composite
 
     loaded, edited = _edited(report, scene, steps)
-    picture = mt.composite(loaded, edited, spp=spp, progress=report)
+    picture = mt.composite(loaded, edited, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
@@ -126,7 +126,7 @@ def _package(report: Reporter, loaded: Scene, edited: Scene, folder: Path) -> No
     from materialist.edits.composite.composite import developed
 
     if edited is not loaded:
-        edited = developed(loaded, edited, mt.composite(loaded, edited, spp=SETTINGS.final_spp, progress=report))
+        edited = developed(loaded, edited, mt.composite(loaded, edited, progress=report))
     report("save", 0, 1)
     mt.save_scene(edited, folder, force=True)
 

@@ -158,18 +158,18 @@ class PageContext:
         yield from self.following(job)
         return job.state == DONE
 
-    def traced(self, session: Session, spp: int) -> Generator[Updates, Any, FinalPicture | None]:
+    def traced(self, session: Session) -> Generator[Updates, Any, FinalPicture | None]:
         """Path-trace the edits of a page, if that is not done yet, with the updates of `following`.
 
         Returns the picture, which the session keeps; None where the job failed or was stopped.
         """
         steps, known = session.edits.active, session.final
-        if known is not None and known.of(steps) and known.spp >= spp:
+        if known is not None and known.of(steps):
             return known
         target = self.studio.work.cache / f"final-{session.mark}"  # goes when the studio ends
-        if not (yield from self.work(session, tasks.final, target, steps=steps, spp=spp)):
+        if not (yield from self.work(session, tasks.final, target, steps=steps)):
             return None
-        session.final = FinalPicture(steps, target, spp)
+        session.final = FinalPicture(steps, target)
         return session.final
 
 

@@ -13,15 +13,14 @@ from materialist.edits.composite.disclosed import compared, without_traces
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured
-from materialist.edits.core.renderer import PATHS, EditRenderer, denoised, rendered
+from materialist.edits.core.renderer import EditRenderer, denoised, rendered
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
 from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.image import write_image
+from materialist.options import PATHS
 from materialist.types import Array, Photo, Scene
 
-FRAME_PATHS = 32
-"""Paths a pixel of a film's frames where none are asked for; by eye, denoised."""
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
 RERENDERED = 64
@@ -29,7 +28,7 @@ RERENDERED = 64
 
 
 def composite(
-    scene: Scene, edited: Scene, *, spp: int | None = None, seed: int = 0, full_render: bool = False,
+    scene: Scene, edited: Scene, *, spp: int = PATHS, seed: int = 0, full_render: bool = False,
     denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
 ) -> Array:  # fmt: skip
     """The photograph with the edit in it: [H0, W0, 3] float32 linear, at the photo's native size.
@@ -38,7 +37,7 @@ def composite(
 
     Args:
         scene: the fitted scene; its photo is what stays. edited: the same scene after `edit`, `relight`, ...
-        spp: paths per pixel, of each of the two renderings; None: `PATHS`.
+        spp: paths per pixel, of each of the two renderings.
         full_render: the plain rendering of the edited scene [H, W, 3], as in the paper, and no photo.
         denoise: clean the renderings before they are compared (where the denoiser is installed).
         upscale: with `full_render`, a super-resolution of yours that enlarges the rendering, by as much as it does
@@ -47,24 +46,21 @@ def composite(
     Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
-    spp = spp or PATHS
     renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device)
     return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
 
 def pictures(
-    scene: Scene, edits: Iterable[Scene], *, spp: int | None = None, seed: int = 0, full_render: bool = False,
+    scene: Scene, edits: Iterable[Scene], *, spp: int = PATHS, seed: int = 0, full_render: bool = False,
     denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
     count: int | None = None,
 ) -> Iterator[Array]:  # fmt: skip
     """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
 
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
-    spp: paths per pixel; None: `FRAME_PATHS`.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
     tick = progress or (lambda *_: None)
-    spp = spp or FRAME_PATHS
     total = len(edits) if isinstance(edits, Sequence) else count or 0
     before: Scene | None = None
     renderer, picture = EditRenderer(scene, device=device), scene.photo.original

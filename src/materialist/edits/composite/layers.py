@@ -60,7 +60,7 @@ class Layers:
 
 
 def render_layers(
-    renderer: EditRenderer, edited: Scene, *, spp: int = 128, seed: int = 0, clean: bool = True, progress=None,
+    renderer: EditRenderer, edited: Scene, *, spp: int, seed: int = 0, clean: bool = True, progress=None,
 ) -> Layers:  # fmt: skip
     """Render a fitted scene and an edit of it, and separate the edit from the noise.
 

@@ -174,10 +174,6 @@ def is_relit(scene: Scene, edited: Scene) -> bool:
     return scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
 
 
-PATHS = 64
-"""Paths a pixel of a composite where none are asked for; by eye, denoised."""
-
-
 def path_depth(scene: Scene) -> int:
     """Length of the paths that the scene needs: longer ones through glass."""
     from materialist.render.scene import GLASS_DEPTH, MAX_DEPTH
