@@ -70,7 +70,8 @@ class Revolution:
 
     def thickness(self, depth: Array, inside: Array, rays: Array) -> Array:
         """[H, W] float32 scene units along rays: from the front [H, W] planar depth to the last surface of the body."""
-        _, last = self._chords(rays[inside])
+        nearest, reach = self._reach(rays[inside])
+        last = self._met(rays[inside], nearest + reach, -2 * reach)
         found = np.zeros(depth.shape, np.float32)
         found[inside] = np.maximum(np.nan_to_num(last) - depth[inside], 0) * np.linalg.norm(rays[inside], axis=-1)
         return found
@@ -78,19 +79,18 @@ class Revolution:
     def front(self, inside: Array, rays: Array) -> tuple[Array, Array]:
         """[H, W] planar depth at which rays enter the body, 0 where they pass, and its unit normals [H, W, 3] there."""
         depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
-        first, _ = self._chords(rays[inside])
-        depth[inside] = np.nan_to_num(first)
+        nearest, reach = self._reach(rays[inside])
+        depth[inside] = np.nan_to_num(self._met(rays[inside], nearest - reach, 2 * reach))
         points = rays[inside] * depth[inside][:, None]
         normal[inside] = self.axis.spread(points, self.profile.slope(self.axis.of(points)))
         return depth, normal
 
-    def _chords(self, rays: Array) -> tuple[Array, Array]:
-        """[N] planar depths of the first and of the last point of rays [N, 3] in the body, NaN where they pass it."""
+    def _reach(self, rays: Array) -> tuple[Array, Array]:
+        """[N] planar depths of rays [N, 3]: nearest to the body's middle, and how far the body goes from there."""
         wide, high = self.profile.size
         middle = self.axis.foot + (self.profile.floor + high / 2) * self.axis.up
         length = np.linalg.norm(rays, axis=-1)
-        nearest, reach = rays @ middle / length**2, np.hypot(wide, high / 2) / length
-        return self._met(rays, nearest - reach, 2 * reach), self._met(rays, nearest + reach, -2 * reach)
+        return rays @ middle / length**2, np.hypot(wide, high / 2) / length
 
     def _met(self, rays: Array, start: Array, way: Array) -> Array:
         """[N] planar depth of the first point in the body from `start` [N] on, up to start + way; NaN where none is.
