@@ -9,7 +9,7 @@ import torch
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, resize_envmap
-from materialist.fit.light import LightStart, envmap_field, fit_light, start_light
+from materialist.fit.light import LightStart, envmap_field, fit_light, share_of_light, start_light
 from materialist.fit.settings import DEFAULT, LightSettings, Schedule
 
 HEIGHT = 8
@@ -67,3 +67,14 @@ def test_what_the_photo_tells_nothing_about_stays_as_predicted():
     torch.testing.assert_close(problem.render(found), target, rtol=0.05, atol=0.0)
     colour = found[12:].mean((0, 1))
     torch.testing.assert_close(colour / colour[0], torch.tensor([1, 5 / 7, 3 / 7]), rtol=0.05, atol=0.0)
+
+
+def test_a_lamp_counts_by_what_it_lights():
+    """A texel's share is its radiance times its solid angle, 1 in the mean."""
+    angle = torch.from_numpy(row_solid_angle(HEIGHT)).float().view(-1, 1, 1)
+    envmap = torch.ones(HEIGHT, 2 * HEIGHT, 3)
+    envmap[3, 5] = torch.tensor([30.0, 30.0, 0.0])
+    share = share_of_light(envmap, angle)
+    assert share.shape == envmap.shape[:2] and float(share.mean()) == pytest.approx(1)
+    assert float(share[3, 5] / share[3, 4]) == pytest.approx(20)
+    assert float(share[0, 0] / share[3, 0]) == pytest.approx(float(angle[0] / angle[3]))

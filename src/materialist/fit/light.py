@@ -70,8 +70,8 @@ def fit_light(
     """
     target = photo[problem.pixels]
     before, trust = resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log(), None
+    angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
     if start.scale is not None:
-        angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
         trust = angle / angle.mean() / resize_envmap(start.scale.expand(-1, -1, 3), problem.height)
     jitter = torch.Generator().manual_seed(seed)
 
@@ -82,7 +82,8 @@ def fit_light(
         if settings.smooth or settings.chroma:
             change = envmap.clamp_min(1e-6).log() - before
             value = value + settings.smooth * log_total_variation(change)
-            value = value + settings.chroma * log_chroma(change, settings.chroma_square)
+            share = share_of_light(envmap.detach(), angle)
+            value = value + settings.chroma * log_chroma(change, settings.chroma_square, share)
             if trust is not None:
                 value = value + settings.prior * (trust * change.abs()).mean()
         return value
@@ -95,3 +96,12 @@ def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: t
     if settings.height <= height:
         return resize_envmap(field(settings.height), height)
     return field(height, None if settings.field == "texels" else jitter)
+
+
+def share_of_light(envmap: torch.Tensor, angle: torch.Tensor) -> torch.Tensor:
+    """[h, 2h] power of the texels of a map [h, 2h, 3], 1 in the mean; angle: [h, 1, 1] solid angle of a row's texels.
+
+    The colour of a lamp counts by what it lights: by its area alone a yellow one costs nothing.
+    """
+    power = (envmap.clamp_min(0).mean(-1, keepdim=True) * angle)[..., 0]
+    return power / power.mean().clamp_min(1e-9)
