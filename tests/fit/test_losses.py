@@ -59,9 +59,8 @@ def test_log_total_variation_equals_a_loop():
     assert float(log_total_variation(log_map)) == pytest.approx(np.mean(down) + np.mean(right), rel=1e-5)
 
 
-def test_chroma_is_the_spread_of_the_channels_and_its_square_by_their_share():
+def test_chroma_is_the_spread_of_the_channels_by_their_share():
     log_map = torch.tensor([[[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], [[2.0, 1.0, 0.0], [-1.0, 2.0, -1.0]]])
     even, share = torch.ones(2, 2), torch.tensor([[1.0, 0.0], [2.0, 1.0]])
-    assert float(log_chroma(log_map, 0.0, even)) == pytest.approx((2**0.5 + 6**0.5) / 4, abs=1e-3)
-    assert float(log_chroma(log_map, 3.0, even)) == pytest.approx((2**0.5 + 6**0.5 + 3 * (2 + 6)) / 4, abs=1e-3)
-    assert float(log_chroma(log_map, 0.0, share)) == pytest.approx((2 * 2**0.5 + 6**0.5) / 4, abs=1e-3)
+    assert float(log_chroma(log_map, even)) == pytest.approx((2**0.5 + 6**0.5) / 4, abs=1e-3)
+    assert float(log_chroma(log_map, share)) == pytest.approx((2 * 2**0.5 + 6**0.5) / 4, abs=1e-3)

@@ -83,7 +83,7 @@ def fit_light(
             change = envmap.clamp_min(1e-6).log() - before
             value = value + settings.smooth * log_total_variation(change)
             share = share_of_light(envmap.detach(), angle)
-            value = value + settings.chroma * log_chroma(change, settings.chroma_square, share)
+            value = value + settings.chroma * log_chroma(change, share)
             if trust is not None:
                 value = value + settings.prior * (trust * change.abs()).mean()
         return value

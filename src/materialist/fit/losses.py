@@ -51,10 +51,6 @@ def log_total_variation(log_map: torch.Tensor) -> torch.Tensor:
     return (log_map[1:] - log_map[:-1]).abs().mean() + (log_map - log_map.roll(1, 1)).abs().mean()
 
 
-def log_chroma(log_map: torch.Tensor, square: float, share: torch.Tensor) -> torch.Tensor:
-    """Mean of c + square c^2, c the colourfulness of log radiance [..., 3]: most lights are white, and none is pure.
-
-    share: [...] what each counts, 1 in the mean.
-    """
-    c = ((log_map - log_map.mean(-1, keepdim=True)).square().sum(-1) + 1e-8).sqrt()
-    return (share * (c + square * c.square())).mean()
+def log_chroma(log_map: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
+    """Mean colourfulness of log radiance [..., 3]: most lights are white. share: [...] what each counts, mean 1."""
+    return (share * ((log_map - log_map.mean(-1, keepdim=True)).square().sum(-1) + 1e-8).sqrt()).mean()

@@ -38,7 +38,6 @@ class LightSettings:
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
     chroma: float = 0.0  # weight of the colourfulness of the same; larger: whiter; tuned on 12 scenes
-    chroma_square: float = 5.0  # weight of its square beside it; larger: no saturated lamps; tuned on 12 scenes
     prior: float = 0.0  # weight of the distance from a predicted light, over its scale of error; tuned on 14 scenes
     start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
     start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
