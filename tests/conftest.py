@@ -112,9 +112,9 @@ def refused(run):
     return call
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser():
-    """Chromium (skipped, with the reason, where it is not there)."""
+    """Chromium (skipped, with the reason, where it is not there); some tests end all processes that theirs began."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:

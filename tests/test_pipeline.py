@@ -105,6 +105,7 @@ def test_rerendering_is_the_scenes_rendering(scene):
         render_scene(scene, spp=0)
 
 
+@pytest.mark.slow
 def test_papers_engine_gives_a_scene(folder, monkeypatch):
     from materialist.fit import engine
 

@@ -44,6 +44,7 @@ def command(source, runs):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_result(tmp_path, monkeypatch):
     source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
     monkeypatch.setenv("MADE_SLOW", "30")  # the second batch of photos is at work when it is killed

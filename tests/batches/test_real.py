@@ -18,6 +18,7 @@ pytest.importorskip("mitsuba")
 OPTIONS = {"size": 64, "envmap_size": [64, 32], "spp": 2, "device": "cpu", "predictor": "constant"}
 
 
+@pytest.mark.slow
 def test_a_photo_becomes_a_scene_and_an_edited_photo(tmp_path):
     (tmp_path / "edits.yaml").write_text("- relight:\n    rotate: 90\n")
     outcome = batch("example:cat", tmp_path / "runs", apply=tmp_path / "edits.yaml", workers=1, **OPTIONS)

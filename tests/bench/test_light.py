@@ -7,6 +7,7 @@ from materialist import metrics
 from materialist.bench import light
 
 
+@pytest.mark.slow
 def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
     found, steps, geometry = light.fit(sample, light.METHODS["default"], "auto", device="cpu")
     assert geometry.plane_label.shape == sample.photo.linear.shape[:2]

@@ -142,6 +142,7 @@ def test_the_splits_share_no_file(tmp_path):
     assert {p.stem for p in aside} == HELD_OUT
 
 
+@pytest.mark.slow
 def test_a_killed_run_leaves_whole_samples_only(tmp_path):
     command = [sys.executable, "-m", "materialist", "train", "data", "-o", str(tmp_path / "d"), "--count", "500",
                "--size", "32", "--spp", "4", "--seed", "11", "--device", "cpu"]  # fmt: skip
