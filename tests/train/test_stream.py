@@ -5,7 +5,6 @@ import multiprocessing
 import made_runs
 import made_samples
 import pytest
-import torch
 
 from materialist.errors import InputError
 from materialist.io.samples import SampleFolder
@@ -46,17 +45,6 @@ def test_a_set_of_bad_files_ends_a_run_by_one_sentence(tmp_path, workers):
     assert "Traceback" not in str(caught.value)
     del caught
     assert not multiprocessing.active_children()
-
-
-def test_kept_examples_are_read_once_and_give_the_same_batches(tmp_path, monkeypatch):
-    task, kept, read = made_runs.bundled(made_samples.write_set(tmp_path, 4)), {}, []
-    streamed = [list(epoch(task, batch=2, **(ARGS | {"number": n}))) for n in (1, 2)]
-    monkeypatch.setattr(task, "read", lambda index, read_one=task.read: read.append(index) or read_one(index))
-    for number, expected in enumerate(streamed, 1):
-        found = list(epoch(task, batch=2, kept=kept, **(ARGS | {"number": number})))
-        for a, b in zip(found, expected, strict=True):
-            assert all(torch.equal(a[name], b[name]) for name in b)
-    assert sorted(read) == [0, 1, 2, 3]
 
 
 def test_held_out_samples_are_never_trained_on(tmp_path):

@@ -78,7 +78,6 @@ def matnet(
     training: Training = Training(every=300),  # noqa: B008
     score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
     workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,
-    keep: Annotated[bool, typer.Option("--keep", help="Keep all samples in the device's memory (2 MB each).")] = False,
 ) -> None:
     """Train a network of all maps; RUN/weights.safetensors holds it, ready to use."""
     from materialist.io.datasets import open_sources
@@ -91,7 +90,7 @@ def matnet(
     }[learning.config]  # fmt: skip
     recipe = learning.recipe(base)
     task = lambda begin, _: make(open_sources(data), recipe, init=begin, score_samples=score_samples)  # noqa: E731
-    _train("matnet", task, output, training, init=learning.init, workers=workers, keep=keep)
+    _train("matnet", task, output, training, init=learning.init, workers=workers)
 
 
 def refraction(
@@ -143,7 +142,7 @@ def clicks(
 
 def _train(
     kind: str, make_task: Callable[[Path | None, Progress], Any], output: Path, training: Training, *,
-    init: Path | None, minutes: float | None = None, workers: int = 0, keep: bool = False,
+    init: Path | None, minutes: float | None = None, workers: int = 0,
 ) -> None:  # fmt: skip
     """Train the task that `make_task` makes of (weights to begin from, progress), in the folder `output`.
 
@@ -157,7 +156,7 @@ def _train(
 
     unlimited = training.steps is None and training.minutes is None
     budget = Budget(training.steps, minutes if unlimited else training.minutes)
-    options = RunOptions(checkpoint_seconds=training.every, workers=workers, keep=keep, seed=training.seed)
+    options = RunOptions(checkpoint_seconds=training.every, workers=workers, seed=training.seed)
     device = "cuda" if on_gpu(training.device) else "cpu"
     note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
     checkpoint.load(output, kind, resume=training.resume)

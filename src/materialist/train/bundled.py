@@ -50,7 +50,6 @@ class BundledLoss:
 class BundledTask(MapsTask):
     """The network that ships in the package."""
 
-    fixed = True
     notes: tuple[str, ...] = (
         "Albedo is compared by L1, L2, gradients at four scales, and after one factor a picture; there is no LPIPS: "
         "its backbone is not part of this project.",

@@ -43,9 +43,6 @@ class MapsTask(Task):
         self.source.refresh()
         self._places = trained_on(self.source)
 
-    def name(self, index: int) -> Path:
-        return self.source.paths[self._places[index]]
-
     def read(self, index: int) -> Sample:
         """Example number `index` of those that are trained on. Raises InputError where it is damaged."""
         return self.source.read(self._places[index])

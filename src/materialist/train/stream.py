@@ -2,8 +2,7 @@
 
 import logging
 import signal
-from collections.abc import Generator, Sequence
-from contextlib import closing
+from collections.abc import Generator
 from functools import partial
 from typing import Any
 
@@ -25,19 +24,13 @@ Key = tuple[int, tuple[int, ...]]
 """Number of an example, and the seed of its variant."""
 
 
-Kept = dict[Any, dict[str, torch.Tensor]]
-"""Examples on the device, by what the task calls them."""
-
-
 def epoch(
     task: Task, *, number: int, side: int, batch: int, seed: int, skip: int = 0, workers: int = 0, device: Any = "cpu",
-    kept: Kept | None = None,
 ) -> Generator[Batch, None, None]:  # fmt: skip
     """Batches of one pass over all examples in a random order, on the device, without the first `skip` of them.
 
     Order and variants depend on (seed, number) alone, for any number of workers. A small set is repeated so that a
-    pass has at least one batch. With `kept`, examples are loaded once and stay there, for a task whose examples are
-    `fixed`.
+    pass has at least one batch.
     Raises InputError where ATTEMPTS examples in a row cannot be read.
     """
     task.refresh()
@@ -46,55 +39,22 @@ def epoch(
     order = order[: len(order) // batch * batch]
     keys = [(int(index), (seed, number, k)) for k, index in enumerate(order)]
     random = torch.Generator(device)
-    if kept is None:
-        batches = _loaded(task, keys[skip * batch :], side, batch, workers, device)
-    else:
-        _keep(kept, task, keys, side, workers, device)
-        batches = _gathered(kept, task, keys[skip * batch :], batch)
-    with closing(batches):
-        for k, found in enumerate(batches, skip):
-            random.manual_seed(int(np.random.SeedSequence((seed, number, k)).generate_state(1)[0]))
-            with torch.no_grad():
-                varied = task.vary(found, side, random)
-            yield varied
-
-
-def _loaded(
-    task: Task, keys: Sequence[Key], side: int, batch: int, workers: int, device: Any
-) -> Generator[Batch, None, None]:
-    """The examples in batches, on the device."""
+    rest: Any = keys[skip * batch :]
     loader: DataLoader[Any] = DataLoader(
-        keys, batch_size=batch, num_workers=workers, prefetch_factor=2 if workers else None,  # type: ignore[arg-type]
-        collate_fn=partial(_drawn, task, side), worker_init_fn=_init_worker,
-        pin_memory=torch.device(device).type == "cuda",
+        rest, batch_size=batch, num_workers=workers, prefetch_factor=2 if workers else None,
+        collate_fn=partial(_drawn, task, side), worker_init_fn=_init_worker, pin_memory=random.device.type == "cuda",
     )  # fmt: skip
     batches = iter(loader)
     try:
-        for found in batches:
+        for k, found in enumerate(batches, skip):
             if isinstance(found, str):
                 raise InputError(found)
-            yield {n: t.to(device, non_blocking=True) for n, t in found.items()}
+            random.manual_seed(int(np.random.SeedSequence((seed, number, k)).generate_state(1)[0]))
+            with torch.no_grad():
+                varied = task.vary({n: t.to(device, non_blocking=True) for n, t in found.items()}, side, random)
+            yield varied
     finally:
         del batches  # ends the workers
-
-
-def _keep(kept: Kept, task: Task, keys: Sequence[Key], side: int, workers: int, device: Any) -> None:
-    """Load the examples that are not kept yet."""
-    new = {task.name(index): (index, seed) for index, seed in keys if task.name(index) not in kept}
-    size = 32
-    batches = _loaded(task, list(new.values()), side, size, workers if len(new) > size else 0, device)
-    with closing(batches):
-        names = iter(new)
-        for found in batches:
-            for values in zip(*found.values(), strict=True):
-                kept[next(names)] = dict(zip(found, values, strict=True))
-
-
-def _gathered(kept: Kept, task: Task, keys: Sequence[Key], batch: int) -> Generator[Batch, None, None]:
-    """Batches of kept examples."""
-    for first in range(0, len(keys), batch):
-        examples = [kept[task.name(index)] for index, _ in keys[first : first + batch]]
-        yield {n: torch.stack([example[n] for example in examples]) for n in examples[0]}
 
 
 def _drawn(task: Task, side: int, keys: list[Key]) -> Any:

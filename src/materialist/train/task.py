@@ -70,8 +70,6 @@ class Task(ABC):
     """What checkpoints call its runs: the name of the command."""
     notes: tuple[str, ...] = ()
     """What the log must say at the start."""
-    fixed: ClassVar[bool] = False
-    """Whether `draw` returns the same for an example each time, at any side: it can stay on the device then."""
 
     def __init__(self, recipe: Recipe, init: Path | None = None):
         """`init`: weights to begin from."""
@@ -87,10 +85,6 @@ class Task(ABC):
 
         Raises InputError when it is damaged.
         """
-
-    def name(self, index: int) -> Any:
-        """What example `index` is called; it keeps its name when others come or go."""
-        return index
 
     def vary(self, batch: Batch, side: int, random: torch.Generator) -> Batch:
         """The batch with what is changed at random in all its examples together, where the network is trained."""

@@ -32,8 +32,6 @@ class RunOptions:
     """Steps of which a line of the curve is the mean."""
     workers: int = 0
     """Processes that load and augment; 0 for the training process itself."""
-    keep: bool = False
-    """Whether examples stay in the device's memory once they were loaded, where the task's are `fixed`."""
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -73,7 +71,6 @@ class Trainer:
         )  # fmt: skip
         self.schedule = TrainingSchedule(budget, state and state["schedule"])
         self.epoch, self.batch = 1, 0
-        self._kept: stream.Kept | None = {} if self.options.keep and task.fixed else None
         self.last_scores: dict[str, Any] = {}
         if state is not None:
             self._restore(state)
@@ -147,7 +144,7 @@ class Trainer:
             side = self.recipe.side_at(self.schedule.progress)
             batches = stream.epoch(
                 self.task, number=self.epoch, side=side, batch=self.recipe.batch, seed=self.options.seed,
-                skip=self.batch, workers=self.options.workers, device=self.device, kept=self._kept,
+                skip=self.batch, workers=self.options.workers, device=self.device,
             )  # fmt: skip
             for batch in batches:
                 self.batch += 1
