@@ -114,7 +114,7 @@ def refused(run):
 
 @pytest.fixture(scope="module")
 def browser():
-    """Chromium (skipped, with the reason, where it is not there); some tests end all processes that theirs began."""
+    """Chromium (skipped, with the reason, where it is not there), for one file: tests of a killed trainer end it."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
