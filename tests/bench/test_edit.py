@@ -17,6 +17,7 @@ def cases(mitsuba):
     return sample, {edit.kind: edit for edit in edits(sample, sample.envmap[:, ::-1], KINDS)}
 
 
+@pytest.mark.slow
 def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
     sample, found = cases
     before = sample.scene.render(sample.envmap, spp=64, seed=3)

@@ -4,6 +4,7 @@ from export_scenes import room
 from materialist.bench import export
 
 
+@pytest.mark.slow
 def test_what_was_written_looks_as_the_scene_does(measured, monkeypatch):
     pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
     monkeypatch.setattr(export.pipeline, "invert", lambda *_, **__: room())

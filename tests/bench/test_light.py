@@ -32,6 +32,7 @@ def test_maps_are_given_as_the_method_says(sample):
         assert (given.roughness == 0.5).all() and np.allclose(given.metallic, 0.1)
 
 
+@pytest.mark.slow
 def test_one_colour_of_light_and_the_predicted_one_are_not_fitted(sample):
     found, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
     colours = np.unique(found.reshape(-1, 3), axis=0, return_counts=True)[1]

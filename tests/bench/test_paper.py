@@ -95,6 +95,7 @@ def test_a_name_that_is_no_measure_is_refused(tmp_path):
     assert not (tmp_path / "out" / "rows").exists()
 
 
+@pytest.mark.slow
 def test_one_row_from_end_to_end(mitsuba, tmp_path, monkeypatch):
     small = replace(MEASURES["fov"], quick={"scenes": 1, "size": 24, "spp": 4, "predictor": "truth"})
     monkeypatch.setitem(MEASURES, "fov", small)

@@ -151,6 +151,7 @@ def test_insert_writes_picture_and_scene(done, folder, tmp_path):
     assert len(load_scene(tmp_path / "b.scene").bodies) == 2
 
 
+@pytest.mark.slow
 def test_drop_films_into_a_folder(done, folder, tmp_path):
     pytest.importorskip("mujoco")
     told = done(

@@ -59,7 +59,10 @@ def elsewhere(monkeypatch):
         yield
 
 
-@pytest.mark.parametrize("engine, preset", [("transport", DEFAULT), ("transport", PAPER), ("path", PAPER)])
+@pytest.mark.parametrize(
+    "engine, preset",
+    [("transport", DEFAULT), ("transport", PAPER), pytest.param("path", PAPER, marks=pytest.mark.slow)],
+)
 def test_a_fit_elsewhere_finds_what_it_finds_here(engine, preset, request):
     room = Room(16)
     setup = room.setup(preset.at_most(2), spp=2, engine=engine, completion="none", mask=np.eye(16) > 0)

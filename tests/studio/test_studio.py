@@ -135,6 +135,7 @@ def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
     assert [name for name, folder in folders.items() if not folder.exists()] == ["old"]
 
 
+@pytest.mark.slow
 def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
     """Two jobs at work, two in the queue, two pages open."""
     script = """if True:

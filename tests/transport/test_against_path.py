@@ -86,7 +86,9 @@ def test_cached_shading_has_no_bias(either):
     assert ratio == pytest.approx(1, abs=0.01)
 
 
-@pytest.mark.parametrize("max_depth", [2, 4], ids=["direct", "indirect"])
+@pytest.mark.parametrize(
+    "max_depth", [pytest.param(2, marks=pytest.mark.slow, id="direct"), pytest.param(4, id="indirect")]
+)
 def test_cached_gradients_point_where_path_replay_says(comparison, max_depth):
     cosines = gradient_cosines(comparison, max_depth, spp=36, image_spp=100)
     assert min(cosines) >= 0.95, cosines

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from edit_scenes import INNER, MASK, flat_scene
 
 from materialist.edits.composite.composite import composite
@@ -39,6 +40,7 @@ def test_the_map_has_the_photo_where_the_photo_shows_sky():
     assert photo_sky(whole) is whole.envmap
 
 
+@pytest.mark.slow
 def test_glass_that_bends_nothing_shows_the_sky_behind_it():
     background = SCENE.photo.linear[4:5, :, ::-1].repeat(36, 0)
     edited = glass(SCENE, MASK, ior=1.0, thickness="symmetry", background=background)
