@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from typing import Any
 
+import cv2
 import numpy as np
 import torch
 from scipy.ndimage import binary_propagation
 from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.camera import rays_at, unit
-from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.color import linear_to_srgb, srgb_levels, srgb_to_linear
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
 from materialist.predict.bundled.edges import GuidedFilter, weighted_median, with_relief
@@ -29,8 +30,9 @@ class InferenceSettings:
     edge_reach: float = 0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
     median_depth: float = 3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
     depth_span: float = 50.0  # largest ratio of a depth to the median, either way
-    likely_sky: float = -1.0  # logit of a surface below which a pixel is sky where it is joined to sure sky; by eye
+    likely_sky: float = 0.0  # logit of a surface below which a pixel is likely sky; derived
     sure_sky: float = -5.0  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
+    sure_surface: float = 2.0  # logit from which it surely is none; by eye
     unsure_told: float = 0.03  # share of the picture that may be sky from which a note says so; by eye
     least_island: float = 0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
 
@@ -49,7 +51,7 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
     maps, light = _mean_answer(network, linear, rays, device)
-    surface = _without_specks(_surface(maps["mask"]))
+    surface = _without_specks(_surface(maps["mask"], resample.values(linear, maps["mask"].shape)))
     if not surface.any():
         surface[:] = True
     unsure = _unsure_sky(maps["mask"], surface)
@@ -143,12 +145,23 @@ def _scaled(log_depth: Array, surface: Array) -> Array:
     return np.where(surface, SETTINGS.median_depth * np.exp(np.clip(relative, -limit, limit)), 0).astype(np.float32)
 
 
-def _surface(logit: Array) -> Array:
-    """[h, w] bool from the logit of there being a surface: sky is what is likely sky and joined to what surely is.
+def _surface(logit: Array, photo: Array) -> Array:
+    """[h, w] bool from the logit of there being a surface: sky is what is joined to what surely is, and looks like it.
 
-    White walls and windows look like sky, and a hole in a room costs more than a sky that is a far surface.
+    Between sure sky and sure surface the colours of the photo [h, w, 3], linear, decide (GrabCut, Rother et al. 2004):
+    a cloud is sky, the dark between trees is not. Where nothing is sure nothing is sky: white walls and windows look
+    like it, and a hole in a room costs more than a sky that is a far surface.
     """
-    return ~binary_propagation(logit < SETTINGS.sure_sky, mask=logit < SETTINGS.likely_sky)
+    sure = logit < SETTINGS.sure_sky
+    labels = np.where(logit < SETTINGS.likely_sky, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[sure], labels[logit > SETTINGS.sure_surface] = cv2.GC_FGD, cv2.GC_BGD
+    likely = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    if not sure.any() or min(likely.sum(), (~likely).sum()) < 5:  # as many as its colour models have parts
+        return ~sure
+    model = np.zeros((1, 65)), np.zeros((1, 65))  # GrabCut's colour models, filled by it
+    cv2.setRNGSeed(0)
+    cv2.grabCut(srgb_levels(photo), labels, (0, 0, 0, 0), *model, 5, cv2.GC_INIT_WITH_MASK)
+    return ~binary_propagation(sure, mask=np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)))
 
 
 def _unsure_sky(logit: Array, surface: Array) -> float:
