@@ -25,7 +25,7 @@ _UP: dict[str, Any] = {"kind": "word", "choices": ("auto", "y", "z"), "called": 
 _SCALE: dict[str, Any] = {"low": 0, "high": 1e3, "ends": "(]"}
 _PREDICTOR: dict[str, Any] = {"kind": "any", "metavar": "PREDICTOR"}
 
-PATHS = 32
+PATHS = 16
 """Paths a pixel of final pictures, denoised; twice as many score the same (`bench photo-alone`)."""
 
 # fmt: off
