@@ -32,7 +32,7 @@ class InferenceSettings:
     depth_span: float = 50.0  # largest ratio of a depth to the median, either way
     likely_sky: float = 0.0  # logit of a surface below which a pixel is likely sky; derived
     sure_sky: float = -5.0  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
-    sure_surface: float = 2.0  # logit from which it surely is none; by eye
+    sure_surface: float = 2.0  # logit above which a pixel surely is a surface; by eye
     unsure_told: float = 0.03  # share of the picture that may be sky from which a note says so; by eye
     least_island: float = 0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
 
