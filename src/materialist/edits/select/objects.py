@@ -10,16 +10,14 @@ from scipy import ndimage
 from skimage.morphology import remove_small_holes
 from skimage.segmentation import random_walker
 
-from materialist.color import linear_to_srgb, srgb_levels
+from materialist.color import linear_to_srgb
 from materialist.geometry.silhouette import disc, window
-from materialist.predict.bundled.edges import GuidedFilter
+from materialist.predict.bundled.edges import GuidedFilter, grabcut
 from materialist.predict.clicks import segment
 from materialist.types import Array, Scene
 
 Box = tuple[int, int, int, int]
 """(x0, y0, x1, y1), the latter two beyond it."""
-POSSIBLE, PROBABLE, CERTAIN = 2, 3, 1
-"""GrabCut's labels (cv2.GC_PR_BGD, cv2.GC_PR_FGD, cv2.GC_FGD); 0 is background."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool 
         likely = clicknet(scene, points)
         if all(likely[y, x] > 0.5 for x, y in points):
             return outlined(scene, likely, points)
-    return tidy(grabcut(scene, _around(scene, points), rounds=5), points)
+    return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
 def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
@@ -71,8 +69,8 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     for share in DEFAULT.growth:
         more = round(share * min(box[2] - box[0], box[3] - box[1]))
         label = np.zeros(scene.depth.shape, np.uint8)
-        label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = PROBABLE
-        best = max(tidy(grabcut(scene, label, rounds=5), ()), best, key=lambda mask: box_overlap(mask, box))
+        label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = cv2.GC_PR_FGD
+        best = max(tidy(grabcut(scene.photo.linear, label), ()), best, key=lambda mask: box_overlap(mask, box))
         if box_overlap(best, box) >= DEFAULT.fills:
             break
     return best if box_overlap(best, box) >= DEFAULT.least else np.zeros_like(best)
@@ -97,7 +95,7 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] uint8 labels for GrabCut: discs around the clicks."""
     label = np.zeros(scene.depth.shape, np.uint8)
     shares = (DEFAULT.possible, DEFAULT.probable, DEFAULT.core)
-    for share, value in zip(shares, (POSSIBLE, PROBABLE, CERTAIN), strict=True):
+    for share, value in zip(shares, (cv2.GC_PR_BGD, cv2.GC_PR_FGD, cv2.GC_FGD), strict=True):
         for x, y in points:
             cv2.circle(label, (int(x), int(y)), max(2, round(share * max(label.shape))), value, -1)
     return label
@@ -143,22 +141,6 @@ def _divided(photo: Array, likely: Array) -> Array:
     with warnings.catch_warnings(action="ignore"):  # that other solvers are faster
         share = random_walker(seen, seeds, beta=DEFAULT.edge, mode="cg_j", channel_axis=-1, return_full_prob=True)[0]
     return np.asarray(cv2.resize(share.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR))
-
-
-def grabcut(scene: Scene, label: Array, rounds: int = 1) -> Array:
-    """[H, W] bool from labels [H, W] uint8 (POSSIBLE, PROBABLE, CERTAIN or 0)."""
-    ours = (label == CERTAIN) | (label == PROBABLE)
-    if not ours.any() or (label != CERTAIN).sum() < 16:
-        return ours
-    picture = np.ascontiguousarray(srgb_levels(scene.photo.linear[..., ::-1]))
-    labels = np.ascontiguousarray(label)
-    cv2.setRNGSeed(0)
-    try:
-        model = np.zeros((1, 65)), np.zeros((1, 65))  # GrabCut's colour models, filled by it
-        cv2.grabCut(picture, labels, (0, 0, 0, 0), *model, rounds, cv2.GC_INIT_WITH_MASK)
-    except cv2.error:  # too few pixels on one side for its colour model
-        return ours
-    return (labels == CERTAIN) | (labels == PROBABLE)
 
 
 def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:

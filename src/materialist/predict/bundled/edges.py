@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import cg
 
+from materialist.color import srgb_levels
 from materialist.types import Array
 
 STEP = 0.015
@@ -25,6 +26,24 @@ STEEPEST = 0.12
 """Least n.v of a normal that depth follows."""
 LENGTH = 10.0
 """Pixels above which the depth decides, below which the normals do; tuned by eye."""
+
+PARTS = 5
+"""Parts of GrabCut's colour models, which need as many pixels; derived: OpenCV's."""
+
+
+def grabcut(photo: Array, labels: Array) -> Array:
+    """[H, W] bool: the foreground by the photo's colours (GrabCut, Rother et al. 2004).
+
+    photo: [H, W, 3] linear. labels: [H, W] uint8, cv2.GC_FGD and so on: what is certain, and what is likely at first;
+    the result is their foreground where one side has too few pixels for a colour model.
+    """
+    likely = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    if min(likely.sum(), (~likely).sum()) < PARTS:
+        return likely
+    labels, models = labels.copy(), (np.zeros((1, 65)), np.zeros((1, 65)))  # filled by it
+    cv2.setRNGSeed(0)
+    cv2.grabCut(srgb_levels(photo), labels, (0, 0, 0, 0), *models, 5, cv2.GC_INIT_WITH_MASK)
+    return np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
 
 
 class GuidedFilter:

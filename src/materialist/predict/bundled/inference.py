@@ -10,10 +10,10 @@ from scipy.ndimage import binary_propagation
 from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.camera import rays_at, unit
-from materialist.color import linear_to_srgb, srgb_levels, srgb_to_linear
+from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
-from materialist.predict.bundled.edges import GuidedFilter, weighted_median, with_relief
+from materialist.predict.bundled.edges import GuidedFilter, grabcut, weighted_median, with_relief
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.network import STRIDE
 from materialist.types import Array, Materials, Prediction
@@ -155,13 +155,7 @@ def _surface(logit: Array, photo: Array) -> Array:
     sure = logit < SETTINGS.sure_sky
     labels = np.where(logit < SETTINGS.likely_sky, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
     labels[sure], labels[logit > SETTINGS.sure_surface] = cv2.GC_FGD, cv2.GC_BGD
-    likely = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    if not sure.any() or min(likely.sum(), (~likely).sum()) < 5:  # as many as its colour models have parts
-        return ~sure
-    model = np.zeros((1, 65)), np.zeros((1, 65))  # GrabCut's colour models, filled by it
-    cv2.setRNGSeed(0)
-    cv2.grabCut(srgb_levels(photo), labels, (0, 0, 0, 0), *model, 5, cv2.GC_INIT_WITH_MASK)
-    return ~binary_propagation(sure, mask=np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)))
+    return ~binary_propagation(sure, mask=grabcut(photo, labels)) if sure.any() else ~sure
 
 
 def _unsure_sky(logit: Array, surface: Array) -> float:
