@@ -154,6 +154,7 @@ def test_mask_is_taken_at_working_size(folder):
         ({"mask": np.ones((3, 3), bool)}, r"\(3, 3\).*\(18, 24\)"),
         ({"mask": np.zeros((HEIGHT, WIDTH), bool)}, "empty"),
         ({"predictor": "oracle"}, "oracle"),
+        ({"predictor": None}, "predictor 'None'"),
         ({"photo": "nowhere.png"}, "nowhere.png"),
     ],
     ids=lambda v: "-".join(v) if isinstance(v, dict) else "",
@@ -161,6 +162,11 @@ def test_mask_is_taken_at_working_size(folder):
 def test_bad_options_are_named(folder, changes, words):
     with pytest.raises(InputError, match=words):
         invert(**{**options(folder), **changes})
+
+
+def test_a_prior_of_another_size_is_refused(folder, scene):
+    with pytest.raises(InputError, match="prior has 24 x 18 pixels, the photo 12 x 9 at working size"):
+        invert(**options(folder, prior=scene.prior, size=WIDTH // 2))
 
 
 def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, tmp_path):

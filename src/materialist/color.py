@@ -6,6 +6,8 @@ from materialist.types import Array
 
 ROWS = 256
 """Rows of a picture encoded at a time: bounds the memory."""
+CLIPPED = 0.99
+"""Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 

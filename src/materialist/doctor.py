@@ -17,6 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from materialist.errors import MaterialistError
+from materialist.render.variant import INSTALL_LLVM, find_llvm, package_of, usable_gpus
 
 _PROBE = """
 import os, sys
@@ -83,11 +84,9 @@ def _pip(name: str) -> str:
 
 def _llvm() -> tuple[Finding, str | None]:
     try:
-        from materialist.render.variant import find_llvm
-
         found = find_llvm()
-    except (MaterialistError, ImportError) as error:
-        return Finding("LLVM", "broken", str(error), "sudo apt-get install -y libllvm19"), None
+    except MaterialistError as error:
+        return Finding("LLVM", "broken", str(error), INSTALL_LLVM), None
     return Finding("LLVM", "ok", f"{found.version} at {found.path}"), str(found.path)
 
 
@@ -102,25 +101,25 @@ def _renderer(llvm: str | None) -> Finding:
         return Finding("renderer (CPU)", "ok", f"variants {child.stdout.strip()}")
     absent = re.search(r"(lib\S+\.so\S*): cannot open shared object", child.stderr)
     if absent:
-        from materialist.render.variant import package_of
-
         return broken(f"{absent[1]} is missing", f"sudo apt-get install -y {package_of(absent[1])}")
     last = (child.stderr.strip().splitlines() or ["no message"])[-1]
-    return broken(f"exit {child.returncode}: {last[:160]}", "sudo apt-get install -y libllvm19")
+    return broken(f"exit {child.returncode}: {last[:160]}", INSTALL_LLVM)
 
 
 def _cuda(needed: bool = False) -> Finding:
-    """Whether an NVIDIA driver answers; broken where a GPU is `needed` and none does."""
+    """Whether a driver with OptiX answers; broken where a GPU is `needed` and none does."""
     tool, said = shutil.which("nvidia-smi"), ""
     if tool is not None:
         query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
         with suppress(OSError, subprocess.SubprocessError):
             said = subprocess.run(query, capture_output=True, text=True, timeout=20, check=True).stdout.strip()
-    if said:
-        return Finding("GPU (CUDA)", "ok", said.splitlines()[0])
+    name = said.partition("\n")[0]
+    if usable_gpus():
+        return Finding("GPU (CUDA)", "ok", name or "a driver with OptiX")
+    lacking = f"{name}: no OptiX (libnvoptix.so.1)" if name else "no NVIDIA GPU answers"
     if needed:
-        return Finding("GPU (CUDA)", "broken", "no NVIDIA GPU answers", "materialist doctor --device cpu")
-    return Finding("GPU (CUDA)", "missing", "no NVIDIA GPU answers; everything runs on the CPU")
+        return Finding("GPU (CUDA)", "broken", lacking, "materialist doctor --device cpu")
+    return Finding("GPU (CUDA)", "missing", f"{lacking}; everything runs on the CPU")
 
 
 def _package(name: str, extra: str = "", purpose: str = "") -> Finding:
@@ -151,7 +150,7 @@ def _memory() -> Finding:
     detail = f"{free:.1f} GB free (an inversion at 512 needs up to 4)"
     if free >= 4:
         return Finding("memory", "ok", detail)
-    return Finding("memory", "missing", detail, "materialist invert --size 256")
+    return Finding("memory", "missing", detail, "materialist invert PHOTO --size 256")
 
 
 def _disk() -> Finding:

@@ -132,9 +132,9 @@ def numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
     parts = value.split(",") if isinstance(value, str) else value
     try:
         found = tuple(float(part) for part in parts)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         found = ()
-    if len(found) != count:
+    if len(found) != count or not all(map(math.isfinite, found)):
         raise InputError(f"The {called} must be {count} numbers, with commas between them, not {value!r}.")
     return found
 
@@ -168,8 +168,9 @@ def _number(declared: Option, called: str, value: Any) -> Any:
     try:
         if isinstance(value, bool):
             raise TypeError
-        number = value if isinstance(value, int) else float(value)
-    except (TypeError, ValueError) as error:
+        number = float(value)
+        number = value if isinstance(value, int) else number
+    except (TypeError, ValueError, OverflowError) as error:
         or_else = "".join(f", or {word}" for word in declared.choices)
         raise InputError(f"The {called} must be a number{or_else}, not {value!r}.") from error
     excluded = [end for end, mark in zip((low, high), ends) if mark in "()"]
@@ -239,8 +240,8 @@ def _size(declared: Option, called: str, value: Any) -> tuple[int, int]:
     """(width, height) of an environment map, from a pair or a text such as 512x256."""
     parts = re.split("[xX×]", value) if isinstance(value, str) else value
     try:
-        width, height = (int(part) for part in parts)
-    except (TypeError, ValueError) as error:
+        width, height = (_whole(declared, called, part) for part in parts)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"The {called} must look like 512x256, not {value!r}.") from error
     if width != 2 * height or not 8 <= height <= 4096:
         raise InputError(f"The {called} is {width}x{height}; it must be twice as wide as high, from 16x8 to 8192x4096.")

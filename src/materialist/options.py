@@ -23,7 +23,7 @@ _SHIFT: dict[str, Any] = {"kind": "shift", **_SHARE, "metavar": "V|±D"}
 _PAINT: dict[str, Any] = {"kind": "paint", "choices": ("as-is", "glass", "mirror")}
 _UP: dict[str, Any] = {"kind": "word", "choices": ("auto", "y", "z"), "called": "axis that points up"}
 _SCALE: dict[str, Any] = {"low": 0, "high": 1e3, "ends": "(]"}
-_PREDICTOR: dict[str, Any] = {"kind": "any", "metavar": "PREDICTOR"}
+_PREDICTOR: dict[str, Any] = {"kind": "name", "metavar": "PREDICTOR"}
 
 PATHS = 16
 """Paths a pixel of final pictures, denoised; twice as many score the same (`bench photo-alone`)."""
@@ -177,19 +177,19 @@ class InvertOptions(OperationOptions):
     operation = "invert"
     predictor: str = option(
         "auto", "auto, bundled[:FILE], matnet[:FILE], marigold, maps:DIR or constant; for every map not named below.",
-        kind="any", flag="--predictor --rest")
+        kind="name", flag="--predictor --rest")
     albedo: str | None = option(None, "Where the albedo comes from.", **_PREDICTOR)
-    roughness: str | None = option(None, "The same for roughness,", **_PREDICTOR)
-    metallic: str | None = option(None, "metallic,", **_PREDICTOR)
-    normal: str | None = option(None, "normals (also moge:DIR),", **_PREDICTOR)
-    depth: str | None = option(None, "depth (also depth-anything, moge:DIR).", **_PREDICTOR)
+    roughness: str | None = option(None, "Where the roughness comes from.", **_PREDICTOR)
+    metallic: str | None = option(None, "Where the metallic comes from.", **_PREDICTOR)
+    normal: str | None = option(None, "Where the normals come from (also moge:DIR).", **_PREDICTOR)
+    depth: str | None = option(None, "Where the depth comes from (also depth-anything, moge:DIR).", **_PREDICTOR)
     engine: str = option(
         "transport", "Cached light transport, or the paper's path tracing.", kind="word",
         choices=("transport", "path"))
     preset: str = option(
         "default", "Our schedule, or the paper's to the letter.", kind="word", choices=("default", "paper"))
     """The path engine always follows the paper."""
-    fov: float | str | None = option(
+    fov: float | str = option(
         "auto", "Horizontal field of view in degrees, or auto: EXIF, else 35.", low=1, high=170, ends="()",
         unit="degrees", choices=("auto",), called="field of view", metavar="TEXT")
     """`auto`: from the predictor of the depth where it knows one (MoGe), else from EXIF, else 35."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from materialist import metrics
-from materialist.color import linear_to_srgb
+from materialist.color import CLIPPED, linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.image import read_mask
 from materialist.io.photo import HDR_CLIP, exposed, read_photo
@@ -104,7 +105,14 @@ def invert(
 def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     """The photo as the predictor sees it, and the prior."""
     if wanted.prior is not None:
-        return picture, wanted.prior
+        given, (height, width) = wanted.prior, picture.linear.shape[:2]
+        for values in (*vars(given.materials).values(), given.normal, given.depth):
+            if values.shape[:2] != (height, width):
+                raise InputError(
+                    f"The prior has {values.shape[1]} x {values.shape[0]} pixels, the photo {width} x {height} at "
+                    "working size; give maps of that size, or another working size."
+                )
+        return picture, given
     from materialist.predict import get_predictor
 
     parts = {name: getattr(wanted, name) for name in ("albedo", "roughness", "metallic", "normal", "depth")}
@@ -144,7 +152,7 @@ def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[d
         for name in ("albedo", "roughness", "metallic")
     }
     residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
-    white = HDR_CLIP if picture.hdr else 0.99
+    white = HDR_CLIP if picture.hdr else CLIPPED
     clipped = float((picture.linear >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings]
     if lost := int((~np.isfinite(found.rerender).all(-1)).sum()):
@@ -168,10 +176,15 @@ def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[d
             "clipped_fraction": clipped,
             "poor_fraction": poor,
             "total_seconds": time.perf_counter() - start,
-            "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "peak_rss_mb": peak_rss_mb(),
         },
         warnings=tuple(notes),
     )
+
+
+def peak_rss_mb() -> float:
+    """The most memory that this process has held, MB; macOS counts in bytes, Linux in kB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def _named(mask: Array | None) -> dict[str, Any] | None:

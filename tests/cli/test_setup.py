@@ -62,6 +62,17 @@ def test_a_missing_extra_names_the_one_that_brings_it(monkeypatch):
         )
 
 
+def test_a_driver_without_optix_is_no_gpu(monkeypatch):
+    class Answer:
+        stdout = "NVIDIA H100, 550.1\n"
+
+    monkeypatch.setattr(doctor.shutil, "which", lambda name: name)
+    monkeypatch.setattr(doctor.subprocess, "run", lambda *_, **__: Answer())
+    for gpus, state in ((0, "broken"), (1, "ok")):
+        monkeypatch.setattr(doctor, "usable_gpus", lambda gpus=gpus: gpus)
+        assert doctor._cuda(needed=True).state == state and "H100" in doctor._cuda().detail
+
+
 @pytest.mark.parametrize(("state", "code"), [("ok", 0), ("missing", 0), ("broken", 2)])
 def test_exit_code_follows_the_main_job(run, monkeypatch, state, code):
     monkeypatch.setattr(doctor, "examine", lambda device: [Finding("LLVM", state, "19", "mend it")])

@@ -11,7 +11,7 @@ from materialist import metrics
 from materialist.envmap import paste_visible_sky, texel_directions
 from materialist.fit.engine import TransportEngine
 from materialist.fit.invert import Fit, FitSetup, invert
-from materialist.fit.losses import CLIPPED
+from materialist.color import CLIPPED
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
 from materialist.render.scene import RenderScene
 from materialist.transport.cache import CacheSettings

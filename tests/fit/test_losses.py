@@ -1,21 +1,14 @@
 """Losses against closed forms."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
-from materialist.color import linear_to_srgb
-from materialist.fit.losses import (
-    CLIPPED,
-    consistency,
-    encode,
-    log_chroma,
-    log_total_variation,
-    rendering_loss,
-    residual,
-)
+from materialist.color import CLIPPED, linear_to_srgb
+from materialist.fit.losses import consistency, encode, log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.settings import DEFAULT, PAPER
 
 
@@ -27,9 +20,9 @@ def test_srgb_encoding_is_the_packages():
 def test_clipped_channels_are_wrong_on_one_side_only():
     photo = torch.tensor([[0.5, CLIPPED, 1.0]])
     brighter, darker = photo + 0.4, photo - 0.4
-    torch.testing.assert_close(residual(brighter, photo, "linear", clipped=True), torch.tensor([[0.4, 0, 0]]))
-    torch.testing.assert_close(residual(darker, photo, "linear", clipped=True), torch.full((1, 3), -0.4))
-    torch.testing.assert_close(residual(brighter, photo, "linear", clipped=False), torch.full((1, 3), 0.4))
+    torch.testing.assert_close(residual(brighter, photo, "linear", white=CLIPPED), torch.tensor([[0.4, 0, 0]]))
+    torch.testing.assert_close(residual(darker, photo, "linear", white=CLIPPED), torch.full((1, 3), -0.4))
+    torch.testing.assert_close(residual(brighter, photo, "linear", white=math.inf), torch.full((1, 3), 0.4))
 
 
 def test_consistency_is_a_weighted_sum():

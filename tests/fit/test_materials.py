@@ -1,11 +1,13 @@
 """The material fit against minima found another way."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import torch
 from scipy.optimize import minimize_scalar
 
+from materialist.color import CLIPPED
 from materialist.fit.fields import MaterialMaps
 from materialist.fit.losses import encode
 from materialist.fit.materials import fit_materials
@@ -14,11 +16,11 @@ from materialist.fit.settings import DEFAULT, MaterialStage, Schedule
 WEIGHT = 0.7
 
 
-def fitted(light, photo, prior, clipped=False):
+def fitted(light, photo, prior, white=math.inf):
     """[P, 5] maps where a pixel's radiance is light [P, 3] times albedo."""
     schedule = Schedule(learning_rate=0.02, max_steps=400, decay_every=100, decay=0.3, patience=0)
     settings = replace(
-        DEFAULT.materials, weights=(WEIGHT, 1.0, 1.0), clipped=clipped, stages=(MaterialStage(("albedo",), schedule),)
+        DEFAULT.materials, weights=(WEIGHT, 1.0, 1.0), white=white, stages=(MaterialStage(("albedo",), schedule),)
     )
     field = MaterialMaps(prior)
     fit_materials(lambda maps: maps[:, :3] * light, photo, field, prior, settings)
@@ -43,5 +45,5 @@ def test_albedo_lies_between_the_prior_and_what_the_photo_asks_for():
 
 def test_a_clipped_photo_asks_for_nothing_darker():
     light, prior = torch.full((1, 3), 2.0), torch.full((1, 5), 0.6)
-    torch.testing.assert_close(fitted(light, torch.ones(1, 3), prior, clipped=True), prior)
+    torch.testing.assert_close(fitted(light, torch.ones(1, 3), prior, white=CLIPPED), prior)
     assert (fitted(light, torch.ones(1, 3), prior)[:, :3] < 0.57).all()

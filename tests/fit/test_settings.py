@@ -1,5 +1,6 @@
 """The paper's preset is the paper's numbers (Implementation Details)."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -8,12 +9,13 @@ import torch
 from materialist.errors import InputError
 from materialist.fit.light import envmap_field
 from materialist.fit.settings import DEFAULT, PAPER, preset
+from materialist.io.photo import HDR_CLIP
 
 PAPER_NUMBERS = {
     "light.field": "mlp",
     "light.height": 256,
     "light.encoding": "linear",
-    "light.clipped": False,
+    "light.white": math.inf,
     "light.schedule.learning_rate": 1e-3,
     "light.schedule.decay_every": 100,
     "light.schedule.decay": 0.8,
@@ -25,7 +27,7 @@ PAPER_NUMBERS = {
     "materials.field": "mlp",
     "materials.remap": True,
     "materials.encoding": "linear",
-    "materials.clipped": False,
+    "materials.white": math.inf,
     "materials.delta": 0.5,
     "materials.weights": (1, 1, 1),
     "materials.loss": "l1+l2",
@@ -60,5 +62,5 @@ def test_unknown_names_are_told():
 def test_hdr_photos_are_compared_as_log_in_the_paper_and_as_ours_compares_all(name, encodings):
     settings = preset(name, hdr=True)
     assert (settings.light.encoding, settings.materials.encoding) == encodings
-    assert not settings.light.clipped and not settings.materials.clipped
+    assert settings.light.white == settings.materials.white == (math.inf if name == "paper" else HDR_CLIP)
     assert preset(name) == {"paper": PAPER, "default": DEFAULT}[name]

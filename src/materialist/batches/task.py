@@ -2,7 +2,6 @@
 
 import gc
 import hashlib
-import resource
 import time
 from dataclasses import dataclass, field, replace
 from importlib import import_module
@@ -21,6 +20,7 @@ from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable, write_whole
 from materialist.io.display import encoded
+from materialist.pipeline import peak_rss_mb
 from materialist.types import Array, Progress, Scene
 
 SINGLE_THREAD = {
@@ -90,7 +90,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     }  # fmt: skip
     del scene, pictures
     gc.collect()
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    peak = peak_rss_mb()
     facts["cpu_seconds"] = time.process_time() - processor
     return facts | {"seconds": time.perf_counter() - start, "peak_rss_mb": peak}
 

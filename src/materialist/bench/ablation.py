@@ -129,7 +129,7 @@ class _Photo:
         def render(maps: torch.Tensor) -> torch.Tensor:
             radiance = problem(maps)
             with torch.no_grad():
-                error = residual(radiance, photo, settings.encoding, clipped=settings.clipped)
+                error = residual(radiance, photo, settings.encoding, white=settings.white)
                 seen.append(float(rendering_loss(error, settings.loss)))
             return radiance
 

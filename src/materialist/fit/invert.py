@@ -12,11 +12,9 @@ from materialist.buffers import placed
 from materialist.envmap import paste_visible_sky
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
 from materialist.fit.light import envmap_field, fit_light, start_light
-from materialist.fit.losses import CLIPPED
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import SYNONYMS, build_geometry
-from materialist.io.photo import HDR_CLIP
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction, Progress
 
@@ -108,7 +106,7 @@ class Fit:
             return envmap
         surface = np.zeros(setup.photo.linear.shape[:2], bool)
         surface.reshape(-1)[self.engine.pixels.numpy()] = True
-        white = HDR_CLIP if setup.photo.hdr else CLIPPED
+        white = setup.settings.light.white
         return paste_visible_sky(envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
 
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:

@@ -12,7 +12,7 @@ from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
-from materialist.fit.losses import CLIPPED, log_chroma, log_total_variation, rendering_loss, residual
+from materialist.fit.losses import log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.optimise import StageResult, optimise
 from materialist.fit.settings import LightSettings
 from materialist.types import Array, Progress
@@ -43,9 +43,9 @@ def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | Non
     target = photo[problem.pixels]
     with torch.no_grad():
         rendered = problem.render(resize_envmap(radiance, problem.height))
-    known = target < CLIPPED
+    known = target < settings.white
     exposure = (target * rendered)[known].sum() / rendered[known].square().sum().clamp_min(1e-9)
-    return LightStart(radiance * exposure, resize_envmap(scale.expand(-1, -1, 3), settings.height)[..., :1])
+    return LightStart(radiance * exposure, resize_envmap(scale, settings.height))
 
 
 def envmap_field(settings: LightSettings, start: torch.Tensor, *, seed: int = 0) -> nn.Module:
@@ -72,14 +72,14 @@ def fit_light(
     before, trust = resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log(), None
     angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
     if start.scale is not None:
-        trust = angle / angle.mean() / resize_envmap(start.scale.expand(-1, -1, 3), problem.height)
+        trust = angle / angle.mean() / resize_envmap(start.scale, problem.height)
     jitter = torch.Generator().manual_seed(seed)
 
     def loss(_: int) -> torch.Tensor:
         envmap = _at_height(field, settings, problem.height, jitter)
-        error = residual(problem.render(envmap), target, settings.encoding, clipped=settings.clipped)
+        error = residual(problem.render(envmap), target, settings.encoding, white=settings.white)
         value = rendering_loss(error)
-        if settings.smooth or settings.chroma:
+        if settings.smooth or settings.chroma or settings.prior:
             change = envmap.clamp_min(1e-6).log() - before
             value = value + settings.smooth * log_total_variation(change)
             share = share_of_light(envmap.detach(), angle)

@@ -4,9 +4,6 @@ import torch
 
 from materialist.fit.settings import Encoding, Loss, MaterialSettings
 
-CLIPPED = 0.99
-"""Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
-
 
 def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     """Radiance as the loss sees it: `linear` (paper), `srgb` (as an eye sees it), `log1p` (paper, HDR)."""
@@ -18,10 +15,12 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def residual(radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, clipped: bool) -> torch.Tensor:
-    """Encoded rendering minus encoded photo, [..., 3]; with `clipped`, no error above a clipped channel."""
+def residual(
+    radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, white: float
+) -> torch.Tensor:  # fmt: skip
+    """Encoded rendering minus encoded photo, [..., 3]; no error where it is brighter than a channel of `white`."""
     error = encode(radiance, encoding) - encode(photo, encoding)
-    return torch.where(photo >= CLIPPED, error.clamp_max(0), error) if clipped else error
+    return torch.where(photo >= white, error.clamp_max(0), error)
 
 
 def rendering_loss(error: torch.Tensor, loss: Loss = "l1+l2") -> torch.Tensor:

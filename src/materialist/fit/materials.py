@@ -49,7 +49,7 @@ def fit_materials(
         def loss(_: int, held=held) -> torch.Tensor:
             values = field()
             values = torch.cat([held.get(name, values[:, c]) for name, c in COLUMNS.items()], 1)
-            error = residual(problem(values), photo, settings.encoding, clipped=settings.clipped)
+            error = residual(problem(values), photo, settings.encoding, white=settings.white)
             return rendering_loss(error, settings.loss) + consistency(values, prior, settings)
 
         def into_range() -> None:

@@ -4,10 +4,13 @@ The defaults of the classes are the paper's (Implementation Details), or leave o
 """
 
 import dataclasses
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from materialist.color import CLIPPED
 from materialist.errors import InputError
+from materialist.io.photo import HDR_CLIP
 
 Encoding = Literal["linear", "srgb", "log1p"]
 Loss = Literal["l1+l2", "l2"]
@@ -33,7 +36,7 @@ class LightSettings:
     field: str = "mlp"  # `mlp` (directions), `mlp-uv`, `texels` or `sh`
     height: int = 256  # paper; rows of the field's map
     encoding: Encoding = "linear"
-    clipped: bool = False  # a rendering brighter than a clipped photo channel is no error
+    white: float = math.inf  # linear value from which a photo's channel is clipped: a brighter rendering is no error
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
@@ -59,7 +62,7 @@ class MaterialSettings:
     remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
     loss: Loss = "l1+l2"  # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
-    clipped: bool = False
+    white: float = math.inf
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -102,7 +105,7 @@ DEFAULT = FitSettings(
         field="texels",
         height=24,
         encoding="srgb",
-        clipped=True,
+        white=CLIPPED,
         sky=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
@@ -114,7 +117,7 @@ DEFAULT = FitSettings(
         remap=False,
         encoding="srgb",
         loss="l2",
-        clipped=True,
+        white=CLIPPED,
         delta=1.0,
         weights=(0.7, 1.0, 1.0),
         stages=(
@@ -138,14 +141,13 @@ def preset(name: str, *, hdr: bool = False) -> FitSettings:
     """Settings by name.
 
     For HDR photos the paper's loss compares log(1 + x) (paper, Handling HDR Images); ours sees them exposed as a
-    photograph is, and nothing in them is clipped.
+    photograph is, and clipped at HDR_CLIP.
     """
     if name not in PRESETS:
         raise InputError(f"Preset is '{name}'; choose one of {', '.join(PRESETS)}.")
     settings = PRESETS[name]
     if not hdr:
         return settings
-    light, materials = replace(settings.light, clipped=False), replace(settings.materials, clipped=False)
-    if settings is PAPER:
-        light, materials = replace(light, encoding="log1p"), replace(materials, encoding="log1p")
+    how = {"encoding": "log1p"} if settings is PAPER else {"white": HDR_CLIP}
+    light, materials = replace(settings.light, **how), replace(settings.materials, **how)
     return replace(settings, light=light, materials=materials)

@@ -59,10 +59,12 @@ def find_llvm() -> LLVM:
     raise SetupError(f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}")
 
 
+INSTALL_LLVM = "brew install llvm@19" if sys.platform == "darwin" else "sudo apt-get install -y libllvm19"
+
+
 def _remedy() -> str:
-    if sys.platform == "darwin":
-        return "install one with: brew install llvm@19"
-    return "install one with: sudo apt install libllvm19 (Fedora: sudo dnf install llvm-libs)"
+    other = "" if sys.platform == "darwin" else " (Fedora: sudo dnf install llvm-libs)"
+    return f"install one with: {INSTALL_LLVM}{other}"
 
 
 def llvm_version(path: str) -> int | None:

@@ -11,6 +11,7 @@ from materialist.edits.core.renderer import photo_sky
 from materialist.edits.glass.glass import glass
 from materialist.edits.light.relight import relight
 from materialist.geometry.build import build_geometry
+from materialist.io.photo import HDR_CLIP
 
 
 def before_sky():
@@ -36,6 +37,11 @@ def test_the_map_has_the_photo_where_the_photo_shows_sky():
     photographed = row[:, 1] == np.float32(0.3)
     assert 0 < photographed.mean() < 0.2 and (np.diff(row[photographed][:, 2]) >= 0).all()  # bluer to the right
     assert (row[~photographed] > 1).all()  # the fitted light elsewhere
+    # What an HDR file clips is a lower bound, too: a sun that the fit found stays.
+    clipped = np.where((SCENE.depth == 0)[..., None], HDR_CLIP, SCENE.photo.linear).astype(np.float32)
+    hdr = replace(SCENE, photo=replace(SCENE.photo, linear=clipped, hdr=True), envmap=SCENE.envmap * 100)
+    assert photo_sky(hdr).max() > HDR_CLIP
+    assert photo_sky(replace(hdr, envmap=SCENE.envmap)).max() == HDR_CLIP
     whole = replace(SCENE, depth=np.full_like(SCENE.depth, 2))
     assert photo_sky(whole) is whole.envmap
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from materialist.color import CLIPPED
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.envmap import environment, paste_visible_sky, texel_directions
 from materialist.errors import SetupError
 from materialist.geometry.silhouette import window
+from materialist.io.photo import HDR_CLIP
 from materialist.render.bodies import is_glowing, is_transparent
 from materialist.types import Array, Scene
 
 SKY_ROWS = 768
 """Rows of the largest map with the photo's sky (derived: memory)."""
-CLIPPED = 0.98
-"""Channel of an ordinary photo from which its value is a lower bound (derived: 8 bits)."""
 
 
 Made = dict[tuple[int, int], tuple[Array, Array]]
@@ -164,7 +164,7 @@ def photo_sky(scene: Scene) -> Array:
         return scene.envmap
     rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), max(SKY_ROWS, len(scene.envmap))))
     sky = environment(texel_directions(rows, 2 * rows).reshape(-1, 3), scene.envmap).reshape(rows, 2 * rows, 3)
-    white = np.inf if scene.photo.hdr else CLIPPED
+    white = HDR_CLIP if scene.photo.hdr else CLIPPED
     return paste_visible_sky(sky.astype(np.float32), scene.photo.linear, scene.depth > 0, camera, white=white)
 
 
