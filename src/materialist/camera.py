@@ -7,11 +7,8 @@ from materialist.types import Array, Camera
 
 def pixel_rays(camera: Camera) -> Array:
     """[H, W, 3] float32 rays through pixel centres, scaled to z = -1, so that `rays * depth` is the surface point."""
-    x = (np.arange(camera.width) + 0.5 - camera.width / 2) / camera.focal
-    y = -(np.arange(camera.height) + 0.5 - camera.height / 2) / camera.focal
-    rays = np.empty((camera.height, camera.width, 3), np.float32)
-    rays[..., 0], rays[..., 1], rays[..., 2] = x[None, :], y[:, None], -1
-    return rays
+    x, y = np.meshgrid(np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5)
+    return rays_through(np.stack([x, y], -1), camera).astype(np.float32)
 
 
 def rays_through(place: Array, camera: Camera) -> Array:
@@ -24,8 +21,7 @@ def rays_through(place: Array, camera: Camera) -> Array:
 def rays_at(rays: Array, height: int, width: int) -> Array:
     """The rays [H, W, 2] (x and y at z = -1) of a picture or of a part of one, at height x width pixels.
 
-    x is even along rows and y along columns, so that they go on to pixels that are nearer to the border than the first
-    and the last were.
+    Rays are linear in the pixel: beyond the first and the last pixel centre they are extrapolated.
     """
     rows, columns = rays.shape[:2]
     x, y = rays[0, :, 0].astype(np.float64), rays[:, 0, 1].astype(np.float64)

@@ -36,11 +36,21 @@ def sh_basis(direction: Array, degree: int) -> Array:
 
 def environment(direction: Array, envmap: Array) -> Array:
     """[N, 3] bilinear lookup of an envmap [h, 2h, 3] in unit directions [N, 3]."""
-    height, width = envmap.shape[:2]
-    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * width
-    y = np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * height
-    wrapped = np.concatenate([envmap[:, -1:], envmap, envmap[:, :1]], 1)
-    return bilinear(wrapped, np.stack([x + 1, y], -1))
+    index, share = texels_around(direction, envmap.shape[:2])
+    return (envmap.reshape(-1, 3)[index] * share[..., None]).sum(1)
+
+
+def texels_around(direction: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    """[N, 4] flat index and bilinear share of the four texels around unit directions [N, 3] in an [h, 2h] map."""
+    h, w = shape
+    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * w - 0.5
+    y = np.clip(np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * h - 0.5, 0, h - 1)
+    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    fx, fy = x - x0, y - y0
+    xs, ys = np.stack([x0 % w, (x0 + 1) % w], -1), np.stack([y0, np.minimum(y0 + 1, h - 1)], -1)
+    index = ys[:, [0, 0, 1, 1]] * w + xs[:, [0, 1, 0, 1]]
+    share = np.stack([(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx], -1)
+    return index, share
 
 
 def bilinear(picture: Array, place: Array) -> Array:

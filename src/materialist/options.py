@@ -201,9 +201,9 @@ class InvertOptions(OperationOptions):
     completion: str = option(
         "auto", "Continue planes beyond what is seen: floors, walls as well (planes), or none; auto: floors, with "
         "the paper's preset none.",
-        kind="word", choices=("auto", "planes", "floors", "none", "planes,backs", "floors,backs"))
+        kind="word", choices=("auto", "planes", "floors", "none"))
     """`floors` continues planes behind what the photo shows, and floors and table tops beyond the frame; `planes` walls
-    and ceilings as well, `none` adds nothing. `planes,backs` and `floors,backs` mean `planes` and `floors`."""
+    and ceilings as well, `none` adds nothing."""
     tau: float = option(
         6.0, "Grazing angle below which the surface is cut, degrees.", low=0, high=90, ends="()", unit="degrees")
     mask: Array | str | Path | None = option(

@@ -8,10 +8,10 @@ import torch
 from transport_scenes import furnished_room, windowed_sky
 
 from materialist import metrics
+from materialist.color import CLIPPED
 from materialist.envmap import paste_visible_sky, texel_directions
 from materialist.fit.engine import TransportEngine
 from materialist.fit.invert import Fit, FitSetup, invert
-from materialist.color import CLIPPED
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
 from materialist.render.scene import RenderScene
 from materialist.transport.cache import CacheSettings

@@ -5,9 +5,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from materialist.envmap import row_solid_angle
+from materialist.envmap import row_solid_angle, texels_around
 from materialist.transport.environment import EnvmapPyramid, halve
-from materialist.transport.light import bilinear
 
 
 def random_map(height, seed=0):
@@ -24,10 +23,10 @@ def look(envmap, directions):
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_lookup_equals_the_shares_of_the_light_matrix(seed):
-    """`bilinear` spreads a ray over the texels that `lookup` reads."""
+    """`texels_around` spreads a ray over the texels that `lookup` reads."""
     envmap, d = random_map(8, seed), np.random.default_rng(seed).standard_normal((64, 3))
     d /= np.linalg.norm(d, axis=-1, keepdims=True)
-    index, share = bilinear(d, (8, 16))
+    index, share = texels_around(d, (8, 16))
     np.testing.assert_allclose(share.sum(-1), 1, atol=1e-9)
     np.testing.assert_allclose((envmap.reshape(-1, 3)[index] * share[..., None]).sum(1), look(envmap, d), atol=2e-4)
 

@@ -24,7 +24,7 @@ class Part:
     materials: Materials
     """Maps [H, W], looked up by uv without filtering; [1, 1] for a constant."""
     surface: Surface | None = None
-    """For a body: its own material, whose maps repeat and are filtered ."""
+    """For a body: its own material, whose maps repeat and are filtered."""
 
     @property
     def prefix(self) -> str:

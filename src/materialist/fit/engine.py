@@ -11,16 +11,16 @@ import torch
 
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
+from materialist.envmap import texels_around
 from materialist.fit.fields import resize_envmap
 from materialist.transport.cache import CacheSettings, Tables, TransportCache
 from materialist.transport.filter import Guide, filter_tables
-from materialist.transport.light import bilinear, light_matrix
+from materialist.transport.light import light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
 
 LIGHT_PIXELS, LEAST_PIXELS = 2048, 256
-"""Pixels of a whole picture that the light is fitted to, of which a surface before the sky gets its share; and how many
-it gets at least, where it has them."""
+"""Pixels that the light is fitted to, shared by surfaces and sky by their area; surfaces get at least the second."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class TransportEngine:
         indirect = matrix.indirect(placed(self.cache.slot_radiance(self.radiance)))
         direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-        index, weight = (placed(v) for v in bilinear(direction, matrix.shape))
+        index, weight = (placed(v) for v in texels_around(direction, matrix.shape))
 
         def render(envmap: torch.Tensor) -> torch.Tensor:
             flat = envmap.reshape(-1, 3)

@@ -14,7 +14,7 @@ from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared
 from materialist.fit.light import envmap_field, fit_light, start_light
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
-from materialist.geometry.build import SYNONYMS, build_geometry
+from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
 from materialist.types import Array, Geometry, Materials, Photo, Prediction, Progress
 
@@ -43,7 +43,7 @@ class FitSetup:
 
     def __post_init__(self) -> None:
         given = self.settings.completion if self.completion == "auto" else self.completion
-        object.__setattr__(self, "completion", SYNONYMS.get(given, given))
+        object.__setattr__(self, "completion", given)
 
 
 @dataclass

@@ -41,7 +41,10 @@ def fit_materials(
     problem: MaterialProblem, photo: torch.Tensor, field: nn.Module, prior: torch.Tensor, settings: MaterialSettings,
     *, progress: Progress | None = None,
 ) -> list[StageResult]:  # fmt: skip
-    """Move `field` stage by stage: argmin L_re + delta L_cons; photo: [P, 3] linear, prior: [P, 5] as there."""
+    """Move `field` stage by stage: argmin L_re + delta L_cons.
+
+    photo: [P, 3] linear. prior: [P, 5] maps that L_cons holds on to.
+    """
     results = []
     for stage in settings.stages:
         held = {name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets}

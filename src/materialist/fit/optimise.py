@@ -22,7 +22,7 @@ class StageResult:
 
     def summary(self) -> dict:
         """Entry of report.json: steps, seconds, and the losses at up to 50 steps."""
-        stride = max(1, len(self.losses) // 50)
+        stride = max(1, -(-len(self.losses) // 50))
         return {
             "name": self.name,
             "steps": self.steps,
@@ -61,7 +61,7 @@ def optimise(
 ) -> StageResult:  # fmt: skip
     """Minimise `loss(step)` over the tensors `parameters` in place.
 
-    The loss that counts for early stopping is the best of each window of `patience` steps.
+    It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
     """
     tensors = list(parameters)
     adam = Adam(tensors)

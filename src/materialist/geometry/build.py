@@ -14,8 +14,6 @@ from materialist.types import Array, Camera, Geometry, Mesh, Scene
 COMPLETIONS = ("planes", "floors", "none")
 """What can be added to what the picture shows: the dominant planes continued, the same with walls (planes that do not
 face up) ending at the frame, nothing."""
-SYNONYMS = {"auto": "floors", "planes,backs": "planes", "floors,backs": "floors"}
-"""The usual completion, and names of older scenes and scripts, whose objects had backs."""
 CREASE = 40.0
 """Angle between the normals of two pixels, degrees, from which neither has a part in the other's shading; by eye."""
 
@@ -26,10 +24,10 @@ def build_geometry(
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
-    completion: one of `COMPLETIONS` or `SYNONYMS`.
+    completion: one of `COMPLETIONS`; auto: floors.
     Raises InputError for maps or options that cannot be used.
     """
-    completion = SYNONYMS.get(completion, completion)
+    completion = "floors" if completion == "auto" else completion
     if completion not in COMPLETIONS:
         raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
     mesh = depth_to_mesh(depth, normal, camera, tau=tau)
@@ -46,7 +44,7 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
     """The geometry of other maps, built as the scene's own: as its provenance says, else as its mesh looks."""
     told = scene.provenance
     completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
-    if told.get("completion") in (*COMPLETIONS, *SYNONYMS):
+    if told.get("completion") in COMPLETIONS:
         completion = told["completion"]
     return build_geometry(
         depth, normal, camera, tau=float(told.get("tau", 6.0)), completion=completion,

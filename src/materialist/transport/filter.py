@@ -65,14 +65,9 @@ def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
 
 def _shifted(image: Array, dy: int, dx: int) -> Array:
     """`image` [H, W, ...] with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
-    out = np.zeros_like(image)
-    h, w = image.shape[:2]
-    if abs(dy) >= h or abs(dx) >= w:
-        return out
-    ys, xs = slice(max(0, -dy), min(h, h - dy)), slice(max(0, -dx), min(w, w - dx))
-    yd, xd = slice(max(0, dy), min(h, h + dy)), slice(max(0, dx), min(w, w + dx))
-    out[ys, xs] = image[yd, xd]
-    return out
+    (h, w), reach = image.shape[:2], len(_TAPS) // 2
+    padded = np.pad(image, [(reach, reach), (reach, reach), *[(0, 0)] * (image.ndim - 2)])
+    return padded[reach + dy : reach + dy + h, reach + dx : reach + dx + w]
 
 
 def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 
 from materialist.buffers import placed
+from materialist.envmap import texels_around
 from materialist.transport.cache import MISS, TransportCache
 from materialist.transport.rays import LobeRays
 from materialist.types import Array, Materials
@@ -92,7 +93,7 @@ def light_matrix(
         pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
         slots_met = dr.gather(mi.UInt32, cache.slots, pi.prim_index, pi.is_valid())
         slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] uint32 radiance slot that each ray meets
-        index, share = bilinear(np.array(some.ray.d).T, shape)
+        index, share = texels_around(np.array(some.ray.d).T, shape)
         leaves = slot == MISS
         for part, weight in zip(parts, some.weights, strict=True):
             add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
@@ -109,16 +110,3 @@ def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array,
     flat = row[:, None] * out.shape[-1] + index
     values = (share * weight[:, None]).astype(np.float32)
     out.view(-1).index_add_(0, torch.from_numpy(flat.ravel()), torch.from_numpy(values.ravel()))
-
-
-def bilinear(direction: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
-    """The four texels ([N, 4] flat index) around unit directions [N, 3] in an [h, w] map, and their shares [N, 4]."""
-    h, w = shape
-    x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * w - 0.5
-    y = np.clip(np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * h - 0.5, 0, h - 1)
-    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    fx, fy = x - x0, y - y0
-    xs, ys = np.stack([x0 % w, (x0 + 1) % w], -1), np.stack([y0, np.minimum(y0 + 1, h - 1)], -1)
-    index = ys[:, [0, 0, 1, 1]] * w + xs[:, [0, 1, 0, 1]]
-    share = np.stack([(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx], -1)
-    return index, share

@@ -20,7 +20,7 @@ def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metalli
 def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
     """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P].
 
-    Tables at the pixels' own roughness as they are.
+    Tables made at the pixels' own roughness (L = 1) are returned unchanged.
     """
     if len(tables.specular) == 1:
         return tables.specular[0]
