@@ -13,6 +13,7 @@ from materialist.edits.composite.native_layer import native_layer
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.insert.insert import insert, picture_width, put, support_at
 from materialist.errors import InputError
+from materialist.geometry.build import build_geometry
 
 UP = np.array([0, np.cos(np.radians(30)), np.sin(np.radians(30))])
 
@@ -79,9 +80,15 @@ def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
     assert shadow.size and shadow.mean() < 0.495
 
 
-def test_the_matte_is_the_bodys_outline_at_native_size(box):
+@pytest.mark.parametrize("bump", [0, 0.002])
+def test_the_matte_is_the_bodys_outline_at_native_size(box, bump):
+    """The ground that it stands on does not cut its foot."""
     scene = floor_scene(native=4)
-    edited = insert(scene, box, (24.0, 26.0))
+    bodies = insert(scene, box, (24.0, 25.5)).bodies
+    depth = scene.depth * (1 - bump * np.exp(-(((np.arange(36) - 27) / 4) ** 2)))[:, None].astype(np.float32)
+    geometry = build_geometry(depth, scene.normal, scene.camera, completion="none")
+    scene = replace(scene, depth=depth, geometry=geometry)
+    edited = replace(scene, bodies=bodies)
     share = native_layer(EditRenderer(scene), edited, spp=2, seed=0, clean=False).share
     place, _ = project(edited.bodies[0].vertices.astype(np.float64), scene.camera)
     area = ConvexHull(place * 4).volume  # native pixels; a box is convex

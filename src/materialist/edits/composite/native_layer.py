@@ -70,20 +70,27 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
         return None
     there = window(small > 0, native, SETTINGS.margin)
     sight = first_hits(target.mi_scene, camera, chosen, native, there)
-    alone = first_hits(only(target.mi_scene, names), camera, chosen, native, there)
+    everything = [*bodies, *(f"lamp{k}" for k in range(len(edited.lamps)))]
+    bare = only(target.mi_scene, everything)  # without the photo's surface
+    alone = first_hits(bare, camera, chosen, native, there)
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
-    gap = (SETTINGS.lamp_contact if names == lamps else SETTINGS.contact) * _extent(alone)
+    stands = names != lamps
+    gap = (SETTINGS.contact if stands else SETTINGS.lamp_contact) * _extent(alone)
     size, part = _traced_size(native, there)
     most = SETTINGS.most_paths * (1 + any(body and is_transparent(body.surface) for body in chosen.values()))
     paths = max(SETTINGS.fewest_paths, min(most * spp, int(SETTINGS.budget * spp * small.size / area(part))))
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
-    picture = spread(radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names))
+    picture = radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names)
+    few = _resized((sight.share < alone.share / 2).astype(np.float32), picture.shape[:2])[..., None] > 0
+    picture = spread(np.where(few, 0, picture))  # too few paths met the body there
     if clean:
-        guide = sight if size == native else first_hits(target.mi_scene, camera, chosen, size, part)
-        picture = denoised(picture, guide.albedo, guide.normal)
+        guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
+        picture = spread(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
     share, whole = np.zeros(native, np.float32), np.zeros((*native, 3), np.float32)
-    share[there] = _behind_things(sight, alone, scene, there, gap)
+    ground = first_hits(target.mi_scene, camera, {"surface": None}, native, there)
+    nearer = np.where(ground.share > 0, alone.depth - ground.depth, 0)
+    share[there] = _behind_things(sight, alone, scene, there, nearer, gap, stands=stands)
     whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
@@ -106,23 +113,26 @@ def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Arra
     return np.asarray(cv2.resize(values, shape[1::-1], interpolation=getattr(cv2, f"INTER_{how}")))
 
 
-def _behind_things(sight: Any, alone: Any, scene: Scene, there: Box, gap: float) -> Array:
-    """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it stands `gap` before them.
+def _behind_things(
+    sight: Any, alone: Any, scene: Scene, there: Box, nearer: Array, gap: float, *, stands: bool
+) -> Array:
+    """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it is `gap` before them.
 
-    The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo.
+    The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo. What is
+    nearer is the ground that a body `stands` on: it hides nothing, or its bumps would make the foot ragged.
     """
     native, working = scene.photo.original.shape[:2], scene.depth.shape
-    nearer = alone.depth - _resized(scene.depth, native, "NEAREST")[there]
+    share = alone.share if stands else sight.share
     hidden = (alone.share > sight.share + 0.05) & (nearer > gap)
     if not hidden.any():
-        return sight.share
+        return share
     near = grown(hidden, int(np.ceil(2 * max(native[0] / working[0], 1.0))))
     whole = np.zeros(native, np.float32)
     whole[there] = spread(alone.depth)
     depth = spread(_resized(whole, working, "NEAREST"))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
     cut = alone.share * (1 - matte(thing, scene.photo.original)[there])
-    return np.where(near, cut, sight.share).astype(np.float32)
+    return np.where(near, cut, share).astype(np.float32)
 
 
 def _extent(alone: Any) -> float:
