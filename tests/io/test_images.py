@@ -1,6 +1,8 @@
 """EXR, PNG, maps, masks and the contact sheet."""
 
 import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import cv2
 import numpy as np
@@ -11,8 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from made_scene import make_scene
+from PIL import Image
 
 from materialist.errors import InputError, OutputError
+from materialist.io.atomic import whole_file
+from materialist.io.bitmap import pixel_limit_lifted
 from materialist.io.decode import decode
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import ensure_image_writable, read_map, read_mask, write_image
@@ -153,3 +158,30 @@ def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words
     tifffile.imwrite(tmp_path / "a.tif", pixels, **settings)
     with pytest.raises(InputError, match=words):
         decode(tmp_path / "a.tif")
+
+
+def test_several_threads_write_one_file_and_lift_one_limit(tmp_path):
+    before, both, entered = Image.MAX_IMAGE_PIXELS, threading.Barrier(2), threading.Semaphore(0)
+
+    def write(content):
+        with whole_file(tmp_path / "a.txt", force=True) as temporary:
+            temporary.write_text(content)
+            both.wait(10)
+
+    def lift(leave):
+        with pixel_limit_lifted():
+            entered.release()
+            leave.wait(10)
+
+    with ThreadPoolExecutor(2) as threads:
+        for done in [threads.submit(write, "x") for _ in range(2)]:
+            done.result()
+        ends = threading.Event(), threading.Event()
+        lifted = []
+        for end in ends:
+            lifted.append(threads.submit(lift, end))
+            entered.acquire(timeout=0.2)
+        for end, done in zip(ends, lifted):
+            end.set()
+            done.result()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"] and before == Image.MAX_IMAGE_PIXELS

@@ -49,7 +49,8 @@ def assert_same(a, b, where="scene"):
 def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
     body = make_body()
     coated = replace(body, name="another", surface=replace(body.surface, glass_roughness=0.25))
-    full = replace(scene, bodies=(body, coated))
+    light = np.random.default_rng(1).random((8, 16, 4), np.float32) * 100
+    full = replace(scene, bodies=(body, coated), prior=replace(scene.prior, light=light))
     if from_memory:
         original = scene.photo.original[:7, :5] * 7
         full = replace(full, photo=replace(scene.photo, source=None, path=None, original=original))
@@ -58,6 +59,7 @@ def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
     (tmp_path / "a.scene/bodies/1.albedo.exr").unlink()
     with pytest.raises(SceneError, match=r"1\.albedo\.exr"):
         load_scene(tmp_path / "a.scene")
+    save_scene(scene, tmp_path / "a.scene", force=True)  # the light is a file of the package, too
 
 
 def test_the_files_of_the_contract(scene, tmp_path):

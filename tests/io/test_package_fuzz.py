@@ -64,6 +64,12 @@ def counted(file, vertices, faces):
     file.write_bytes(b"\n".join(named))
 
 
+def ply_end(file, content):
+    """Let the last face end with other bytes."""
+    data = file.read_bytes()
+    file.write_bytes(data[: -len(content)] + content)
+
+
 def nan(file):
     pixels = read_exr(file)
     pixels.flat[3] = np.nan
@@ -108,6 +114,10 @@ CASES = {
     "infinite in JSON": lambda root: said(root, '"ior": 1.5', '"ior": 1e999'),
     "many faces": lambda root: counted(root / "mesh.ply", 9, 9_999_999_999),
     "many vertices": lambda root: counted(root / "bodies/0.ply", 4_000_000_000, 2),
+    "a face of no pixel": lambda root: ply_end(root / "mesh.ply", struct.pack("<ih", 2**31 - 1, -1)),
+    "a face of a pixel below 0": lambda root: ply_end(root / "mesh.ply", struct.pack("<ih", -1, -1)),
+    "a light without its scale": lambda root: shutil.copy(root / "envmap.exr", root / "prior/light.exr"),
+    "a huge light": lambda root: window(shutil.copy(root / "envmap.exr", root / "prior/light.exr"), 0, 0, 2**30, 2**30),
     "text for a count": lambda root: counted(root / "mesh.ply", "many", 2),
     "deep JSON": lambda root: (root / "scene.json").write_text('{"a":' * 100_000),
     **{f"no {name}": lambda root, name=name: (root / name).unlink() for name in FILES},

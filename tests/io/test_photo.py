@@ -112,6 +112,9 @@ def test_a_photo_from_memory_is_exposed_and_one_pixel_at_one_is_no_clipping(tmp_
     photo = exposed(Photo(values, Camera(70, 60, 40.0), values, True))
     assert photo.stops == 7 and exposed(photo) is photo
     np.testing.assert_array_equal(photo.original, 128 * values)
+    bright = np.clip(values * 128, 0, 1)
+    bright[0, 0] = 500
+    assert exposed(Photo(bright, Camera(70, 60, 40.0), bright, True)).linear.max() == 10  # without any stops
     ordinary = Photo(values, Camera(70, 60, 40.0), values)
     assert exposed(ordinary) is ordinary
     values[0, 0] = 1

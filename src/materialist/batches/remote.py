@@ -22,7 +22,7 @@ def is_url(text: str) -> bool:
 
 def shown(url: str) -> str:
     """The URL without its secrets: user, password and signed query."""
-    return re.sub(r"://[^/@]*@", "://", url).split("?")[0] if is_url(url) else url
+    return re.sub(r"://[^/]*@", "://", url).split("?")[0] if is_url(url) else url
 
 
 def list_url(url: str, suffixes: frozenset[str]) -> list[str]:

@@ -1,5 +1,6 @@
 """A list of edits as a file, so that they can be replayed and batched: `materialist apply SCENE edits.yaml`."""
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,6 +31,10 @@ KINDS = {
     for name, kind in OPTIONS.items()
 }
 """Kind of step -> what it may say."""
+_DEEPEST = 20
+"""Levels of lists in lists that a file may have; a list of edits has 7."""
+_LARGEST = 1_000_000
+"""Bytes of a file."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,8 @@ def read_recipe(path: str | Path) -> list[Step]:
 
     path = Path(path)
     try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(f"{path} is larger than {_LARGEST / 1e6:g} MB; a list of edits is a short text.")
         content = yaml.load(path.read_text("utf-8"), Loader=_loader())
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
@@ -76,11 +83,27 @@ def _loader() -> Any:
     import yaml
 
     class Texts(yaml.BaseLoader):
-        """Scalars stay texts: YAML would read the shift +0.5 as the value 0.5. No key is given twice."""
+        """Scalars stay texts: YAML would read the shift +0.5 as the value 0.5. No key is given twice.
+
+        Aliases of aliases could stand for more than memory holds, so there are none.
+        """
+
+        depth = 0
+
+        def compose_node(self, parent, index):
+            if self.check_event(yaml.AliasEvent):
+                refused = "an alias (*) cannot be used here; write out what it stands for"
+                raise yaml.composer.ComposerError(None, None, refused, self.peek_event().start_mark)
+            self.depth += 1
+            if self.depth > _DEEPEST:
+                raise yaml.composer.ComposerError(None, None, "lists nested too deeply", self.peek_event().start_mark)
+            node = super().compose_node(parent, index)
+            self.depth -= 1
+            return node
 
         def construct_mapping(self, node, deep=False):
-            names = [key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode)]
-            twice = [name for k, name in enumerate(names) if name in names[:k]]
+            names = Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+            twice = [name for name, count in names.items() if count > 1]
             if twice:
                 raise yaml.constructor.ConstructorError(None, None, f"'{twice[0]}' is given twice", node.start_mark)
             return super().construct_mapping(node, deep)

@@ -10,6 +10,7 @@ import os
 import re
 import secrets
 import shutil
+import threading
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,7 +26,7 @@ MARKER = "scene.json"
 _MAPS = r"(albedo|roughness|metallic|normal|depth)\.exr"
 SCENE_FILES = re.compile(
     r"(scene\.json|report\.json|(photo|rerender)\.(exr|png)|envmap\.exr|mesh\.ply|plane_label\.png|overview\.png"
-    rf"|(prior|maps)/{_MAPS}|maps/shading_residual\.exr|bodies/\d+(\.ply|\.{_MAPS}))"
+    rf"|(prior|maps)/{_MAPS}|prior/light\.exr|maps/shading_residual\.exr|bodies/\d+(\.ply|\.{_MAPS}))"
 )
 """Files of a package, beside the photo as it was given."""
 _JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
@@ -67,10 +68,9 @@ def make_folder(folder: Path) -> None:
 
 
 def partial(path: Path, suffix: str | None = None) -> Path:
-    """Where PATH is written until it is whole; the suffix stays PATH's, in small letters, unless another is given."""
-    return path.with_name(
-        f"{_stem(path)}partial-{os.getpid()}-{_MARK}{path.suffix.lower() if suffix is None else suffix}"
-    )
+    """Where this thread writes PATH until it is whole; the suffix is PATH's, in small letters, unless one is given."""
+    suffix = path.suffix.lower() if suffix is None else suffix
+    return path.with_name(f"{_stem(path)}partial-{os.getpid()}-{_MARK}{threading.get_ident():x}{suffix}")
 
 
 @contextmanager

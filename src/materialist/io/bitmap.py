@@ -1,6 +1,7 @@
 """Pictures of integers and float TIFFs, by Pillow and OpenCV, to linear Rec.709."""
 
 import io
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -29,6 +30,7 @@ MAX_ASPECT = 8
 _LAYOUT = {"BitsPerSample": 8, "PlanarConfiguration": 1, "PhotometricInterpretation": 2, "ExtraSamples": 2}
 """Tags of TIFF, and what they are by themselves: a channel's bits, whether channels lie apart (2), what values mean (0:
 white is zero), and what the channel beyond colour is (1: alpha that colours are multiplied by)."""
+_LIMIT = threading.RLock()
 
 
 @dataclass
@@ -195,9 +197,13 @@ def _upright(pixels: Array, orientation: int) -> Array:
 
 @contextmanager
 def pixel_limit_lifted() -> Iterator[None]:
-    """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
-    before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
-    try:
-        yield
-    finally:
-        Image.MAX_IMAGE_PIXELS = before
+    """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded.
+
+    One thread at a time: the limit is Pillow's for all.
+    """
+    with _LIMIT:
+        before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        try:
+            yield
+        finally:
+            Image.MAX_IMAGE_PIXELS = before

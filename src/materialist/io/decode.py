@@ -13,7 +13,7 @@ from materialist.errors import InputError, MaterialistError, SetupError
 from materialist.io import bitmap
 from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
-from materialist.io.exr import exr_headers, exr_size, read_exr
+from materialist.io.exr import exr_bytes, exr_headers, exr_size, read_exr
 
 RAW_SUFFIXES = frozenset(
     f".{name}"
@@ -59,6 +59,19 @@ def image_size(path: Path) -> tuple[int, int]:
             return image.size
     except UnidentifiedImageError as error:
         raise InputError(f"{path} is not an image this program can read; give it a {bitmap.FORMATS} file.") from error
+
+
+def decoded_bytes(path: Path) -> int:
+    """Bytes of an image once decoded, by its header: of EXR and TIFF all channels; as `image_size` else."""
+    with path.open("rb") as file:
+        head = file.read(4)
+    if head == _EXR:
+        return exr_bytes(path)
+    samples = 3
+    if head in _TIFF:
+        with TiffFile(path) as tiff:
+            samples = max(samples, int(tiff.pages[0].samplesperpixel))  # type: ignore[union-attr]
+    return 4 * samples * math.prod(image_size(path))
 
 
 def decode(path: Path) -> Decoded:

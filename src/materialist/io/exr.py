@@ -1,5 +1,6 @@
 """OpenEXR files, through the reference library: float32 survives a round trip bit for bit."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -61,6 +62,14 @@ def exr_size(header: dict[str, Any]) -> tuple[int, int]:
     """(width, height) of a part."""
     low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
     return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+
+
+def exr_bytes(path: Path) -> int:
+    """Bytes of all channels of all parts once decoded, by their headers. Raises InputError, for deep pixels too."""
+    headers = exr_headers(path)
+    if any("deep" in str(header.get("type")) for header in headers):
+        raise InputError(f"{path} holds deep pixels; save it as a plain picture.")
+    return 4 * sum(math.prod(exr_size(header)) * len(header["channels"]) for header in headers)
 
 
 def write_exr(path: str | Path, array: Array) -> None:

@@ -1,14 +1,13 @@
 """The files of a scene package, checked by their headers before anything is decoded."""
 
-import math
 from pathlib import Path
 
 import numpy as np
 
-from materialist.errors import InputError, SceneError
+from materialist.errors import SceneError
 from materialist.io.bitmap import stored_pixels
-from materialist.io.decode import RAW_SUFFIXES, image_size
-from materialist.io.exr import exr_headers, exr_size, read_exr
+from materialist.io.decode import RAW_SUFFIXES, decoded_bytes, image_size
+from materialist.io.exr import exr_bytes, exr_headers, exr_size, read_exr
 from materialist.types import Array
 
 LONGEST = 8192
@@ -18,6 +17,8 @@ MOST = 16e9
 RAW_GROWS = 12
 """Bytes of a decoded camera RAW for one of its file."""
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
+LIGHT = "prior/light.exr"
+"""The light of a predictor that knows any: radiance, and its scale as alpha."""
 
 
 def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
@@ -26,13 +27,13 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
     Raises whatever the readers of their headers raise.
     """
     pictures = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS]
-    pictures += ["photo.exr", "rerender.exr", "envmap.exr"]
+    pictures += ["photo.exr", "rerender.exr", "envmap.exr", *[LIGHT] * (folder / LIGHT).exists()]
     pictures += [f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3]]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
     total = sum(_exr_bytes(inside(folder, name)) for name in pictures)
     total += sum(inside(folder, name).stat().st_size for name in meshes)
-    total += _photo_bytes(inside(folder, original))
     _check_size(label := inside(folder, "plane_label.png"), image_size(label))
+    total += _photo_bytes(inside(folder, original)) + decoded_bytes(label)
     if total > most:
         raise SceneError(
             f"The scene {folder} takes {total / 1e9:.1f} GB of memory, more than {most / 1e9:g} GB; "
@@ -52,20 +53,13 @@ def read_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
 
 def _exr_bytes(file: Path) -> int:
     """Bytes of all channels once decoded."""
-    headers = exr_headers(file)
-    if any("deep" in str(header.get("type")) for header in headers):
-        raise InputError(f"{file} holds deep pixels; save it as a plain picture.")
-    _check_size(file, exr_size(headers[0]))
-    return 4 * sum(math.prod(exr_size(header)) * len(header["channels"]) for header in headers)
+    _check_size(file, exr_size(exr_headers(file)[0]))
+    return exr_bytes(file)
 
 
 def _photo_bytes(file: Path) -> int:
     """Bytes of a photo once decoded."""
-    if file.suffix.lower() in RAW_SUFFIXES:
-        return RAW_GROWS * file.stat().st_size
-    if file.suffix.lower() == ".exr":
-        return _exr_bytes(file)
-    return 12 * math.prod(image_size(file))
+    return RAW_GROWS * file.stat().st_size if file.suffix.lower() in RAW_SUFFIXES else decoded_bytes(file)
 
 
 def _check_size(file: Path, found: tuple[int, int]) -> None:

@@ -55,8 +55,8 @@ def write_ply(path: str | Path, mesh: Mesh) -> None:
         Path(path).write_bytes(header + vertices.tobytes() + faces.tobytes())
 
 
-def read_ply(path: str | Path) -> Mesh:
-    """Read a mesh that `write_ply` wrote. Raises SceneError for a damaged or foreign PLY."""
+def read_ply(path: str | Path, pixels: int | None = None) -> Mesh:
+    """Read a mesh that `write_ply` wrote, for a photo of `pixels`. Raises SceneError for a damaged or foreign PLY."""
     path = Path(path)
     with path.open("rb") as file:
         head, mark, _ = file.read(2048).partition(b"end_header\n")
@@ -75,11 +75,11 @@ def read_ply(path: str | Path) -> Mesh:
         raise SceneError(f"The mesh {path} has faces that are no triangles, or vertices that are NaN; it is damaged.")
     if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
         raise SceneError(f"The mesh {path} has faces of vertices that do not exist; it is damaged.")
+    pixel = faces["pixel"]
+    if pixels is not None and pixel.size and not 0 <= pixel.min() <= pixel.max() < pixels:
+        raise SceneError(f"The mesh {path} has faces of pixels that do not exist; it is damaged.")
     place, normals, uv = (np.array(part, np.float32, order="C") for part in np.split(vertices, [3, 6], axis=1))
-    return Mesh(
-        place, faces["vertex_indices"].astype(np.int32), normals, uv, faces["pixel"].astype(np.int32),
-        faces["plane"].astype(np.int16),
-    )  # fmt: skip
+    return Mesh(place, corners.astype(np.int32), normals, uv, pixel.astype(np.int32), faces["plane"].astype(np.int16))
 
 
 def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:

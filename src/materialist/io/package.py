@@ -13,7 +13,7 @@ from materialist.errors import SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
-from materialist.io.manifest import MAPS, MOST, check_files, inside, read_map
+from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, read_map
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -55,11 +55,14 @@ def _read(folder: Path, most: float) -> Scene:
     check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
     shape = (camera.height, camera.width)
     before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
+    light = read_map(folder / LIGHT) if (folder / LIGHT).exists() else None
+    if light is not None and light.shape[2:] != (4,):
+        raise SceneError(f"{folder / LIGHT} is {list(light.shape)}, and needs 4 channels; the package is damaged.")
     label = read_map(folder / "plane_label.png", shape).astype(np.int16) - 1
     return Scene(
         camera=camera, photo=_read_photo(folder, photo, shape), materials=materials, normal=normal, depth=depth,
-        prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {})),
-        geometry=Geometry(read_ply(folder / "mesh.ply"), label.astype(np.int8)),
+        prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {}), light),
+        geometry=Geometry(read_ply(folder / "mesh.ply", math.prod(shape)), label.astype(np.int8)),
         envmap=read_map(folder / "envmap.exr"), rerender=read_map(folder / "rerender.exr", (*shape, 3)),
         report=_read_report(folder), provenance=meta["provenance"],
         lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
@@ -76,6 +79,8 @@ def _write(scene: Scene, folder: Path) -> None:
         (folder / name).mkdir()
         for key, array in {**vars(maps.materials), "normal": maps.normal, "depth": maps.depth}.items():
             write_exr(folder / name / f"{key}.exr", array)
+    if scene.prior.light is not None:
+        write_exr(folder / LIGHT, scene.prior.light)
     write_exr(folder / "maps/shading_residual.exr", shading_residual(photo.linear, scene.rerender))
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)

@@ -77,10 +77,9 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
 
 def exposed(photo: Photo) -> Photo:
     """An HDR photo from memory, in any unit, as `read_photo` would have exposed it; any other as it is."""
-    from_memory = photo.source is None and not photo.stops
-    stops = _stops(photo.linear) if photo.hdr and from_memory else 0
-    if not stops:
+    if not photo.hdr or photo.source is not None or photo.stops:
         return photo
+    stops = _stops(photo.linear)
     factor = np.float32(2.0**stops)
     linear = np.minimum(factor * photo.linear, np.float32(HDR_CLIP))
     return replace(photo, linear=linear, original=factor * photo.original, stops=stops)

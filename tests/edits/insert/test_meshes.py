@@ -99,7 +99,7 @@ def test_what_lies_outside_is_never_followed(tmp_path, made, where):
         read_model(path)
 
 
-def test_missing_and_damaged_textures_are_told_and_a_constant_serves(tmp_path):
+def test_missing_and_damaged_textures_are_told_and_a_constant_serves(tmp_path, monkeypatch):
     for path in (textured_obj(tmp_path, texture="gone.png"), gltf_file(tmp_path, "tri.bin", image="gone.png")):
         model = read_model(path)
         assert any("gone.png is missing" in note for note in model.warnings)
@@ -110,6 +110,8 @@ def test_missing_and_damaged_textures_are_told_and_a_constant_serves(tmp_path):
     model = read_model(path)
     assert any("cannot be read" in note for note in model.warnings)
     np.testing.assert_allclose(model.parts[0].surface.albedo, 0.5)
+    monkeypatch.setattr("materialist.edits.insert.mesh_material.MAX_PIXELS", 3)
+    assert any("cannot be read" in note for note in read_model(textured_obj(tmp_path)).warnings)
 
 
 def test_what_an_mtl_says_beyond_its_colours(tmp_path):

@@ -1,5 +1,6 @@
 """Materials of mesh files as surfaces: glTF's metallic-roughness, OBJ's .mtl, colours of vertices."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import triple, uniform_surface
+from materialist.io.bitmap import MAX_PIXELS
 from materialist.types import Array, Surface
 
 GREY = 0.5
@@ -29,11 +31,13 @@ class Textures:
     def pixels(self, image: Any) -> Array | None:
         """[h, w, 3] float32 in [0, 1] as stored, of a PIL picture without its alpha; None for none, or a damaged one.
 
-        A picture whose longer side exceeds `longest` pixels is shrunk.
+        A picture whose longer side exceeds `longest` pixels is shrunk; one larger than any photo counts as damaged.
         """
         if image is None:
             return None
         try:
+            if math.prod(image.size) > MAX_PIXELS:
+                raise ValueError("too large")
             if image.mode.startswith(("I", "F")):  # greys of 16 bits or floats: "RGB" would clip them at 255
                 from PIL import Image
 
