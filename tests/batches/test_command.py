@@ -51,3 +51,12 @@ def test_a_spreadsheet_cannot_be_made_to_compute(tmp_path):
     )
     row = next(csv.DictReader((tmp_path / "summary.csv").open()))
     assert row["id"] == "'=1+1.png" and row["name"] == "'@x"
+
+
+def test_a_reader_that_left_does_not_make_a_failed_batch_a_good_one(run, tmp_path, monkeypatch):
+    def gone(*lines, **facts):
+        raise BrokenPipeError
+
+    monkeypatch.setattr("materialist.cli.batch.report_success", gone)
+    source = photos(tmp_path / "in", "impossible")
+    assert run("batch", source, "-o", tmp_path / "runs", "--workers", 1, "--device", "cpu")[0] == 2

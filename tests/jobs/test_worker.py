@@ -1,7 +1,10 @@
 """Worker processes: results, failures, death. Their pool, and the end of who started them: batches/test_kill.py."""
 
+import pytest
 from made_tasks import answer, until
 
+from materialist.errors import SetupError
+from materialist.jobs.pool import LocalPool
 from materialist.jobs.process import LOST, Worker
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
@@ -54,3 +57,12 @@ def test_an_idle_process_ends_by_itself():
     assert told(worker, "fine")[0].kind == DONE
     until(lambda: not worker.running)
     worker.close()
+
+
+def test_a_worker_that_cannot_be_started_is_a_sentence(monkeypatch):
+    def none(*words, **how):
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("subprocess.Popen", none)
+    with pytest.raises(SetupError, match="resource temporarily unavailable; give fewer --workers"):
+        LocalPool([{}]).begin("a", answer, {})

@@ -38,9 +38,11 @@ def batch(
             )  # fmt: skip
     except KeyboardInterrupt:
         raise Interrupted("Interrupted; what is done stays. Go on with the same command and --resume.") from None
-    _report(outcome, output, computing.as_json)
-    if outcome.exit_code:
-        raise typer.Exit(outcome.exit_code)
+    try:
+        _report(outcome, output, computing.as_json)
+    finally:  # also where the reader of a pipe left
+        if outcome.exit_code:
+            raise typer.Exit(outcome.exit_code)
 
 
 def _report(outcome: Outcome, output: Path, as_json: bool) -> None:

@@ -48,6 +48,10 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     except BrokenPipeError:  # the reader of a pipe left, as `head` does
         sys.stderr.close()
         return OK
+    except OSError as error:  # a name that is too long, a full disk
+        reason = (error.strerror or str(error)).lower()
+        said = f"{error.filename} cannot be used: {reason}." if error.filename else f"The system refused: {reason}."
+        return _fail("OSError", said, BAD_INPUT, wants_json)
     except Exception as error:
         if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("materialist"):
             return _fail("SetupError", f"{error.name} is not installed; see: materialist doctor", BAD_INPUT, wants_json)

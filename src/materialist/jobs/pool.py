@@ -31,7 +31,11 @@ class LocalPool:
 
     def begin(self, key: Hashable, task: Callable[..., Any], arguments: dict[str, Any]) -> None:
         place = next(place for place in self._places if place.key is None)
-        place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
+        try:
+            place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise SetupError(f"A worker process cannot be started: {reason}; give fewer --workers.") from error
         place.key = key
         place.worker.begin(task, arguments)
 
