@@ -10,7 +10,7 @@ from starlette.responses import PlainTextResponse
 from starlette.testclient import TestClient
 
 from materialist.errors import InputError
-from materialist.studio import StudioSettings, gate
+from materialist.studio import StudioSettings, gate, server
 from materialist.studio.gate import Gate
 from materialist.studio.server import password_of
 from materialist.studio.studio import PERSON
@@ -152,3 +152,49 @@ def test_the_password_need_not_be_an_argument(tmp_path, refused):
             password_of(word, tmp_path / file)
     assert "--password-file" in refused("studio", "--behind-proxy", "studio.example", "--work", tmp_path / "w")
     assert "HOST" in refused("studio", "--behind-proxy", "http://x/y", "--open", "--work", tmp_path / "w")
+
+
+@pytest.mark.parametrize(
+    ("method", "place", "status"),
+    [
+        ("GET", "/", 200), ("HEAD", "/", 200), ("GET", "/gradio_api/queue/data", 200), ("GET", "/runs", 404),
+        ("POST", "/", 404), ("POST", "/gradio_api/queue/join", 200), ("GET", "/gradio_api/info", 404),
+        ("POST", "/gradio_api/process_recording", 404), ("GET", "/gradio_api/deep_link", 404),
+        ("GET", "/gradio_api/proxy=http://a.example/b", 404),
+        ("GET", "/gradio_api/file=http://a.example/b.png", 403), ("GET", "/gradio_api/file=/etc/passwd", 403),
+        ("GET", "/gradio_api/file=CACHE/../../etc/passwd", 403), ("GET", "/gradio_api/file=CACHE/a/b.png", 200),
+        ("GET", "/gradio_api/heartbeat/a/b", 404), ("POST", "/gradio_api/heartbeat/a", 404),
+        ("HEAD", "/gradio_api/heartbeat/a", 200),
+    ],
+)  # fmt: skip
+def test_only_what_the_page_asks_for_is_answered(shared, method, place, status):
+    place = place.replace("CACHE", str(shared.work.cache))
+    assert client(shared).request(method, place).status_code == status
+    assert not any(one.beats for one in shared._sessions.values())
+
+
+def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
+    monkeypatch.setattr(gate, "SETTINGS", StudioSettings(request_bytes=1000, upload_megabytes=0.001))
+
+    async def reads(scope, receive, send):
+        while (await receive()).get("more_body"):
+            pass
+        await PlainTextResponse("read")(scope, receive, send)
+
+    page, closed = (TestClient(Gate(reads, shared, password=word)) for word in (None, "open sesame"))
+    chunks = lambda count: iter([b"x" * 100] * count)  # noqa: E731
+    for place, fits in (("queue/join", 10), ("upload", 20)):
+        size = {"content-length": "10"} if place == "upload" else {}
+        assert page.post(f"/gradio_api/{place}", content=chunks(fits), headers=size).status_code == 200
+        assert page.post(f"/gradio_api/{place}", content=chunks(fits + 1), headers=size).status_code == 413
+    assert closed.post("/login", content=chunks(50)).status_code == 413
+
+
+def test_gradio_fetches_nothing(shared, monkeypatch):
+    processing = pytest.importorskip("gradio", reason="needs gradio").processing_utils
+    for name in ("async_ssrf_protected_get", "async_ssrf_protected_download"):
+        monkeypatch.setattr(processing, name, getattr(processing, name))  # as it was, afterwards
+    server._fetch_nothing()
+    with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
+        thread.submit(processing.save_url_to_cache, "http://127.0.0.1:9/a.png", str(shared.work.cache)).result()
+    assert not list(shared.work.cache.iterdir())

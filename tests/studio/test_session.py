@@ -12,7 +12,7 @@ from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
-from materialist.studio import objects
+from materialist.studio import SETTINGS, objects
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
 from materialist.studio.preview import LivePreview, free_memory
@@ -257,3 +257,21 @@ def test_the_report_is_plain_and_harmless():
     text = report(scene)
     assert "31.5 dB from the photo" in text and "40.0°" in text and "&lt;img src=x> &#91;a](b)" in text
     assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in maps(room())) and len(maps(room())) == 8
+
+
+def test_places_are_pixels_and_those_outside_are_refused(session):
+    click(session, 64, 47.9)  # the page clips to the edge
+    objects.set_option(session, "mesh", objects.library_file(session, "Cube"))
+    objects.place(session, 64, 47.6)
+    assert session.edits.steps[-1].options["at"] == ["63", "47"]
+    place_lamp(session, 40.7, 40.7)
+    assert session.edits.steps[-1].options["lamps"][0][:2] == ["40", "40"]
+    for change in (click, objects.place, place_lamp):
+        with pytest.raises(InputError, match="outside of the photo"):
+            change(session, 99999, 20)
+
+
+def test_sixty_steps_can_be_taken_back(session):
+    for _ in range(70):
+        session.deselect()
+    assert len(session._past) == SETTINGS.undo_steps

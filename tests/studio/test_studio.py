@@ -6,17 +6,22 @@ import subprocess
 import sys
 import time
 import urllib.request
+from types import SimpleNamespace
 
 import pytest
 from made_tasks import until
 from studio_server import free_port
 
+from materialist.edits.recipe import Step
 from materialist.errors import InputError
+from materialist.io.photo import example_path
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, StudioSettings, widgets
+from materialist.studio.edit_list import EditList
 from materialist.studio.server import check_host
 from materialist.studio.studio import LOCAL_PERSON
+from materialist.studio.tab_open import _start_inversion
 from materialist.studio.widgets import PageContext
 
 
@@ -64,12 +69,13 @@ def test_a_port_in_use_is_one_sentence(refused, tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [["--port", "0"], ["--port", "99999"], ["--work", "/proc/nowhere"], ["--workers", "0"],
-     ["/no/such/scene"]],
+     ["/no/such/scene"], ["x" * 300]],
 )  # fmt: skip
-def test_bad_options_end_with_2(refused, arguments, tmp_path):
-    work = [] if "--work" in arguments else ["--work", tmp_path]
+def test_bad_options_end_with_2_and_make_no_folder(refused, arguments, tmp_path):
+    work = [] if "--work" in arguments else ["--work", tmp_path / "w"]
     port = [] if "--port" in arguments else ["--port", "47391"]
     refused("studio", *arguments, *work, *port)
+    assert not (tmp_path / "w").exists()
 
 
 def test_files_are_handed_over_under_names_nobody_guesses(shared):
@@ -188,3 +194,49 @@ def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shar
     person = "a" * 32
     silent, open_ = shared.session("silent", person), shared.session("open", person, beats=True)
     assert shared.session("silent", person) is not silent and shared.session("open", person) is open_
+
+
+def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
+    session = shared.session("page", "a" * 32)
+    for _ in range(SETTINGS.jobs_a_person):
+        shared.submit(session, time.sleep, shared.work.root)
+    with pytest.raises(InputError, match="6 jobs waiting"):
+        _start_inversion(PageContext(shared), session, str(example_path("example:cat")), "auto", 512, "auto")
+    assert not shared.work.projects()
+
+
+def test_little_is_remembered_of_people_who_are_gone(shared, monkeypatch):
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(people=2))
+    for person in "abac":
+        shared.note_last(person, "photo-001")
+    assert [*shared.last] == ["a", "c"]
+    shared.note_upload("a", "10")
+    shared._uploads = [(time.monotonic() - 3601, "a", SETTINGS.upload_quota)]
+    shared.note_upload("b", "10")
+    assert len(shared._uploads) == 1
+
+
+def test_the_disk_of_the_photos_counts_too(shared, monkeypatch):
+    free = {shared.work.cache: 10**12, shared.work.root: 10}
+    monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=free[place]))
+    with pytest.raises(InputError, match="disk of the studio is full"):
+        shared.note_upload("a", "10")
+
+
+def test_two_path_traced_pictures_of_a_page_are_two_files(shared, tmp_path, monkeypatch):
+    """The first is being written when its job is stopped, and the next begins."""
+    session = shared.session("page", "a" * 32)
+    session.project, made = shared.work.new("One", session.person), []
+
+    def work(self, session, task, output, **arguments):
+        output.with_suffix(".png").write_text(str(len(made)))
+        made.append(output)
+        return True
+        yield
+
+    monkeypatch.setattr(PageContext, "work", work)
+    for kind in ("edit", "relight"):
+        session.edits = EditList((Step(kind, {"hue": "3"}),))
+        assert [*PageContext(shared).traced(session)] == []
+    assert made[0] != made[1] and session.final.path == made[1]
+    assert [file.name for file in shared.work.cache.iterdir()] == [f"{made[1].name}.png"]

@@ -2,12 +2,15 @@
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
+import tifffile
 from made_png import png_header
 from studio_scenes import zipped, zipped_package
 
+from materialist.edits.insert.meshes import read_model
 from materialist.errors import InputError, SceneError
-from materialist.io.decode import image_size
+from materialist.io.decode import decoded_bytes, image_size
 from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
 from materialist.studio import StudioSettings, archives, tab_open, uploads
@@ -78,11 +81,24 @@ def test_zips_that_are_none(tmp_path, monkeypatch):
 def test_meshes_name_no_other_files(tmp_path):
     obj = tmp_path / "a.obj"
     obj.write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
-    assert uploads.checked_mesh(obj) == ".obj"
-    assert "secret" not in obj.read_text() and "f 1 2 3" in obj.read_text()
-    glb = tmp_path / "a.glb"
-    glb.write_bytes(b'glTF....{"images":[{"uri":"../../secret.png"}]}')
-    with pytest.raises(InputError, match="other files"):
-        uploads.checked_mesh(glb)
+    with pytest.raises(InputError, match="outside of its folder"), uploads.taken(tmp_path, obj, "mesh") as name:
+        read_model(tmp_path / name)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.obj"]  # what was refused does not stay
     with pytest.raises(InputError, match="not a mesh"):
-        uploads.checked_mesh(glb.with_suffix(".gltf"))
+        uploads.checked_mesh(obj.with_suffix(".gltf"))
+    with pytest.raises(InputError, match="no longer here"):
+        uploads.checked_mesh(tmp_path / "b.obj")
+
+
+def test_a_picture_is_measured_by_what_it_holds_and_not_by_its_name(tmp_path):
+    channels = {f"{k}.Y": np.zeros((400, 500), np.float32) for k in range(20)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels).write(str(tmp_path / "a.exr"))
+    (tmp_path / "a.exr").rename(tmp_path / "a.png")
+    assert decoded_bytes(tmp_path / "a.png") == 400 * 500 * 20 * 4
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(uploads, "SETTINGS", StudioSettings(upload_pixels=1_000_000))
+        with pytest.raises(InputError, match="without further channels"):
+            uploads.checked_picture(tmp_path / "a.png")
+    tifffile.imwrite(tmp_path / "a.tif", np.zeros((40, 50, 9), np.float32), photometric="rgb")
+    assert decoded_bytes(tmp_path / "a.tif") == 40 * 50 * 9 * 4

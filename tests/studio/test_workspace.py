@@ -1,5 +1,7 @@
 """The work folder: names of ours, people apart, nothing lost."""
 
+import os
+
 import pytest
 
 from materialist.studio.workspace import CARD, WorkFolder
@@ -44,3 +46,24 @@ def test_a_damaged_card_hides_its_project_alone(tmp_path):
     broken, good = work.new("a", "me"), work.new("b", "me")
     (broken.folder / CARD).write_text("{")
     assert [p.name for p in work.projects()] == [good.name]
+
+
+def test_the_newest_photo_is_first_and_no_folder_is_two_studios(tmp_path, monkeypatch):
+    one, other = WorkFolder(tmp_path), WorkFolder(tmp_path)
+    for number in (999, 1000):
+        monkeypatch.setattr("materialist.studio.workspace.count", lambda _, number=number: iter([number]))
+        one.new("a", "me")
+    assert [project.name for project in one.projects()] == ["photo-1000", "photo-999"]
+    monkeypatch.setattr("materialist.studio.workspace.count", lambda _: iter([999, 1000, 1001]))
+    assert other.new("b", "me").name == "photo-1001"
+
+
+def test_old_copies_go_and_what_the_page_shows_stays(tmp_path):
+    work = WorkFolder(tmp_path)
+    for name in ("old", "fresh", "page"):
+        (work.cache / name).mkdir()
+    work.kept = {work.cache / "page"}
+    for name in ("old", "page"):
+        os.utime(work.cache / name, (0, 0))
+    work.sweep()
+    assert sorted(place.name for place in work.cache.iterdir()) == ["fresh", "page"]

@@ -44,17 +44,18 @@ def studio(
     ] = None,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
-    from materialist.studio.server import check_host, check_port, first_target, new_studio, password_of, serve
+    from materialist.studio import server
 
-    password = password_of(how.password or os.environ.get("MATERIALIST_PASSWORD"), how.password_file)
-    single_user = check_host(how.host, password, how.everyone, how.behind_proxy)
-    check_port(how.host, how.port)
+    password = server.password_of(how.password or os.environ.get("MATERIALIST_PASSWORD"), how.password_file)
+    single_user = server.check_host(how.host, password, how.everyone, how.behind_proxy)
+    server.check_port(how.host, how.port)
     if how.device != "auto":
         from materialist.render.variant import setup
 
         setup(how.device)
-    made = new_studio(how.work, single_user=single_user, workers=how.workers, seed=how.seed, device=how.device)
-    made.start = first_target(made.work, target)
+    first = None if target is None else server.checked_target(target)
+    made = server.new_studio(how.work, single_user=single_user, workers=how.workers, seed=how.seed, device=how.device)
+    made.start = None if first is None else server.first_shown(made.work, first)
     if not how.as_json:
         typer.echo(f"Scenes and edits are kept in {made.work.root}")
 
@@ -62,4 +63,4 @@ def studio(
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
         report_success("studio", how.as_json, lines, address=address, work=str(made.work.root))
 
-    serve(made, host=how.host, port=how.port, password=password, proxy=how.behind_proxy, on_ready=on_ready)
+    server.serve(made, host=how.host, port=how.port, password=password, proxy=how.behind_proxy, on_ready=on_ready)

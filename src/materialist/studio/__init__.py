@@ -14,6 +14,7 @@ class StudioSettings:
     """Limits and sizes of the studio; tuned by eye."""
 
     upload_megabytes: float = 60  # largest upload
+    request_bytes: int = 2_000_000  # largest body of any other request
     upload_pixels: int = 60_000_000  # largest picture, from its header
     upload_quota: int = 1_000_000_000  # bytes that a person may upload in an hour
     disk_left: int = 2_000_000_000  # bytes that uploads leave free
@@ -22,9 +23,12 @@ class StudioSettings:
     jobs_a_person: int = 6  # that wait or run
     jobs: int = 60  # of all
     wrong_passwords: int = 20  # a minute, of all who try
+    people: int = 10_000  # whose last photo is remembered
     person_seconds: int = 31_536_000  # a browser stays the same person: a year
     page_seconds: float = 60.0  # a page that never showed that it is open is forgotten after its last request
-    unfinished_seconds: float = 86_400.0  # the folder of a photo that was not taken apart to the end goes
+    unfinished_seconds: float = (
+        86_400.0  # folders of photos that were not taken apart to the end go, uploads and copies
+    )
     free_for_scene: float = 1.2e9  # bytes of memory that must be free before another scene is opened
     free_for_glass: float = 2.0e9  # bytes of memory that must be free before glass is traced
     glass_idle: float = 900.0  # seconds without a request after which the glass process ends

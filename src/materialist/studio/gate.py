@@ -1,6 +1,8 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
 import hmac
+import os
+import re
 import secrets
 import time
 from collections import deque
@@ -9,6 +11,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 
@@ -18,9 +21,16 @@ from materialist.studio.studio import PERSON, Studio
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
 LOCAL = ("localhost", "127.0.0.1", "::1")
-_BEAT = "/gradio_api/heartbeat/"
+_API = "/gradio_api/"
+_BEAT = f"{_API}heartbeat/"
 """A page holds a request to this place, and its name, as long as it is open."""
-_UPLOAD = "/gradio_api/upload"
+_UPLOAD, _FILE = f"{_API}upload", f"{_API}file="
+_READ = re.compile(
+    rf"/|/(config|theme\.css|favicon\.ico|robots\.txt)|/(assets|static)/.+|{_FILE}.+|{_BEAT}\w+"
+    rf"|{_API}(queue/data|upload_progress|app_id)"
+)
+_PLACES = {"GET": _READ, "HEAD": _READ, "POST": re.compile(rf"{_API}(queue/join|run/predict|upload)")}
+"""Method -> what the page asks for. Gradio has more: places that fetch from other machines, record and write."""
 _FORM_BYTES = 4096
 HEADERS = {
     # Gradio makes functions of texts and styles of its own; whatever they do, it stays between page and studio.
@@ -39,11 +49,11 @@ HEADERS = {
 class Gate:
     """ASGI application before the page.
 
-    It refuses what pages of other sites ask. A browser sends `Origin` with what a page asks of another place; it must
-    be the place that is asked. Where the studio serves this machine only, that place must have one of its names, too:
-    a site that lets its own name point to 127.0.0.1 (DNS rebinding) is of the same origin, but not of ours. Behind a
-    proxy it must be the proxy's. With a password nothing but the form for it is shown before it was given. The name of
-    a page (Gradio's session hash) belongs to the browser that used it first.
+    It refuses what the page never asks for, and what pages of other sites ask. A browser sends `Origin` with what a
+    page asks of another place; it must be the place that is asked. Where the studio serves this machine only, that
+    place must have one of its names, too: a site that lets its own name point to 127.0.0.1 (DNS rebinding) is of the
+    same origin, but not of ours. Behind a proxy it must be the proxy's. With a password nothing but the form for it is
+    shown before it was given. The name of a page (Gradio's session hash) belongs to the browser that used it first.
     """
 
     def __init__(
@@ -67,7 +77,7 @@ class Gate:
         if scope["type"] != "http":
             return await send({"type": "websocket.close", "code": 1008})
         scope["headers"] = self._heard(scope["headers"])
-        request = Request(scope, receive)
+        request = Request(scope, _limited(receive, self._most(scope)))
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies)
 
@@ -81,7 +91,16 @@ class Gate:
                     headers.append("set-cookie", f"{name}={value}; Path=/; HttpOnly; SameSite=Lax{kept}{secure}")
             await send(message)
 
-        await app(scope, receive, answer)
+        try:
+            await app(scope, request.receive, answer)
+        except HTTPException as error:  # of a body that is too long, where the application lets it pass
+            await PlainTextResponse(f"{error.detail}\n", error.status_code)(scope, receive, answer)
+
+    def _most(self, scope: Any) -> int:
+        """Bytes that the body of a request may have."""
+        if scope["path"] == _UPLOAD:
+            return int(SETTINGS.upload_megabytes * 1e6) + SETTINGS.request_bytes
+        return _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
 
     def allows(self, headers: dict[bytes, bytes]) -> bool:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
@@ -118,11 +137,15 @@ class Gate:
             person = self.studio.person(request.cookies.get(PERSON))
         except InputError:  # its browser is new here
             cookies[PERSON] = person = secrets.token_hex(16)
-        path = request.url.path.rstrip("/")
+        path = request.scope["path"]
+        if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
+            return PlainTextResponse("The studio has no such place.\n", 404)
+        if path.startswith(_FILE) and not self._served(path.removeprefix(_FILE)):
+            return PlainTextResponse("The studio serves no such file.\n", 403)
         try:
             if page := request.query_params.get("session_hash"):
                 self.studio.session(page, person)
-            if path.startswith(_BEAT):
+            if path.startswith(_BEAT) and request.method == "GET":
                 self.studio.session(path.removeprefix(_BEAT), person, beats=True)
             if path == _UPLOAD:
                 self.studio.note_upload(person, request.headers.get("content-length", ""))
@@ -130,12 +153,16 @@ class Gate:
             return PlainTextResponse(f"{error}\n", 403)
         return self.app
 
+    def _served(self, file: str) -> bool:
+        """Whether a file is one that the studio handed over, or was given."""
+        return os.path.realpath(file).startswith(f"{os.path.realpath(self.studio.work.cache)}/")
+
     async def _log_in(self, request: Request, cookies: dict[str, str]) -> Response:
         """The page where the password is right, else the form again; after too many wrong ones whatever it is."""
-        size = request.headers.get("content-length", "")
-        if not size.isdigit() or int(size) > _FORM_BYTES:
+        try:
+            body = await request.body()
+        except HTTPException:
             return self._form(413, "That is too long for a password.")
-        body = await request.body()
         now = time.monotonic()
         while self._wrong and now - self._wrong[0] > 60:
             self._wrong.popleft()
@@ -151,6 +178,21 @@ class Gate:
 
     def _form(self, status: int, message: str = "") -> Response:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
+
+
+def _limited(receive: Any, most: int) -> Any:
+    """`receive` that raises HTTPException after so many bytes, whatever the headers promise."""
+    got = 0
+
+    async def counted() -> Any:
+        nonlocal got
+        message = await receive()
+        got += len(message.get("body", b""))
+        if got > most:
+            raise HTTPException(413, f"That is more than the {most} bytes that may come here.")
+        return message
+
+    return counted
 
 
 def _place(address: str) -> tuple[str, int | None]:

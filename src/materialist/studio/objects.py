@@ -8,6 +8,7 @@ from trimesh import creation, transformations
 from materialist.edits.recipe import KINDS as STEPS
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
+from materialist.io.atomic import whole_file
 from materialist.studio.session import Session
 
 KINDS = ("insert", "drop")
@@ -33,12 +34,12 @@ def last(session: Session) -> int | None:
 def place(session: Session, x: float, y: float) -> None:
     """Stand the current object at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
     with session.lock:
-        _, edits = session.scene, session.edits
+        at, edits = [str(v) for v in session.pixel(x, y)], session.edits
         if session.current_kind not in KINDS:
             if "mesh" not in session.next_object:
                 raise InputError("Choose an object from the list, or upload one, first.")
             edits = edits.add(Step("insert", session.next_object, session.workspace))
-        session.put(edits, at=[f"{x:.0f}", f"{y:.0f}"])
+        session.put(edits, at=at)
 
 
 def set_option(session: Session, name: str, value: str | None) -> None:
@@ -46,9 +47,9 @@ def set_option(session: Session, name: str, value: str | None) -> None:
     with session.lock:
         if name == "mesh":  # another object is a new one
             session.edits = session.edits.chosen(None)
-        session.next_object = {k: v for k, v in {**session.next_object, name: value}.items() if v is not None}
         if session.current_kind == "insert" or (session.current_kind == "drop" and name in STEPS["drop"]):
             session.put(session.edits, **{name: value})
+        session.next_object = {k: v for k, v in {**session.next_object, name: value}.items() if v is not None}
 
 
 def let_fall(session: Session, height: float) -> list[str]:
@@ -93,5 +94,6 @@ def library_file(session: Session, name: str) -> str:
         mesh = getattr(creation, maker)(**options)
         # trimesh builds along +Z; a ring lies flat as it is.
         mesh.apply_transform(transformations.rotation_matrix(-np.pi / 2, [1, 0, 0]))
-        mesh.export(file)
+        with whole_file(file, force=True) as temporary:
+            mesh.export(temporary)
     return file.name

@@ -65,20 +65,24 @@ def check_port(host: str, port: int) -> None:
             ) from error
 
 
-def first_target(work: WorkFolder, target: str | None) -> Project | Path | None:
-    """The target of the command: a scene package as a project, or a photo as a file. Raises InputError."""
-    if target is None:
-        return None
-    path = Path(target)
-    if (path / "scene.json").is_file():
-        resolved = path.resolve()
-        known = next((p for p in work.projects() if p.scene == resolved), None)
-        return known or work.new(path.stem, LOCAL_PERSON, scene=resolved)
-    photo = example_path(target) if target.startswith(PREFIX) else path
-    if not photo.is_file():
-        raise InputError(f"There is no photo and no scene package at {target}.")
-    uploads.checked_picture(photo)
-    return photo
+def checked_target(target: str) -> Path:
+    """The target of the command: a scene package or a photo. Raises InputError."""
+    path = example_path(target) if target.startswith(PREFIX) else Path(target)
+    if not (path / "scene.json").is_file():
+        if not path.is_file():
+            raise InputError(f"There is no photo and no scene package at {target}.")
+        uploads.checked_picture(path)
+    return path
+
+
+def first_shown(work: WorkFolder, path: Path) -> Project | Path:
+    """A scene package as a project; a photo as it is."""
+    if path.is_file():
+        return path
+    scene = path.resolve()
+    return next((p for p in work.projects() if p.scene == scene), None) or work.new(
+        path.stem, LOCAL_PERSON, scene=scene
+    )
 
 
 def serve(
@@ -102,6 +106,8 @@ def serve(
     from materialist.studio.page import build
 
     page = build(studio)
+    studio.work.kept = {*studio.work.cache.iterdir()}
+    _fetch_nothing()
     page.queue(default_concurrency_limit=8, max_size=200)
     app = gr.mount_gradio_app(
         FastAPI(openapi_url=None), page, "/", footer_links=[], show_error=True, allowed_paths=[], ssr_mode=False,
@@ -130,6 +136,16 @@ def serve(
         server.should_exit = True
         thread.join(3)
         shutil.rmtree(studio.work.cache, ignore_errors=True)
+
+
+def _fetch_nothing() -> None:
+    """Let Gradio open no address that a request names in place of a file."""
+    from gradio import processing_utils
+
+    async def refused(url: str, *_: Any) -> Any:
+        raise InputError(f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file.")
+
+    processing_utils.async_ssrf_protected_get = processing_utils.async_ssrf_protected_download = refused
 
 
 def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:

@@ -1,7 +1,6 @@
 """The state of one page: its scene, selection, list of edits and undo history."""
 
 import re
-import secrets
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -56,8 +55,6 @@ class Session:
         self._past: list[tuple[str, EditList, Selection]] = []
         self._future: list[tuple[str, EditList, Selection]] = []
         self.running: list[Job] = []
-        self.mark = secrets.token_hex(4)
-        """Tells this page's path-traced pictures from those of other pages."""
         self.seen, self.beats = 0.0, False
         """When this page last asked for something, by the monotonic clock, and whether it shows that it is open."""
         self._kept: bytes | None = None
@@ -82,6 +79,13 @@ class Session:
     def workspace(self) -> Path:
         """Where this person's edits of the open photo lie."""
         return self.opened.workspace(self.person)
+
+    def pixel(self, x: float, y: float) -> tuple[int, int]:
+        """(column, row) of the pixel at a place of the photo, its right and bottom edge included. Raises InputError."""
+        camera = self.scene.camera
+        if not (0 <= x <= camera.width and 0 <= y <= camera.height):
+            raise InputError(f"The place {x:g}, {y:g} is outside of the photo; click in it.")
+        return min(int(x), camera.width - 1), min(int(y), camera.height - 1)
 
     def note_job(self, job: Job) -> None:
         """Note a job that this page asked for, to stop it by a button, or when the page is closed."""
@@ -122,12 +126,18 @@ class Session:
                 self.live.close()
             if self.glass is not None:
                 self.glass.stop()
-            if self.final is not None:
-                for file in self.final.path.parent.glob(f"{self.final.path.name}*"):
-                    file.unlink()
+            self.take_final(None)
             self.project = self.live = self.glass = self.final = None
             self.edits, self._past, self._future = EditList(), [], []
             self.selection = Selection()
+
+    def take_final(self, picture: FinalPicture | None) -> None:
+        """Keep another path-traced picture, or none; the files of the last one go."""
+        with self.lock:
+            if self.final is not None:
+                for file in self.final.path.parent.glob(f"{self.final.path.name}*"):
+                    file.unlink()
+            self.final = picture
 
     # Selecting
 
@@ -136,7 +146,7 @@ class Session:
         with self.lock:
             scene, mode, before = self.scene, pick["mode"], self.selection
             if pick["tool"] == "click":
-                x, y = pick["at"]
+                x, y = self.pixel(*pick["at"])
                 after = before.click(scene, x, y, mode, method)
             elif pick["tool"] == "box":
                 after = before.box(scene, pick["at"], mode, method)
@@ -259,7 +269,7 @@ class Session:
             self._check_unchanged()
         self._future = []
         if not (moving and self._past and self._past[-1][0] == what):
-            self._past = [*self._past[-SETTINGS.undo_steps :], (what, self.edits, self.selection)]
+            self._past = [*self._past, (what, self.edits, self.selection)][-SETTINGS.undo_steps :]
 
     def _region_of(self, edits: EditList) -> Selection:
         """The selection that the current step was made with."""

@@ -5,7 +5,6 @@ import secrets
 import shutil
 import threading
 import time
-from collections import deque
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -44,8 +43,8 @@ class Studio:
     last: dict[str, str] = field(default_factory=dict)
     """Person -> the project last opened or begun; a page that is loaded again goes on with it."""
     _sessions: dict[str, Session] = field(default_factory=dict)
-    _uploads: dict[str, deque[tuple[float, int]]] = field(default_factory=dict)
-    """Person -> when, and how many bytes."""
+    _uploads: list[tuple[float, str, int]] = field(default_factory=list)
+    """When, by whom, and how many bytes, within the last hour."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def person(self, token: Any) -> str:
@@ -86,14 +85,13 @@ class Studio:
             raise InputError("An upload must say how long it is.")
         now = time.monotonic()
         with self._lock:
-            mine = self._uploads.setdefault(person, deque())
-            while mine and now - mine[0][0] > 3600:
-                mine.popleft()
-            if sum(bytes_ for _, bytes_ in mine) + int(size) > SETTINGS.upload_quota:
+            self._uploads = [one for one in self._uploads if now - one[0] < 3600]
+            if sum(bytes_ for _, who, bytes_ in self._uploads if who == person) + int(size) > SETTINGS.upload_quota:
                 raise InputError(f"You have uploaded {SETTINGS.upload_quota / 1e9:g} GB within an hour; go on later.")
-            if shutil.disk_usage(self.work.cache).free - int(size) < SETTINGS.disk_left:
+            free = min(shutil.disk_usage(place).free for place in (self.work.cache, self.work.root))
+            if free - int(size) < SETTINGS.disk_left:
                 raise InputError("The disk of the studio is full; it takes no more uploads.")
-            mine.append((now, int(size)))
+            self._uploads.append((now, person, int(size)))
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
@@ -116,7 +114,15 @@ class Studio:
         if psutil.virtual_memory().available < SETTINGS.free_for_scene:
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
-        self.last[session.person] = name
+        self.note_last(session.person, name)
+
+    def note_last(self, person: str, name: str) -> None:
+        """Note the project that a person opened or began last; those who did so longest ago are forgotten."""
+        with self._lock:
+            self.last.pop(person, None)
+            self.last[person] = name
+            if len(self.last) > SETTINGS.people:
+                del self.last[next(iter(self.last))]
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
         """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`.

@@ -10,7 +10,7 @@ import numpy as np
 from materialist.edits.light import presets
 from materialist.errors import InputError
 from materialist.io.display import light
-from materialist.io.exr import write_exr
+from materialist.io.image import write_image
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.controls import SUN, file_field, number_text, slider
 from materialist.studio.session import Session
@@ -72,17 +72,19 @@ def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: fl
 
 
 def _uploaded(session: Session, file: Path) -> None:
-    session.light(envmap=uploads.stored(session.workspace, file, "envmap"), gain="auto")
+    with uploads.taken(session.workspace, file, "envmap") as name:
+        session.light(envmap=name, gain="auto")
 
 
 def place_lamp(
     session: Session, x: float, y: float, kelvin: float = 2700, power: float = 1, before: float = SETTINGS.lamp_share
 ) -> None:
     """Hang a lamp before the surface at a pixel, `before` its share of the way. Raises InputError without a surface."""
-    depth = float(session.scene.depth[int(y), int(x)])
+    column, row = session.pixel(x, y)
+    depth = float(session.scene.depth[row, column])
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
-    new = [f"{x:.0f}", f"{y:.0f}", *(number_text(v) for v in (depth * before, kelvin, power))]
+    new = [str(column), str(row), *(number_text(v) for v in (depth * before, kelvin, power))]
     place = session.edits.light
     known = session.edits.steps[place].options.get("lamps", []) if place is not None else []
     session.light(lamps=[*known, new])
@@ -92,7 +94,7 @@ def _written(session: Session, name: str) -> str:
     """A computed light as a file in the workspace, so that the recipe can be replayed anywhere."""
     file = session.workspace / f"light-{name.lower()}.exr"
     if not file.is_file():
-        write_exr(file, presets.light(name))
+        write_image(file, presets.light(name), force=True)
     return file.name
 
 

@@ -37,7 +37,7 @@ def wire(context: PageContext) -> None:
 
     def show_mesh(session: Session) -> Iterator[Updates]:
         file = session.workspace / MESH
-        if file.is_file() or (yield from context.work(session, tasks.mesh, file)):
+        if (yield from context.work(session, tasks.mesh, file)):
             yield {"mesh": studio.public_copy(file)}
             yield {}  # Gradio sends the last updates twice, and of a value sent twice the viewer loads nothing
 

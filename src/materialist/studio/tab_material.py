@@ -51,4 +51,5 @@ def _coloured(session: Session, value: str) -> None:
 
 
 def _textured(session: Session, file: Path) -> None:
-    session.set("edit", albedo=None, texture=uploads.stored(session.workspace, file, "texture"))
+    with uploads.taken(session.workspace, file, "texture") as name:
+        session.set("edit", albedo=None, texture=name)

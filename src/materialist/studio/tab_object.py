@@ -71,9 +71,9 @@ def _choose(session: Session, name: str | None) -> Updates:
 
 
 def _uploaded(session: Session, file: Path) -> Updates:
-    stored = uploads.stored(session.workspace, file, "mesh")
-    read_model(session.workspace / stored)
-    objects.set_option(session, "mesh", stored)
+    with uploads.taken(session.workspace, file, "mesh") as name:
+        read_model(session.workspace / name)
+        objects.set_option(session, "mesh", name)
     return {"tool": "place", "thing": None}
 
 

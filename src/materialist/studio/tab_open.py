@@ -117,11 +117,15 @@ def _start_inversion(
     suffix = uploads.checked_picture(source)
     project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
-    shutil.copyfile(source, photo)
-    job = studio.submit(
-        session, tasks.invert, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
-        predictor=predictor, size=int(size), fov=fov.strip() or "auto", seed=studio.seed,
-    )  # fmt: skip
+    try:
+        shutil.copyfile(source, photo)
+        job = studio.submit(
+            session, tasks.invert, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
+            predictor=predictor, size=int(size), fov=fov.strip() or "auto", seed=studio.seed,
+        )  # fmt: skip
+    except Exception:
+        shutil.rmtree(project.folder, ignore_errors=True)
+        raise
     return project, job
 
 
@@ -140,7 +144,7 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     """Progress and first pictures of an inversion until it is over; then the project, if it is done."""
     studio = context.studio
     session.note_job(job)
-    studio.last[session.person] = project.name
+    studio.note_last(session.person, project.name)
     yield {"start": gr.update(interactive=False)}
     shown = 0
     for update in context.following(job):

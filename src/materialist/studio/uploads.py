@@ -1,11 +1,12 @@
 """Uploaded files: checked by size and header before anything is decoded, and stored under names of ours."""
 
-import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from materialist.errors import InputError
 from materialist.io.bitmap import check_size
-from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, image_size
+from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decoded_bytes, image_size
 from materialist.studio import SETTINGS
 from materialist.studio.workspace import store
 
@@ -18,6 +19,19 @@ def stored(workspace: Path, file: Path, option: str) -> str:
     return store(workspace, option, file.read_bytes(), suffix)
 
 
+@contextmanager
+def taken(workspace: Path, file: Path, option: str) -> Iterator[str]:
+    """`stored` for a block that uses the file; where it is refused there, it does not stay."""
+    before = {*workspace.iterdir()}
+    name = stored(workspace, file, option)
+    try:
+        yield name
+    except Exception:
+        if workspace / name not in before:
+            (workspace / name).unlink()
+        raise
+
+
 def checked_picture(path: Path) -> str:
     """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large."""
     suffix, shown = path.suffix.lower(), shown_name(path)
@@ -26,7 +40,7 @@ def checked_picture(path: Path) -> str:
     check_bytes(path, shown)
     if suffix not in RAW_SUFFIXES:
         try:
-            width, height = image_size(path)
+            (width, height), decoded = image_size(path), decoded_bytes(path)
         except InputError:
             raise
         except Exception as error:  # decoders raise anything
@@ -37,23 +51,20 @@ def checked_picture(path: Path) -> str:
                 f"{SETTINGS.upload_pixels / 1e6:.0f}: shrink it first."
             )
         check_size(width, height, shown)
+        if decoded > 12 * SETTINGS.upload_pixels:
+            raise InputError(
+                f"{shown} takes {decoded / 1e9:.1f} GB of memory; the studio takes up to "
+                f"{12e-9 * SETTINGS.upload_pixels:g}: save its colours without further channels."
+            )
     return suffix
 
 
 def checked_mesh(path: Path) -> str:
-    """The suffix of an uploaded mesh. Raises InputError for a kind that could name other files.
-
-    PLY, STL and binary glTF hold everything in one file; OBJ is taken without its material library.
-    """
+    """The suffix of an uploaded mesh, whose reader follows no reference out of its folder. Raises InputError."""
     suffix, shown = path.suffix.lower(), shown_name(path)
     if suffix not in MESHES:
         raise InputError(f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file.")
     check_bytes(path, shown)
-    content = path.read_bytes()
-    if suffix == ".glb" and re.search(rb'"uri"\s*:\s*"(?!data:)', content):
-        raise InputError(f"{shown} refers to other files; export it with everything embedded.")
-    if suffix == ".obj" and re.search(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b", content):
-        path.write_bytes(re.sub(rb"(?m)^\s*(mtllib|usemap|map_\w+|call|csh)\b.*$", b"", content))
     return suffix
 
 
@@ -63,7 +74,9 @@ def shown_name(path: Path) -> str:
 
 
 def check_bytes(path: Path, shown: str) -> None:
-    """Raises InputError for an empty file, and for one that is too large."""
+    """Raises InputError for a file that was cleared away, an empty one, and one that is too large."""
+    if not path.is_file():
+        raise InputError(f"{shown} is no longer here; give it again.")
     size = path.stat().st_size
     if size == 0:
         raise InputError(f"{shown} is empty (0 bytes); copy it again.")

@@ -1,5 +1,6 @@
 """Shared by the tabs of the page: components, events that change the session, and the values of the controls."""
 
+import secrets
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterator
@@ -166,11 +167,11 @@ class PageContext:
         steps, known = session.edits.active, session.final
         if known is not None and known.of(steps):
             return known
-        target = self.studio.work.cache / f"final-{session.mark}"  # goes when the studio ends
-        if not (yield from self.work(session, tasks.final, target, steps=steps)):
+        made = FinalPicture(steps, self.studio.work.cache / f"final-{secrets.token_hex(16)}")
+        if not (yield from self.work(session, tasks.final, made.path, steps=steps)):
             return None
-        session.final = FinalPicture(steps, target)
-        return session.final
+        session.take_final(made)
+        return made
 
 
 def failure(job: Job) -> str:

@@ -13,7 +13,9 @@ import threading
 import time
 import weakref
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -75,22 +77,26 @@ class WorkFolder:
             tempfile.TemporaryFile(dir=self.root).close()
         self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
         """Uploads and results that are handed over; they go with this object."""
+        self.kept: set[Path] = set()
+        """What stays there: pictures of the page itself."""
         self._end = weakref.finalize(self, shutil.rmtree, self.cache, ignore_errors=True)
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
         found = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
         mine = [p for p in found if p is not None and person in (None, p.owner)]
-        return sorted(mine, key=lambda p: p.name, reverse=True)
+        return sorted(mine, key=lambda p: int(p.name[6:]), reverse=True)
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
         """An empty project; with `scene` one that uses a package elsewhere. Old unfinished ones go."""
         self.sweep()
         with self._lock:  # two people may ask at once
             taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
-            folder = self.root / f"photo-{max(taken, default=0) + 1:03d}"
-            with writing(folder):
-                make_folder(folder)
+            for number in count(max(taken, default=0) + 1):
+                folder = self.root / f"photo-{number:03d}"
+                with writing(folder), suppress(FileExistsError):  # another studio was faster
+                    folder.mkdir()
+                    break
         project = Project(folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE)
         place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
         content = {"title": project.title, "owner": project.owner, "scene": place}
@@ -99,7 +105,10 @@ class WorkFolder:
         return project
 
     def sweep(self) -> None:
-        """Remove the folders of photos that were not taken apart to the end and lie idle."""
+        """Remove what lies idle: folders of photos that were not taken apart to the end, uploads, and results."""
+        for place in {*self.cache.iterdir()} - self.kept:
+            if place.is_dir() and time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds:
+                shutil.rmtree(place, ignore_errors=True)
         for project in self.projects():
             idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
