@@ -1,6 +1,7 @@
 """`materialist batch`: exit codes, what is printed, the page and the tables it leaves."""
 
 import csv
+import io
 import json
 import re
 
@@ -58,5 +59,6 @@ def test_a_reader_that_left_does_not_make_a_failed_batch_a_good_one(run, tmp_pat
         raise BrokenPipeError
 
     monkeypatch.setattr("materialist.cli.batch.report_success", gone)
+    monkeypatch.setattr("sys.stderr", io.StringIO())  # a command whose reader left closes it
     source = photos(tmp_path / "in", "impossible")
     assert run("batch", source, "-o", tmp_path / "runs", "--workers", 1, "--device", "cpu")[0] == 2

@@ -3,8 +3,9 @@
 import pytest
 from made_batch import photos
 
-from materialist.batches.edits import edits_key
+from materialist.batches.edits import edits_for, edits_key
 from materialist.batches.run import batch
+from materialist.edits.recipe import read_recipe
 from materialist.errors import InputError
 
 TEXT = "- drop: {mesh: ['{name}.ply', ball.ply], at: [3, 4]}\n- edit: {mask: 'm/{name}.png', hue: 20}\n"
@@ -54,3 +55,12 @@ def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     outcome = batch(source, runs, resume=True, progress=said.append, **options)
     assert said[0].news.startswith("1 of 2 photos lack a file") and not said[0].running
     assert "m/two.png for two.png" in said[0].news and outcome.count("failed") == 2 and (runs / "two.scene").is_dir()
+
+
+def test_a_list_is_parsed_once_for_all_photos_and_anew_when_it_was_changed(recipe, monkeypatch):
+    parsed, real = [], read_recipe
+    monkeypatch.setattr("materialist.edits.recipe.read_recipe", lambda path: parsed.append(path) or real(path))
+    one, other = (edits_for(recipe, name)[0].options["mesh"] for name in "ab")
+    assert len(parsed) == 1 and one == ["a.ply", "ball.ply"] and other == ["b.ply", "ball.ply"]
+    recipe.write_text(TEXT.replace("20", "30"))
+    assert edits_for(recipe, "a")[1].options["hue"] == "30"

@@ -8,7 +8,7 @@ from made_batch import photos
 
 from materialist.batches.photos import LONGEST_NAME as LONGEST
 from materialist.batches.photos import list_photos, unique_names
-from materialist.batches.remote import fingerprint, local_copy, shown
+from materialist.batches.remote import fingerprint, local_copy, without_secrets
 from materialist.batches.run import batch
 from materialist.errors import InputError
 
@@ -35,7 +35,7 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
     assert found["a.png"] == str(tmp_path / "a.png") and found["none.png"] == str(tmp_path / "none.png")
     assert found["example:cat"] == "example:cat" and len(found) == 5
     assert found["https://host/x.jpg"] == "https://me:secret@host/x.jpg?signature=1"
-    assert shown("ftp://user:p@ss@host/x.jpg") == "ftp://host/x.jpg"
+    assert without_secrets("ftp://user:p@ss@host/x.jpg") == "ftp://host/x.jpg"
 
 
 @pytest.mark.parametrize(

@@ -146,3 +146,20 @@ def test_download_without_a_hub_and_of_nothing(refused):
 def test_train_on_without_a_folder_says_what_it_needs():
     done = subprocess.run([str(ROOT / "scripts" / "train-on")], capture_output=True, text=True)
     assert done.returncode == 2 and "RUN/data" in done.stderr
+
+
+def test_quickstart_takes_paths_of_the_caller_and_forces_its_own_place_only(tmp_path):
+    for name in ("scripts/quickstart", "scripts/setup", ".venv/bin/materialist"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        text = (ROOT / name).read_text() if name == "scripts/quickstart" else '#!/bin/sh\necho "$@"\n'
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+    here = tmp_path / "else where"
+    here.mkdir()
+    for given, said in (
+        ([], "invert example:coffee -o out/coffee.scene --force"),
+        (["a.png"], f"invert {here}/a.png -o out/a.scene --force"),
+        (["/b/a.png", "yes"], f"invert /b/a.png -o {here}/yes"),
+    ):
+        told = subprocess.run(["../scripts/quickstart", *given], cwd=here, capture_output=True, text=True, check=True)
+        assert told.stdout.splitlines()[-1] == said

@@ -117,7 +117,7 @@ def test_lists_and_zips_that_are_refused_leave_nothing(studio, session, tmp_path
         file.write_text(given)
     with pytest.raises(InputError, match=words) as error:
         session.read_edits(file)
-    assert str(tmp_path) not in studio.shown(str(error.value)) and session.edits.steps == ()
+    assert str(tmp_path) not in studio.without_folders(str(error.value)) and session.edits.steps == ()
     assert sorted(session.workspace.iterdir()) == before
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,10 +18,22 @@ def edits_for(path: str | Path, name: str) -> "list[Step]":
 
     Raises InputError as `read_recipe`.
     """
-    from materialist.edits.recipe import read_recipe, with_files
+    from materialist.edits.recipe import with_files
 
     put = lambda _, value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
-    return [with_files(step, put) for step in read_recipe(path)]
+    try:
+        content = Path(path).read_bytes()
+    except OSError:  # told by what reads the steps
+        content = b""
+    return [with_files(step, put) for step in _steps(path, content)]
+
+
+@lru_cache(maxsize=1)
+def _steps(path: str | Path, content: bytes) -> "list[Step]":
+    """The steps of a file with this content, parsed once for all photos."""
+    from materialist.edits.recipe import read_recipe
+
+    return read_recipe(path)
 
 
 def edits_key(path: str | Path, name: str, spp: int) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from materialist.batches.ledger import LEDGER
-from materialist.batches.remote import is_url, list_url, shown
+from materialist.batches.remote import is_url, list_url, without_secrets
 from materialist.errors import InputError
 from materialist.io.atomic import MARKER
 from materialist.io.bitmap import FORMATS
@@ -39,7 +39,7 @@ def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
     """
     text = str(source)
     if is_url(text):
-        found = [Listed(shown(url), url) for url in list_url(text, SUFFIXES)]
+        found = [Listed(without_secrets(url), url) for url in list_url(text, SUFFIXES)]
     elif text.startswith(PREFIX) or (Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()):
         found = [_named(text, Path())]
     elif Path(text).is_dir():
@@ -49,7 +49,7 @@ def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
     else:
         raise InputError(f"There is no folder or list of photos at {text}.")
     if not found:
-        raise InputError(f"{shown(text)} holds no photo; it may hold {FORMATS}.")
+        raise InputError(f"{without_secrets(text)} holds no photo; it may hold {FORMATS}.")
     return sorted({photo.id: photo for photo in found}.values(), key=lambda photo: photo.id)
 
 
@@ -92,7 +92,7 @@ def _of_list(file: Path) -> list[Listed]:
 
 def _named(entry: str, folder: Path) -> Listed:
     if is_url(entry):
-        return Listed(shown(entry), entry)
+        return Listed(without_secrets(entry), entry)
     if entry.startswith(PREFIX):
         return Listed(entry, entry)
     return Listed(entry, os.path.abspath(folder / entry))

@@ -20,7 +20,7 @@ def is_url(text: str) -> bool:
     return re.match(r"[A-Za-z][A-Za-z0-9+.-]*(::[A-Za-z0-9+.-]+)*://", text) is not None
 
 
-def shown(url: str) -> str:
+def without_secrets(url: str) -> str:
     """The URL without its secrets: user, password and signed query."""
     return re.sub(r"://[^/]*@", "://", url).split("?")[0] if is_url(url) else url
 
@@ -34,7 +34,11 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
         found = [str(system.unstrip_protocol(one)) for one in paths]
-    return [one for one in found if _suffix(one) in suffixes and not PurePosixPath(shown(one)).name.startswith(".")]
+    return [
+        one
+        for one in found
+        if _suffix(one) in suffixes and not PurePosixPath(without_secrets(one)).name.startswith(".")
+    ]
 
 
 def fingerprint(location: str) -> str | None:
@@ -59,7 +63,9 @@ def local_copy(location: str) -> Iterator[Path]:
         with _opened(location) as (system, path):
             size = system.info(path).get("size")
             if size is not None and size > LARGEST:
-                raise InputError(f"{shown(location)} has {size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}.")
+                raise InputError(
+                    f"{without_secrets(location)} has {size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}."
+                )
             system.get_file(path, str(file))
         yield file
 
@@ -74,13 +80,13 @@ def _opened(url: str) -> Iterator[tuple[Any, str]]:
     except (InputError, SetupError):
         raise
     except ImportError as error:  # fsspec names the package that the protocol needs
-        raise SetupError(f"{shown(url)} cannot be opened: {error}.") from error
+        raise SetupError(f"{without_secrets(url)} cannot be opened: {error}.") from error
     except FileNotFoundError as error:
-        raise InputError(f"There is nothing at {shown(url)}.") from error
+        raise InputError(f"There is nothing at {without_secrets(url)}.") from error
     except Exception as error:
-        reason = str(error).replace(url, shown(url)) or type(error).__name__
-        raise InputError(f"{shown(url)} cannot be read: {reason}.") from error
+        reason = str(error).replace(url, without_secrets(url)) or type(error).__name__
+        raise InputError(f"{without_secrets(url)} cannot be read: {reason}.") from error
 
 
 def _suffix(url: str) -> str:
-    return PurePosixPath(shown(url)).suffix.lower()
+    return PurePosixPath(without_secrets(url)).suffix.lower()

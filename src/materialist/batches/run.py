@@ -21,7 +21,7 @@ from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
 from materialist.errors import InputError
 from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
-from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
+from materialist.jobs.worker import DONE, FAILED, PROGRESS
 
 Watch = Callable[[Status], None]
 
@@ -134,6 +134,8 @@ class _Run:
     tries: Counter[str] = field(default_factory=Counter)
     ended: dict[str, str] = field(default_factory=dict)
     """Photo id -> done or failed, of the photos that ended in this call."""
+    failed: int = 0
+    """How many of them failed."""
 
     def work(self, pool: LocalPool | RayPool) -> None:
         """Run until every photo is over, or an error occurs that would fail all of them."""
@@ -175,8 +177,8 @@ class _Run:
 
     def _hear(self, task: PhotoTask, message: Message) -> bool:
         """Take note of a message; returns whether the task is to be begun again."""
-        if message.kind in (PROGRESS, FOUND):
-            self.stages[task.id] = str(message.facts.get("stage", self.stages[task.id]))
+        if message.kind == PROGRESS:
+            self.stages[task.id] = str(message.facts["stage"])
             return False
         facts, stage = message.facts, self.stages.pop(task.id)
         if message.kind == LOST and self.tries[task.id] < SETTINGS.tries:
@@ -190,6 +192,7 @@ class _Run:
         return False
 
     def _end(self, task: PhotoTask, event: str, facts: dict[str, Any]) -> None:
+        self.failed += event == FAILED
         self.ended[task.id] = event  # first, as in the ledger: Ctrl-C may come while the entry goes to the disk
         self.ledger.append(event, id=task.id, name=task.name, attempts=self.tries[task.id], **{**task.kept, **facts})
         if event == FAILED:
@@ -200,10 +203,9 @@ class _Run:
         self.tell(f"{task.id}: {line}")
 
     def tell(self, news: str | None) -> None:
-        total, failed = len(self.photos), list(self.ended.values()).count(FAILED)
-        over = total - len(self.tasks) + len(self.ended)
+        over = len(self.photos) - len(self.tasks) + len(self.ended)
         running = {self.tasks[id].name: stage for id, stage in self.stages.items()}
-        self.watch(Status(total, over - failed, failed, running, news))
+        self.watch(Status(len(self.photos), over - self.failed, self.failed, running, news))
 
     def _row(self, photo: Listed) -> Row:
         entry, task = self.ledger.last.get(photo.id, {}), self.tasks.get(photo.id)

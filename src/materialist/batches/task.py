@@ -101,7 +101,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
         return mt.load_scene(task.scene), dict(task.kept)
     ensure_writable(task.scene, force=True)
     options = task.named_options()
-    size, fov = options.pop("size", 512), options.pop("fov", "auto")
+    size, fov = options.pop("size"), options.pop("fov")
     report("read", 0, 1)
     photo_version = fingerprint(task.location)
     with local_copy(task.location) as file:
@@ -126,7 +126,7 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
     from materialist.edits.recipe import apply
 
     report("edit", 0, 1)
-    seed, device = task.options.get("seed", 0), task.options.get("device", "auto")
+    seed, device = task.options["seed"], task.options["device"]
     try:
         edited = apply(scene, edits_for(edits, task.name), seed=seed, device=device)
     except InputError as error:

@@ -41,7 +41,7 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
         )
 
 
-def read_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
+def package_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
     """A map of a known shape, or of any. Raises SceneError for another one, and for NaN, InputError for none."""
     array = read_exr(path) if path.suffix == ".exr" else stored_pixels(path)[0][..., 0]
     if shape is not None and array.shape != shape:

@@ -14,7 +14,7 @@ import numpy as np
 from materialist.errors import SceneError
 from materialist.io.atomic import writing
 from materialist.io.exr import write_exr
-from materialist.io.manifest import MAPS, read_map
+from materialist.io.manifest import MAPS, package_map
 from materialist.types import Body, Mesh, Surface
 
 _FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
@@ -100,7 +100,7 @@ def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, 
     bodies = []
     for k, entry in enumerate(entries):
         mesh = read_ply(folder / f"bodies/{k}.ply")
-        albedo, roughness, metallic = (read_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3])
+        albedo, roughness, metallic = (package_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3])
         if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
             raise SceneError(f"The maps of body {k} have other channels than they need; the package is damaged.")
         told: dict[str, Any] = {key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None}

@@ -13,7 +13,7 @@ from materialist.errors import SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
-from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, read_map
+from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, package_map
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -55,15 +55,15 @@ def _read(folder: Path, most: float) -> Scene:
     check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
     shape = (camera.height, camera.width)
     before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
-    light = read_map(folder / LIGHT) if (folder / LIGHT).exists() else None
+    light = package_map(folder / LIGHT) if (folder / LIGHT).exists() else None
     if light is not None and light.shape[2:] != (4,):
         raise SceneError(f"{folder / LIGHT} is {list(light.shape)}, and needs 4 channels; the package is damaged.")
-    label = read_map(folder / "plane_label.png", shape).astype(np.int16) - 1
+    label = package_map(folder / "plane_label.png", shape).astype(np.int16) - 1
     return Scene(
         camera=camera, photo=_read_photo(folder, photo, shape), materials=materials, normal=normal, depth=depth,
         prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {}), light),
         geometry=Geometry(read_ply(folder / "mesh.ply", math.prod(shape)), label.astype(np.int8)),
-        envmap=read_map(folder / "envmap.exr"), rerender=read_map(folder / "rerender.exr", (*shape, 3)),
+        envmap=package_map(folder / "envmap.exr"), rerender=package_map(folder / "rerender.exr", (*shape, 3)),
         report=_read_report(folder), provenance=meta["provenance"],
         lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
         bodies=read_bodies(folder, meta.get("bodies", [])),
@@ -141,13 +141,13 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     else:
         original, source = read_exr(file), None
     return Photo(
-        read_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
+        package_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
         meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
     )  # fmt: skip
 
 
 def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
-    maps = [read_map(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in MAPS]
+    maps = [package_map(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in MAPS]
     return Materials(*maps[:3]), maps[3], maps[4]
 
 

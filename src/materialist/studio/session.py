@@ -36,13 +36,17 @@ class FinalPicture:
     def of(self, steps: tuple[Step, ...]) -> bool:
         return bool(steps) and self.steps == steps
 
+    def remove(self) -> None:
+        for file in self.path.parent.glob(f"{self.path.name}*"):
+            file.unlink(missing_ok=True)
+
 
 class Session:
     """The state of one page. Its methods may be called from any thread."""
 
-    def __init__(self, person: str, shown: Callable[[str], str] = str, local: bool = True):
-        self.person, self.shown, self.local = person, shown, local
-        """`shown` is `Studio.shown`; `local`: the person has the command line of this machine, too."""
+    def __init__(self, person: str, without_folders: Callable[[str], str] = str, local: bool = True):
+        self.person, self.without_folders, self.local = person, without_folders, local
+        """`without_folders` is the studio's; `local`: the person has the command line of this machine, too."""
         self.lock = threading.RLock()
         self.project: Project | None = None
         self.live: LivePreview | None = None
@@ -135,8 +139,7 @@ class Session:
         """Keep another path-traced picture, or none; the files of the last one go."""
         with self.lock:
             if self.final is not None:
-                for file in self.final.path.parent.glob(f"{self.final.path.name}*"):
-                    file.unlink()
+                self.final.remove()
             self.final = picture
 
     # Selecting

@@ -58,7 +58,7 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     try:
         linear = live.picture(steps, client, coarse=coarse)
     except MaterialistError as error:
-        photo, why = jpeg_url(live.scene.photo.linear), session.shown(str(error))
+        photo, why = jpeg_url(live.scene.photo.linear), session.without_folders(str(error))
         badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
         return {**shown, "picture": photo, "before": "", "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off

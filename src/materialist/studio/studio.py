@@ -64,7 +64,11 @@ class Studio:
         with self._lock:
             last = now - SETTINGS.page_seconds
             gone = [name for name, one in self._sessions.items() if not one.beats and one.seen < last and name != page]
-            known = self._sessions.setdefault(page, Session(person, self.shown, self.single_user)) if page else None
+            known = (
+                self._sessions.setdefault(page, Session(person, self.without_folders, self.single_user))
+                if page
+                else None
+            )
             if known is not None and known.person == person:
                 known.seen, known.beats = now, known.beats or beats
         for name in gone:
@@ -73,7 +77,7 @@ class Studio:
             raise InputError(LOST)
         return known
 
-    def shown(self, text: str) -> str:
+    def without_folders(self, text: str) -> str:
         """A text for a page: names in place of the paths of this machine."""
         for root in (self.work.root, self.work.cache):
             text = text.replace(f"{root}/", "/")

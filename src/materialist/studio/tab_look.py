@@ -33,7 +33,7 @@ def wire(context: PageContext) -> None:
 
     def look(session: Session) -> Iterator[Updates]:
         if session.live is not None:
-            yield {"report": session.shown(report(session.scene)), "maps": maps(session.scene)}
+            yield {"report": session.without_folders(report(session.scene)), "maps": maps(session.scene)}
 
     def show_mesh(session: Session) -> Iterator[Updates]:
         file = session.workspace / MESH

@@ -91,7 +91,7 @@ def _follow(context: PageContext, session: Session) -> Iterator[Updates]:
     while client is not None and client is session.glass:
         state = client.state
         if not state.waiting:
-            told = box(session.shown(state.words), bad=True) if state.bad else ""
+            told = box(session.without_folders(state.words), bad=True) if state.bad else ""
             yield context.picture(session) | {"progress": told}
             return
         if state.words != said:
@@ -103,5 +103,5 @@ def _follow(context: PageContext, session: Session) -> Iterator[Updates]:
 
 def _fall(context: PageContext, session: Session, height: float) -> Iterator[Updates]:
     yield {"progress": box("It falls …")}
-    notes = session.shown(" ".join(objects.let_fall(session, float(height))))
+    notes = session.without_folders(" ".join(objects.let_fall(session, float(height))))
     yield context.everything(session) | {"progress": box(notes) if notes else ""}

@@ -143,7 +143,6 @@ def _unpack(context: PageContext, session: Session, file: Path) -> Project:
 def _follow_inversion(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[Updates]:
     """Progress and first pictures of an inversion until it is over; then the project, if it is done."""
     studio = context.studio
-    session.note_job(job)
     studio.note_last(session.person, project.name)
     yield {"start": gr.update(interactive=False)}
     shown = 0
@@ -174,6 +173,7 @@ def _resume(context: PageContext, session: Session, name: str | None) -> Iterato
     project = studio.project(name, session.person)
     running = [j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder]
     if running:
+        session.note_job(running[0])
         yield from _follow_inversion(context, session, project, running[0])
     elif project.ready:
         yield from _show_project(context, session, project)

@@ -36,8 +36,7 @@ def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> No
 
 
 def invert(
-    report: Reporter, photo: str, scene: str, title: str, predictor: str = "auto", size: int = 512,
-    fov: float | str = "auto", seed: int = 0,
+    report: Reporter, photo: str, scene: str, title: str, predictor: str, size: int, fov: float | str, seed: int
 ) -> None:  # fmt: skip
     """`materialist invert`; maps and light go to `found` as soon as they are there."""
     from dataclasses import replace

@@ -112,7 +112,7 @@ class PageContext:
         known = isinstance(error, MaterialistError)
         text = f"Something went wrong inside ({type(error).__name__}); the terminal of the studio has the details."
         if known:  # its message may hold a name that a stranger chose
-            text = escape(self.studio.shown(str(error)), quote=False)
+            text = escape(self.studio.without_folders(str(error)), quote=False)
         else:
             traceback.print_exception(error)
         title = "That did not work" if known else "Our mistake"
@@ -146,7 +146,7 @@ class PageContext:
         if job.state == STOPPED:
             return box("Stopped; nothing was changed.")
         if job.state == FAILED:
-            return box(self.studio.shown(failure(job)), bad=True)
+            return box(self.studio.without_folders(failure(job)), bad=True)
         if job.over:
             return box(f"Done in {job.seconds:.0f} s.")
         part = min(1.0, job.done / job.total) if job.total else 0.0
@@ -168,7 +168,13 @@ class PageContext:
         if known is not None and known.of(steps):
             return known
         made = FinalPicture(steps, self.studio.work.cache / f"final-{secrets.token_hex(16)}")
-        if not (yield from self.work(session, tasks.final, made.path, steps=steps)):
+        done = False
+        try:
+            done = yield from self.work(session, tasks.final, made.path, steps=steps)
+        finally:  # the page may be closed meanwhile
+            if not done:
+                made.remove()
+        if not done:
             return None
         session.take_final(made)
         return made
@@ -203,7 +209,7 @@ def commands(session: Session) -> str:
     project = session.project
     if project is None:
         return ""
-    place = str if session.local else session.shown
+    place = str if session.local else session.without_folders
     lines, scene = [f"cd {quote(place(str(project.folder)))}"], quote(place(str(project.scene)))
     if session.edits.active:
         lines.append(f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene")
