@@ -21,11 +21,7 @@ def edits_for(path: str | Path, name: str) -> "list[Step]":
     from materialist.edits.recipe import with_files
 
     put = lambda _, value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
-    try:
-        content = Path(path).read_bytes()
-    except OSError:  # told by what reads the steps
-        content = b""
-    return [with_files(step, put) for step in _steps(path, content)]
+    return [with_files(step, put) for step in _steps(path, Path(path).read_bytes() if Path(path).is_file() else b"")]
 
 
 @lru_cache(maxsize=1)

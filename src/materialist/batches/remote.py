@@ -33,12 +33,8 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
         if not pattern and _suffix(url) in suffixes:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
-        found = [str(system.unstrip_protocol(one)) for one in paths]
-    return [
-        one
-        for one in found
-        if _suffix(one) in suffixes and not PurePosixPath(without_secrets(one)).name.startswith(".")
-    ]
+        found = [str(system.unstrip_protocol(one)) for one in paths if not PurePosixPath(one).name.startswith(".")]
+    return [one for one in found if _suffix(one) in suffixes]
 
 
 def fingerprint(location: str) -> str | None:
@@ -63,9 +59,8 @@ def local_copy(location: str) -> Iterator[Path]:
         with _opened(location) as (system, path):
             size = system.info(path).get("size")
             if size is not None and size > LARGEST:
-                raise InputError(
-                    f"{without_secrets(location)} has {size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}."
-                )
+                told = f"{size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}."
+                raise InputError(f"{without_secrets(location)} has {told}")
             system.get_file(path, str(file))
         yield file
 

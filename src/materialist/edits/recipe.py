@@ -31,10 +31,6 @@ KINDS = {
     for name, kind in OPTIONS.items()
 }
 """Kind of step -> what it may say."""
-_DEEPEST = 20
-"""Levels of lists in lists that a file may have; a list of edits has 7."""
-_LARGEST = 1_000_000
-"""Bytes of a file."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +59,8 @@ def read_recipe(path: str | Path) -> list[Step]:
 
     path = Path(path)
     try:
-        if path.stat().st_size > _LARGEST:
-            raise InputError(f"{path} is larger than {_LARGEST / 1e6:g} MB; a list of edits is a short text.")
+        if path.stat().st_size > 1_000_000:
+            raise InputError(f"{path} is larger than 1 MB; a list of edits is a short text.")
         content = yaml.load(path.read_text("utf-8"), Loader=_loader())
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
@@ -83,20 +79,16 @@ def _loader() -> Any:
     import yaml
 
     class Texts(yaml.BaseLoader):
-        """Scalars stay texts: YAML would read the shift +0.5 as the value 0.5. No key is given twice.
-
-        Aliases of aliases could stand for more than memory holds, so there are none.
-        """
+        """Scalars stay texts: YAML would read the shift +0.5 as the value 0.5. No key is given twice, and nothing is
+        an alias: aliases of aliases can stand for more than memory holds."""
 
         depth = 0
 
         def compose_node(self, parent, index):
-            if self.check_event(yaml.AliasEvent):
-                refused = "an alias (*) cannot be used here; write out what it stands for"
-                raise yaml.composer.ComposerError(None, None, refused, self.peek_event().start_mark)
             self.depth += 1
-            if self.depth > _DEEPEST:
-                raise yaml.composer.ComposerError(None, None, "lists nested too deeply", self.peek_event().start_mark)
+            if self.check_event(yaml.AliasEvent) or self.depth > 20:  # a list of edits has 7 levels
+                said = "an alias (*) or lists nested too deeply; write them out flat"
+                raise yaml.composer.ComposerError(None, None, said, self.peek_event().start_mark)
             node = super().compose_node(parent, index)
             self.depth -= 1
             return node

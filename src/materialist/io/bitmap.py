@@ -197,11 +197,8 @@ def _upright(pixels: Array, orientation: int) -> Array:
 
 @contextmanager
 def pixel_limit_lifted() -> Iterator[None]:
-    """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded.
-
-    One thread at a time: the limit is Pillow's for all.
-    """
-    with _LIMIT:
+    """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
+    with _LIMIT:  # all threads share Pillow's
         before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
         try:
             yield

@@ -34,8 +34,7 @@ class LocalPool:
         try:
             place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise SetupError(f"A worker process cannot be started: {reason}; give fewer --workers.") from error
+            raise SetupError(f"A worker process cannot be started: {error}; give fewer --workers.") from error
         place.key = key
         place.worker.begin(task, arguments)
 

@@ -26,9 +26,7 @@ class StudioSettings:
     people: int = 10_000  # whose last photo is remembered
     person_seconds: int = 31_536_000  # a browser stays the same person: a year
     page_seconds: float = 60.0  # a page that never showed that it is open is forgotten after its last request
-    unfinished_seconds: float = (
-        86_400.0  # folders of photos that were not taken apart to the end go, uploads and copies
-    )
+    unfinished_seconds: float = 86_400.0  # then photos that were not taken apart to the end go, uploads and results
     free_for_scene: float = 1.2e9  # bytes of memory that must be free before another scene is opened
     free_for_glass: float = 2.0e9  # bytes of memory that must be free before glass is traced
     glass_idle: float = 900.0  # seconds without a request after which the glass process ends

@@ -1,12 +1,12 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
 import hmac
-import os
 import re
 import secrets
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -26,7 +26,7 @@ _BEAT = f"{_API}heartbeat/"
 """A page holds a request to this place, and its name, as long as it is open."""
 _UPLOAD, _FILE = f"{_API}upload", f"{_API}file="
 _READ = re.compile(
-    rf"/|/(config|theme\.css|favicon\.ico|robots\.txt)|/(assets|static)/.+|{_FILE}.+|{_BEAT}\w+"
+    rf"/|/(config|theme\.css|favicon\.ico|robots\.txt)|/(assets|static)/.+|{_FILE}[^\0]+|{_BEAT}\w+"
     rf"|{_API}(queue/data|upload_progress|app_id)"
 )
 _PLACES = {"GET": _READ, "HEAD": _READ, "POST": re.compile(rf"{_API}(queue/join|run/predict|upload)")}
@@ -77,7 +77,9 @@ class Gate:
         if scope["type"] != "http":
             return await send({"type": "websocket.close", "code": 1008})
         scope["headers"] = self._heard(scope["headers"])
-        request = Request(scope, _limited(receive, self._most(scope)))
+        upload = int(SETTINGS.upload_megabytes * 1e6) if scope["path"] == _UPLOAD else 0
+        most = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes + upload
+        request = Request(scope, _limited(receive, most))
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies)
 
@@ -91,16 +93,7 @@ class Gate:
                     headers.append("set-cookie", f"{name}={value}; Path=/; HttpOnly; SameSite=Lax{kept}{secure}")
             await send(message)
 
-        try:
-            await app(scope, request.receive, answer)
-        except HTTPException as error:  # of a body that is too long, where the application lets it pass
-            await PlainTextResponse(f"{error.detail}\n", error.status_code)(scope, receive, answer)
-
-    def _most(self, scope: Any) -> int:
-        """Bytes that the body of a request may have."""
-        if scope["path"] == _UPLOAD:
-            return int(SETTINGS.upload_megabytes * 1e6) + SETTINGS.request_bytes
-        return _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
+        await app(scope, request.receive, answer)
 
     def allows(self, headers: dict[bytes, bytes]) -> bool:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
@@ -140,8 +133,10 @@ class Gate:
         path = request.scope["path"]
         if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
             return PlainTextResponse("The studio has no such place.\n", 404)
-        if path.startswith(_FILE) and not self._served(path.removeprefix(_FILE)):
-            return PlainTextResponse("The studio serves no such file.\n", 403)
+        if path.startswith(_FILE):
+            file, cache = (Path(one).resolve() for one in (path.removeprefix(_FILE), self.studio.work.cache))
+            if not file.is_relative_to(cache):  # files of ours, and addresses that Gradio would fetch
+                return PlainTextResponse("The studio serves no such file.\n", 403)
         try:
             if page := request.query_params.get("session_hash"):
                 self.studio.session(page, person)
@@ -152,10 +147,6 @@ class Gate:
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 403)
         return self.app
-
-    def _served(self, file: str) -> bool:
-        """Whether a file is one that the studio handed over, or was given."""
-        return os.path.realpath(file).startswith(f"{os.path.realpath(self.studio.work.cache)}/")
 
     async def _log_in(self, request: Request, cookies: dict[str, str]) -> Response:
         """The page where the password is right, else the form again; after too many wrong ones whatever it is."""
@@ -181,7 +172,7 @@ class Gate:
 
 
 def _limited(receive: Any, most: int) -> Any:
-    """`receive` that raises HTTPException after so many bytes, whatever the headers promise."""
+    """`receive` that raises an HTTPException, which Gradio answers with, after so many bytes, promised or not."""
     got = 0
 
     async def counted() -> Any:

@@ -77,12 +77,9 @@ def checked_target(target: str) -> Path:
 
 def first_shown(work: WorkFolder, path: Path) -> Project | Path:
     """A scene package as a project; a photo as it is."""
-    if path.is_file():
-        return path
     scene = path.resolve()
-    return next((p for p in work.projects() if p.scene == scene), None) or work.new(
-        path.stem, LOCAL_PERSON, scene=scene
-    )
+    known = next((p for p in work.projects() if p.scene == scene), None)
+    return path if path.is_file() else known or work.new(path.stem, LOCAL_PERSON, scene=scene)
 
 
 def serve(
@@ -140,12 +137,12 @@ def serve(
 
 def _fetch_nothing() -> None:
     """Let Gradio open no address that a request names in place of a file."""
-    from gradio import processing_utils
+    from gradio import processing_utils as fetching
 
     async def refused(url: str, *_: Any) -> Any:
         raise InputError(f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file.")
 
-    processing_utils.async_ssrf_protected_get = processing_utils.async_ssrf_protected_download = refused
+    fetching.async_ssrf_protected_get = fetching.async_ssrf_protected_download = refused  # type: ignore[assignment]
 
 
 def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:

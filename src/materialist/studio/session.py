@@ -130,17 +130,11 @@ class Session:
                 self.live.close()
             if self.glass is not None:
                 self.glass.stop()
-            self.take_final(None)
+            if self.final is not None:
+                self.final.remove()
             self.project = self.live = self.glass = self.final = None
             self.edits, self._past, self._future = EditList(), [], []
             self.selection = Selection()
-
-    def take_final(self, picture: FinalPicture | None) -> None:
-        """Keep another path-traced picture, or none; the files of the last one go."""
-        with self.lock:
-            if self.final is not None:
-                self.final.remove()
-            self.final = picture
 
     # Selecting
 

@@ -72,8 +72,7 @@ def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: fl
 
 
 def _uploaded(session: Session, file: Path) -> None:
-    with uploads.taken(session.workspace, file, "envmap") as name:
-        session.light(envmap=name, gain="auto")
+    uploads.used(session.workspace, file, "envmap", lambda name: session.light(envmap=name, gain="auto"))
 
 
 def place_lamp(

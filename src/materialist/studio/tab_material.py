@@ -51,5 +51,4 @@ def _coloured(session: Session, value: str) -> None:
 
 
 def _textured(session: Session, file: Path) -> None:
-    with uploads.taken(session.workspace, file, "texture") as name:
-        session.set("edit", albedo=None, texture=name)
+    uploads.used(session.workspace, file, "texture", lambda name: session.set("edit", albedo=None, texture=name))

@@ -71,9 +71,11 @@ def _choose(session: Session, name: str | None) -> Updates:
 
 
 def _uploaded(session: Session, file: Path) -> Updates:
-    with uploads.taken(session.workspace, file, "mesh") as name:
+    def use(name: str) -> None:
         read_model(session.workspace / name)
         objects.set_option(session, "mesh", name)
+
+    uploads.used(session.workspace, file, "mesh", use)
     return {"tool": "place", "thing": None}
 
 

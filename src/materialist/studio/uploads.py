@@ -1,8 +1,8 @@
 """Uploaded files: checked by size and header before anything is decoded, and stored under names of ours."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from materialist.errors import InputError
 from materialist.io.bitmap import check_size
@@ -19,13 +19,12 @@ def stored(workspace: Path, file: Path, option: str) -> str:
     return store(workspace, option, file.read_bytes(), suffix)
 
 
-@contextmanager
-def taken(workspace: Path, file: Path, option: str) -> Iterator[str]:
-    """`stored` for a block that uses the file; where it is refused there, it does not stay."""
+def used(workspace: Path, file: Path, option: str, use: Callable[[str], Any]) -> None:
+    """`stored`, and use(name); a file that is refused there does not stay."""
     before = {*workspace.iterdir()}
     name = stored(workspace, file, option)
     try:
-        yield name
+        use(name)
     except Exception:
         if workspace / name not in before:
             (workspace / name).unlink()
@@ -45,17 +44,12 @@ def checked_picture(path: Path) -> str:
             raise
         except Exception as error:  # decoders raise anything
             raise InputError(f"{shown} is not an image that can be read; export it as PNG or JPEG.") from error
-        if width * height > SETTINGS.upload_pixels:
-            raise InputError(
-                f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels; the studio takes up to "
-                f"{SETTINGS.upload_pixels / 1e6:.0f}: shrink it first."
-            )
-        check_size(width, height, shown)
         if decoded > 12 * SETTINGS.upload_pixels:
             raise InputError(
-                f"{shown} takes {decoded / 1e9:.1f} GB of memory; the studio takes up to "
-                f"{12e-9 * SETTINGS.upload_pixels:g}: save its colours without further channels."
+                f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels, {decoded / 1e6:.0f} MB in "
+                f"memory, above {12e-6 * SETTINGS.upload_pixels:.0f} MB: shrink it, or save its colours alone."
             )
+        check_size(width, height, shown)
     return suffix
 
 

@@ -168,16 +168,16 @@ class PageContext:
         if known is not None and known.of(steps):
             return known
         made = FinalPicture(steps, self.studio.work.cache / f"final-{secrets.token_hex(16)}")
-        done = False
         try:
-            done = yield from self.work(session, tasks.final, made.path, steps=steps)
-        finally:  # the page may be closed meanwhile
-            if not done:
-                made.remove()
-        if not done:
+            if (yield from self.work(session, tasks.final, made.path, steps=steps)):
+                known, session.final = session.final, made
+                if known is not None:
+                    known.remove()
+                return made
             return None
-        session.take_final(made)
-        return made
+        finally:
+            if session.final is not made:  # it failed, was stopped, or the page was closed
+                made.remove()
 
 
 def failure(job: Job) -> str:
