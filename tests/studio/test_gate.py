@@ -199,4 +199,7 @@ def test_gradio_fetches_nothing(shared, monkeypatch):
     server._fetch_nothing()
     with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
         thread.submit(processing.save_url_to_cache, "http://127.0.0.1:9/a.png", str(shared.work.cache)).result()
+    asked = lambda: processing.async_ssrf_protected_download("http://127.0.0.1:9/a.png", cache_dir="x")  # noqa: E731
+    with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
+        thread.submit(lambda: asyncio.run(asked())).result()
     assert not list(shared.work.cache.iterdir())

@@ -180,7 +180,7 @@ def _limited(receive: Any, most: int) -> Any:
         message = await receive()
         got += len(message.get("body", b""))
         if got > most:
-            raise HTTPException(413, f"That is more than the {most} bytes that may come here.")
+            raise HTTPException(413, f"More than {most / 1e6:g} MB is not taken here.")
         return message
 
     return counted

@@ -139,7 +139,7 @@ def _fetch_nothing() -> None:
     """Let Gradio open no address that a request names in place of a file."""
     from gradio import processing_utils as fetching
 
-    async def refused(url: str, *_: Any) -> Any:
+    async def refused(url: str, *_: Any, **how: Any) -> Any:
         raise InputError(f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file.")
 
     fetching.async_ssrf_protected_get = fetching.async_ssrf_protected_download = refused  # type: ignore[assignment]
