@@ -9,7 +9,7 @@ from made_meshes import floor_scene
 from studio_scenes import block, click, room
 
 from materialist.edits.recipe import Step, apply, read_recipe
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.studio import SETTINGS, objects
@@ -275,3 +275,14 @@ def test_sixty_steps_can_be_taken_back(session):
     for _ in range(70):
         session.deselect()
     assert len(session._past) == SETTINGS.undo_steps
+
+
+def test_a_shape_that_was_not_written_to_its_end_is_not_there(session, monkeypatch):
+    def broken(mesh, file):
+        file.write_bytes(b"ply")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("trimesh.Trimesh.export", broken)
+    with pytest.raises(OutputError, match="no space left"):
+        objects.library_file(session, "Cone")
+    assert not [*session.workspace.glob("*cone*")]

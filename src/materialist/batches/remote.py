@@ -30,11 +30,11 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
     with _opened(url) as (system, path):
         system.invalidate_cache()  # an earlier listing in this process may be out of date
         pattern = any(mark in path for mark in "*[")
-        if not pattern and _suffix(url) in suffixes:
+        if not pattern and _path(url).suffix.lower() in suffixes:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
-        found = [str(system.unstrip_protocol(one)) for one in paths if not PurePosixPath(one).name.startswith(".")]
-    return [one for one in found if _suffix(one) in suffixes]
+        found = [(str(one), _path(str(one))) for one in map(system.unstrip_protocol, paths)]
+    return [one for one, path in found if path.suffix.lower() in suffixes and not path.name.startswith(".")]
 
 
 def fingerprint(location: str) -> str | None:
@@ -55,7 +55,7 @@ def local_copy(location: str) -> Iterator[Path]:
         yield Path(location)
         return
     with tempfile.TemporaryDirectory(prefix="materialist-") as folder:
-        file = Path(folder) / f"photo{_suffix(location)}"
+        file = Path(folder) / f"photo{_path(location).suffix.lower()}"
         with _opened(location) as (system, path):
             size = system.info(path).get("size")
             if size is not None and size > LARGEST:
@@ -83,5 +83,5 @@ def _opened(url: str) -> Iterator[tuple[Any, str]]:
         raise InputError(f"{without_secrets(url)} cannot be read: {reason}.") from error
 
 
-def _suffix(url: str) -> str:
-    return PurePosixPath(without_secrets(url)).suffix.lower()
+def _path(url: str) -> PurePosixPath:
+    return PurePosixPath(without_secrets(url))

@@ -49,7 +49,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
         sys.stderr.close()
         return OK
     except OSError as error:  # a name that is too long, a full disk
-        said = f"{error.filename or 'The system'} cannot be used: {(error.strerror or str(error)).lower()}."
+        said = f"The system refused {error.filename or 'it'}: {(error.strerror or str(error)).lower()}."
         return _fail("OSError", said, BAD_INPUT, wants_json)
     except Exception as error:
         if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("materialist"):
