@@ -62,8 +62,10 @@ def test_old_copies_go_and_what_the_page_shows_stays(tmp_path):
     work = WorkFolder(tmp_path)
     for name in ("old", "fresh", "page"):
         (work.cache / name).mkdir()
+    for name in ("old.png", "final-1.png"):
+        (work.cache / name).touch()
     work.kept = {work.cache / "page"}
-    for name in ("old", "page"):
+    for name in ("old", "page", "old.png", "final-1.png"):
         os.utime(work.cache / name, (0, 0))
     work.sweep()
-    assert sorted(place.name for place in work.cache.iterdir()) == ["fresh", "page"]
+    assert sorted(place.name for place in work.cache.iterdir()) == ["final-1.png", "fresh", "page"]

@@ -122,8 +122,8 @@ class Studio:
 
     def note_last(self, person: str, name: str) -> None:
         """Note the project that a person opened or began last; those who did so longest ago are forgotten."""
-        others = [one for one in self.last.items() if one[0] != person]
-        self.last = dict([*others, (person, name)][-SETTINGS.people :])
+        self.last.pop(person, None)
+        self.last = dict([*self.last.items(), (person, name)][-SETTINGS.people :])
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
         """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`.

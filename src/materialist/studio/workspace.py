@@ -77,8 +77,7 @@ class WorkFolder:
             tempfile.TemporaryFile(dir=self.root).close()
         self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
         """Uploads and results that are handed over; they go with this object."""
-        self.kept: set[Path] = set()
-        """What stays there: pictures of the page itself."""
+        self.kept: set[Path] = set()  # what stays there: pictures of the page itself
         self._end = weakref.finalize(self, shutil.rmtree, self.cache, ignore_errors=True)
 
     def projects(self, person: str | None = None) -> list[Project]:
@@ -107,8 +106,9 @@ class WorkFolder:
     def sweep(self) -> None:
         """Remove what lies idle: folders of photos that were not taken apart to the end, uploads, and results."""
         for place in {*self.cache.iterdir()} - self.kept:
-            if place.is_dir() and time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds:
-                shutil.rmtree(place, ignore_errors=True)
+            with suppress(OSError):  # it goes by itself meanwhile; path-traced pictures go with their page
+                if time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds and place.name[:6] != "final-":
+                    shutil.rmtree(place) if place.is_dir() else place.unlink()
         for project in self.projects():
             idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
