@@ -1,8 +1,11 @@
 """Material edits against closed forms, and what they refuse."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from edit_scenes import MASK, flat_scene
+from made_meshes import floor_scene
 
 from materialist.color import linear_to_srgb
 from materialist.edits.material.material import edit, shifted_hsv
@@ -94,3 +97,19 @@ def test_impossible_values_are_named(options, words):
     with pytest.raises(InputError) as error:
         edit(SCENE, MASK, **options)
     assert words in str(error.value) and str(error.value).endswith(".")
+
+
+def test_a_texture_keeps_its_detail_before_a_wall_far_away():
+    scene = flat_scene()
+    far = replace(scene, depth=np.where(MASK, scene.depth, 60).astype(np.float32))
+    picture = np.random.default_rng(0).random((12, 12, 3), np.float32)
+    near, before_far = (edit(one, MASK, texture=picture).materials.albedo[MASK] for one in (scene, far))
+    np.testing.assert_allclose(before_far, near, atol=1e-5)
+
+
+def test_a_texture_lies_on_a_floor_with_its_top_in_the_depth():
+    scene = floor_scene(tilt=80.0)
+    ramp = np.linspace(0.9, 0.1, 16, dtype=np.float32)
+    picture = np.stack(np.broadcast_arrays(ramp[:, None], ramp[None], 0.5), -1)
+    albedo = edit(scene, scene.depth > 0, texture=picture).materials.albedo[4:-4, 4:-4]
+    assert (np.diff(albedo[..., 0], axis=0) < 0).mean() > 0.9 and (np.diff(albedo[..., 1], axis=1) < 0).mean() > 0.9

@@ -12,6 +12,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
 from materialist.errors import InputError
+from materialist.geometry.planes import axes
 from materialist.io.photo import decode_photo
 from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
@@ -103,34 +104,32 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
         raise InputError(f"The texture has values from {picture.min():g} to {picture.max():g}; they must be 0 to 1.")
     use = region & (scene.depth > 0)
     points = unproject(scene.depth, scene.camera)
-    right, up = _tangents(scene.normal[use].mean(0))
+    normal = unit(scene.normal[use].mean(0))
+    right, up = axes(normal) * (-1 if normal[1] >= 0.9 else 1)  # on a floor the way up leads into the depth
     across, along = points @ right, points @ -up  # [H, W], scene units, along growing downwards as rows do
     h, w = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
     extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h, 1e-9) * scale
     u, v = ((place - place[use].min()) / (extent * n) for place, n in ((across, w), (along, h)))
-    return _repeated(picture, u, v)
+    return _repeated(picture, u, v, use)
 
 
-def _tangents(normal: Array) -> tuple[Array, Array]:
-    """Unit vectors to the right and up in the plane of `normal` [3], as the camera sees them."""
-    normal = unit(normal)
-    # On a floor the way up leads into the depth, on a ceiling out of it.
-    up = np.array([0.0, 1.0, 0.0]) if abs(normal[1]) < 0.9 else np.array([0.0, 0.0, -np.sign(normal[1])])
-    right = unit(np.cross(up, normal))
-    return right, np.cross(normal, right)
-
-
-def _repeated(picture: Array, u: Array, v: Array) -> Array:
-    """[H, W, 3] bilinear lookup at (u, v) in pictures, repeated; a large picture is first shrunk to what is seen."""
+def _repeated(picture: Array, u: Array, v: Array, use: Array) -> Array:
+    """[H, W, 3] bilinear lookup at (u, v) in pictures, repeated; a large picture is first shrunk to what `use` sees."""
     h, w = picture.shape[:2]
     x = (u - np.floor(u)) * w - 0.5
     y = (v - np.floor(v)) * h - 0.5
     # Texture pixels to a pixel of the photo, by the median step: above 1 the picture would alias.
-    step = max(float(np.median(np.abs(np.diff(u, axis=1)))) * w, float(np.median(np.abs(np.diff(v, axis=0)))) * h)
+    step = max(_median_step(u.T, use.T) * w, _median_step(v, use) * h)
     if step > 1.5:
         k = min(1 / step, 1.0)
         small = cv2.resize(picture, (max(1, round(w * k)), max(1, round(h * k))), interpolation=cv2.INTER_AREA)
-        return _repeated(small, u, v) if small.shape != picture.shape else small
+        return _repeated(small, u, v, use) if small.shape != picture.shape else small
     padded = cv2.copyMakeBorder(picture, 1, 1, 1, 1, cv2.BORDER_WRAP)
     return cv2.remap(padded, x.astype(np.float32) + 1, y.astype(np.float32) + 1, cv2.INTER_LINEAR)
+
+
+def _median_step(values: Array, use: Array) -> float:
+    """Median change of values [H, W] from row to row, where both are in use [H, W] bool; 0 where none are."""
+    steps = np.abs(np.diff(values, axis=0))[use[1:] & use[:-1]]
+    return float(np.median(steps)) if steps.size else 0.0
