@@ -67,6 +67,22 @@ def floor_scene(width: int = 48, height: int = 36, *, tilt: float = 30.0, native
     return scene_of(camera, depth, normals, albedo, roughness=0.9, original=original)
 
 
+def triangles_glb(path: Path, materials: list[dict], **extensions: dict) -> Path:
+    """A .glb of a triangle for each material; its uv, v down, are (0, 0), (1, 0) and (0, 1)."""
+    meshes = []
+    for k in range(len(materials)):
+        uv = trimesh.visual.TextureVisuals([[0, 1], [1, 1], [0, 0]], trimesh.visual.material.PBRMaterial())
+        meshes.append(trimesh.Trimesh([[k, 0, 0], [k + 1, 0, 0], [k, 1, 0]], [[0, 1, 2]], visual=uv, process=False))
+
+    def told(tree: dict) -> None:
+        tree["materials"], tree["extensions"] = materials, extensions
+        for k, mesh in enumerate(tree["meshes"]):
+            mesh["primitives"][0]["material"] = k
+
+    path.write_bytes(trimesh.exchange.gltf.export_glb(trimesh.Scene(meshes), tree_postprocessor=told))
+    return path
+
+
 def tetrahedron_glb(path: Path, material: dict | None = None, required: tuple[str, ...] = ()) -> Path:
     """A .glb of a tetrahedron with a material that requires these extensions."""
 

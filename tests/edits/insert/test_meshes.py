@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import trimesh
-from made_meshes import box_file, floor_scene, gltf_file, tetrahedron_glb, textured_obj
+from made_meshes import box_file, floor_scene, gltf_file, tetrahedron_glb, textured_obj, triangles_glb
 from PIL import Image
 
 from materialist.color import srgb_to_linear
@@ -158,6 +158,7 @@ def test_bad_meshes_have_a_sentence_each(tmp_path, monkeypatch):
         (write(tmp_path / "l.glb", b"glTF" + np.uint32([2, 500_020, 500_000]).tobytes() + b"JSON" + b'{"a":' * 100_000),
          "not a readable GLB"),
         (tetrahedron_glb(tmp_path / "j.glb", None, ("KHR_draco_mesh_compression",)), "KHR_draco_mesh_compression"),
+        (tetrahedron_glb(tmp_path / "k.glb", None, ("KHR_lights_punctual",)), "KHR_lights_punctual"),
     ]  # fmt: skip
     for path, sentence in bad:
         with pytest.raises(InputError, match=sentence) as error:
@@ -216,6 +217,29 @@ def test_glass_and_emission_of_gltf(tmp_path):
     np.testing.assert_allclose(model.parts[0].surface.emission, [4, 2, 0])
     assert any("transparency" in note for note in model.warnings)
     assert any("KHR_materials_sheen" in note for note in model.warnings)
+
+
+@pytest.mark.parametrize("name", [{}, {"name": "paint"}])
+def test_materials_of_gltf_need_no_names(tmp_path, name):
+    glass = {"extensions": {"KHR_materials_transmission": {"transmissionFactor": 0.9}}}
+    model = read_model(triangles_glb(tmp_path / "two.glb", [name | glass, name]))
+    assert {part.vertices[0, 0] < 0: round(part.surface.transmission, 3) for part in model.parts} == {
+        True: 0.9,
+        False: 0,
+    }
+
+
+def test_textures_of_gltf_lie_where_the_file_puts_them(tmp_path):
+    put = {"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": np.pi / 2, "scale": [2, 3]}}
+    pbr = {"baseColorTexture": {"index": 0, "extensions": put}, "metallicRoughnessTexture": {"index": 0}}
+    model = read_model(
+        triangles_glb(tmp_path / "two.glb", [{"pbrMetallicRoughness": pbr}, {}], KHR_lights_punctual={"lights": []})
+    )
+    moved, plain = sorted(model.parts, key=lambda part: part.vertices[0, 0])
+    np.testing.assert_allclose(plain.uv, [[0, 0], [1, 0], [0, 1]], atol=1e-6)
+    np.testing.assert_allclose(moved.uv, [[0.5, 0.25], [0.5, -1.75], [3.5, 0.25]], atol=1e-6)
+    for words in ("its lighting", "the transform of its roughness texture"):
+        assert f"two.glb: {words} is left out." in model.warnings
 
 
 def test_our_own_glass_comes_back_as_glass(tmp_path):

@@ -13,7 +13,7 @@ from materialist.types import Array, Surface
 
 GREY = 0.5
 """Albedo and roughness where a file says nothing."""
-TRANSMISSION = "KHR_materials_transmission"
+TRANSMISSION, TRANSFORM = "KHR_materials_transmission", "KHR_texture_transform"
 SHOWN = {
     TRANSMISSION, "KHR_materials_ior", "KHR_materials_emissive_strength", "KHR_materials_pbrSpecularGlossiness",
     "EXT_texture_webp",
@@ -82,10 +82,25 @@ def gltf_surface(material: Any, said: dict[str, Any], textures: Textures) -> Sur
     return surface
 
 
+def gltf_uv(said: dict[str, Any], uv: Array) -> Array:
+    """uv [V, 2], v DOWN, under the transform of a glTF material's textures."""
+    told = next(iter(_transforms(said)), {})
+    cos, sin = np.cos(told.get("rotation", 0.0)), np.sin(told.get("rotation", 0.0))
+    return uv * told.get("scale", 1.0) @ np.array([[cos, -sin], [sin, cos]]) + told.get("offset", 0.0)
+
+
+def _transforms(said: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those of the base colour's texture, and of the roughness'."""
+    pbr = said.get("pbrMetallicRoughness") or {}
+    names = ("baseColorTexture", "metallicRoughnessTexture")
+    return [_extension(pbr[name], TRANSFORM) for name in names if pbr.get(name)]
+
+
 def gltf_left_out(said: dict[str, Any]) -> list[str]:
     """Parts of a glTF material that are not shown."""
-    extensions = said.get("extensions") or {}
+    extensions, transforms = said.get("extensions") or {}, _transforms(said)
     return [
+        *["the transform of its roughness texture"] * any(one != transforms[0] for one in transforms),
         *["its normal map"] * ("normalTexture" in said),
         *["its emissive texture"] * ("emissiveTexture" in said),
         *["its transparency (taken as opaque)"] * (said.get("alphaMode", "OPAQUE") != "OPAQUE"),

@@ -18,14 +18,23 @@ from trimesh import Trimesh
 from materialist.camera import unit
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import edge_faults, uniform_surface
-from materialist.edits.insert.mesh_material import GREY, Textures, coloured, gltf_left_out, gltf_surface, mtl_surface
+from materialist.edits.insert.mesh_material import (
+    GREY,
+    TRANSFORM,
+    Textures,
+    coloured,
+    gltf_left_out,
+    gltf_surface,
+    gltf_uv,
+    mtl_surface,
+)
 from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.option_kinds import parse_colour
 from materialist.types import Array, Body, Surface
 
 FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
-READ = ("KHR_materials_", "EXT_texture_webp", "KHR_lights_punctual", "KHR_texture_transform")
+READ = ("KHR_materials_", "EXT_texture_webp", TRANSFORM)
 """Beginnings of the glTF extensions that a file may require."""
 
 
@@ -115,7 +124,8 @@ def read_model(path: str | Path, *, up: str = "auto") -> MeshModel:
     if up not in ("auto", "y", "z"):
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
     data, folder = _bytes(path), MeshFolder(path.parent)
-    reader = _Reader(path, _gltf_materials(path, data))
+    data, materials, left_out = _numbered(path, data)
+    reader = _Reader(path, materials, left_out)
     parts = list(reader.parts(_parsed(path, data, folder)))
     if folder.refused:
         raise InputError(
@@ -208,37 +218,47 @@ def _parsed(path: Path, data: bytes, folder: MeshFolder) -> Any:
         quiet.setLevel(level)
 
 
-def _gltf_materials(path: Path, data: bytes) -> dict[str | None, dict[str, Any]]:
-    """Name -> material as a .gltf or .glb has it, for the entries that trimesh leaves out.
+def _numbered(path: Path, data: bytes) -> tuple[bytes, dict[str, dict[str, Any]], list[str]]:
+    """(a .gltf or .glb with numbers for the names of its materials, number -> material as the file has it, for the
+    entries that trimesh leaves out, and what else is left out); names need be neither there nor unique.
 
-    Bytes that are no glTF have none; trimesh refuses them. Raises InputError for a required extension that is not read.
+    Bytes that are no glTF stay; trimesh refuses them. Raises InputError for a required extension that is not read.
     """
     if path.suffix.lower() not in (".gltf", ".glb"):
-        return {}
+        return data, {}, []
+    start, end, total = 0, len(data), 0
     try:
         if data[:4] == b"glTF":
-            (length,) = struct.unpack_from("<I", data, 12)
-            data = data[20 : 20 + length]
-        header = json.loads(data)
+            start, (total, length) = 20, struct.unpack_from("<II", data, 8)
+            end = start + length
+        header = json.loads(data[start:end])
         unread = [name for name in header.get("extensionsRequired", []) if not name.startswith(READ)]
-        materials = {material.get("name"): material for material in reversed(header.get("materials", []))}
+        materials = {str(number): material for number, material in enumerate(header.get("materials", []))}
+        header["materials"] = [material | {"name": number} for number, material in materials.items()]
+        left_out = ["its lighting"] * ("KHR_lights_punctual" in header.get("extensions", {}))
     except (ValueError, TypeError, AttributeError, RecursionError, struct.error):
-        return {}
+        return data, {}, []
     if unread:
         raise InputError(
             f"{path} needs the glTF extension {unread[0]}, which is not read; export it without (in Blender, without "
             "compression), or as OBJ or PLY."
         )
-    return materials
+    text = json.dumps(header).encode()
+    sizes = struct.pack("<II", total + len(text) - (end - start), len(text))
+    return (data[:8] + sizes + data[16:20]) * (start > 0) + text + data[end:], materials, left_out
 
 
 class _Reader:
     """The meshes of a trimesh scene as bodies."""
 
-    def __init__(self, path: Path, materials: dict[str | None, dict[str, Any]]):
+    def __init__(self, path: Path, materials: dict[str, dict[str, Any]], left_out: list[str]):
         self.path, self.materials = path, materials
         self.textures = Textures(LIMITS.texture)
         self.notes: list[str] = []
+        self._tell(left_out)
+
+    def _tell(self, left_out: list[str]) -> None:
+        self.notes += [f"{self.path.name}: {what} is left out." for what in left_out]
 
     def parts(self, scene: Any) -> Iterator[Body]:
         """Its meshes as bodies where their nodes put them, about the middle of the base of all."""
@@ -300,16 +320,17 @@ class _Reader:
         material = getattr(visual, "material", None)
         if material is None:
             return uniform_surface(GREY, GREY, 0.0), None, None
+        said: dict[str, Any] = {}
         if hasattr(material, "metallicFactor"):
-            said = self.materials.get(getattr(material, "name", None), {})
+            said = self.materials.get(material.name, {})
             surface, left_out = gltf_surface(material, said, self.textures), gltf_left_out(said)
         else:
             surface, left_out = mtl_surface(material, self.textures)
         if "color" in (getattr(visual, "vertex_attributes", None) or {}):
             left_out = [*left_out, "the colours of its vertices"]
-        self.notes += [f"{self.path.name}: {what} is left out." for what in left_out]
+        self._tell(left_out)
         uv = np.asarray(visual.uv, np.float64) if np.shape(visual.uv) == (len(mesh.vertices), 2) else None
-        return surface, None if uv is None else np.nan_to_num(np.stack([uv[:, 0], 1 - uv[:, 1]], -1)), None
+        return surface, None if uv is None else np.nan_to_num(gltf_uv(said, uv * [1, -1] + [0, 1])), None
 
 
 def creased_normals(vertices: Array, faces: Array, degrees: float) -> Array:
