@@ -57,6 +57,19 @@ def test_an_inpainter_gets_the_photo_and_the_hole():
     np.testing.assert_allclose(removed.photo.linear[MASK], 0.4)
 
 
+@pytest.mark.parametrize(
+    ("paint", "message"),
+    [
+        (lambda photo, hole: np.where(hole[..., None], np.nan, photo), "not finite"),
+        (lambda photo, hole: photo[..., 0], r"picture of the inpainter is \(36, 48\)"),
+        (lambda photo, hole: None, "same proportions"), (lambda photo, hole: photo / hole.sum(2), "inpainter failed"),
+    ],
+)  # fmt: skip
+def test_what_an_inpainter_gives_is_checked(paint, message):
+    with pytest.raises(InputError, match=message):
+        remove(flat_scene(), MASK, inpaint=paint)
+
+
 def test_a_saved_pipeline_fills_the_hole_and_nothing_else(tmp_path):
     pytest.importorskip("diffusers")
     paint = inpainter(f"sd:{save_inpainting(tmp_path / 'sd')}", device="cpu", steps=2)

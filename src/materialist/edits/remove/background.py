@@ -39,13 +39,16 @@ def picture_behind(
     background, inpaint = options.background, options.inpaint
     if background is not None and inpaint is not None:
         raise InputError("Give a background or an inpainter, not both.")
-    if inpaint is not None:
-        if isinstance(inpaint, str):
-            inpaint = inpainter(inpaint, seed=options.seed, device=options.device)
-        return np.asarray(inpaint(scene.photo.linear, hole), np.float32), "inpainter", []
-    if background is None:
+    if background is None and inpaint is None:
         return patched(scene.photo.original, hole, usable, found.label, options.seed), "patches", []
-    notes: list[str] = []
+    name, notes = "background" if inpaint is None else "inpainter", list[str]()
+    if isinstance(inpaint, str):
+        inpaint = inpainter(inpaint, seed=options.seed, device=options.device)
+    if inpaint is not None:
+        try:
+            background = np.asarray(inpaint(scene.photo.linear, hole), np.float32)
+        except Exception as error:  # whatever a user's function raises
+            raise InputError(f"The inpainter failed: {type(error).__name__}: {error}.") from error
     if isinstance(background, str | Path):
         decoded = decode_photo(Path(background))
         notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
@@ -53,12 +56,14 @@ def picture_behind(
     picture = np.asarray(background, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, hole.shape):
         raise InputError(
-            f"The background is {' x '.join(map(str, picture.shape[1::-1]))} pixels, the photo {hole.shape[1]} x "
-            f"{hole.shape[0]} at working size; give the same view at the same proportions."
+            f"The picture of the {name} is {picture.shape}, the photo {hole.shape} (rows, columns) at working size; "
+            "give the same view in colour, at the same proportions."
         )
     if not (np.isfinite(picture).all() and picture.min() >= 0):
-        raise InputError("The background has negative or infinite values; give a linear or sRGB picture.")
-    return picture, "background", notes
+        raise InputError(
+            f"The picture of the {name} has values that are negative or not finite; give linear ones >= 0."
+        )
+    return picture, name, notes
 
 
 def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30) -> Inpaint:

@@ -49,7 +49,8 @@ def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, b
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
     gone = grown(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
-    if (gone & surface).sum() > SETTINGS.most * surface.sum() or (gone | ~surface).all():
+    nearly_all = lambda m: (m & surface).sum() > SETTINGS.most * surface.sum() or (m | ~surface).all()  # noqa: E731
+    if nearly_all(gone):
         raise InputError(
             f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of the photo's surfaces (sky is none), so that "
             "nothing tells what stands behind; mark one object only, which stands on something."
@@ -58,6 +59,10 @@ def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, b
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
     share = SETTINGS.shadow if shadow is None else shadow
     painted = gone | (ground & grown(gone, round(share * float(np.sqrt(own.sum())))))
+    if nearly_all(painted):
+        raise InputError(
+            f"With a shadow of {share:g} the hole takes (nearly) all of the photo's surfaces; choose a smaller shadow."
+        )
     return Hole(own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies)
 
 
