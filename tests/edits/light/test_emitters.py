@@ -1,5 +1,6 @@
 """Lights that the photo shows: found, estimated, dimmed, and what the room then looks like."""
 
+import tracemalloc
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +15,7 @@ from materialist.edits.composite.into_photo import in_photo, into_photo
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.core.surfaces import KEY, emitting
-from materialist.edits.light.emitters import _patch, dimmed, visible_lights
+from materialist.edits.light.emitters import _parts, _patch, dimmed, visible_lights
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
@@ -59,6 +60,17 @@ def test_the_window_is_found_and_a_speck_is_not():
     large[3, 3:6] = 1  # a highlight: less than a thousandth
     depth = np.ones((60, 80), np.float32)
     assert not visible_lights(replace(fit, photo=replace(fit.photo, linear=large), depth=depth))
+
+
+def test_specks_take_no_memory():
+    specks = np.zeros((256, 256), bool)
+    specks[::4, ::4] = True
+    specks[100:110, 100:110] = True
+    tracemalloc.start()
+    (part,) = _parts(specks, 9)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert part.sum() == 100 and peak < 100 * specks.nbytes
 
 
 def test_its_radiance_is_found():
@@ -107,7 +119,7 @@ def test_edits_before_do_not_change_what_is_found():
     np.testing.assert_allclose(one.pop("emission"), other.pop("emission"), rtol=1e-6)
     assert one == pytest.approx(other, rel=1e-6)
     np.testing.assert_allclose(after.envmap, before.envmap, rtol=1e-5)
-    with pytest.raises(InputError, match="fitted="):
+    with pytest.raises(InputError, match="dim that one"):
         relight(edit(fit, floor, albedo=(0.05, 0.05, 0.05)), dim=0.5)
 
 

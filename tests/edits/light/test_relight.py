@@ -98,6 +98,8 @@ def test_edited_light_is_noted_and_warned_about():
     assert any("double shadows" in note for note in lit.report.warnings)
     assert lit.provenance["edits"] == [{"kind": "light", "rotate": 40}]
     assert relight(SCENE, rotate=40).report.warnings == SCENE.report.warnings
+    with_sun = relight(SCENE, sun=(20, 40), sun_power=5)
+    assert not relight(with_sun, ambient=0.5, fitted=SCENE).report.warnings, "it is not the photo's"
 
 
 @pytest.mark.parametrize(

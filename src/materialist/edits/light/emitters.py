@@ -54,7 +54,7 @@ def visible_lights(scene: Scene) -> list[Array]:
     grown = ndimage.binary_propagation(bright, mask=(value >= DEFAULT.beside * least) & surface & near)
     closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(DEFAULT.gap * longer))) > 0
     masks = [
-        mask for mask in _parts(closed)
+        mask for mask in _parts(closed, DEFAULT.area * closed.size)
         if (mask & bright).sum() >= DEFAULT.area * mask.size
         and scene.normal[mask][:, 1].mean() <= DEFAULT.upward
     ]  # fmt: skip
@@ -77,10 +77,10 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
         raise InputError("The lights of this photo are dimmed already; start from the scene before.")
     if fitted is None and is_edited(scene):
         raise InputError(
-            "The lights of a photo are found in the scene before its edits; give that as fitted=, or dim first."
+            "The lights of a photo are found in the scene before its edits; dim that one, and edit it afterwards."
         )
     known = fitted or scene
-    masks = visible_lights(known) if lights is None else _parts(checked_region(known, lights) > 0.5)
+    masks = visible_lights(known) if lights is None else _parts(checked_region(known, lights) > 0.5, DEFAULT.pixels)
     if not any(mask.sum() >= DEFAULT.pixels for mask in masks):
         raise InputError(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
@@ -89,7 +89,7 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
             else f"The mask of lights has no connected part of {DEFAULT.pixels} pixels; mark the whole light."
         )
     gone = (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
-    masks = [part for mask in masks for part in _parts(mask & ~gone) if part.sum() >= DEFAULT.pixels]
+    masks = [part for mask in masks for part in _parts(mask & ~gone, DEFAULT.pixels)]
     if not masks:
         raise InputError("The lights of this photo were taken away by an earlier step; leave the dimming out.")
     colours, radiance = _looks(known.photo, masks)
@@ -106,10 +106,10 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
     return warned(replace(edited, provenance={**scene.provenance, KEY: found}), note)
 
 
-def _parts(mask: Array) -> list[Array]:
-    """[H, W] bool each: the connected parts of a mask."""
-    label, count = ndimage.label(mask)
-    return [label == k for k in range(1, count + 1)]
+def _parts(mask: Array, least: float) -> list[Array]:
+    """[H, W] bool each: the connected parts of a mask that have at least `least` pixels."""
+    label, _ = ndimage.label(mask)
+    return [label == k for k in np.flatnonzero(np.bincount(label.ravel()) >= least) if k]
 
 
 def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, float]], float | None]:

@@ -71,7 +71,7 @@ def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | Non
         "ambient": wanted.ambient if wanted.ambient != 1 else None, "lamps": len(lamps) or None, "dim": wanted.dim,
     }  # fmt: skip
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
-    return noted(warned(new, *_warnings(scene)), "light", what)
+    return noted(warned(new, *_warnings(fitted or scene)), "light", what)
 
 
 def resolved(scene: Scene, options: Relight) -> Any:
@@ -232,11 +232,11 @@ def moving_light(
     for k in range(count):
         t = k / (count if closed else count - 1)
         sun = tuple(_between(suns, t)) if suns else None
-        lamp = None
+        placed: tuple[Lamp, ...] = ()
         if lamps:
             x, y, z, *power, radius = _between([(*one.position, *one.power, one.radius) for one in lamps], t)
-            lamp = Lamp((x, y, z), triple(power), radius)
-        yield relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=(lamp,) if lamp else ())
+            placed = (Lamp((x, y, z), triple(power), radius),)
+        yield relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=placed)
 
 
 def _between(stations: Sequence[tuple[float, ...]], t: float) -> list[float]:
