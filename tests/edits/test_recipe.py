@@ -6,6 +6,7 @@ from edit_scenes import MASK, flat_scene
 from made_meshes import box_file
 from PIL import Image
 
+from materialist.edits import recipe
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.edits.recipe import apply, read_recipe
@@ -89,3 +90,10 @@ def test_what_was_taken_away_is_in_no_later_region(folder, second):
     gone = removed.depth != SCENE.depth
     assert gone.any() and np.array_equal(got.materials.albedo[gone], removed.materials.albedo[gone])
     assert np.allclose(got.materials.albedo[wide & ~gone], [0, 0, 1])
+
+
+def test_a_region_is_chosen_on_the_steps_device(monkeypatch):
+    seen = []
+    monkeypatch.setattr(recipe, "select", lambda scene, device, **_: seen.append(device) or MASK)
+    apply(SCENE, [recipe.Step("edit", {"click": [16, 18], "with": "sam2", "hue": 10})], device="cpu")
+    assert seen == ["cpu"]

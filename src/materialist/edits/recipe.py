@@ -170,7 +170,7 @@ def region_of(scene: Scene, step: Step) -> Array:
         "box": numbers(given["box"], 4, "box") if "box" in given else None,
         "mask": beside(step.folder, "mask", given["mask"]) if "mask" in given else None,
     }
-    return select(scene, method=given.get("with", "network"), **where)
+    return select(scene, method=given.get("with", "network"), device=step.device, **where)
 
 
 def _left(scene: Scene, edited: Scene, region: Array) -> Array:
