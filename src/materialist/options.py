@@ -102,7 +102,7 @@ class Glass(Removal):
         kind="word", choices=("found", "same"))
     thickness: Array | str | Path = option(
         "auto", "How thick it is; a file has scene units.", kind="file",
-        choices=("auto", "network", "symmetry", "half-turn"), metavar="auto|network|symmetry|FILE")
+        choices=("auto", "network", "symmetry"), metavar="auto|network|symmetry|FILE")
     """One of the methods, or [H, W] along the camera rays, or a file of that."""
 
     def __post_init__(self) -> None:

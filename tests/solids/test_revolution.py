@@ -52,6 +52,7 @@ def test_its_axis_and_front_are_those_of_the_object(pot):
     assert np.linalg.norm(offset - (offset @ UP) * UP) < 0.03
     depth, normal = body.front(mask, RAYS)
     there = mask & (depth > 0)
+    assert not normal[~there].any() and not body.front(np.ones_like(mask), RAYS)[1][0, 0].any()
     assert there.sum() > 0.97 * mask.sum() and error(thick, front, mask) < 0.06
     assert np.abs(depth - front.depth)[there].mean() < 0.02
     assert np.degrees(np.arccos(np.clip((normal * front.normal).sum(-1), -1, 1)))[there].mean() < 8

@@ -77,13 +77,13 @@ class Revolution:
         return found
 
     def front(self, inside: Array, rays: Array) -> tuple[Array, Array]:
-        """[H, W] planar depth at which rays enter the body, 0 where they pass, and its unit normals [H, W, 3] there."""
+        """[H, W] planar depth at which rays enter the body, and its unit normals [H, W, 3] there; 0 where they pass."""
         depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
         nearest, reach = self._reach(rays[inside])
         depth[inside] = np.nan_to_num(self._met(rays[inside], nearest - reach, 2 * reach))
         points = rays[inside] * depth[inside][:, None]
         normal[inside] = self.axis.spread(points, self.profile.slope(self.axis.of(points)))
-        return depth, normal
+        return depth, normal * (depth > 0)[..., None]
 
     def _reach(self, rays: Array) -> tuple[Array, Array]:
         """[N] planar depths of rays [N, 3]: nearest to the body's middle, and how far the body goes from there."""

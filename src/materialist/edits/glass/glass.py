@@ -23,6 +23,7 @@ from materialist.types import Array, Body, Scene, Surface
 
 SOLID = "The two-interface model knows no walls: this glass is solid."
 LID = "Only a surface of revolution can be open at the top; this glass is hollow, and closed."
+NARROW = "There is no room for an opening within the wall; this glass is hollow, and closed."
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
 
 
@@ -42,10 +43,7 @@ def glass(
     options = Glass.given(options, **values)
     own = checked_region(scene, mask) > 0.5
     removed = remove(scene, mask, options, fitted=fitted)
-    each = [
-        (part, object_thickness(scene, part, options.thickness, behind=removed.depth))
-        for part in objects_in(own) if (part & (scene.depth > 0)).any()
-    ]  # fmt: skip
+    each = [(part, object_thickness(scene, part, options.thickness, behind=removed.depth)) for part in objects_in(own)]
     if options.model == "two-interface":
         edited = _two_interface(scene, removed, each, options, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if options.hollow else edited
@@ -75,7 +73,9 @@ def _shell(scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: 
         if opened is not None:
             return opened, []
         shell = whole.body(camera, wall=wall)
-    return shell, [LID] * (hollow == "open") + [NO_ROOM] * (bool(hollow) and not shell.hollow)
+    if not hollow or (shell.hollow and hollow != "open"):
+        return shell, []
+    return shell, [NO_ROOM if not shell.hollow else LID if whole is None else NARROW]
 
 
 def glass_surface(scene: Scene, options: Glass) -> Surface:

@@ -10,14 +10,14 @@ from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
 from materialist.geometry.planes import upright
-from materialist.geometry.silhouette import object_size, surface_in
+from materialist.geometry.silhouette import object_size, silhouette_field, surface_in
 from materialist.io.image import read_map
 from materialist.predict.refraction.thickness import Thickness, best_thickness, thickness
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
 
-METHODS = ("auto", "network", "symmetry", "half-turn")
-"""Names of `--thickness`; `half-turn`, of older recipes, is `auto`."""
+METHODS = ("auto", "network", "symmetry")
+"""Names of `--thickness`."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,7 @@ class WallSettings:
     usual: float = 0.05  # where nothing tells it
     least: float = 0.015  # bounds on what RefractionNet says
     most: float = 0.12
+    thick: float = 0.02  # pixels inside its outline that a part of a mask has to reach, or it gives no body; derived
     part: float = 0.01  # share of the largest part of a mask from which a part is an object of its own
 
 
@@ -36,10 +37,11 @@ WALL = WallSettings()
 def objects_in(mask: Array) -> list[Array]:
     """[H, W] bool masks of the connected objects under a mask [H, W] bool; together they are the mask.
 
-    Specks count to the nearest object.
+    Specks, and lines too thin for a body, count to the nearest object.
     """
     number, _ = label(mask, np.ones((3, 3)))
-    area = np.bincount(number.ravel())
+    thick = np.isin(number, number[mask & (silhouette_field(mask) > WALL.thick)])
+    area = np.bincount(number[thick] if thick.any() else number.ravel())
     area[0] = 0
     large = np.flatnonzero(area >= max(WALL.part * area.max(), 1))
     whose = number[nearest(np.isin(number, large))]
@@ -52,7 +54,7 @@ def object_thickness(
     """The thickness of the object under a mask [H, W] bool (paper, Thickness Prior Prediction).
 
     Args:
-        method: `auto` (a surface of revolution where its normals or its outline say so, else RefractionNet),
+        method: `auto` (a surface of revolution where its outline says so, else RefractionNet),
             `network` (RefractionNet), `symmetry` (the paper's assumption), or a map [H, W] of scene
             units along the rays, or its file.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
