@@ -1,5 +1,6 @@
 """Previews from cached transport against the path tracer."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,15 @@ def test_nothing_changed_is_the_photo(preview):
     far = np.s_[:8]
     np.testing.assert_array_equal(changed[far], preview.scene.photo.linear[far])
     assert (changed[MASK] != preview.scene.photo.linear[MASK]).any(-1).all()
+
+
+def test_new_metal_hides_the_photos_texture(preview):
+    edited = edit(preview.scene, MASK, metallic=1.0)
+    seen = preview.scene.photo
+    textured = copy(preview)
+    rough = np.where(MASK[..., None], np.random.default_rng(0).uniform(0.8, 1.2, seen.linear.shape), 1)
+    textured.scene = replace(preview.scene, photo=replace(seen, linear=(seen.linear * rough).astype(np.float32)))
+    np.testing.assert_allclose(textured.picture(edited)[MASK], preview.picture(edited)[MASK], atol=1e-3)
 
 
 def test_kept_tables_are_taken_and_damaged_ones_made_again(preview, tmp_path):

@@ -15,7 +15,7 @@ import numpy as np
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.edits.composite.into_photo import onto_working
-from materialist.edits.composite.layers import Layers, changed_pixels
+from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_left
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.envmap import environment
@@ -39,7 +39,7 @@ class Preview:
 
     What surfaces send to each other stays that of the fitted scene (for another light: of one shading under it), so
     that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once (a
-    second or two), keep it; it has a sixth of the rays until `prepare` has traced the others.
+    second or two), keep it; it has a seventh of the rays until `prepare` has traced the others.
 
     file: where the finer tables of the fitted light are kept (.npz). Where it has those of this scene, nothing is
         traced before there is another light; what cannot be read, or is of another scene, is made again.
@@ -110,16 +110,16 @@ class Preview:
         picture, base = self.render(edited, coarse=coarse), self._base
         differs = (picture != base).any(-1)
         changed = changed_pixels(self.scene, edited) & differs
-        return onto_working(self.scene.photo, Layers(base, picture, differs, changed, is_relit(self.scene, edited)))
+        relit, left = is_relit(self.scene, edited), diffuse_left(self.scene, edited)
+        return onto_working(self.scene.photo, Layers(base, picture, differs, changed, relit, diffuse=left))
 
     def _seen(self, edited: Scene) -> Scene:
         """The scene as it is shaded: in-photo emitters are not shown, and their light comes from the map, as fitted."""
         found = dimmed_emitters(self.scene, edited)
         if found is None:
             return edited
-        ambient, dim = float(found["ambient"]), float(found.get("dim", 1.0))
-        lights = float(found.get("share", max(1 - ambient, 0)))
-        brought = (ambient + lights * dim) / max(ambient + lights, 1e-6)  # relative to the photo's light
+        ambient, lights = float(found["ambient"]), float(found["share"])
+        brought = (ambient + lights * found["dim"]) / max(ambient + lights, 1e-6)  # relative to the photo's light
         # Without its lights the map may have nothing left to be scaled.
         light = edited.envmap / ambient if ambient > LEAST_AMBIENT else self.scene.envmap
         return replace(edited, envmap=(light * brought).astype(np.float32))

@@ -23,7 +23,7 @@ class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
     first: int = 16  # one in so many of all paths, in each half, finds out where the edit reaches
-    least_first: int = 8  # paths of each half that do so at the least; decides below 256 paths
+    least_first: int = 8  # paths of each half that do so at the least, below 144 paths; at 16 all of them
     lattice: int = 256  # pixels along the longer side that do so
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
     visible: float = 1 / 255  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
@@ -88,8 +88,13 @@ def render_layers(
             guides[1] = renderer.guides(edited, anything)
     how: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
     layers = difference(base, other, changed, guides if clean else None, **how)
+    return replace(layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited))
+
+
+def diffuse_left(scene: Scene, edited: Scene) -> Array:
+    """[H, W] in [0, 1]: `Layers.diffuse` of an edit."""
     old, new = (np.maximum(1 - one.materials.metallic, 1e-3) for one in (scene, edited))
-    return replace(layers, relit=relit, native=alone, covered=covered, diffuse=np.minimum(new / old, 1))
+    return np.minimum(new / old, 1)
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:

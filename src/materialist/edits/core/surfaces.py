@@ -1,4 +1,4 @@
-"""Surfaces of bodies, whether they are closed, and bodies that stand for something in the photo, as its lights do."""
+"""Surfaces of bodies, whether bodies are closed, and those that stand for something in the photo, as its lights do."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -46,10 +46,8 @@ def base_of(scene: Scene, edited: Scene) -> Scene:
     found = dimmed_emitters(scene, edited)
     if found is None:
         return scene
-    white = [[found["radiance"]] * 3] * len(edited.bodies)  # scenes of earlier versions hold no colours
-    emission = found.get("emission", white)
     lights = [body for body in edited.bodies if body.name.startswith(PHOTO_LIGHT)]
-    return with_emitters(scene, [emitting(body, own) for body, own in zip(lights, emission)], found)
+    return with_emitters(scene, [emitting(body, own) for body, own in zip(lights, found["emission"])], found)
 
 
 def with_emitters(scene: Scene, emitters: Sequence[Body], found: dict) -> Scene:
