@@ -11,6 +11,7 @@ from edit_scenes import MASK, flat_scene, rendered_scene
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
+from materialist.edits.composite import upsample
 from materialist.edits.composite.composite import composite, developed, is_deep, pictures, write_composite
 from materialist.edits.composite.into_photo import DEFAULT, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
@@ -20,6 +21,7 @@ from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
+from materialist.geometry.membrane import nearest
 from materialist.io.decode import decode
 from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
@@ -176,6 +178,23 @@ def test_the_plain_rendering_goes_through_a_super_resolution():
             composite(scene, edited, **{"spp": 4, **options})
 
 
+def test_a_super_resolution_of_a_composite_is_refused_before_anything_is_rendered(monkeypatch):
+    monkeypatch.setattr("materialist.edits.composite.composite.EditRenderer", None)
+    for made in (composite, lambda scene, edited, **how: next(pictures(scene, [edited], **how))):
+        with pytest.raises(InputError, match="full_render"):
+            made(FLAT, FLAT, upscale=lambda picture: picture)
+
+
+def test_a_photo_of_the_working_size_is_searched_once_for_each_side(monkeypatch):
+    searched = []
+    monkeypatch.setattr(upsample, "nearest", lambda members: searched.append(1) or nearest(members))
+    texture = np.random.default_rng(1).uniform(0.1, 0.3, (400, 8, 3)).astype(np.float32)
+    base, edited = (np.full(texture.shape, v, np.float32) for v in (0.2, 0.4))
+    layers = layers_of(base, edited, np.broadcast_to(np.arange(8) < 4, (400, 8)))
+    into_photo(Photo(texture, Camera(8, 400, 45.0), texture), layers)
+    assert len(searched) == 2
+
+
 def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
     photo = rendered_scene(4).photo
@@ -213,16 +232,17 @@ def photo_from(path):
     return replace(FLAT.photo, linear=linear, original=linear, path=str(path), source=path.read_bytes())
 
 
+@pytest.mark.parametrize("suffix", ["png", "tiff"])
 @pytest.mark.parametrize(("dtype", "side"), [(np.uint8, 16), (np.uint16, 256)])
-def test_every_value_comes_back(tmp_path, dtype, side):
+def test_every_value_comes_back(tmp_path, dtype, side, suffix):
     pixels = np.arange(side**2).astype(dtype).reshape(side, side)[..., None].repeat(3, -1)
-    cv2.imwrite(str(tmp_path / "a.png"), pixels)
-    photo = photo_from(tmp_path / "a.png")
+    cv2.imwrite(str(tmp_path / f"a.{suffix}"), pixels)
+    photo = photo_from(tmp_path / f"a.{suffix}")
     write_composite(tmp_path / "b.png", photo.original, photo)
     back = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED)
     assert back.dtype == dtype and is_deep(photo) == (dtype == np.uint16)
     np.testing.assert_array_equal(back, pixels)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [f"a.{suffix}", "b.png"]
 
 
 def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):

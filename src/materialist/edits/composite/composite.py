@@ -1,5 +1,6 @@
 """The edit brought back into the photograph: everything that it does not reach stays as it was taken."""
 
+import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from tifffile import TiffFile
 
 from materialist import metrics
 from materialist.edits.composite.disclosed import compared, without_traces
@@ -46,6 +48,7 @@ def composite(
     Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
+    _check(upscale, full_render)
     renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device)
     return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
@@ -60,6 +63,7 @@ def pictures(
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
+    _check(upscale, full_render)
     tick = progress or (lambda *_: None)
     total = len(edits) if isinstance(edits, Sequence) else count or 0
     before: Scene | None = None
@@ -74,6 +78,11 @@ def pictures(
         before = edited
         yield picture
     tick("frames", total, total)
+
+
+def _check(upscale: Upscale | None, full_render: bool) -> None:
+    if upscale is not None and not full_render:
+        raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
 
 
 def _base(
@@ -97,8 +106,6 @@ def _picture(
     upscale: Upscale | None, progress=None,
 ) -> Array:  # fmt: skip
     """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
-    if upscale is not None and not full_render:
-        raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
     if full_render:
         if is_pictured(edited):
             raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
@@ -164,4 +171,8 @@ def is_deep(photo: Photo) -> bool:
         return len(head) > 24 and head[24] == 16
     if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
         return True
-    return head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"))
+    if not head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")):
+        return False
+    with TiffFile(io.BytesIO(photo.source or b"")) as tiff:
+        page: Any = tiff.pages[0]
+        return page.bitspersample > 8

@@ -65,16 +65,17 @@ def _changed(photo: Photo, layers: Layers) -> Array:
     if not reached.any():
         return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
+    sides = [(upsample.of(stack, members), members) for members in (changed & clear, ~changed & clear)]
 
     def laid(rows: slice) -> None:
         here, share = out[rows, columns], alpha[rows, columns]
         large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
-        for part, members in ((share, changed & clear), (1 - share, ~changed & clear)):
+        for part, side in zip((share, 1 - share), sides, strict=True):
             where = np.flatnonzero((part > 0).any(0))
             if where.size:
                 own = slice(int(where[0]), int(where[-1]) + 1)
                 there = slice(columns.start + own.start, columns.start + own.stop)
-                large[:, own] += part[:, own, None] * upsample(stack, members, rows, there)
+                large[:, own] += part[:, own, None] * upsample(*side, rows, there)
         change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
         held = here if photo.hdr or layers.relit else _unclipped(here, reference)
         moved = np.maximum(held + change + excess * (held - reference), 0)

@@ -54,13 +54,19 @@ class GuidedUpsample:
         self.guide, self.large = linear_to_srgb(small), large
         self.same = small.shape == large.shape
 
-    def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
-        """[h, w, C] float32: `layer` [H, W, C] in a native window, from the working pixels `members` [H, W] bool.
+    def of(self, layer: Array, members: Array) -> Array:
+        """[H, W, C] a layer for `__call__`: at equal sizes what is no member takes the value of the nearest one."""
+        if not self.same:
+            return layer
+        return layer[nearest(members)] if members.any() else 0 * layer
 
-        0 where none of the 4 x 4 is a member. At equal sizes members keep their own value, and others take the nearest.
+    def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
+        """[h, w, C] float32: a layer `of` the working pixels `members` [H, W] bool in a native window.
+
+        0 where none of the 4 x 4 is a member. At equal sizes the layer itself.
         """
         if self.same:
-            return (layer[nearest(members)] if members.any() else 0 * layer)[rows, columns].astype(np.float32)
+            return layer[rows, columns].astype(np.float32)
         here = linear_to_srgb(self.large[rows, columns])  # [h, w, 3]
         native, working = self.large.shape[:2], members.shape
         y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0], UPSAMPLE.radius)
