@@ -36,7 +36,7 @@ def select(
     run: Run,
     native: Annotated[bool, typer.Option("--native", help="At the photo's native size, with soft edges.")] = False,
 ) -> None:
-    """Find the mask of an object from a click, a box or a rough mask; nothing of it is random."""
+    """Find the mask of an object from a click or a box, or check a given one; nothing of it is random."""
     import numpy as np
 
     from materialist.color import srgb_to_linear

@@ -46,6 +46,15 @@ def test_its_own_maps_guide_the_denoiser(scenes):
     np.testing.assert_array_equal(albedo[body_coverage(striped) == 0], pattern[body_coverage(striped) == 0])
 
 
+def test_several_clicks_cost_one_look_at_what_was_put_there(scenes, monkeypatch):
+    looks = []
+    monkeypatch.setattr(
+        "materialist.edits.select.select.body_coverage", lambda scene: looks.append(1) or np.zeros(scene.depth.shape)
+    )
+    select(scenes[1], click=[(10, 60), (12, 62)])
+    assert len(looks) == 1
+
+
 def test_what_was_put_there_is_not_edited_as_the_photo(scenes):
     _, with_box = scenes
     share = body_coverage(with_box)

@@ -86,21 +86,21 @@ def put(
     low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
     first = support_at(scene, at)
-    unit = scale * (size if size is not None else SETTINGS.width * picture_width(scene, first.depth)) / longest
-    footprint = unit * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
+    factor = scale * (size if size is not None else SETTINGS.width * picture_width(scene, first.depth)) / longest
+    footprint = factor * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     support = support_at(scene, at, footprint)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     turned = frame(support) @ Rotation.from_euler("y", turn, degrees=True).as_matrix()
-    air = SETTINGS.air * unit * longest if any(is_transparent(part.surface) for part in model.parts) else 0.0
-    origin = support.point + air * support.normal - (turned * unit) @ base
-    bodies = tuple(moved(part, turned * unit, origin) for part in model.parts)
+    air = SETTINGS.air * factor * longest if any(is_transparent(part.surface) for part in model.parts) else 0.0
+    origin = support.point + air * support.normal - (turned * factor) @ base
+    bodies = tuple(moved(part, turned * factor, origin) for part in model.parts)
     nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
     if nearest < SETTINGS.nearest * support.depth:
         raise InputError(
             f"{model.name} would reach behind the camera at scale {scale:g}; choose a smaller scale, or a place "
             "further away."
         )
-    return bodies, support, unit * longest
+    return bodies, support, factor * longest
 
 
 def support_at(scene: Scene, at: tuple[float, float], radius: float | None = None) -> Support:

@@ -34,9 +34,8 @@ class SelectSettings:
     probable: float = 0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
     possible: float = 0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
     gap: float = 0.015  # half of the gap across which two parts are one
-    sure: float = (
-        0.9  # likelihood from which a pixel is of the object, and above 1 - sure it may be; 74 clicks, 12 photos
-    )
+    # Likelihood from which a pixel is of the object, and above 1 - sure it may be; 74 clicks, 12 photos.
+    sure: float = 0.9
     side: int = 256  # longer side at which the unsure pixels are shared out
     edge: float = 2000.0  # weight of the photo's edges in that; larger keeps to them more; 74 clicks, 12 photos
     reach: float = 0.02  # how far the outline may move to an edge of the photo; tuned on 206 clicks

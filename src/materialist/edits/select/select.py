@@ -20,7 +20,7 @@ def select(
     box: Sequence[float] | None = None, mask: Array | str | Path | None = None, method: str = "network",
     device: str = "auto",
 ) -> Array:  # fmt: skip
-    """[H, W] bool mask at working size of the object at a click, in a box, or in a rough mask.
+    """[H, W] bool mask at working size of the object at a click, in a box, or the given mask, checked.
 
     Args:
         click: (x, y) at working size, or several, all of them on the object. box: (x0, y0, x1, y1) around the object.
@@ -61,10 +61,11 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
     points = [checked_pixel(scene, point) for point in several(click)]
     if not points:
         raise InputError("The list of clicks is empty; give one pixel of the object.")
+    hidden = body_coverage(scene) > HIDDEN if scene.bodies else np.zeros(scene.depth.shape, bool)
     for x, y in points:
         if scene.depth[y, x] <= 0:
             raise InputError(f"The click {x},{y} is on the sky, where there is no surface; click on an object.")
-        if scene.bodies and body_coverage(scene)[y, x] > HIDDEN:
+        if hidden[y, x]:
             raise InputError(f"The click {x},{y} is on {PLACED}, or click on something else.")
     return points
 
