@@ -70,3 +70,10 @@ def test_hdr_values_stay_and_odd_holes_are_filled():
         most[place] = True
         found = filled(stripes(), most)
         assert np.isfinite(found).all() and found[most].min() > 0.1, "black is no colour of the photo"
+
+
+def test_black_of_the_photo_is_copied():
+    hole = hole_in((72, 96))
+    bright = np.indices(hole.shape)[0] >= 40
+    picture = 0.8 * np.repeat(bright[..., None], 3, -1)
+    assert filled(picture, hole)[hole & ~bright].max() < 0.01

@@ -53,11 +53,11 @@ def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 
     gap, kept = (resample.values(m.astype(np.float32), shape) > 0 for m in (hole, ~usable & ~hole))
     kept &= ~gap
     top = max(1.0, float(picture.max()))
-    levels = np.round(255 * _encoded(picture, top)).astype(np.uint8)
+    levels = np.maximum(np.round(255 * _encoded(picture, top)), 1).astype(np.uint8)  # 0: no patch fitted
     surface = resample.values((SETTINGS.surface * label).astype(np.float32), shape)
     guide = np.stack([surface, 0 * surface, 0 * surface], -1)
     filled = _inpainted(levels, gap, kept, guide, seed).astype(np.float32) / 255
-    plain = gap & (filled == 0).all(-1)  # where no patch fitted at all
+    plain = gap & (filled == 0).all(-1)
     if plain.any():
         filled = np.where(plain[..., None], membrane(filled, ~gap & ~kept), filled)
     return np.where(gap[..., None], _decoded(filled, top), picture).astype(np.float32)
