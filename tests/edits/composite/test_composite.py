@@ -11,7 +11,7 @@ from edit_scenes import MASK, flat_scene, rendered_scene
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
-from materialist.edits.composite import upsample
+from materialist.edits.composite import into_photo as into_photo_module
 from materialist.edits.composite.composite import composite, developed, is_deep, pictures, write_composite
 from materialist.edits.composite.into_photo import DEFAULT, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
@@ -187,7 +187,7 @@ def test_a_super_resolution_of_a_composite_is_refused_before_anything_is_rendere
 
 def test_a_photo_of_the_working_size_is_searched_once_for_each_side(monkeypatch):
     searched = []
-    monkeypatch.setattr(upsample, "nearest", lambda members: searched.append(1) or nearest(members))
+    monkeypatch.setattr(into_photo_module, "nearest", lambda members: searched.append(1) or nearest(members))
     texture = np.random.default_rng(1).uniform(0.1, 0.3, (400, 8, 3)).astype(np.float32)
     base, edited = (np.full(texture.shape, v, np.float32) for v in (0.2, 0.4))
     layers = layers_of(base, edited, np.broadcast_to(np.arange(8) < 4, (400, 8)))

@@ -60,7 +60,7 @@ def test_an_inpainter_gets_the_photo_and_the_hole():
 @pytest.mark.parametrize(
     ("paint", "message"),
     [
-        (lambda photo, hole: np.where(hole[..., None], np.nan, photo), "not finite"),
+        (lambda photo, hole: np.where(hole[..., None], np.nan, photo), "or NaN"),
         (lambda photo, hole: photo[..., 0], r"picture of the inpainter is \(36, 48\)"),
         (lambda photo, hole: None, "same proportions"), (lambda photo, hole: photo / hole.sum(2), "inpainter failed"),
     ],

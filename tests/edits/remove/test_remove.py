@@ -158,5 +158,5 @@ def test_a_given_shadow_widens_the_hole_on_the_ground_alone():
         floor, depth=np.where(np.arange(36)[:, None] >= 12, floor.depth, 0), normal=0 * floor.normal + [0, 1, 0]
     )
     floor = replace(floor, geometry=replace(floor.geometry, plane_label=np.zeros((36, 48), np.int8)))
-    with pytest.raises(InputError, match=r"shadow of 5 .* smaller shadow"):
+    with pytest.raises(InputError, match=r"shadow of 5, .* smaller shadow"):
         make_hole(floor, MASK, grow=0.006, shadow=5.0, bodies=np.zeros_like(MASK))

@@ -171,8 +171,5 @@ def is_deep(photo: Photo) -> bool:
         return len(head) > 24 and head[24] == 16
     if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
         return True
-    if not head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")):
-        return False
-    with TiffFile(io.BytesIO(photo.source or b"")) as tiff:
-        page: Any = tiff.pages[0]
-        return page.bitspersample > 8
+    tiff = head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"))
+    return tiff and TiffFile(io.BytesIO(photo.source or b"")).pages.first.bitspersample > 8

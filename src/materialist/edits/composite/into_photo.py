@@ -9,6 +9,7 @@ from scipy import ndimage
 
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
+from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Photo
 
@@ -65,7 +66,10 @@ def _changed(photo: Photo, layers: Layers) -> Array:
     if not reached.any():
         return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
-    sides = [(upsample.of(stack, members), members) for members in (changed & clear, ~changed & clear)]
+    sides = [
+        (stack[nearest(own)] if upsample.same and own.any() else stack * own.any(), own)
+        for own in (changed & clear, ~changed & clear)
+    ]
 
     def laid(rows: slice) -> None:
         here, share = out[rows, columns], alpha[rows, columns]

@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import window
 from materialist.types import Array
 
@@ -54,16 +53,10 @@ class GuidedUpsample:
         self.guide, self.large = linear_to_srgb(small), large
         self.same = small.shape == large.shape
 
-    def of(self, layer: Array, members: Array) -> Array:
-        """[H, W, C] a layer for `__call__`: at equal sizes what is no member takes the value of the nearest one."""
-        if not self.same:
-            return layer
-        return layer[nearest(members)] if members.any() else 0 * layer
-
     def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
-        """[h, w, C] float32: a layer `of` the working pixels `members` [H, W] bool in a native window.
+        """[h, w, C] float32: `layer` [H, W, C] in a native window, from the working pixels `members` [H, W] bool.
 
-        0 where none of the 4 x 4 is a member. At equal sizes the layer itself.
+        0 where none of the 4 x 4 is a member. At equal sizes (`same`) the layer itself, whatever the members.
         """
         if self.same:
             return layer[rows, columns].astype(np.float32)

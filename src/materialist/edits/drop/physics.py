@@ -121,8 +121,7 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
         return spec.compile()
     except ValueError as error:  # as of a mass that is nearly none
         size = max(float(np.ptp(piece, axis=0).max()) for thing in things for piece in thing.pieces)
-        reason = str(error).splitlines()[0].removeprefix("Error: ")
-        raise InputError(f"MuJoCo takes no things of {size:.3g} m ({reason}); choose larger metres.") from error
+        raise InputError(f"Things of {size:.3g} m are too light for the simulation; choose larger metres.") from error
 
 
 def _piece(mujoco, spec, body, name: str, corners: Array) -> None:

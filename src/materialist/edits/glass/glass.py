@@ -73,9 +73,8 @@ def _shell(scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: 
         if opened is not None:
             return opened, []
         shell = whole.body(camera, wall=wall)
-    if not hollow or (shell.hollow and hollow != "open"):
-        return shell, []
-    return shell, [NO_ROOM if not shell.hollow else LID if whole is None else NARROW]
+    note = NO_ROOM if not shell.hollow else LID if whole is None else NARROW
+    return shell, [note] * (hollow == "open" or (bool(hollow) and not shell.hollow))
 
 
 def glass_surface(scene: Scene, options: Glass) -> Surface:

@@ -56,8 +56,8 @@ class Textures:
         return image
 
 
-def gltf_surface(material: Any, said: dict[str, Any], textures: Textures) -> Surface:
-    """The surface of trimesh's PBRMaterial; `said` is the same material in the file, with what trimesh leaves out.
+def gltf_surface(material: Any, said: dict[str, Any], textures: Textures) -> tuple[Surface, list[str]]:
+    """(surface of trimesh's PBRMaterial, parts that are not shown); `said` is the same material in the file.
 
     glTF 2.0, section 3.9: factors times textures; green is roughness, blue metallic; factors default to 1. Transmitted
     light is tinted by the base colour, and an emissive strength of 1 is the white of the photo.
@@ -79,28 +79,21 @@ def gltf_surface(material: Any, said: dict[str, Any], textures: Textures) -> Sur
     if share > 0 and "transmissionTexture" not in entering:
         ior = float(np.clip(_extension(said, "KHR_materials_ior").get("ior", 1.5), 1, 3))
         surface = replace(surface, transmission=share, ior=ior, tint=triple(surface.albedo.mean((0, 1))))
-    return surface
+    return surface, _left_out(said)
 
 
 def gltf_uv(said: dict[str, Any], uv: Array) -> Array:
-    """uv [V, 2], v DOWN, under the transform of a glTF material's textures."""
-    told = next(iter(_transforms(said)), {})
+    """uv [V, 2], v DOWN, under the transform of a glTF material's base colour, or else of its roughness."""
+    pbr = said.get("pbrMetallicRoughness") or {}
+    told = _extension(pbr.get("baseColorTexture") or pbr.get("metallicRoughnessTexture") or {}, TRANSFORM)
     cos, sin = np.cos(told.get("rotation", 0.0)), np.sin(told.get("rotation", 0.0))
     return uv * told.get("scale", 1.0) @ np.array([[cos, -sin], [sin, cos]]) + told.get("offset", 0.0)
 
 
-def _transforms(said: dict[str, Any]) -> list[dict[str, Any]]:
-    """Those of the base colour's texture, and of the roughness'."""
-    pbr = said.get("pbrMetallicRoughness") or {}
-    names = ("baseColorTexture", "metallicRoughnessTexture")
-    return [_extension(pbr[name], TRANSFORM) for name in names if pbr.get(name)]
-
-
-def gltf_left_out(said: dict[str, Any]) -> list[str]:
+def _left_out(said: dict[str, Any]) -> list[str]:
     """Parts of a glTF material that are not shown."""
-    extensions, transforms = said.get("extensions") or {}, _transforms(said)
+    extensions = said.get("extensions") or {}
     return [
-        *["the transform of its roughness texture"] * any(one != transforms[0] for one in transforms),
         *["its normal map"] * ("normalTexture" in said),
         *["its emissive texture"] * ("emissiveTexture" in said),
         *["its transparency (taken as opaque)"] * (said.get("alphaMode", "OPAQUE") != "OPAQUE"),

@@ -18,23 +18,14 @@ from trimesh import Trimesh
 from materialist.camera import unit
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import edge_faults, uniform_surface
-from materialist.edits.insert.mesh_material import (
-    GREY,
-    TRANSFORM,
-    Textures,
-    coloured,
-    gltf_left_out,
-    gltf_surface,
-    gltf_uv,
-    mtl_surface,
-)
+from materialist.edits.insert.mesh_material import GREY, Textures, coloured, gltf_surface, gltf_uv, mtl_surface
 from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.option_kinds import parse_colour
 from materialist.types import Array, Body, Surface
 
 FORMATS = (".obj", ".ply", ".stl", ".gltf", ".glb")
-READ = ("KHR_materials_", "EXT_texture_webp", TRANSFORM)
+READ = ("KHR_materials_", "EXT_texture_webp", "KHR_texture_transform")
 """Beginnings of the glTF extensions that a file may require."""
 
 
@@ -143,10 +134,9 @@ def read_model(path: str | Path, *, up: str = "auto") -> MeshModel:
     if up == "z" or (up == "auto" and path.suffix.lower() == ".stl"):
         turned = lambda v: np.stack([v[:, 0], v[:, 2], -v[:, 1]], -1)  # noqa: E731
         parts = [replace(part, vertices=turned(part.vertices), normals=turned(part.normals)) for part in parts]
+    notes = [f"{path.name}: {what} is left out." for what in reader.left_out]
     lacking = [f"{name} is missing" for name in folder.missing] + ["a texture cannot be read"] * reader.textures.damaged
-    return _checked(
-        parts, path, reader.notes + [f"{path.name}: {what}; a constant takes its place." for what in lacking]
-    )
+    return _checked(parts, path, notes + [f"{path.name}: {what}; a constant takes its place." for what in lacking])
 
 
 def files_beside(path: Path) -> list[Path]:
@@ -236,6 +226,9 @@ def _numbered(path: Path, data: bytes) -> tuple[bytes, dict[str, dict[str, Any]]
         materials = {str(number): material for number, material in enumerate(header.get("materials", []))}
         header["materials"] = [material | {"name": number} for number, material in materials.items()]
         left_out = ["its lighting"] * ("KHR_lights_punctual" in header.get("extensions", {}))
+        text = json.dumps(header).encode()
+        sizes = struct.pack("<II", total + len(text) - (end - start), len(text)) if start else b""
+        data = data[: min(start, 8)] + sizes + data[16:start] + text + data[end:]
     except (ValueError, TypeError, AttributeError, RecursionError, struct.error):
         return data, {}, []
     if unread:
@@ -243,9 +236,7 @@ def _numbered(path: Path, data: bytes) -> tuple[bytes, dict[str, dict[str, Any]]
             f"{path} needs the glTF extension {unread[0]}, which is not read; export it without (in Blender, without "
             "compression), or as OBJ or PLY."
         )
-    text = json.dumps(header).encode()
-    sizes = struct.pack("<II", total + len(text) - (end - start), len(text))
-    return (data[:8] + sizes + data[16:20]) * (start > 0) + text + data[end:], materials, left_out
+    return data, materials, left_out
 
 
 class _Reader:
@@ -254,11 +245,7 @@ class _Reader:
     def __init__(self, path: Path, materials: dict[str, dict[str, Any]], left_out: list[str]):
         self.path, self.materials = path, materials
         self.textures = Textures(LIMITS.texture)
-        self.notes: list[str] = []
-        self._tell(left_out)
-
-    def _tell(self, left_out: list[str]) -> None:
-        self.notes += [f"{self.path.name}: {what} is left out." for what in left_out]
+        self.left_out = left_out
 
     def parts(self, scene: Any) -> Iterator[Body]:
         """Its meshes as bodies where their nodes put them, about the middle of the base of all."""
@@ -320,15 +307,14 @@ class _Reader:
         material = getattr(visual, "material", None)
         if material is None:
             return uniform_surface(GREY, GREY, 0.0), None, None
-        said: dict[str, Any] = {}
+        said = self.materials.get(getattr(material, "name", ""), {})
         if hasattr(material, "metallicFactor"):
-            said = self.materials.get(material.name, {})
-            surface, left_out = gltf_surface(material, said, self.textures), gltf_left_out(said)
+            surface, left_out = gltf_surface(material, said, self.textures)
         else:
             surface, left_out = mtl_surface(material, self.textures)
         if "color" in (getattr(visual, "vertex_attributes", None) or {}):
             left_out = [*left_out, "the colours of its vertices"]
-        self._tell(left_out)
+        self.left_out += left_out
         uv = np.asarray(visual.uv, np.float64) if np.shape(visual.uv) == (len(mesh.vertices), 2) else None
         return surface, None if uv is None else np.nan_to_num(gltf_uv(said, uv * [1, -1] + [0, 1])), None
 

@@ -60,9 +60,7 @@ def picture_behind(
             "give the same view in colour, at the same proportions."
         )
     if not (np.isfinite(picture).all() and picture.min() >= 0):
-        raise InputError(
-            f"The picture of the {name} has values that are negative or not finite; give linear ones >= 0."
-        )
+        raise InputError(f"The picture of the {name} has negative or infinite values, or NaN; give a linear one.")
     return picture, name, notes
 
 

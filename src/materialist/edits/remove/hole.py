@@ -49,19 +49,15 @@ def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, b
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
     gone = grown(own, round(grow * max(own.shape)))
     surface = scene.depth > 0
-    nearly_all = lambda m: (m & surface).sum() > SETTINGS.most * surface.sum() or (m | ~surface).all()  # noqa: E731
-    if nearly_all(gone):
-        raise InputError(
-            f"The mask covers {own.sum() / max(surface.sum(), 1):.0%} of the photo's surfaces (sky is none), so that "
-            "nothing tells what stands behind; mark one object only, which stands on something."
-        )
     plane = scene.geometry.plane_label
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
     share = SETTINGS.shadow if shadow is None else shadow
     painted = gone | (ground & grown(gone, round(share * float(np.sqrt(own.sum())))))
-    if nearly_all(painted):
+    if (painted & surface).sum() > SETTINGS.most * surface.sum() or (painted | ~surface).all():
+        mask_share, whole = ((part & surface).sum() / max(surface.sum(), 1) for part in (own, painted))
         raise InputError(
-            f"With a shadow of {share:g} the hole takes (nearly) all of the photo's surfaces; choose a smaller shadow."
+            f"The mask covers {mask_share:.0%} of the photo's surfaces (sky is none), {whole:.0%} with a shadow of "
+            f"{share:g}, so that nothing tells what stands behind; mark one object only, or give a smaller shadow."
         )
     return Hole(own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies)
 
