@@ -241,6 +241,19 @@ def test_textures_of_gltf_lie_where_the_file_puts_them(tmp_path):
     assert "two.glb: its lighting is left out." in model.warnings
 
 
+@pytest.mark.parametrize(
+    "material",
+    [
+        {"extensions": {"KHR_materials_ior": {"ior": "x"}, "KHR_materials_transmission": {"transmissionFactor": 1}}},
+        {"pbrMetallicRoughness": {"baseColorFactor": {}}},
+        {"pbrMetallicRoughness": {"baseColorTexture": {"extensions": {"KHR_texture_transform": {"scale": [1, 2, 3]}}}}},
+    ],
+)
+def test_materials_that_say_nonsense_are_refused(tmp_path, material):
+    with pytest.raises(InputError, match="has a material that cannot be read"):
+        read_model(triangles_glb(tmp_path / "two.glb", [material, {}]))
+
+
 def test_our_own_glass_comes_back_as_glass(tmp_path):
     scene = insert(floor_scene(), box_file(tmp_path / "box.ply"), (24, 26), material="glass")
     export(scene, tmp_path / "scene.glb")

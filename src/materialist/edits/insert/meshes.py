@@ -308,15 +308,21 @@ class _Reader:
         if material is None:
             return uniform_surface(GREY, GREY, 0.0), None, None
         said = self.materials.get(getattr(material, "name", ""), {})
-        if hasattr(material, "metallicFactor"):
-            surface, left_out = gltf_surface(material, said, self.textures)
-        else:
-            surface, left_out = mtl_surface(material, self.textures)
+        try:
+            if hasattr(material, "metallicFactor"):
+                surface, left_out = gltf_surface(material, said, self.textures)
+            else:
+                surface, left_out = mtl_surface(material, self.textures)
+            uv = np.asarray(visual.uv, np.float64) if np.shape(visual.uv) == (len(mesh.vertices), 2) else None
+            uv = None if uv is None else np.nan_to_num(gltf_uv(said, uv * [1, -1] + [0, 1]))
+        except InputError:
+            raise
+        except Exception as error:  # a file may say anything
+            raise InputError(f"{self.path} has a material that cannot be read: {error}; export it again.") from error
         if "color" in (getattr(visual, "vertex_attributes", None) or {}):
             left_out = [*left_out, "the colours of its vertices"]
         self.left_out += left_out
-        uv = np.asarray(visual.uv, np.float64) if np.shape(visual.uv) == (len(mesh.vertices), 2) else None
-        return surface, None if uv is None else np.nan_to_num(gltf_uv(said, uv * [1, -1] + [0, 1])), None
+        return surface, uv, None
 
 
 def creased_normals(vertices: Array, faces: Array, degrees: float) -> Array:
