@@ -116,10 +116,11 @@ def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Arra
 def _behind_things(
     sight: Any, alone: Any, scene: Scene, there: Box, nearer: Array, gap: float, *, stands: bool
 ) -> Array:
-    """[h, w] share of the bodies, with the photo's own silhouettes where a thing in it is `gap` before them.
+    """[h, w] share of the bodies, with the photo's own silhouettes where its surface is more than `gap` before them.
 
-    The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo. What is
-    nearer is the ground that a body `stands` on: it hides nothing, or its bumps would make the foot ragged.
+    nearer: [h, w] how far it is before them, scene units. The mesh has the steps of working pixels there;
+    `upsample.matte` finds the thing's outline in the photo. A surface less than `gap` before a body is the ground that
+    it `stands` on, and hides nothing: its bumps would make the foot ragged.
     """
     native, working = scene.photo.original.shape[:2], scene.depth.shape
     share = alone.share if stands else sight.share
