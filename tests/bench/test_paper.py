@@ -32,6 +32,9 @@ def test_every_table_names_figures_and_methods_that_there_are(table):
     methods = {method for line in table.lines for method in line[2]}
     if measure.bench == "light":
         assert methods <= set(measure.options["methods"].split(","))
+    if measure.bench == "invert":
+        sizes = {size for sized in (measure.quick, measure.full) for size in sized["sizes"].split(",")}
+        assert {f"{size} × {size}" for size in sizes} <= methods
     if measure.bench in ("edit", "photo-alone"):
         kinds = {method.removeprefix("ceiling ").partition(":")[0] for method in methods}
         assert kinds <= {*edits.KINDS, "maps"}

@@ -1,6 +1,7 @@
 """Reports of benchmarks, and the dispatcher."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -33,6 +34,14 @@ def test_the_table_marks_the_best_figure_of_each_column():
     assert "| slow | 2 | **26.0** | 50 |" in text
     assert "| ceiling | 1 | 44.0 | – |" in text
     assert "What was done." in text and "size 64" in text and "None" not in text
+
+
+def test_methods_compete_within_their_part():
+    rows = [
+        {"method": m, "sample": "a", "psnr": v} for m, v in (("hue: a", 1), ("hue: b", 2), ("cup: a", 8), ("cup: b", 9))
+    ]
+    text = markdown(replace(REPORT, rows=[*rows, {"method": "cup: ceiling", "sample": "a", "psnr": 99}]))
+    assert "| hue: b | 1 | **2.0** |" in text and "| cup: b | 1 | **9.0** |" in text and text.count("**") == 4
 
 
 def test_a_report_is_three_files_of_valid_content(tmp_path):
@@ -105,7 +114,7 @@ def test_options_are_brought_to_the_kind_that_is_taken():
     """A whole number may be written with a point, and a name may read as a number."""
     found = SelectBench.given(scenes="3", size="64.0", loose="0.5", device="cpu")
     assert (found.scenes, found.size, found.loose) == (3, 64, 0.5) and isinstance(found.size, int)
-    assert GlassBench.given(iors=1.5, full="true") == GlassBench(iors="1.5", full=True)
+    assert GlassBench.given(iors=1.5, shapes="3") == GlassBench(iors="1.5", shapes=3)
 
 
 def test_a_run_that_is_stopped_leaves_the_rows_that_were_measured(tmp_path, monkeypatch):

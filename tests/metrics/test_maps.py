@@ -49,6 +49,10 @@ def test_only_surface_counts(truth):
     wrong[:4] = 1
     found = score(replace(truth, materials=replace(truth.materials, albedo=wrong)), truth)
     assert found["albedo_psnr"] == 100
+    noise = replace(truth.materials, roughness=np.random.default_rng(1).uniform(0, 0.8, (24, 32)).astype(np.float32))
+    assert score(replace(truth, materials=noise), truth)["roughness_ssim"] < 0.1
+    far = replace(truth, depth=np.where(np.arange(24)[:, None] < 20, 0, truth.depth))  # sky is no agreement
+    assert score(replace(far, materials=noise), far)["roughness_ssim"] < 0.5
     assert score(truth, replace(truth, depth=np.zeros_like(truth.depth))) == {}
 
 

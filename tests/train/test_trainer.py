@@ -112,6 +112,17 @@ def test_a_termination_of_the_whole_group_is_a_stop_like_any_other(data, tmp_pat
     assert checkpoint.load(tmp_path / "run", "matnet")["schedule"]["step"] == 1
 
 
+def test_a_run_whose_data_break_keeps_what_it_learnt(data, tmp_path):
+    def broken():
+        raise InputError("Four files in a row cannot be read.")
+
+    trainer = made_runs.trainer(made_runs.bundled(data), tmp_path / "run", steps=10)
+    during(trainer, 3, broken)
+    with pytest.raises(InputError, match="Four files"):
+        trainer.fit()
+    assert checkpoint.load(tmp_path / "run", "matnet")["schedule"]["step"] == 3
+
+
 def test_a_run_is_not_overwritten_nor_mixed_up(run, data, tasks, tmp_path):
     folder, _ = run
     with pytest.raises(OutputError, match="add --resume"):

@@ -18,7 +18,7 @@ from pathlib import Path
 from materialist.batches.photos import list_photos
 from materialist.batches.results import package_hash
 from materialist.batches.task import SINGLE_THREAD
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers
+from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers, spread
 from materialist.bench.report import Column, Report
 from materialist.errors import MaterialistError
 from materialist.option_kinds import option
@@ -78,7 +78,7 @@ def chosen(data: Path | None, photos: int, runs: Path) -> list[str]:
         return list(EXAMPLES[:photos])
     below = data / "photos"
     found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=runs)]
-    return found[:: max(1, len(found) // photos)][:photos]
+    return spread(found, photos)
 
 
 def _usage() -> tuple[float, float]:

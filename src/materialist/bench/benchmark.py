@@ -107,3 +107,10 @@ def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dic
     wall, cpu = time.perf_counter(), time.process_time()
     value = work(*given, **named)
     return value, {"seconds": time.perf_counter() - wall, "cpu_seconds": time.process_time() - cpu}
+
+
+def spread(things: list, limit: int) -> list:
+    """At most `limit` of them (0: all), evenly spread."""
+    if not limit or limit >= len(things):
+        return things
+    return [things[round(k * (len(things) - 1) / max(limit - 1, 1))] for k in range(limit)]

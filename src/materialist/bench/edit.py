@@ -66,17 +66,26 @@ class EditBench(Benchmark):
             sample, other = sample_and_light(scene, 0, scene, size=self.size, data=data, seed=self.seed)
             fitted, cost = timed(pipeline.invert, sample.photo, prior=sample.truth, seed=self.seed, device=self.device)
             perfect = true_scene(sample)
+            before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
             for edit in edits(sample, other, kinds):
-                for row in self._compared(edit, sample, perfect, (fitted, cost["seconds"]), report):
+                for row in self._compared(edit, sample, before, perfect, (fitted, cost["seconds"]), report):
                     yield {**row, "sample": sample.name}
         if self.latency:
             yield from self._latencies(data)
 
     def _compared(
-        self, edit: Edit, sample: SyntheticSample, perfect: Scene, fitted: tuple[Scene, float], report: Report
+        self,
+        edit: Edit,
+        sample: SyntheticSample,
+        before: Array,
+        perfect: Scene,
+        fitted: tuple[Scene, float],
+        report: Report,
     ) -> Iterator[Row]:
-        """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet."""
-        before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
+        """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet.
+
+        before: the true picture of the photo.
+        """
         caustics = self.caustics if edit.kind == "glass cup" else 1
         after = edit.truth.render(edit.envmap, spp=caustics * self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)

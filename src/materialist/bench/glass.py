@@ -15,6 +15,7 @@ inpainted background.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -68,15 +69,11 @@ class GlassBench(Benchmark):
     size: int = option(128, "Width and height of the pictures.", **SIZE)
     spp: int = option(144, "Paths a pixel of predictions.", **COUNT)
     reference: int = option(1024, "Paths a pixel of photos and truth.", **COUNT)
-    full: bool = option(False, "The paper's 20 objects x 30 lights x 1.1 and 1.3.", kind="switch")
     draws: int = option(10, "Noisy thicknesses a case.", **COUNT_OR_0)
     pictures: int = option(6, "Cases that are drawn.", **COUNT_OR_0)
     latency: int = option(0, "Size of the timed preview; 0: none.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        if self.full:
-            paper = replace(self, full=False, shapes=10, envmaps=30, iors="1.1,1.3")
-            return (yield from paper.rows(data, report))
         iors = numbers("iors", self.iors, 1.001, 3, float)
         for case, behind in self._cases(data, iors) if self.shapes else ():
             shown: dict[str, Array] = {}
@@ -91,10 +88,11 @@ class GlassBench(Benchmark):
 
     def _cases(self, data: Path | None, iors: list[float]) -> Iterator[tuple[Case, dict[str, Background]]]:
         """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
-        for k, thing in enumerate(scenes.things(data, self.shapes, self.seed)):
+        lights = {group: count() for group in scenes.GROUPS}  # both groups see the same ones
+        for thing in scenes.things(data, self.shapes, self.seed):
             stage = scenes.GlassScene(thing, self.size, self.seed, self.background)
             for j in range(self.envmaps):
-                light = scenes.environment(k * self.envmaps + j, stage, data=data, seed=self.seed)
+                light = scenes.environment(next(lights[thing.group]), stage, data=data, seed=self.seed)
                 room = stage.room.render(light, self.reference, seed=1)
                 gain = scenes.exposure(room)
                 grey = stage.grey.render(light * gain, self.reference, seed=2)

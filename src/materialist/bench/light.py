@@ -135,18 +135,23 @@ class _Stage:
         """`other` [h, 2h, 3] is the light of the relit pictures."""
         self.bench, self.sample, self.other = bench, sample, other
         self.photo = sample.scene.render(sample.envmap, spp=bench.spp, seed=bench.seed + 2)
-        self.relit_photo = sample.scene.render(other, spp=bench.spp, seed=bench.seed + 3)
 
     def relit(self) -> Iterator[Row]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
         truth, device = self.sample.truth, self.bench.device
+        after = self.sample.scene.render(self.other, spp=self.bench.spp, seed=self.bench.seed + 3)
+
+        def on(scene: Scene) -> dict[str, float]:
+            relit = self._rendered(replace(scene, envmap=self.other))
+            return self._on(scene) | {"relit_psnr": metrics.psnr(relit, after)}
+
         for completion, suffix in COMPLETIONS.items():
             perfect = true_scene(self.sample, completion=completion, seed=self.bench.seed)
-            yield {"method": CEILING + suffix, **self._on(perfect)}
+            yield {"method": CEILING + suffix, **on(perfect)}
             options: dict[str, Any] = {"completion": completion, "seed": self.bench.seed, "device": device}
             found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
             off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
-            figures = self._of_light(found.envmap) | self._on(found)
+            figures = self._of_light(found.envmap) | on(found)
             yield {"method": "inversion" + suffix, **figures, "albedo_l1": float(off.mean()), **cost}
 
     def fitted(self, methods: list[str]) -> Iterator[Row]:
@@ -154,11 +159,12 @@ class _Stage:
         bench, perfect = self.bench, true_scene(self.sample)
         for name in methods:
             method, completion = METHODS[name], bench.completion
+            given = given_maps(self.sample, method, seed=bench.seed, device=bench.device)
             (envmap, steps, geometry), cost = timed(
-                fit, self.sample, method, completion, seed=bench.seed, device=bench.device
+                fit, self.sample, method, given, completion, seed=bench.seed, device=bench.device
             )
-            seen = self._on(replace(perfect, geometry=geometry, envmap=envmap))["mesh_psnr"]
-            yield {"method": name, **self._of_light(envmap), "mesh_psnr": seen, "steps": steps, **cost}
+            figures = self._of_light(envmap) | self._on(replace(perfect, geometry=geometry, envmap=envmap))
+            yield {"method": name, **figures, "steps": steps, **cost}
 
     def _of_light(self, envmap: Array) -> dict[str, float]:
         """The map against the true one, and the true scene under it against the photo."""
@@ -170,19 +176,18 @@ class _Stage:
         return of_map
 
     def _on(self, scene: Scene) -> dict[str, float]:
-        """PSNR of a scene under its light and under the other."""
-        how: dict[str, Any] = {"spp": self.bench.spp, "seed": self.bench.seed + 1, "device": self.bench.device}
-        picture, relit = (rendered(one, **how) for one in (scene, replace(scene, envmap=self.other)))
-        return {"mesh_psnr": metrics.psnr(picture, self.photo), "relit_psnr": metrics.psnr(relit, self.relit_photo)}
+        """PSNR of a scene under its light."""
+        return {"mesh_psnr": metrics.psnr(self._rendered(scene), self.photo)}
+
+    def _rendered(self, scene: Scene) -> Array:
+        return rendered(scene, spp=self.bench.spp, seed=self.bench.seed + 1, device=self.bench.device)
 
 
 def fit(
-    sample: SyntheticSample, method: Method, completion: str, *, seed: int = 0, device: str = "auto"
+    sample: SyntheticSample, method: Method, given: Prediction, completion: str, *, seed: int = 0, device: str = "auto"
 ) -> tuple[Array, int, Geometry]:
-    """The envmap [256, 512, 3] that the method finds for the sample's photo on the mesh of the depth that is given, in
-    how many steps, and that mesh."""
+    """(envmap [256, 512, 3], steps, mesh): what the method finds for the photo with the maps `given`."""
     photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
-    given = given_maps(sample, method, seed=seed, device=device)
     light = named.light
     if method.field not in FITLESS:
         light = replace(light, field=method.field or light.field, height=method.height or light.height)

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, timed
+from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, spread, timed
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.io.datasets import InteriorVerse, open_sources
@@ -88,13 +88,13 @@ class MaterialsBench(Benchmark):
         """(name, photo, truth) of the samples; see the module for what `data` may be. Raises InputError."""
         folders = photo_folders(data)
         if folders:
-            for folder in _spread(folders, self.limit):
+            for folder in spread(folders, self.limit):
                 yield folder.name, *_read_folder(folder)
             return
         source = open_sources([data], split=self.split)
         if isinstance(source, InteriorVerse):
             report.settings["left out"] = " ".join(source.notes) or None
-        for index in _spread(list(range(len(source))), self.limit):
+        for index in spread(list(range(len(source))), self.limit):
             sample = source.read(index)
             spoilt = self.photographic and isinstance(source, SampleFolder)
             seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
@@ -119,13 +119,6 @@ def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
     truth = MapsPredictor(maps).predict(photo)
     there = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
     return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=there)
-
-
-def _spread(things: list, limit: int) -> list:
-    """At most `limit` of them (0: all), evenly spread."""
-    if not limit or limit >= len(things):
-        return things
-    return [things[k] for k in np.unique(np.linspace(0, len(things) - 1, limit).astype(int))]
 
 
 def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:

@@ -13,7 +13,7 @@ darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` a
 the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also with `screen space`
 shadows of the fitted light; `glass` is the largest object turned to glass, `remove` the picture without it. `shadow` is
 the PSNR where the true picture changes outside: in shadows and reflections. sheet.png: photo, truth, and the pictures
-of the rows after `untouched`. An edit that the program refuses has no row.
+of the rows after `untouched`. An edit that the program refuses leaves the photo as it was.
 """
 
 from collections.abc import Iterator
@@ -129,11 +129,12 @@ class PhotoAloneBench(Benchmark):
         for name, scene in scenes.items():
             try:
                 edited = edit.change(scene)
+                picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
             except InputError:
-                continue
-            picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
+                edited, picture = scene, sample.photo.linear
             if (edit.kind, name) == ("insert", "fitted"):
-                flat = screen_space(sample.photo.linear, edited, picture, device=self.device)
+                photo = sample.photo.linear
+                flat = photo if edited is scene else screen_space(photo, edited, picture, device=self.device)
                 shown.append(flat)
                 yield {"method": "insert: screen space", **self._scores(edit, flat, after, *region)}
             shown.append(picture)

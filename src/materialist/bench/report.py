@@ -19,7 +19,7 @@ from materialist.plain import plain
 from materialist.types import Array
 
 CEILING = "ceiling"
-"""How the method names of rows begin that no method can beat: they do not compete for the best figure."""
+"""In the method names of rows that are given the truth: they do not compete for the best figure."""
 
 
 @dataclass(frozen=True)
@@ -99,25 +99,34 @@ def means(report: Report) -> dict[str, dict[str, float]]:
 
 
 def markdown(report: Report) -> str:
-    """The content of report.md: the note and the table of means, the best figure of each column in bold."""
+    """The content of report.md: the note and the table of means, the best figure of a column and part in bold."""
     table = means(report)
     arrow = {"higher": " ↑", "lower": " ↓", "": ""}
     head = ["method", "samples", *(c.title + arrow[c.better] for c in report.columns)]
     lines = [f"# {report.title}", "", report.note, "", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
-    best = {}
+    best: dict[tuple[str, str], float] = {}
     for c in report.columns:
-        values = [f[c.key] for method, f in table.items() if c.key in f and not method.startswith(CEILING)]
-        if c.better and len(values) > 1:
-            best[c.key] = max(values) if c.better == "higher" else min(values)
+        values: dict[str, list[float]] = {}
+        for method, figures in table.items():
+            if c.better and c.key in figures and CEILING not in method:
+                values.setdefault(_part(method), []).append(figures[c.key])
+        choose = max if c.better == "higher" else min
+        best |= {(part, c.key): choose(found) for part, found in values.items() if len(found) > 1}
     for method, figures in table.items():
         cells = [method, str(int(figures["samples"]))]
         for c in report.columns:
             text = f"{figures[c.key]:.{c.digits}f}" if c.key in figures else "–"
-            winner = c.key in best and not method.startswith(CEILING) and figures.get(c.key) == best[c.key]
+            rival = CEILING not in method and c.key in figures
+            winner = rival and figures[c.key] == best.get((_part(method), c.key))
             cells.append(f"**{text}**" if winner else text)
         lines.append("| " + " | ".join(cells) + " |")
     settings = ", ".join(f"{k} {v}" for k, v in report.settings.items() if v is not None)
     return "\n".join([*lines, "", f"Settings: {settings}.", ""])
+
+
+def _part(method: str) -> str:
+    """What comes before the colon of a method's name, as an edit; only methods of one part compete."""
+    return method.partition(":")[0] if ":" in method else ""
 
 
 def _plot(report: Report, path: Path) -> None:

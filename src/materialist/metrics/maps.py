@@ -31,7 +31,7 @@ def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
         p, t = getattr(predicted.materials, name), getattr(true.materials, name)
         found[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
         found[f"{name}_psnr"] = decibel(found[f"{name}_mse"])
-        found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t)
+        found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
     found |= depth_figures(predicted.depth, true.depth, surface)
     cosine = np.clip((predicted.normal * true.normal).sum(-1), -1, 1)[surface]
     found["normal_angle"] = float(np.degrees(np.arccos(cosine)).mean())
@@ -103,6 +103,6 @@ def _albedo(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
         difference = linear_to_srgb(estimate)[surface].astype(np.float64) - linear_to_srgb(true)[surface]
         found[f"albedo{suffix}_mse"] = float(np.square(difference).mean())
         found[f"albedo_psnr{suffix}"] = decibel(found[f"albedo{suffix}_mse"])
-        filled = np.where(surface[..., None], estimate, true)  # outside the surface nothing differs
-        found[f"albedo_ssim{suffix}"] = ssim(filled, true)
+        filled = np.where(surface[..., None], estimate, true)  # windows at the border see no difference beyond it
+        found[f"albedo_ssim{suffix}"] = ssim(filled, true, mask=surface)
     return found

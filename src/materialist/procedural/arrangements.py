@@ -84,7 +84,7 @@ def _room(rng: np.random.Generator, walls: int, natural: bool) -> list[Item]:
 
 
 def _object(rng: np.random.Generator, meshes: list[Path]) -> Solid:
-    """One solid of about 0.3 to 0.8 metres: a mesh from the folder, if there are any, half of the time."""
+    """One solid of about 0.3 to 0.8 metres: a mesh from the folder, if there are any, in 60 % of the cases."""
     if meshes and rng.random() < 0.6:
         return shapes.placed(shapes.load(meshes[rng.integers(len(meshes))]), scale=rng.uniform(0.5, 0.75))
     size = rng.uniform(0.25, 0.55, 3)

@@ -195,7 +195,7 @@ _KINDS = (_sky, _studio, _room, _overcast)
 
 
 def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array:
-    """[h, 2h, 3] float32: a sky over ground, or (often, where there are any) a capture that is brighter above."""
+    """[h, 2h, 3] float32: a sky over ground, or often, where there are any, a capture not much darker above."""
     if captures and rng.random() < 0.6:
         picture = captured(rng, captures)
         if luminance(picture[: len(picture) // 3]).mean() > 0.8 * luminance(picture).mean():

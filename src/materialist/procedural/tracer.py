@@ -59,7 +59,7 @@ class SampleTracer:
         The shading is what the diffuse lobe of the first surface would send back with albedo 1 and metallic 0.
         """
         h, w = self.camera.height, self.camera.width
-        rows = max(1, int(np.sqrt(spp)))
+        rows = max(1, int(np.ceil(np.sqrt(spp))))
         spp = rows * rows
         lane = dr.arange(mi.UInt32, h * w * spp)
         # Lanes that end together belong to pixels far from each other: their common fate leaves no streaks.

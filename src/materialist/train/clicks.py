@@ -200,7 +200,7 @@ class ClickTask(Task):
         return click_losses(network(batch["maps"]).float(), batch["mask"])
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
-        """Mean and median intersection over union of one click, on the views kept aside."""
+        """Mean and median intersection over union of the clicks of examples, on the views kept aside."""
         network, overlap = copy.deepcopy(network).cpu(), []
         for number, view in enumerate(self.held_out):
             rng = np.random.default_rng([7, number])

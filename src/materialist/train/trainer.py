@@ -85,11 +85,12 @@ class Trainer:
         Always leaves a checkpoint and the averaged weights.
         """
         with stop_requests() as stop:
-            self._train(stop, progress)
-            self.interrupted = signal.SIGINT in stop
-            scores = {} if stop else self.score()
-            self.save()
-        return scores
+            try:
+                self._train(stop, progress)
+                self.interrupted = signal.SIGINT in stop
+                return {} if stop else self.score()
+            finally:
+                self.save()
 
     def _train(self, stop: list[int], progress: Progress) -> None:
         losses: dict[str, float] = {}
