@@ -74,14 +74,9 @@ class EditBench(Benchmark):
             yield from self._latencies(data)
 
     def _compared(
-        self,
-        edit: Edit,
-        sample: SyntheticSample,
-        before: Array,
-        perfect: Scene,
-        fitted: tuple[Scene, float],
+        self, edit: Edit, sample: SyntheticSample, before: Array, perfect: Scene, fitted: tuple[Scene, float],
         report: Report,
-    ) -> Iterator[Row]:
+    ) -> Iterator[Row]:  # fmt: skip
         """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet.
 
         before: the true picture of the photo.

@@ -88,9 +88,7 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
         guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
         picture = spread(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
     share, whole = np.zeros(native, np.float32), np.zeros((*native, 3), np.float32)
-    ground = first_hits(target.mi_scene, camera, {"surface": None}, native, there)
-    nearer = np.where(ground.share > 0, alone.depth - ground.depth, 0)
-    share[there] = _behind_things(sight, alone, scene, there, nearer, gap, stands=stands)
+    share[there] = _behind_things(target.mi_scene, sight, alone, scene, there, gap, stands=stands)
     whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
@@ -114,17 +112,22 @@ def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Arra
 
 
 def _behind_things(
-    sight: Any, alone: Any, scene: Scene, there: Box, nearer: Array, gap: float, *, stands: bool
+    mi_scene: Any, sight: Any, alone: Any, scene: Scene, there: Box, gap: float, *, stands: bool
 ) -> Array:
     """[h, w] share of the bodies, with the photo's own silhouettes where its surface is more than `gap` before them.
 
-    nearer: [h, w] how far it is before them, scene units. The mesh has the steps of working pixels there;
-    `upsample.matte` finds the thing's outline in the photo. A surface less than `gap` before a body is the ground that
-    it `stands` on, and hides nothing: its bumps would make the foot ragged.
+    The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo. A surface
+    less than `gap` before a body is the ground that it `stands` on, and hides nothing: its bumps would make the foot
+    ragged.
     """
+    from materialist.render.pixels import first_hits
+
     native, working = scene.photo.original.shape[:2], scene.depth.shape
     share = alone.share if stands else sight.share
-    hidden = (alone.share > sight.share + 0.05) & (nearer > gap)
+    hidden = alone.share > sight.share + 0.05
+    if hidden.any():
+        ground = first_hits(mi_scene, scene.camera, {"surface": None}, native, there)
+        hidden &= (ground.share > 0) & (alone.depth - ground.depth > gap)
     if not hidden.any():
         return share
     near = grown(hidden, int(np.ceil(2 * max(native[0] / working[0], 1.0))))

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.color import LUMINANCE, luminance
+from materialist.color import CLIPPED, LUMINANCE, luminance
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
@@ -197,7 +197,7 @@ def _warnings(scene: Scene) -> list[str]:
             "The photo has hard light: its shadows may be baked into the albedo and stay beside the new ones "
             "(double shadows); look at maps/albedo.exr."
         )
-    clipped = float((scene.photo.linear >= 0.99).any(-1).mean())
+    clipped = float((scene.photo.linear >= CLIPPED).any(-1).mean())
     if clipped > 0.05 and not scene.photo.hdr:
         notes.append(f"{clipped:.0%} of the photo is clipped; light and albedo are uncertain there.")
     return notes
