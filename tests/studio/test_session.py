@@ -1,5 +1,6 @@
 """A page's session, on a small scene with a real preview."""
 
+import threading
 import weakref
 from dataclasses import replace
 
@@ -8,6 +9,7 @@ import pytest
 from made_meshes import floor_scene
 from studio_scenes import block, click, room
 
+from materialist.edits.preview import Preview
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError, OutputError
 from materialist.io.exr import write_exr
@@ -149,6 +151,27 @@ def test_reopened_where_it_was_left(studio, session):
         live.wait()
     with pytest.raises(InputError, match="Open a photo"):
         other.set("edit", hue="1")
+
+
+def test_a_preview_closed_while_it_prepares_is_freed(session, monkeypatch):
+    """Its next part would wait in the queue, and hold the scene, until after `free_memory`."""
+    begun, ends, seen = threading.Event(), threading.Event(), []
+
+    def prepare(preview):
+        begun.set()
+        return ends.wait(60)
+
+    monkeypatch.setattr(Preview, "prepare", prepare)
+    live = LivePreview(session.scene)
+    assert begun.wait(60)
+    known = weakref.ref(live)
+    live.close()
+    freed = free_memory()
+    freed.add_done_callback(lambda _: seen.append(known()))
+    del live
+    ends.set()
+    free_memory().result(60)  # after the callback of the first
+    assert seen == [None]
 
 
 def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):

@@ -48,7 +48,8 @@ class LivePreview:
 
     def _prepare(self, built: Future[Any]) -> None:
         """Get ready for another light part by part: pictures come between."""
-        if built is self._preview and built.exception() is None and built.result().prepare():
+        more = built is self._preview and built.exception() is None and built.result().prepare()
+        if more and built is self._preview:  # else it would hold the closed preview until after `free_memory`
             _THREAD.submit(self._prepare, built)
 
     @property
@@ -132,10 +133,15 @@ def _build(scene: Scene, file: Path | None) -> Any:
 
 def free_memory() -> Future[None]:
     """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
+    if "torch" not in sys.modules:  # no scene was open
+        done = Future[None]()
+        done.set_result(None)
+        return done
 
     def free() -> None:
         gc.collect()
         if "drjit" in sys.modules:
+            sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
             sys.modules["drjit"].flush_malloc_cache()
         with suppress(OSError, AttributeError):  # glibc has it
             ctypes.CDLL(None).malloc_trim(0)
