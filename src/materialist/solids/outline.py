@@ -34,7 +34,6 @@ class OutlineSettings:
     stepped: float = 0.9  # least `_stepped`, over normals that look up or down by less than `side`
     side: float = 0.5  # see `stepped`
     above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
-    tilts: tuple[float, ...] = (0.05, 0.15, 0.28, 0.42)  # radians the camera may look down where no ground tells it
     standing: float = 0.15  # distance from the ground, in its heights, up to which it is made to reach it where it is
     elsewhere: float = 0.3  # relative distance from the depth map's place up to which the ground is believed
     stairs: float = 0.1  # root mean square by which pixels move an outline, pixels: it is smoothed by so much; 4 meshes
@@ -54,29 +53,22 @@ def surface_of_revolution(
 
     depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object; one
         that the frame cuts, or that has a hole, is none.
-    up: [3] unit, the axis' direction in the camera's frame, where a support tells it. Where it does not, or does not
-        fit, the camera looks down at the angle at which the body fills the outline best.
+    up: [3] unit, the axis' direction in the camera's frame, as a support tells it; None: there is no such object.
     behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
     Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
     cut = inside[[0, -1]].any() or inside[:, [0, -1]].any()
-    if cut or inside.sum() < DEFAULT.fewest or binary_fill_holes(inside).sum() > DEFAULT.pierced * inside.sum():
+    pierced = binary_fill_holes(inside).sum() > DEFAULT.pierced * inside.sum()
+    if up is None or cut or inside.sum() < DEFAULT.fewest or pierced:
         return None
     rays = pixel_rays(camera).astype(np.float64)
     depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float64)
-    told = [] if up is None else [(up, behind)]
-    # A predicted ground may lean: then the outline says how far the camera looks down, and the ground says nothing.
-    guessed = [(np.array([0, np.cos(tilt), np.sin(tilt)]), None) for tilt in DEFAULT.tilts]
-    for tries in (told, guessed):
-        standing = (_along(upright, _Seen(inside, depth, normal, rays, below, camera)) for upright, below in tries)
-        share, best = max(standing, key=lambda one: one[0], default=(0.0, None))
-        if best is not None and share > DEFAULT.covered:
-            if not best.profile.lines():
-                return None
-            front, _ = best.front(inside, rays)
-            return best, best.thickness(np.where(front > 0, front, depth), inside, rays)
-    return None
+    share, best = _along(up, _Seen(inside, depth, normal, rays, behind, camera))
+    if best is None or share <= DEFAULT.covered or not best.profile.lines():
+        return None
+    front, _ = best.front(inside, rays)
+    return best, best.thickness(np.where(front > 0, front, depth), inside, rays)
 
 
 class _Seen(NamedTuple):
