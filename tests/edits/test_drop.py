@@ -9,7 +9,7 @@ from made_meshes import extent, floor_scene
 
 from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.ground import Field, blocks
-from materialist.edits.drop.physics import DEFAULT, Pose, RigidBody, convex_pieces, fall
+from materialist.edits.drop.physics import SETTINGS, Pose, RigidBody, convex_pieces, fall
 from materialist.edits.insert.insert import insert
 from materialist.edits.recipe import apply, read_recipe, write_recipe
 from materialist.errors import InputError
@@ -81,7 +81,7 @@ def test_it_spins_about_its_centre_of_mass_which_falls_as_newton_says():
     )
     mass = np.array([pose.centre + pose.turn @ off for pose in spun])
     np.testing.assert_allclose(mass[:, :2], np.tile(off[:2], (10, 1)), atol=2e-3)
-    np.testing.assert_allclose(mass[:, 2], 2.05 - DEFAULT.gravity / 2 * (np.arange(10) / 25) ** 2, atol=2e-3)
+    np.testing.assert_allclose(mass[:, 2], 2.05 - SETTINGS.gravity / 2 * (np.arange(10) / 25) ** 2, atol=2e-3)
 
 
 def test_the_fastest_spin_ends_and_one_beyond_it_says_so(tmp_path, monkeypatch):

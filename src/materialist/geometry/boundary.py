@@ -28,7 +28,7 @@ class BoundarySettings:
     least_facing: float = 0.02  # least n . v of shading normals (89 degrees), so that every visible point can be shaded
 
 
-DEFAULT = BoundarySettings()
+SETTINGS = BoundarySettings()
 # Corner slots of a pixel, and pixel slots around a grid corner, in reading order.
 TOP_LEFT, TOP_RIGHT, BOTTOM_LEFT, BOTTOM_RIGHT = range(4)
 QUAD = np.array([[TOP_LEFT, BOTTOM_LEFT, BOTTOM_RIGHT], [TOP_LEFT, BOTTOM_RIGHT, TOP_RIGHT]])
@@ -126,7 +126,7 @@ def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
     half_x = _half_step(inverse, cuts.link_x)  # [H, W] change over half a pixel to the right
     half_y = _half_step(inverse.T, cuts.link_y.T).T  # [H, W] ... downwards
     corners = np.stack([-half_x - half_y, half_x - half_y, half_y - half_x, half_x + half_y], -1) + inverse[..., None]
-    return np.clip(corners, inverse[..., None] / DEFAULT.extrapolation, inverse[..., None] * DEFAULT.extrapolation)
+    return np.clip(corners, inverse[..., None] / SETTINGS.extrapolation, inverse[..., None] * SETTINGS.extrapolation)
 
 
 def _half_step(inverse: Array, link: Array) -> Array:
@@ -199,19 +199,19 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     slope_y = (grid[:, 1] - grid[:, 0]).mean(1, keepdims=True)
     centre = grid.mean((1, 2))[:, None]
     beyond = centre + slope_x * (column - 0.5) + slope_y * (row - 0.5)
-    beyond = np.clip(beyond, centre / DEFAULT.extrapolation, centre * DEFAULT.extrapolation)
+    beyond = np.clip(beyond, centre / SETTINGS.extrapolation, centre * SETTINGS.extrapolation)
     inverse = np.where(shared, mean_inverse[joint], beyond)
     front_vertex = flat_vertex[front]  # [T, 4]
     tip = shared & (joint == front_vertex)  # the cut ends here: both surfaces share this vertex
-    limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - DEFAULT.behind)
+    limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - SETTINGS.behind)
     loose = shared & (inverse > limit)  # the background comes in front at this corner: pass under it
     # So moved, such a corner must stay behind the front face carried on to there, whose slope is at most this.
     slope = np.ptp(mean_inverse[front_vertex], axis=1, keepdims=True)
-    inverse = np.minimum(inverse, limit - 2 * DEFAULT.overlap * slope * loose)
+    inverse = np.minimum(inverse, limit - 2 * SETTINGS.overlap * slope * loose)
     torn = (shared & ~tip).any(1)  # a cut whose both ends are tips has not opened, so there is no gap to close
     screen = np.stack([front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1)
     straight = (offset == 0).any(1)  # diagonally, such a corner would come out beside the front pixel
-    screen = screen - DEFAULT.overlap * (loose & straight[:, None])[..., None] * offset[:, None]
+    screen = screen - SETTINGS.overlap * (loose & straight[:, None])[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
 
@@ -250,8 +250,10 @@ def face_camera(normals: Array, points: Array) -> Array:
     facing = (unit * view).sum(-1, keepdims=True)
     aside = unit - facing * view
     aside_length = np.linalg.norm(aside, axis=-1, keepdims=True)
-    turned = DEFAULT.least_facing * view + np.sqrt(1 - DEFAULT.least_facing**2) * aside / np.maximum(aside_length, 1e-6)
+    turned = SETTINGS.least_facing * view + np.sqrt(1 - SETTINGS.least_facing**2) * aside / np.maximum(
+        aside_length, 1e-6
+    )
     # A normal that points straight away has no nearest turn; it is taken as flipped.
     turned = np.where(aside_length > 1e-6, turned, view)
-    unit = np.where(facing < DEFAULT.least_facing, turned, unit)
+    unit = np.where(facing < SETTINGS.least_facing, turned, unit)
     return (unit / np.linalg.norm(unit, axis=-1, keepdims=True)).astype(np.float32)

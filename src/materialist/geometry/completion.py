@@ -36,7 +36,7 @@ class CompletionSettings:
     cell: float = 0.2  # size of a continuation's cells beyond the frame, part of the distance from its middle; by eye
 
 
-DEFAULT = CompletionSettings()
+SETTINGS = CompletionSettings()
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, w
     for sheet in sheets:
         stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
         found = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
-        if walls or sheet.plane.normal[1] >= DEFAULT.upward:
+        if walls or sheet.plane.normal[1] >= SETTINGS.upward:
             found.append(_beyond_frame(sheet, stops, camera))  # [T, 3, 3]
         parts += [_patch(sheet, corners, camera) for corners in found if len(corners)]
     # Faces keep their order.
@@ -93,9 +93,9 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
     found = []
     for index, plane in enumerate(planes):
         others = points[surface & ~plane.mask]
-        bounding = not len(others) or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > DEFAULT.bounding
+        bounding = not len(others) or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > SETTINGS.bounding
         sides = plane.mask[-1], plane.mask[:, 0], plane.mask[:, -1], plane.mask[0]
-        touches = tuple(bool(side.mean() > DEFAULT.touch) for side in sides)
+        touches = tuple(bool(side.mean() > SETTINGS.touch) for side in sides)
         # A plane through the camera would cut the view open.
         if -plane.offset < 0.02 * radius or not (bounding or any(touches)):
             continue
@@ -103,10 +103,10 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
         pixels = pixels[:: max(1, len(pixels) // 20_000)]
         own = points.reshape(-1, 3)[pixels]
         own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
-        outdoors = np.mean(~surface) > DEFAULT.sky_share and plane.normal[1] > DEFAULT.upward
-        half = behind = (DEFAULT.ground_extent if outdoors else DEFAULT.extent) * radius
-        if plane.normal[1] < DEFAULT.upward:
-            half, behind = min(half, DEFAULT.wall_reach * _size(own)), min(behind, DEFAULT.wall_behind * _size(own))
+        outdoors = np.mean(~surface) > SETTINGS.sky_share and plane.normal[1] > SETTINGS.upward
+        half = behind = (SETTINGS.ground_extent if outdoors else SETTINGS.extent) * radius
+        if plane.normal[1] < SETTINGS.upward:
+            half, behind = min(half, SETTINGS.wall_reach * _size(own)), min(behind, SETTINGS.wall_behind * _size(own))
         found.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, half, behind))
     return found
 
@@ -135,10 +135,10 @@ def _stops(sheet: _Sheet, sheets: list[_Sheet]) -> Array:
             continue
         height = sheet.points @ other.plane.normal - other.plane.offset  # [N] above the other plane
         share = float(np.mean(height > 0))
-        if max(share, 1 - share) >= DEFAULT.one_side:
+        if max(share, 1 - share) >= SETTINGS.one_side:
             sign = 1 if share > 0.5 else -1
             walls.append(sign * np.array([[*other.plane.normal, -other.plane.offset]]))
-    if sheet.plane.normal[1] < DEFAULT.upward:
+    if sheet.plane.normal[1] < SETTINGS.upward:
         walls.append(np.array([[0.0, 0, -1, 0]]))  # in front of the camera
     return np.concatenate(walls)
 
@@ -146,7 +146,7 @@ def _stops(sheet: _Sheet, sheets: list[_Sheet]) -> Array:
 def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) -> Array:
     """[Q, 4, 3] corners of the quads that continue the plane behind what the picture shows, scene units."""
     height, width = farthest.shape
-    cell = max(1, max(height, width) // DEFAULT.cells)
+    cell = max(1, max(height, width) // SETTINGS.cells)
     xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
     rays = rays_through(np.stack(np.meshgrid(xs, ys), -1), camera)  # [h+1, w+1, 3] through the cell corners
     reach = rays @ (sheet.plane.normal / sheet.plane.offset)  # [h+1, w+1] inverse depth of the plane; <= 0: never
@@ -159,7 +159,7 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     hidden = np.where(sheet.plane.mask, 0, farthest)  # on the plane's own pixels there is nothing to add
     hidden = np.minimum.reduceat(np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1)  # [h, w] farthest in the cell
     # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
-    keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - DEFAULT.behind) * hidden)
+    keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - SETTINGS.behind) * hidden)
     if not sheet.bounding:
         hull = convex_hull_image(sheet.plane.mask)
         keep &= hull[np.ix_((ys[:-1] + ys[1:]) // 2, (xs[:-1] + xs[1:]) // 2)]
@@ -172,12 +172,12 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
     reach = np.arcsinh(sheet.half / spread)
     # Cells grow with the distance from the middle, from as far away as the visible points are in the mean.
-    along = spread * np.sinh(np.linspace(-reach, reach, 2 * int(np.ceil(reach / DEFAULT.cell)) + 1))
+    along = spread * np.sinh(np.linspace(-reach, reach, 2 * int(np.ceil(reach / SETTINGS.cell)) + 1))
     places = np.stack(np.meshgrid(along, -along), -1).reshape(-1, 2)
     rest = origin + places @ axes(sheet.plane.normal), grid_faces(len(along), len(along))
     for wall in walls:
         rest = _cut(rest, wall)
-    side_x, side_y = (camera.width / 2 + DEFAULT.rim) / camera.focal, (camera.height / 2 + DEFAULT.rim) / camera.focal
+    side_x, side_y = (camera.width / 2 + SETTINGS.rim) / camera.focal, (camera.height / 2 + SETTINGS.rim) / camera.focal
     # a . p >= 0 inside the frustum: bottom, left, right, top
     frustum = np.array([[0.0, 1, -side_y, 0], [1, 0, -side_x, 0], [-1, 0, -side_x, 0], [0, -1, -side_y, 0]])
     pieces = [np.zeros((0, 3, 3))]

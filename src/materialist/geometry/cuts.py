@@ -19,7 +19,7 @@ class CutSettings:
     most: float = 5.0  # largest such factor: the last step of a sphere's rim is 4.2 times the least (derived, tau = 6)
 
 
-DEFAULT = CutSettings()
+SETTINGS = CutSettings()
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
     slanted = np.ones(depth.shape, bool)  # [H, W] whether the normals are near enough to grazing for a slope
     if normal is not None:
-        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(np.radians(DEFAULT.slanted))
+        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(np.radians(SETTINGS.slanted))
     steep_x = _exceeds_slope(inverse, surface) | ~(slanted[:, :-1] | slanted[:, 1:])
     steep_y = _exceeds_slope(inverse.T, surface.T).T | ~(slanted[:-1] | slanted[1:])
     pair_x = surface[:, :-1] & surface[:, 1:]
@@ -111,7 +111,7 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
     for side in (-1, 1):
         least, first = np.full_like(step, np.inf), np.zeros_like(step)  # smallest slope, and the one next to the pair
         held = np.ones(step.shape, bool)  # no hole and no picture rim met so far
-        for reach in range(1, min(DEFAULT.support, width - 2) + 1):
+        for reach in range(1, min(SETTINGS.support, width - 2) + 1):
             here, there = (slice(reach, None), slice(None, -reach))[::side]
             reached = np.zeros(step.shape, bool)
             reached[:, here] = pair[:, there]
@@ -122,6 +122,6 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
             first = np.where(held & (reach == 1), beside, first)
         steady = np.isfinite(least) & (least > 0)
         least = np.where(steady, least, 1)
-        bending = first * (DEFAULT.steady + DEFAULT.bending * (first / least - 1))
-        allowed = np.maximum(allowed, np.where(steady, np.minimum(bending, DEFAULT.most * least), 0))
+        bending = first * (SETTINGS.steady + SETTINGS.bending * (first / least - 1))
+        allowed = np.maximum(allowed, np.where(steady, np.minimum(bending, SETTINGS.most * least), 0))
     return np.abs(step) > allowed

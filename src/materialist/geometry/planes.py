@@ -31,7 +31,7 @@ class PlaneSettings:
     speck: float = 0.004  # connected patches below this share of the picture are chance agreement
 
 
-DEFAULT = PlaneSettings()
+SETTINGS = PlaneSettings()
 
 
 @dataclass(frozen=True)
@@ -62,15 +62,15 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
     """
     depth, normal = check_maps(depth, normal, camera)
     rays = pixel_rays(camera).astype(np.float64)  # [H, W, 3], z = -1
-    stride = max(1, int(np.sqrt(depth.size / DEFAULT.samples)))
+    stride = max(1, int(np.sqrt(depth.size / SETTINGS.samples)))
     thin = np.s_[stride // 2 :: stride, stride // 2 :: stride]
     small = _Maps(rays[thin], normal[thin].astype(np.float64), depth[thin])
     rng = np.random.default_rng(seed)
     found: list[_Fit] = []
     free = small.depth > 0  # [h, w]
-    least = DEFAULT.least * free.sum()
-    for _ in range(2 * DEFAULT.most):  # some of the candidates are unsound and only use up their pixels
-        if len(found) == DEFAULT.most or free.sum() < max(3.0, least):
+    least = SETTINGS.least * free.sum()
+    for _ in range(2 * SETTINGS.most):  # some of the candidates are unsound and only use up their pixels
+        if len(found) == SETTINGS.most or free.sum() < max(3.0, least):
             break
         fit = _best_fit(small, free, rng)
         if fit is None:
@@ -78,8 +78,8 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
         fit, grown = _grow(small, free, fit)
         if grown.sum() < least:
             break
-        flat = np.median(small.normal[grown] @ fit.facing) > DEFAULT.flat
-        if flat and unit(-fit.coefficients) @ fit.facing > DEFAULT.like_geometry:
+        flat = np.median(small.normal[grown] @ fit.facing) > SETTINGS.flat
+        if flat and unit(-fit.coefficients) @ fit.facing > SETTINGS.like_geometry:
             found.append(fit)
         free &= ~grown
     return _label(_Maps(rays, normal.astype(np.float64), depth), found)
@@ -115,7 +115,7 @@ class _Maps:
 
     def alike(self, fit: _Fit) -> Array:
         """[H, W] bool: has a surface whose predicted normal is like the plane's."""
-        return (self.depth > 0) & (self.normal @ fit.facing > DEFAULT.same_normal)
+        return (self.depth > 0) & (self.normal @ fit.facing > SETTINGS.same_normal)
 
 
 @dataclass(frozen=True)
@@ -133,21 +133,21 @@ def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None
     rays, facing, depth = maps.rays[free], maps.normal[free], maps.depth[free]  # [N, 3], [N, 3], [N]
     count = len(depth)
     best, best_score = None, 2
-    for _ in range(DEFAULT.hypotheses):
+    for _ in range(SETTINGS.hypotheses):
         seed = facing[rng.integers(count)]
         draw = rng.integers(count, size=12)
-        trio = draw[facing[draw] @ seed > DEFAULT.same_normal][:3]
+        trio = draw[facing[draw] @ seed > SETTINGS.same_normal][:3]
         if len(trio) < 3 or abs(np.linalg.det(rays[trio])) < 1e-6:
             continue
         coefficients = np.linalg.solve(rays[trio], 1 / depth[trio])
-        close = np.abs(depth * (rays @ coefficients) - 1) < DEFAULT.tolerance
-        score = int(np.count_nonzero(close & (facing @ seed > DEFAULT.same_normal)))
+        close = np.abs(depth * (rays @ coefficients) - 1) < SETTINGS.tolerance
+        score = int(np.count_nonzero(close & (facing @ seed > SETTINGS.same_normal)))
         if score > best_score:
             best, best_score = _Fit(coefficients, seed), score
     for _ in range(5):
         if best is None:
             return None
-        best = _refit(maps, free & maps.alike(best) & (np.abs(maps.error(best)) < DEFAULT.tolerance))
+        best = _refit(maps, free & maps.alike(best) & (np.abs(maps.error(best)) < SETTINGS.tolerance))
     return best
 
 
@@ -182,9 +182,9 @@ def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
     """[H, W] bool: free pixels within the tolerance, and what is smoothly connected to them within `bent`."""
     error = maps.error(fit)
     alike = free & maps.alike(fit)
-    core = alike & (np.abs(error) < DEFAULT.tolerance)
-    wide = alike & (np.abs(error) < DEFAULT.bent)
-    step = DEFAULT.step * max(1.0, DEFAULT.small_picture / max(error.shape))
+    core = alike & (np.abs(error) < SETTINGS.tolerance)
+    wide = alike & (np.abs(error) < SETTINGS.bent)
+    step = SETTINGS.step * max(1.0, SETTINGS.small_picture / max(error.shape))
     jump_x, jump_y = np.abs(np.diff(error, axis=1)) > step, np.abs(np.diff(error, axis=0)) > step
     calm = wide.copy()
     calm[:, 1:] &= ~jump_x
@@ -202,10 +202,10 @@ def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
         label = np.where(error < nearest, k, label)
         nearest = np.minimum(nearest, error)
     planes = []
-    speck = int(np.ceil(DEFAULT.speck * surface.size)) - 1  # pixels of the largest patch that is chance
+    speck = int(np.ceil(SETTINGS.speck * surface.size)) - 1  # pixels of the largest patch that is chance
     for k, fit in enumerate(found):
         mask = remove_small_objects(label == k, max_size=speck)
-        if mask.sum() < DEFAULT.least * surface.sum():
+        if mask.sum() < SETTINGS.least * surface.sum():
             continue
         size = float(np.linalg.norm(fit.coefficients))
         planes.append(Plane(-fit.coefficients / size, -1 / size, mask))

@@ -35,7 +35,7 @@ class ClosedSettings:
     grazing: float = 0.35  # least n.v by which a wall seen at a slant gets longer; tuned by eye
 
 
-DEFAULT = ClosedSettings()
+SETTINGS = ClosedSettings()
 NOTHING = 1e9
 """Room behind an object with nothing there."""
 
@@ -99,7 +99,7 @@ class _View:
 
 
 def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:
-    margin = DEFAULT.margin
+    margin = SETTINGS.margin
     edge = margin + 1
     y, x = (np.arange(side.start - edge, side.stop + edge) for side in window(inside))
     # Beyond the frame everything goes on as at its edge, for some pixels.
@@ -115,7 +115,7 @@ def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _
 
 def _thickness(view: _View) -> Array:
     """[h, w] along the ray, scene units: never behind what stands there, and never none."""
-    least = DEFAULT.thin * view.size * np.median(view.pixel[view.inside])
+    least = SETTINGS.thin * view.size * np.median(view.pixel[view.inside])
     thick = np.minimum(view.thickness.astype(np.float64), _room(view))
     return np.where(view.inside, np.maximum(thick, least), 0)
 
@@ -123,9 +123,9 @@ def _thickness(view: _View) -> Array:
 def _cavity(view: _View, wall: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
     facing = np.abs((view.normal * view.rays).sum(-1)) / view.length
-    through = wall / np.clip(facing, DEFAULT.grazing, 1)  # [h, w] along the ray, of one wall
+    through = wall / np.clip(facing, SETTINGS.grazing, 1)  # [h, w] along the ray, of one wall
     left = view.thickness - 2 * through
-    room = view.inside & (left > DEFAULT.thin * view.size * view.pixel)
+    room = view.inside & (left > SETTINGS.thin * view.size * view.pixel)
     room &= border_distance(view.inside) * view.pixel > wall
     if room.sum() < 16:
         return None
@@ -138,7 +138,7 @@ def _closed(view: _View, camera: Camera) -> Shell:
     """Front and back over one triangulated region."""
     known, length, front, thick = view.inside, view.length, view.depth, view.thickness
     edge = silhouette_field(known)  # [h, w] pixels
-    factor = int(np.clip(round(DEFAULT.grid / max(known.shape)), 1, DEFAULT.finest))
+    factor = int(np.clip(round(SETTINGS.grid / max(known.shape)), 1, SETTINGS.finest))
     size = (known.shape[1] * factor, known.shape[0] * factor)
     within = cv2.resize(edge.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     points, faces = region(_ended(within))
@@ -151,8 +151,8 @@ def _closed(view: _View, camera: Camera) -> Shell:
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
     through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
     own = np.exp(at(middle)) - through / (2 * at(length))
-    through = np.maximum(np.minimum(through, at(_room(view))), DEFAULT.least * own)
-    sigma = DEFAULT.smooth * view.size
+    through = np.maximum(np.minimum(through, at(_room(view))), SETTINGS.least * own)
+    sigma = SETTINGS.smooth * view.size
     if view.back is None:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
@@ -171,7 +171,7 @@ def _between(normal: Array, known: Array, place: Array) -> Array:
 def _room(view: _View) -> Array:
     """[h, w] length of the ray between the front and what stands behind, scene units."""
     known = view.inside & (view.behind > 0)
-    room = np.where(known, np.maximum(DEFAULT.nearest * view.behind - view.depth, 0) * view.length, NOTHING)
+    room = np.where(known, np.maximum(SETTINGS.nearest * view.behind - view.depth, 0) * view.length, NOTHING)
     # Next to the mask the values are those of the last pixels in it.
     return membrane(room, view.inside)
 
@@ -179,4 +179,4 @@ def _room(view: _View) -> Array:
 def _ended(field: Array) -> Array:
     """The field with its outermost points negative, and none so near 0 that its border meets a grid point."""
     field[[0, -1]], field[:, [0, -1]] = np.minimum(field[[0, -1]], -1), np.minimum(field[:, [0, -1]], -1)
-    return np.copysign(np.maximum(np.abs(field), DEFAULT.clear), field)
+    return np.copysign(np.maximum(np.abs(field), SETTINGS.clear), field)

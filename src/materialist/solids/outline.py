@@ -43,7 +43,7 @@ class OutlineSettings:
     flat: float = 1.25  # slopes up to this multiple of the camera's are of the end caps, which the outline hides
 
 
-DEFAULT = OutlineSettings()
+SETTINGS = OutlineSettings()
 
 
 def surface_of_revolution(
@@ -59,13 +59,13 @@ def surface_of_revolution(
     """
     inside = surface_in(mask, depth, camera)
     cut = inside[[0, -1]].any() or inside[:, [0, -1]].any()
-    pierced = binary_fill_holes(inside).sum() > DEFAULT.pierced * inside.sum()
-    if up is None or cut or inside.sum() < DEFAULT.fewest or pierced:
+    pierced = binary_fill_holes(inside).sum() > SETTINGS.pierced * inside.sum()
+    if up is None or cut or inside.sum() < SETTINGS.fewest or pierced:
         return None
     rays = pixel_rays(camera).astype(np.float64)
     depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float64)
     share, best = _along(up, _Seen(inside, depth, normal, rays, behind, camera))
-    if best is None or share <= DEFAULT.covered or not best.profile.lines():
+    if best is None or share <= SETTINGS.covered or not best.profile.lines():
         return None
     front, _ = best.front(inside, rays)
     return best, best.thickness(np.where(front > 0, front, depth), inside, rays)
@@ -85,10 +85,10 @@ class _Seen(NamedTuple):
 def _along(up: Array, seen: _Seen) -> tuple[float, Revolution | None]:
     """The body whose axis points along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
     middle = seen.rays[seen.inside].mean(0)
-    if np.linalg.norm(np.cross(up, middle)) < DEFAULT.above * np.linalg.norm(middle):
+    if np.linalg.norm(np.cross(up, middle)) < SETTINGS.above * np.linalg.norm(middle):
         return 0.0, None
     across, alike = _mirror(seen.inside, seen.rays, up, seen.camera)
-    if alike < DEFAULT.alike:
+    if alike < SETTINGS.alike:
         return 0.0, None
     ahead = np.cross(across, up)
     first = Axis(up, ahead * np.sign(ahead @ middle))  # at distance 1
@@ -102,8 +102,10 @@ def _along(up: Array, seen: _Seen) -> tuple[float, Revolution | None]:
     body, front, leaning = max(seen_so, key=lambda one: float((one[2] * seen.normal).sum()))
     there = seen.inside & (front > 0)
     own, other = ((values @ across)[there] for values in (leaning, seen.normal))
-    side = np.abs((leaning @ up)[there]) < DEFAULT.side
-    if (own * other).sum() < DEFAULT.leaning * (own * own).sum() or _stepped(own[side], other[side]) < DEFAULT.stepped:
+    side = np.abs((leaning @ up)[there]) < SETTINGS.side
+    if (own * other).sum() < SETTINGS.leaning * (own * own).sum() or _stepped(
+        own[side], other[side]
+    ) < SETTINGS.stepped:
         return 0.0, None
     return float(there.sum() / seen.inside.sum()), body
 
@@ -163,11 +165,11 @@ def _placed(first: Axis, border: tuple[Array, float], seen: _Seen, round_top: bo
     ground = ground_height(Axis(first.up, np.zeros(3)), seen.behind, seen.inside, seen.rays)
     floor = base * away
     if np.isfinite(ground):
-        near = abs(ground - floor) < DEFAULT.standing * high * away
-        if not near and base < 0 and abs(ground / base / away - 1) < DEFAULT.elsewhere:
+        near = abs(ground - floor) < SETTINGS.standing * high * away
+        if not near and base < 0 and abs(ground / base / away - 1) < SETTINGS.elsewhere:
             away = ground / base
-        lowest, highest = ((base + side * DEFAULT.standing * high) * away for side in (-1, 1))
-        floor = float(np.clip(ground + DEFAULT.air * high * away, lowest, highest))
+        lowest, highest = ((base + side * SETTINGS.standing * high) * away for side in (-1, 1))
+        floor = float(np.clip(ground + SETTINGS.air * high * away, lowest, highest))
     line = line * away
     # Down to the base it goes on straight.
     down = unit(line[0] - line[3])
@@ -187,7 +189,7 @@ def _border(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | N
     if not len(rows):  # thinner than a pixel
         return None
     extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
-    cell = extent / DEFAULT.fine
+    cell = extent / SETTINGS.fine
     place, _ = project(axis.foot[None], camera)
     middle = (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
     base = middle - float((camera.height / 2 - place[0, 1]) * pixel) / max(float(axis.up[1]), 0.3)
@@ -211,7 +213,7 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     halves = []
     for half in (0.0, np.pi):
         least = np.full((len(h), len(r)), np.inf)
-        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, DEFAULT.turns // 2):
+        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, SETTINGS.turns // 2):
             out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
             points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
             x, y = np.moveaxis(project(points, camera)[0], -1, 0)
@@ -227,13 +229,13 @@ def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: boo
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
-    spline, along = splprep(line.T, s=len(line) * (DEFAULT.stairs * far / camera.focal) ** 2)
+    spline, along = splprep(line.T, s=len(line) * (SETTINGS.stairs * far / camera.focal) ** 2)
     smooth = np.stack(splev(along, spline), -1)
     step = unit(np.stack(splev(along, spline, der=1), -1))
     # The lower end is seen from above over its near rim, the upper one over its far rim.
     lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
-    limit = DEFAULT.flat * np.where(half, lower, upper)
+    limit = SETTINGS.flat * np.where(half, lower, upper)
     steep = np.flatnonzero(np.abs(step[:, 1]) > limit * np.abs(step[:, 0]))
     if len(steep) < 4:
         return None

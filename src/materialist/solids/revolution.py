@@ -22,7 +22,7 @@ class RevolutionSettings:
     lip: int = 12  # points of the rounded rim of an open vessel
 
 
-DEFAULT = RevolutionSettings()
+SETTINGS = RevolutionSettings()
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Revolution:
             inner = value < 0
             share = before / np.maximum(before - value, 1e-12)
             found[left[inner]] = (last + np.clip(share, 0, 1) * (at - last))[inner]
-            step = along[left] * np.maximum(value, DEFAULT.step) * self.profile.cell / length[left]
+            step = along[left] * np.maximum(value, SETTINGS.step) * self.profile.cell / length[left]
             on = ~inner & (np.abs(at + step - start[left]) < np.abs(way[left]))
             last, before, at, left = at[on], value[on], (at + step)[on], left[on]
         return found
@@ -122,13 +122,13 @@ def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) 
 
 def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     """One line [K, 2] with normals [K, 2], the body to its left, swept around the axis; ends at the axis are poles."""
-    angle = 2 * np.pi * np.arange(DEFAULT.around) / DEFAULT.around
+    angle = 2 * np.pi * np.arange(SETTINGS.around) / SETTINGS.around
     out = np.stack([np.cos(angle), np.sin(angle)], -1) @ axes(axis.up)  # [A, 3]
     ring = bool(np.allclose(line[0], line[-1]))
     rows, lean = (line[:-1], leaning[:-1]) if ring else (line, leaning)
     points = axis.foot + rows[:, None, :1] * out + rows[:, None, 1:] * axis.up  # [K, A, 3]
     normals = lean[:, None, :1] * out + lean[:, None, 1:] * axis.up
-    index = np.arange(points.shape[0] * DEFAULT.around).reshape(-1, DEFAULT.around)
+    index = np.arange(points.shape[0] * SETTINGS.around).reshape(-1, SETTINGS.around)
     if not ring:  # a pole is one vertex
         index[0], index[-1] = index[0, 0], index[-1, 0]
     below, above = (index, np.roll(index, -1, 0)) if ring else (index[:-1], index[1:])
@@ -156,11 +156,11 @@ def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
     place, lean = outer
     top = _last_side(outer)
     rim = None if top is None else _last_side(outer, place[top, 1] - wall / 2)  # the round lip ends where the side did
-    within = None if rim is None else _last_side(inner, place[rim, 1] - DEFAULT.under * wall)
+    within = None if rim is None else _last_side(inner, place[rim, 1] - SETTINGS.under * wall)
     if rim is None or within is None:
         return None
     # Next to the lid the inside is as far from the outside as the wall is thick.
-    near = np.flatnonzero((place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > DEFAULT.side))[::-1]
+    near = np.flatnonzero((place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > SETTINGS.side))[::-1]
     upper = place[near] - wall * lean[near]
     if not len(near) or upper[:, 0].min() <= 0 or inner[0][within, 0] >= place[: rim + 1, 0].max():
         return None
@@ -168,7 +168,7 @@ def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
     facing = -np.concatenate([lean[near], inner[1][: within + 1][::-1]])
     r, height = upper[0, 0], place[rim, 1]
     half, middle = (place[rim, 0] - r) / 2, (place[rim, 0] + r) / 2
-    angle = np.pi * np.arange(1, DEFAULT.lip) / DEFAULT.lip
+    angle = np.pi * np.arange(1, SETTINGS.lip) / SETTINGS.lip
     round_ = np.stack([np.cos(angle), np.sin(angle)], -1)
     lip = np.array([middle, height]) + half * round_
     return np.concatenate([place[: rim + 1], lip, inside]), np.concatenate([lean[: rim + 1], round_, facing])
@@ -185,5 +185,5 @@ def _around(lines: list[tuple[Array, Array]]) -> tuple[Array, Array] | None:
 def _last_side(line: tuple[Array, Array], below: float = np.inf) -> int | None:
     """The last point of a line, up to a height, that is on a side."""
     place, lean = line
-    sides = np.flatnonzero((lean[:, 0] > DEFAULT.side) & (place[:, 1] <= below))
+    sides = np.flatnonzero((lean[:, 0] > SETTINGS.side) & (place[:, 1] <= below))
     return int(sides[-1]) if len(sides) else None

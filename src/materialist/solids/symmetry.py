@@ -27,7 +27,7 @@ class SymmetrySettings:
     deepest: float = 2.0  # largest thickness, in object sizes
 
 
-DEFAULT = SymmetrySettings()
+SETTINGS = SymmetrySettings()
 
 
 def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera) -> Array:
@@ -55,25 +55,25 @@ def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     width = border * front * spacing(rays)  # [H, W] scene units to the silhouette
     widest = width[inside].max()
     inflated = 2 * np.sqrt(np.maximum(width * (2 * widest - width), 0))  # a body with a round section
-    limit = DEFAULT.deepest * object_size(inside, depth, rays)
-    thickness = np.clip((back - front) * length, np.minimum(DEFAULT.floor * inflated, limit), limit)
+    limit = SETTINGS.deepest * object_size(inside, depth, rays)
+    thickness = np.clip((back - front) * length, np.minimum(SETTINGS.floor * inflated, limit), limit)
     return np.where(inside, thickness, 0).astype(np.float32)
 
 
 def _silhouette_plane(front: Array, normal: Array, rays: Array, border: Array, inside: Array) -> Array:
     """[H, W] inverse planar depth of the plane through the silhouette: linear over the picture, as for every plane."""
-    widest = max(DEFAULT.ring, DEFAULT.ring_share * np.sqrt(inside.sum()))
+    widest = max(SETTINGS.ring, SETTINGS.ring_share * np.sqrt(inside.sum()))
     # The outermost pixels are known too badly: where in them the silhouette runs is open.
     ring = inside & (border <= widest) & (border > 0.6)
     if not ring.any():
         ring = inside
     length = np.linalg.norm(rays, axis=-1)[ring]
-    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, DEFAULT.steepest, 1)
+    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, SETTINGS.steepest, 1)
     # The surface just inside lies before the silhouette. With a round section of radius r, a point at distance e from
     # the border has e = r (1 - sin) and lies r cos before it. The picture's plane is not across a slanting ray.
     gap = border[ring] * front[ring] * spacing(rays) / length
     before = gap * cosine / (1 - np.sqrt(1 - cosine**2))
-    weight = (1 - cosine) ** DEFAULT.grazing + 1e-4
+    weight = (1 - cosine) ** SETTINGS.grazing + 1e-4
     a, b, c = _robust_plane(rays[ring][:, 0], rays[ring][:, 1], 1 / (front[ring] + before), weight)
     return a + b * rays[..., 0] + c * rays[..., 1]
 

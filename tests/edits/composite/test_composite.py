@@ -13,7 +13,7 @@ from scipy.ndimage import binary_erosion
 from materialist.camera import project
 from materialist.edits.composite import into_photo as into_photo_module
 from materialist.edits.composite.composite import composite, developed, is_deep, pictures, write_composite
-from materialist.edits.composite.into_photo import DEFAULT, into_photo
+from materialist.edits.composite.into_photo import SETTINGS, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.composite.upsample import matte
@@ -73,7 +73,7 @@ def test_texture_beyond_the_fit_dims_with_the_surface():
     photo = replace(scene.photo, linear=base * grain, original=base * grain)
     edited = np.where(MASK[..., None], 0.2, base).astype(np.float32)
     out = into_photo(photo, layers_of(base, edited, MASK))
-    factor = (0.2 + DEFAULT.floor) / (0.5 + DEFAULT.floor)
+    factor = (0.2 + SETTINGS.floor) / (0.5 + SETTINGS.floor)
     np.testing.assert_allclose(out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02)
     np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.edits.composite.into_photo import DEFAULT, into_photo, onto_working
+from materialist.edits.composite.into_photo import SETTINGS, into_photo, onto_working
 from materialist.edits.composite.layers import difference, inner
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.core.surfaces import base_of
@@ -62,7 +62,7 @@ def without_traces(
     tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
     spanned = grown(hole, RIM)
     layers = difference(*pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp, seed=seed, progress=tick)
-    factor = np.log((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor))
+    factor = np.log((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor))
     factor = np.where(spanned[..., None], membrane(factor, ~spanned), factor)
     reached = np.where(spanned, np.abs(factor).max(-1) > LEAST, layers.reached)
     layers = replace(layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached)

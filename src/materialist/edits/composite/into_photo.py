@@ -28,7 +28,7 @@ class CompositeSettings:
     threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
 
 
-DEFAULT = CompositeSettings()
+SETTINGS = CompositeSettings()
 
 
 def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None = None) -> Array:
@@ -85,7 +85,7 @@ def _changed(photo: Photo, layers: Layers) -> Array:
         moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
 
-    with ThreadPoolExecutor(min(DEFAULT.threads, os.cpu_count() or 1)) as threads:
+    with ThreadPoolExecutor(min(SETTINGS.threads, os.cpu_count() or 1)) as threads:
         list(threads.map(laid, strips(box.stop, start=box.start)))
     return out
 
@@ -111,7 +111,7 @@ def _terms(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
         excess = np.where(own, -1, excess)
     if not (photo.hdr or layers.relit):
         # As with the rim of bodies: where a surface ends, white is mixed in, not what outshines it.
-        edge = grown(layers.changed, DEFAULT.edge) & grown(~layers.changed, DEFAULT.edge)
+        edge = grown(layers.changed, SETTINGS.edge) & grown(~layers.changed, SETTINGS.edge)
         change = np.where(edge[..., None], np.minimum(change, np.maximum(1 - reference, 0)), change)
     return change.astype(np.float32), excess.astype(np.float32), reference
 
@@ -122,7 +122,7 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
     factor = edited / base, and does not grow (a ratio above 1 is taken as 1). New metal hides it.
     """
-    factor = np.minimum((layers.edited + DEFAULT.floor) / (layers.base + DEFAULT.floor), 1)
+    factor = np.minimum((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor), 1)
     if layers.diffuse is not None:
         factor = factor * layers.diffuse[..., None]
     return layers.edited - layers.base, factor - 1, layers.base
@@ -134,13 +134,13 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     What the fit leaves unexplained is mostly texture, which goes with the light as the surface does. Highlights and
     shadows that the fit has elsewhere than the photo are not: without the bounds they would print their negative.
     """
-    base, edited, floor = np.maximum(layers.base, 0), np.maximum(layers.edited, 0), DEFAULT.floor
+    base, edited, floor = np.maximum(layers.base, 0), np.maximum(layers.edited, 0), SETTINGS.floor
     factor = (edited + floor) / (base + floor)
     overall = np.exp(np.median(np.log(factor).reshape(-1, 3), axis=0))
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
     dimmed = overall * held
     moved = np.clip((held + floor) * factor - floor, np.minimum(dimmed, edited), np.maximum(dimmed, edited))
-    return moved - photo.linear, np.minimum(factor, DEFAULT.most_detail) - 1, photo.linear
+    return moved - photo.linear, np.minimum(factor, SETTINGS.most_detail) - 1, photo.linear
 
 
 def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
@@ -152,12 +152,12 @@ def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
     if clear.all() or not clear.any():
         return stack, clear
     away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
-    return stack[row, column], away <= DEFAULT.rim
+    return stack[row, column], away <= SETTINGS.rim
 
 
 def _unclipped(photo: Array, base: Array) -> Array:
     """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
-    return np.where(photo >= DEFAULT.white, np.maximum(photo, base), photo)
+    return np.where(photo >= SETTINGS.white, np.maximum(photo, base), photo)
 
 
 def in_photo(picture: Array, photo: Photo, seen: Array, found: dict) -> Array:
@@ -175,9 +175,9 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict) -> Array:
     white = seen_so.min(-1, keepdims=True)
     own = dim * seen_so
     if not photo.hdr:
-        whole = np.clip((white - DEFAULT.nearly) / (DEFAULT.clipped - DEFAULT.nearly), 0, 1)
+        whole = np.clip((white - SETTINGS.nearly) / (SETTINGS.clipped - SETTINGS.nearly), 0, 1)
         lifted = own * (1 + max(found["radiance"] - 1, 0) * whole)
         # What is not clipped is as bright as it is, and dimming brightens nothing.
-        own = np.where((white < DEFAULT.clipped) & (dim < 1), np.minimum(lifted, seen_so), lifted)
+        own = np.where((white < SETTINGS.clipped) & (dim < 1), np.minimum(lifted, seen_so), lifted)
     picture[box] = np.where(share > 0, share * own + (1 - share) * here, here)
     return picture

@@ -34,7 +34,7 @@ class LayerSettings:
     times: float = 3.0  # multiple of the second brightest of the eight neighbours from which a pixel is a firefly
 
 
-DEFAULT = LayerSettings()
+SETTINGS = LayerSettings()
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def difference(
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     half = -(-spp // 2)
-    first = min(half, max(DEFAULT.least_first, spp // DEFAULT.first))
+    first = min(half, max(SETTINGS.least_first, spp // SETTINGS.first))
     tick, seeds, done = progress or (lambda *_: None), (2 * seed, 2 * seed + 1), count()
     steps = 2 * (1 + (not changed.all()) + (half > first))
     wanted = np.ones_like(changed) if hidden is None else ~hidden
@@ -138,16 +138,16 @@ def difference(
 
     near = changed
     if not changed.all():
-        step = max(1, round(max(changed.shape) / DEFAULT.lattice))
+        step = max(1, round(max(changed.shape) / SETTINGS.lattice))
         lattice = np.zeros_like(changed)
         lattice[::step, ::step] = True
         few = [p[::step, ::step] for k in seeds for p in traced(first, k, lattice, lattice)]
         # Parts that chance makes are as large as a window or two.
-        large = remove_small_objects(_gain(*few) > 0, max_size=2 * DEFAULT.window**2 // step**2)
+        large = remove_small_objects(_gain(*few) > 0, max_size=2 * SETTINGS.window**2 // step**2)
         near = changed | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
     if half > first:
-        near = grown(near, DEFAULT.window)
-    shown = grown(near, DEFAULT.margin)
+        near = grown(near, SETTINGS.window)
+    shown = grown(near, SETTINGS.margin)
     pairs = []
     for k in seeds:
         pair = [np.where(shown[..., None], one, 0) for one in traced(first, k, shown, near)]
@@ -164,7 +164,7 @@ def difference(
         return Layers(b, b, differs, differs)
     gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
     if guides is not None:
-        box = window(near, margin=DEFAULT.margin)
+        box = window(near, margin=SETTINGS.margin)
         for picture, noisy, maps in zip((b, e), (b, without_fireflies(e, changed)), guides, strict=True):
             picture[box] = denoised(noisy[box], *(one[box] for one in maps))
     reached = differs & (gain > 0)
@@ -174,14 +174,14 @@ def difference(
 
 def inner(hidden: Array) -> Array:
     """[H, W] bool: those of the hidden pixels on which nothing beside them depends, as `difference` averages."""
-    return ~grown(~hidden, DEFAULT.window)
+    return ~grown(~hidden, SETTINGS.window)
 
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
     """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
     base, edited = (np.maximum(_mean(((one + other) / 2).astype(np.float32)), 0) for one, other in ((b0, b1), (e0, e1)))
     white = np.maximum(np.maximum(base, edited), 1)
-    seen = np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1) >= DEFAULT.visible
+    seen = np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1) >= SETTINGS.visible
     return np.where(seen, significance(e0 - b0, e1 - b1), 0)
 
 
@@ -198,14 +198,14 @@ def significance(d0: Array, d1: Array) -> Array:
         m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
         for k in range(first.shape[-1]):
             m2 += _mean((first[..., k] + second[..., k]) / 2) ** 2
-            variance += _mean(((first[..., k] - second[..., k]) / 2) ** 2) / DEFAULT.window**2
-        gain = np.maximum(gain, 1 - DEFAULT.sigmas**2 * variance / np.maximum(m2, 1e-30))
-    return np.where(gain > DEFAULT.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
+            variance += _mean(((first[..., k] - second[..., k]) / 2) ** 2) / SETTINGS.window**2
+        gain = np.maximum(gain, 1 - SETTINGS.sigmas**2 * variance / np.maximum(m2, 1e-30))
+    return np.where(gain > SETTINGS.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
 
 
 def _mean(values: Array) -> Array:
     """Means over a window: Gaussian ones, as of a box of `window` pixels, which would show its corners in the gain."""
-    return cv2.GaussianBlur(values, (0, 0), DEFAULT.window / np.sqrt(4 * np.pi), borderType=cv2.BORDER_REFLECT)
+    return cv2.GaussianBlur(values, (0, 0), SETTINGS.window / np.sqrt(4 * np.pi), borderType=cv2.BORDER_REFLECT)
 
 
 def without_fireflies(picture: Array, where: Array | None = None) -> Array:
@@ -217,6 +217,6 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
     light = luminance(picture)
     around = np.ones((3, 3), bool)
     around[1, 1] = False
-    limit = np.maximum(DEFAULT.times * rank_filter(light, -2, footprint=around, mode="nearest"), DEFAULT.bright)
+    limit = np.maximum(SETTINGS.times * rank_filter(light, -2, footprint=around, mode="nearest"), SETTINGS.bright)
     found = (light > limit) & (True if where is None else where)
     return (picture * np.where(found, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(np.float32)

@@ -33,7 +33,7 @@ class DropSettings:
     still: int = 12  # looks in a row without motion after which things are at rest
 
 
-DEFAULT = DropSettings()
+SETTINGS = DropSettings()
 
 
 UNSEEN = "What fell came to rest where the camera does not look; try another place, height or seed."
@@ -101,7 +101,7 @@ def settle(scene: Scene, meshes: Sequence[Mesh], at: Places, options: Drop | Non
     notes = [f"{names[k]} falls beside everything that the photo shows, and was left out." for k in sorted(gone)]
     if not rests:
         notes.append(
-            f"After {DEFAULT.longest:g} seconds not everything that fell is at rest; it stays where it is then."
+            f"After {SETTINGS.longest:g} seconds not everything that fell is at rest; it stays where it is then."
         )
     edited = falling.at(poses, gone)
     return warned(edited, *notes, *[UNSEEN] * (not _in_view(scene, edited)))
@@ -188,7 +188,7 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
         if not (np.isfinite(direction).all() and direction.any()):
             raise InputError(f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0.")
         return direction / np.linalg.norm(direction)
-    if support.normal[1] > DEFAULT.upright:
+    if support.normal[1] > SETTINGS.upright:
         return -support.normal
     floor = upright(scene.normal, scene.geometry.plane_label)
     return np.array([0.0, -1.0, 0.0]) if floor is None else -floor
@@ -245,16 +245,16 @@ def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
 def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
     """(the last poses, numbers of the things that fell out of the scene, whether the rest lies still)."""
     bottom = min((float(block[:, 2].min()) for block in falling.ground), default=-np.inf)
-    recent: deque[list[Pose]] = deque(maxlen=DEFAULT.still + 1)
+    recent: deque[list[Pose]] = deque(maxlen=SETTINGS.still + 1)
     gone: frozenset[int] = frozenset()
     for poses in fall(
-        falling.things, falling.ground, frames=round(DEFAULT.longest * DEFAULT.looks) + 1, fps=DEFAULT.looks
+        falling.things, falling.ground, frames=round(SETTINGS.longest * SETTINGS.looks) + 1, fps=SETTINGS.looks
     ):
         gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
         last, metres = recent[-1], falling.what["metres"]
         still = all(len(look) == len(last) and not moves(look, last, metres) for look in recent)
-        if not last or (len(recent) > DEFAULT.still and still):
+        if not last or (len(recent) > SETTINGS.still and still):
             return poses, gone, True
     return poses, gone, False

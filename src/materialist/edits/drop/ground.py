@@ -24,7 +24,7 @@ class GroundSettings:
     behind: float = 0.05  # least cosine of a face's normal with a ray for the ray to come from behind
 
 
-DEFAULT = GroundSettings()
+SETTINGS = GroundSettings()
 
 
 @dataclass(frozen=True)
@@ -47,8 +47,8 @@ def ground_field(scene: Scene, to_up: Array, factor: float, *, places: Array, to
     """
     from materialist.render.scene import RenderScene
 
-    half = DEFAULT.reach * metres + float(np.ptp(places, axis=0).max()) / 2
-    steps = np.linspace(-half, half, DEFAULT.cells + 1)
+    half = SETTINGS.reach * metres + float(np.ptp(places, axis=0).max()) / 2
+    steps = np.linspace(-half, half, SETTINGS.cells + 1)
     middle = places.mean(0)
     x, y = np.meshgrid(middle[0] + steps, middle[1] + steps)
     target = RenderScene(scene.geometry, scene.camera, bodies=scene.bodies)
@@ -61,13 +61,13 @@ def ground_field(scene: Scene, to_up: Array, factor: float, *, places: Array, to
     height = _met(target, start, to_up, factor).reshape(x.shape)
     # Rays along gravity miss what is upright: where visible points stand out of the field, they raise it.
     points = unproject(scene.depth, scene.camera)[scene.depth > 0].astype(np.float64) @ to_up.T * factor
-    cell = 2 * half / DEFAULT.cells
+    cell = 2 * half / SETTINGS.cells
     low = np.nanmin(height) if np.isfinite(height).any() else 0.0
     column, row = np.round((points[:, :2] - [x[0, 0], y[0, 0]]) / cell).astype(int).T
-    inside = (column >= 0) & (column <= DEFAULT.cells) & (row >= 0) & (row <= DEFAULT.cells)
+    inside = (column >= 0) & (column <= SETTINGS.cells) & (row >= 0) & (row <= SETTINGS.cells)
     inside &= points[:, 2] < top(points[:, 0], points[:, 1])
     column, row, z = column[inside], row[inside], points[inside, 2]
-    upright = z > np.nan_to_num(height[row, column], nan=low - metres) + DEFAULT.steep * metres
+    upright = z > np.nan_to_num(height[row, column], nan=low - metres) + SETTINGS.steep * metres
     np.fmax.at(height, (row[upright], column[upright]), z[upright])
     return Field(np.array([x[0, 0], y[0, 0]]), cell, height)
 
@@ -83,7 +83,7 @@ def _met(target, points: Array, to_up: Array, factor: float) -> Array:
     origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))
     hit = target.mi_scene.ray_intersect(mi.Ray3f(origin, mi.Vector3f(*(float(-v) for v in to_up[2]))))
     distance = np.where(np.array(hit.is_valid()), np.array(hit.t, np.float64) * factor, np.nan)
-    distance[np.array(hit.n, np.float64).T @ to_up[2] < -DEFAULT.behind] = 0
+    distance[np.array(hit.n, np.float64).T @ to_up[2] < -SETTINGS.behind] = 0
     return points[:, 2] - distance
 
 
@@ -94,9 +94,9 @@ def blocks(ground: Field, *, metres: float) -> list[Array]:
     """
     for relaxed in range(8):
         found: list[Array] = []
-        flat = DEFAULT.flat * metres * 2**relaxed
-        _split(ground, (0, 0, ground.height.shape[0] - 1), flat, DEFAULT.deep * metres, found)
-        if len(found) <= DEFAULT.blocks:
+        flat = SETTINGS.flat * metres * 2**relaxed
+        _split(ground, (0, 0, ground.height.shape[0] - 1), flat, SETTINGS.deep * metres, found)
+        if len(found) <= SETTINGS.blocks:
             break
     return found
 

@@ -30,7 +30,7 @@ class PhysicsSettings:
     coarse: int = 24  # cells along the longest side to which it is thinned out
 
 
-DEFAULT = PhysicsSettings()
+SETTINGS = PhysicsSettings()
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: floa
     diverged = warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL, warnings.mjWARN_BADQACC
     done = 0
     for frame in range(frames):
-        target = round(frame / fps / DEFAULT.step)
+        target = round(frame / fps / SETTINGS.step)
         while done < target:
             mujoco.mj_step(model, data)
             done += 1
@@ -103,8 +103,8 @@ def load(name: str) -> Any:
 
 def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
-    spec.option.timestep = DEFAULT.step
-    spec.option.gravity = [0, 0, -DEFAULT.gravity]
+    spec.option.timestep = SETTINGS.step
+    spec.option.gravity = [0, 0, -SETTINGS.gravity]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable for things that spin fast
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # later versions always find several contacts
@@ -127,8 +127,8 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
 def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
     spec.add_mesh(name=name, uservert=np.ascontiguousarray(corners, np.float64).ravel().tolist())
     body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, density=DEFAULT.density, friction=list(DEFAULT.friction),
-        condim=4, solref=list(DEFAULT.stiff), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
+        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, density=SETTINGS.density, friction=list(SETTINGS.friction),
+        condim=4, solref=list(SETTINGS.stiff), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
     )  # fmt: skip
 
 
@@ -149,16 +149,16 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
     """
     vertices = np.asarray(vertices, np.float64)
     outer, mesh = hull(vertices), Trimesh(vertices, faces, validate=True)
-    if mesh.is_watertight and ConvexHull(outer).volume <= DEFAULT.same * abs(mesh.volume):
+    if mesh.is_watertight and ConvexHull(outer).volume <= SETTINGS.same * abs(mesh.volume):
         return [outer]
     coacd = load("coacd")
     logging.getLogger("coacd").setLevel(logging.ERROR)
     coacd.set_log_level("error")
-    if len(faces) > DEFAULT.fine:
-        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / DEFAULT.coarse
+    if len(faces) > SETTINGS.fine:
+        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / SETTINGS.coarse
         mesh = Trimesh(np.round(vertices / cell) * cell, faces, validate=True)
     parts = coacd.run_coacd(
-        coacd.Mesh(mesh.vertices, mesh.faces), threshold=DEFAULT.concave, max_convex_hull=DEFAULT.pieces,
+        coacd.Mesh(mesh.vertices, mesh.faces), threshold=SETTINGS.concave, max_convex_hull=SETTINGS.pieces,
         preprocess_resolution=30, resolution=400, mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
     )  # fmt: skip
     return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [outer]

@@ -34,7 +34,7 @@ class EmitterSettings:
     spp: int = 32  # paths a pixel of the rendering that estimates the radiance; derived: sums over the whole picture
 
 
-DEFAULT = EmitterSettings()
+SETTINGS = EmitterSettings()
 
 
 def visible_lights(scene: Scene) -> list[Array]:
@@ -43,20 +43,20 @@ def visible_lights(scene: Scene) -> list[Array]:
     They are connected regions of clipped pixels with the bright ones beside them, and do not face up.
     """
     photo, surface = scene.photo, scene.depth > 0
-    least = DEFAULT.clipped
+    least = SETTINGS.clipped
     if photo.hdr and surface.any():
-        least = max(least, DEFAULT.hdr * float(np.median(photo.linear[surface].mean(-1))))
+        least = max(least, SETTINGS.hdr * float(np.median(photo.linear[surface].mean(-1))))
     value, longer = photo.linear.min(-1), max(surface.shape)
     bright = (value >= least) & surface
     if not bright.any():
         return []
-    near = ndimage.distance_transform_edt(~bright) <= max(1, round(DEFAULT.reach * longer))
-    grown = ndimage.binary_propagation(bright, mask=(value >= DEFAULT.beside * least) & surface & near)
-    closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(DEFAULT.gap * longer))) > 0
+    near = ndimage.distance_transform_edt(~bright) <= max(1, round(SETTINGS.reach * longer))
+    grown = ndimage.binary_propagation(bright, mask=(value >= SETTINGS.beside * least) & surface & near)
+    closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(SETTINGS.gap * longer))) > 0
     masks = [
-        mask for mask in _parts(closed, DEFAULT.area * closed.size)
-        if (mask & bright).sum() >= DEFAULT.area * mask.size
-        and scene.normal[mask][:, 1].mean() <= DEFAULT.upward
+        mask for mask in _parts(closed, SETTINGS.area * closed.size)
+        if (mask & bright).sum() >= SETTINGS.area * mask.size
+        and scene.normal[mask][:, 1].mean() <= SETTINGS.upward
     ]  # fmt: skip
     return sorted(masks, key=lambda mask: -int(mask.sum()))
 
@@ -80,16 +80,16 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
             "The lights of a photo are found in the scene before its edits; dim that one, and edit it afterwards."
         )
     known = fitted or scene
-    masks = visible_lights(known) if lights is None else _parts(checked_region(known, lights) > 0.5, DEFAULT.pixels)
-    if not any(mask.sum() >= DEFAULT.pixels for mask in masks):
+    masks = visible_lights(known) if lights is None else _parts(checked_region(known, lights) > 0.5, SETTINGS.pixels)
+    if not any(mask.sum() >= SETTINGS.pixels for mask in masks):
         raise InputError(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
             "mark the lights that you mean."
             if lights is None
-            else f"The mask of lights has no connected part of {DEFAULT.pixels} pixels; mark the whole light."
+            else f"The mask of lights has no connected part of {SETTINGS.pixels} pixels; mark the whole light."
         )
     gone = (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
-    masks = [part for mask in masks for part in _parts(mask & ~gone, DEFAULT.pixels)]
+    masks = [part for mask in masks for part in _parts(mask & ~gone, SETTINGS.pixels)]
     if not masks:
         raise InputError("The lights of this photo were taken away by an earlier step; leave the dimming out.")
     colours, radiance = _looks(known.photo, masks)
@@ -120,10 +120,10 @@ def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, f
     """
     inside = [photo.linear[mask] for mask in masks]
     means = [pixels.mean(0) for pixels in inside]
-    if photo.hdr or np.concatenate([pixels.max(-1) >= DEFAULT.clipped for pixels in inside]).mean() < DEFAULT.known:
+    if photo.hdr or np.concatenate([pixels.max(-1) >= SETTINGS.clipped for pixels in inside]).mean() < SETTINGS.known:
         peak = max(*(float(mean.max()) for mean in means), OFF)
         return [triple(mean / peak) for mean in means], peak
-    white = [(pixels.min(-1) >= DEFAULT.clipped).mean() > DEFAULT.white for pixels in inside]
+    white = [(pixels.min(-1) >= SETTINGS.clipped).mean() > SETTINGS.white for pixels in inside]
     means = [np.ones(3) if is_white else mean for is_white, mean in zip(white, means)]
     return [triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
 
@@ -142,9 +142,9 @@ def _estimated(
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters))
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), OFF, np.float32))
-    by_emitters = target.render(spp=DEFAULT.spp)  # [H, W, 3] of emitters of radiance 1 alone
+    by_emitters = target.render(spp=SETTINGS.spp)  # [H, W, 3] of emitters of radiance 1 alone
     photo = scene.photo.linear
-    seen = (scene.depth > 0) & ~masked & (photo.max(-1) < DEFAULT.clipped)
+    seen = (scene.depth > 0) & ~masked & (photo.max(-1) < SETTINGS.clipped)
     if not seen.any():
         return 1.0, 1.0 if radiance is None else radiance, 0.0
     wanted, base, lit = (v[seen].astype(np.float64) for v in (photo, scene.rerender, by_emitters))
@@ -158,5 +158,5 @@ def _estimated(
 def _patch(scene: Scene, mask: Array, name: str) -> Body:
     """The surface of the masked pixels, black, and moved a little towards the camera."""
     surface = part(scene.geometry.mesh, -1, mask)
-    vertices = (surface.vertices * np.float32(1 - DEFAULT.lift)).astype(np.float32)
+    vertices = (surface.vertices * np.float32(1 - SETTINGS.lift)).astype(np.float32)
     return Body(vertices, surface.faces, surface.normals, surface.uv, uniform_surface(0.0, 1.0, 0.0), name)

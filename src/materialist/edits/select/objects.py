@@ -42,7 +42,7 @@ class SelectSettings:
     grain: float = 0.01  # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
 
 
-DEFAULT = SelectSettings()
+SETTINGS = SelectSettings()
 
 
 def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True) -> Array:
@@ -62,17 +62,17 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     """
     likely = _in_box(scene, box) if network else np.zeros(scene.depth.shape, np.float32)
     known = outlined(scene, likely, ())
-    if box_overlap(known, box) >= DEFAULT.fills:
+    if box_overlap(known, box) >= SETTINGS.fills:
         return known
     best = known
-    for share in DEFAULT.growth:
+    for share in SETTINGS.growth:
         more = round(share * min(box[2] - box[0], box[3] - box[1]))
         label = np.zeros(scene.depth.shape, np.uint8)
         label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = cv2.GC_PR_FGD
         best = max(tidy(grabcut(scene.photo.linear, label), ()), best, key=lambda mask: box_overlap(mask, box))
-        if box_overlap(best, box) >= DEFAULT.fills:
+        if box_overlap(best, box) >= SETTINGS.fills:
             break
-    return best if box_overlap(best, box) >= DEFAULT.least else np.zeros_like(best)
+    return best if box_overlap(best, box) >= SETTINGS.least else np.zeros_like(best)
 
 
 def box_overlap(mask: Array, box: Box) -> float:
@@ -93,7 +93,7 @@ def clicknet(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
 def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] uint8 labels for GrabCut: discs around the clicks."""
     label = np.zeros(scene.depth.shape, np.uint8)
-    shares = (DEFAULT.possible, DEFAULT.probable, DEFAULT.core)
+    shares = (SETTINGS.possible, SETTINGS.probable, SETTINGS.core)
     for share, value in zip(shares, (cv2.GC_PR_BGD, cv2.GC_PR_FGD, cv2.GC_FGD), strict=True):
         for x, y in points:
             cv2.circle(label, (int(x), int(y)), max(2, round(share * max(label.shape))), value, -1)
@@ -106,11 +106,11 @@ def _in_box(scene: Scene, box: Box) -> Array:
     inside = np.zeros(scene.depth.shape, bool)
     inside[y0:y1, x0:x1] = True
     found = np.zeros(scene.depth.shape, np.float32)
-    for across, down in DEFAULT.places:
+    for across, down in SETTINGS.places:
         x, y = int(x0 + across * (x1 - x0)), int(y0 + down * (y1 - y0))
         if scene.depth[y, x] > 0 and found[y, x] <= 0.5:  # else it is sky, or of an object that was found already
             likely = clicknet(scene, [(x, y)])
-            if (likely * inside).sum() > DEFAULT.within * likely.sum():
+            if (likely * inside).sum() > SETTINGS.within * likely.sum():
                 found = np.maximum(found, likely * inside)
     return found
 
@@ -121,24 +121,24 @@ def outlined(scene: Scene, likely: Array, points: Sequence[tuple[int, int]]) -> 
     Where they are unsure, edges of the photo divide: a random walk (Grady 2006) shares those pixels out at a small
     size, a guided filter (He et al. 2013) sharpens the outline.
     """
-    radius, photo = max(2, round(DEFAULT.reach * max(likely.shape))), linear_to_srgb(scene.photo.linear)
-    guide = GuidedFilter(photo, radius=radius, eps=DEFAULT.grain**2)
+    radius, photo = max(2, round(SETTINGS.reach * max(likely.shape))), linear_to_srgb(scene.photo.linear)
+    guide = GuidedFilter(photo, radius=radius, eps=SETTINGS.grain**2)
     return tidy(guide.share(_divided(photo, likely)) > 0.5, points)
 
 
 def _divided(photo: Array, likely: Array) -> Array:
     """[H, W] float32 in [0, 1]: likelihoods with unsure pixels given to what they lie with in the photo [H, W, 3]."""
     height, width = likely.shape
-    scale = min(1.0, DEFAULT.side / max(height, width))
+    scale = min(1.0, SETTINGS.side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     small, seen = (
         np.asarray(cv2.resize(v.astype(np.float32), size, interpolation=cv2.INTER_AREA)) for v in (likely, photo)
     )
-    seeds = np.where(small > DEFAULT.sure, 1, np.where(small < 1 - DEFAULT.sure, 2, 0))
+    seeds = np.where(small > SETTINGS.sure, 1, np.where(small < 1 - SETTINGS.sure, 2, 0))
     if len(np.unique(seeds)) < 3:  # one side has none, or nothing is unsure
         return likely.astype(np.float32)
     with warnings.catch_warnings(action="ignore"):  # that other solvers are faster
-        share = random_walker(seen, seeds, beta=DEFAULT.edge, mode="cg_j", channel_axis=-1, return_full_prob=True)[0]
+        share = random_walker(seen, seeds, beta=SETTINGS.edge, mode="cg_j", channel_axis=-1, return_full_prob=True)[0]
     return np.asarray(cv2.resize(share.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR))
 
 
@@ -149,7 +149,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     """
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
     # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
-    wide = disc(max(2, round(DEFAULT.gap * max(mask.shape))))
+    wide = disc(max(2, round(SETTINGS.gap * max(mask.shape))))
     closed = cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, wide) > 0
     parts, count = ndimage.label(opened | closed)
     if count == 0:
