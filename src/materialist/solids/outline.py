@@ -64,11 +64,11 @@ def surface_of_revolution(
         return None
     rays = pixel_rays(camera).astype(np.float64)
     depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float64)
-    share, best = _along(up, _Seen(inside, depth, normal, rays, behind, camera))
-    if best is None or share <= SETTINGS.covered or not best.profile.lines():
+    found = _along(up, _Seen(inside, depth, normal, rays, behind, camera))
+    if found is None:
         return None
-    front, _ = best.front(inside, rays)
-    return best, best.thickness(np.where(front > 0, front, depth), inside, rays)
+    body, front = found
+    return body, body.thickness(np.where(front > 0, front, depth), inside, rays)
 
 
 class _Seen(NamedTuple):
@@ -82,32 +82,32 @@ class _Seen(NamedTuple):
     camera: Camera
 
 
-def _along(up: Array, seen: _Seen) -> tuple[float, Revolution | None]:
-    """The body whose axis points along `up`, and the share of the mask that it covers; (0, None) if it does not fit."""
+def _along(up: Array, seen: _Seen) -> tuple[Revolution, Array] | None:
+    """The body whose axis points along `up` and the depth [H, W] of its front, 0 beside it; None if it does not fit."""
     middle = seen.rays[seen.inside].mean(0)
     if np.linalg.norm(np.cross(up, middle)) < SETTINGS.above * np.linalg.norm(middle):
-        return 0.0, None
+        return None
     across, alike = _mirror(seen.inside, seen.rays, up, seen.camera)
     if alike < SETTINGS.alike:
-        return 0.0, None
+        return None
     ahead = np.cross(across, up)
     first = Axis(up, ahead * np.sign(ahead @ middle))  # at distance 1
     border = _border(silhouette_field(seen.inside), first, seen.camera)
     if border is None:
-        return 0.0, None
+        return None
     found = [_placed(first, border, seen, round_top) for round_top in (True, False)]
     seen_so = [(body, *body.front(seen.inside, seen.rays)) for body in found if body is not None]
     if not seen_so:
-        return 0.0, None
+        return None
     body, front, leaning = max(seen_so, key=lambda one: float((one[2] * seen.normal).sum()))
     there = seen.inside & (front > 0)
     own, other = ((values @ across)[there] for values in (leaning, seen.normal))
     side = np.abs((leaning @ up)[there]) < SETTINGS.side
-    if (own * other).sum() < SETTINGS.leaning * (own * own).sum() or _stepped(
-        own[side], other[side]
-    ) < SETTINGS.stepped:
-        return 0.0, None
-    return float(there.sum() / seen.inside.sum()), body
+    leans = (own * other).sum() >= SETTINGS.leaning * (own * own).sum()
+    if not leans or _stepped(own[side], other[side]) < SETTINGS.stepped:
+        return None
+    fits = there.sum() > SETTINGS.covered * seen.inside.sum() and body.profile.lines()
+    return (body, front) if fits else None
 
 
 def _stepped(own: Array, other: Array) -> float:
