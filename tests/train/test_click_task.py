@@ -3,6 +3,7 @@
 import os
 import shutil
 
+import made_cutouts
 import made_runs
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from materialist.errors import InputError
 from materialist.predict.clicks.features import CHANNELS
 from materialist.procedural.dataset import produce as produce_set
 from materialist.procedural.options import DataSetOptions
-from materialist.train.clicks import click_losses, draw_click, load_views, produce_views
+from materialist.train.clicks import PASTED, click_losses, draw_click, load_views, produce_views
 
 
 def test_clicks_lie_on_what_they_ask_for():
@@ -56,6 +57,27 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     with pytest.raises(InputError, match="seed 11, not 12"):
         produce_views(sets[1], views)
     assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
+
+
+def test_cut_outs_are_things_of_further_views(tmp_path):
+    data, folder = tmp_path / "set", tmp_path / "cutouts"
+    produce_set(data, DataSetOptions(size=64, seed=11, spp=1, device="cpu", only="still-life"), count=1)
+    folder.mkdir()
+    made_cutouts.write_disc(folder / "red.png")
+    produce_views(data, tmp_path / "views", folder)
+    *pasted, plain = load_views(tmp_path / "views")
+    assert len(pasted) == PASTED
+    for view in pasted:
+        new = view["thing"] > plain["thing"].max()
+        red = view["rgb"][new].astype(int)
+        assert new.any() and np.median(red[:, 0] - red[:, 1:].max(1)) > 30
+        np.testing.assert_array_equal(view["thing"][~new], plain["thing"][~new])
+    with pytest.raises(InputError, match="begun with cutouts 1, not 0"):
+        produce_views(data, tmp_path / "views")
+    made_cutouts.write_disc(folder / "red.png", size=20)
+    with pytest.raises(InputError, match="No picture in .* large enough"):
+        produce_views(data, tmp_path / "other", folder)
+    assert not (tmp_path / "other").exists()
 
 
 def test_input_that_cannot_be(tmp_path):

@@ -8,11 +8,14 @@ intersection over union with the object's mask; `good` and `lost` are the shares
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib.resources import files
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+import yaml
 from scipy.ndimage import distance_transform_edt
 
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
@@ -21,7 +24,9 @@ from materialist.bench.report import Column, Report
 from materialist.edits.select.objects import Box
 from materialist.edits.select.select import select
 from materialist.errors import InputError
+from materialist.geometry.mesh import build_geometry
 from materialist.geometry.silhouette import window
+from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.procedural.arrangements import arrangement
@@ -45,6 +50,7 @@ class SelectBench(Benchmark):
 
     scenes: int = option(12, "Pictures, and as many with captured meshes where DATA is given.", **COUNT)
     size: int = option(256, "Their width and height.", **SIZE)
+    photo_size: int = option(512, "Longer side of photos with outlined objects.", **SIZE)
     smallest: int = option(400, "Pixels of an object that is clicked on.", **COUNT)
     loose: float = option(0.1, "What a loose box adds on each side, in the object's shorter side.", low=0, high=1)
     spp: int = option(100, "Samples a pixel of the pictures.", **COUNT)
@@ -53,6 +59,8 @@ class SelectBench(Benchmark):
         if data is not None:
             arrangement(0, seed=self.seed, data=data)  # that there are meshes
         predictor = BundledPredictor()
+        if data is not None:
+            yield from self._outlined(data / "photos", predictor)
         for folder in (None,) if data is None else (None, data):
             for k in range(self.scenes):
                 sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp)
@@ -60,6 +68,22 @@ class SelectBench(Benchmark):
                 for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
                     for row in self._selected(true_scene(sample, found), tuple(sample.scene.things.values()), k):
                         yield {**row, "method": f"{row['method']}, {maps} maps", "sample": f"{name} {row['sample']}"}
+
+    def _outlined(self, folder: Path, predictor: BundledPredictor) -> Iterator[Row]:
+        """Rows of the photos of a folder whose objects are known."""
+        for k, (name, objects) in enumerate(outlines().items()):
+            if not (folder / name).is_file():
+                continue
+            photo = read_photo(str(folder / name), size=self.photo_size)
+            maps = predictor.predict(photo)
+            geometry = build_geometry(maps.depth, maps.normal, photo.camera)
+            light = np.ones((16, 32, 3), np.float32)
+            scene = Scene(
+                photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, light, photo.linear
+            )
+            masks = [drawn(thing, maps.depth.shape) for thing in objects]
+            for row in self._selected(scene, masks, k):
+                yield {**row, "method": f"{row['method']}, photos", "sample": f"{name} {row['sample']}"}
 
     def _selected(self, scene: Scene, things: Sequence[Array], number: int) -> Iterator[Row]:
         """A row a click, and a box, by every method."""
@@ -72,6 +96,21 @@ class SelectBench(Benchmark):
             for what, box in boxes(mask, self.loose).items():
                 found = _scores(scene, mask, box=box, method=method)
                 yield {"method": f"{method}, {what}", "sample": f"object {j}", **found}
+
+
+def outlines() -> dict[str, list[dict[str, Any]]]:
+    """Photo -> its objects, each with an `outline` and perhaps `holes`: (x, y) where the longer side is 512 pixels."""
+    text = (files("materialist.bench") / "assets" / "outlines.yaml").read_text("utf-8")
+    return dict(yaml.safe_load(text))
+
+
+def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
+    """[H, W] bool of an object of `outlines` in a photo of that shape."""
+    mask, scale = np.zeros(shape, np.uint8), max(shape) / 512
+    for value, polygons in ((1, [thing["outline"]]), (0, thing.get("holes", []))):
+        corners = [np.rint((np.array(polygon) * scale - 0.5) * 16).astype(np.int32) for polygon in polygons]
+        cv2.fillPoly(mask, corners, value, shift=4)
+    return mask > 0
 
 
 def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float = 2.5) -> list[tuple[int, int]]:

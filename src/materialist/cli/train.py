@@ -127,6 +127,9 @@ def clicks(
     data: Annotated[Path, typer.Option(metavar="SET", help="A data set of: materialist train data.")],
     training: Training,
     learning: Learning,
+    cutouts: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of .png and .webp things cut out, to be pasted in.")
+    ] = None,
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
     from materialist.train.clicks import RECIPE, ClickTask, produce_views
@@ -134,7 +137,7 @@ def clicks(
     recipe = learning.recipe(RECIPE)
 
     def task(begin: Path | None, progress: Progress) -> Any:
-        produce_views(data, output / "views", progress)
+        produce_views(data, output / "views", cutouts, progress)
         return ClickTask(output / "views", recipe, init=begin)
 
     _train("clicks", task, output, training, init=learning.init, minutes=40)

@@ -19,6 +19,7 @@ from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.network import UNetArchitecture
+from materialist.procedural.cutouts import cutout_files, load_cutout, paste
 from materialist.procedural.dataset import identity
 from materialist.procedural.photographic import photographic
 from materialist.train.task import Batch, Recipe, Task
@@ -29,6 +30,8 @@ DESCRIPTION = "views.json"
 RECIPE = Recipe(side=224, batch=16, rate=1.5e-3, growth=((0.5, 128),))
 HELD_OUT = 48
 """Views, the last ones, that are only scored, where there are ten times as many."""
+PASTED = 2
+"""Views with cut-outs of each picture."""
 CLICKS = 3
 """Clicks on each held-out view."""
 DRAWS = 100
@@ -57,29 +60,43 @@ View = dict[str, Array]
 depth [H, W] float16; thing [H, W] int16, number of what is seen, negative for walls and the like, 0 for nothing."""
 
 
-def produce_views(data: Path, folder: Path, progress: Progress = lambda *_: None) -> None:
-    """Make the views that FOLDER lacks, by the bundled network.
+def produce_views(
+    data: Path, folder: Path, cutouts: Path | None = None, progress: Progress = lambda *_: None
+) -> None:
+    """Make the views that FOLDER lacks, by the bundled network: one of each picture, PASTED more with cut-outs.
 
-    Raises InputError for a data set without a description or without things and for a FOLDER with views of another
-    set, OutputError for one that cannot be written.
+    `cutouts` is a folder of things photographed or drawn, with transparency around them; None for none. Raises
+    InputError for a data set without a description or without things, cut-outs that cannot be read, and a FOLDER with
+    views of another set, OutputError for one that cannot be written.
     """
     source = SampleFolder(data)
-    said = identity(data)
+    said = identity(data) | {"cutouts": 0}
+    pasted: list[Array] = []
+    if cutouts is not None:
+        pasted = [found for path in cutout_files(cutouts) if (found := load_cutout(path)) is not None]
+        if not pasted:
+            raise InputError(f"No picture in {cutouts} has transparency around a thing large enough to learn from.")
+        said["cutouts"] = len(pasted)
     claim(folder, DESCRIPTION, said, tuple(said))
     predictor = BundledPredictor()
+    kinds = 1 + PASTED if pasted else 1
 
     def view(number: int) -> View:
-        path = source.paths[number]
-        arrays, rng = read_arrays(path, "thing", "fov"), np.random.default_rng([int(path.stem), 4])
-        linear, _ = photographic(read_sample(path).image, rng)
+        path, kind = source.paths[number // kinds], number % kinds
+        arrays, rng = read_arrays(path, "thing", "fov"), np.random.default_rng([int(path.stem), 4, kind])
+        image, thing = read_sample(path).image, arrays["thing"]
+        if kind:
+            image, thing = paste(image, thing, pasted, rng)
+        linear, _ = photographic(image, rng)
         camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
         found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
         return {
-            "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": arrays["thing"],
+            "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": thing,
             "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
         }  # fmt: skip
 
-    complete([folder / path.name for path in source.paths], view, "views", progress)
+    names = [f"{path.stem}{f'-{kind}' if kind else ''}.npz" for path in source.paths for kind in range(kinds)]
+    complete([folder / name for name in names], view, "views", progress)
 
 
 def load_views(folder: Path) -> list[View]:
