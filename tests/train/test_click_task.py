@@ -75,7 +75,7 @@ def test_cut_outs_are_things_of_further_views(tmp_path):
     with pytest.raises(InputError, match="begun with cutouts 1, not 0"):
         produce_views(data, tmp_path / "views")
     made_cutouts.write_disc(folder / "red.png", size=20)
-    with pytest.raises(InputError, match="No picture in .* large enough"):
+    with pytest.raises(InputError, match=r"No picture in .* large enough"):
         produce_views(data, tmp_path / "other", folder)
     assert not (tmp_path / "other").exists()
 

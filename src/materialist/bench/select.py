@@ -13,10 +13,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import yaml
 from scipy.ndimage import distance_transform_edt
+from skimage.draw import polygon
 
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
 from materialist.bench.edits import true_scene
@@ -24,7 +24,7 @@ from materialist.bench.report import Column, Report
 from materialist.edits.select.objects import Box
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.geometry.mesh import build_geometry
+from materialist.geometry.build import build_geometry
 from materialist.geometry.silhouette import window
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
@@ -66,7 +66,8 @@ class SelectBench(Benchmark):
                 sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp)
                 name = f"{'captured' if folder else 'procedural'} {sample.name}"
                 for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
-                    for row in self._selected(true_scene(sample, found), tuple(sample.scene.things.values()), k):
+                    things = [(mask, mask) for mask in sample.scene.things.values()]
+                    for row in self._selected(true_scene(sample, found), things, k):
                         yield {**row, "method": f"{row['method']}, {maps} maps", "sample": f"{name} {row['sample']}"}
 
     def _outlined(self, folder: Path, predictor: BundledPredictor) -> Iterator[Row]:
@@ -81,16 +82,16 @@ class SelectBench(Benchmark):
             scene = Scene(
                 photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, light, photo.linear
             )
-            masks = [drawn(thing, maps.depth.shape) for thing in objects]
-            for row in self._selected(scene, masks, k):
+            things = clickable(objects, maps.depth.shape)
+            for row in self._selected(scene, things, k):
                 yield {**row, "method": f"{row['method']}, photos", "sample": f"{name} {row['sample']}"}
 
-    def _selected(self, scene: Scene, things: Sequence[Array], number: int) -> Iterator[Row]:
-        """A row a click, and a box, by every method."""
-        for method, (j, mask) in product(METHODS, enumerate(things)):
+    def _selected(self, scene: Scene, things: Sequence[tuple[Array, Array]], number: int) -> Iterator[Row]:
+        """A row a click, and a box, by every method; `things` are masks and where in them clicks may lie."""
+        for method, (j, (mask, place)) in product(METHODS, enumerate(things)):
             if mask.sum() < self.smallest:
                 continue
-            for k, click in enumerate(clicks(mask, scene.depth > 0, np.random.default_rng([number, j]))):
+            for k, click in enumerate(clicks(place, scene.depth > 0, np.random.default_rng([number, j]))):
                 found = _scores(scene, mask, click=click, method=method)
                 yield {"method": method, "sample": f"object {j} click {k}", **found}
             for what, box in boxes(mask, self.loose).items():
@@ -106,11 +107,20 @@ def outlines() -> dict[str, list[dict[str, Any]]]:
 
 def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
     """[H, W] bool of an object of `outlines` in a photo of that shape."""
-    mask, scale = np.zeros(shape, np.uint8), max(shape) / 512
-    for value, polygons in ((1, [thing["outline"]]), (0, thing.get("holes", []))):
-        corners = [np.rint((np.array(polygon) * scale - 0.5) * 16).astype(np.int32) for polygon in polygons]
-        cv2.fillPoly(mask, corners, value, shift=4)
-    return mask > 0
+    mask, scale = np.zeros(shape, bool), max(shape) / 512
+    for inside, polygons in ((True, [thing["outline"]]), (False, thing.get("holes", []))):
+        for corners in polygons:
+            columns, rows = np.array(corners, float).T * scale - 0.5
+            mask[polygon(rows, columns, shape)] = inside
+    return mask
+
+
+def clickable(objects: Sequence[dict[str, Any]], shape: tuple[int, ...]) -> list[tuple[Array, Array]]:
+    """Masks of objects, and where in them a click means them: not on a `part`, which is an object of its own."""
+    masks = [drawn(thing, shape) for thing in objects]
+    parts = [mask for thing, mask in zip(objects, masks, strict=True) if thing.get("part")]
+    other = np.logical_or.reduce([np.zeros(shape, bool), *parts])
+    return [(mask, mask if thing.get("part") else mask & ~other) for thing, mask in zip(objects, masks, strict=True)]
 
 
 def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float = 2.5) -> list[tuple[int, int]]:

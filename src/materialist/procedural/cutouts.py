@@ -38,7 +38,7 @@ def cutout_files(folder: Path) -> list[Path]:
     """The pictures of a folder and those inside it, sorted. Raises InputError where there are none."""
     found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS)
     if not found:
-        raise InputError(f"{folder} holds no {' or '.join(ENDINGS)} files; give a folder of pictures of things cut out.")
+        raise InputError(f"{folder} holds no {' or '.join(ENDINGS)} files; give a folder of things cut out.")
     return found
 
 
@@ -73,7 +73,7 @@ def paste(image: Array, thing: Array, cutouts: Sequence[Array], rng: np.random.G
     """
     image, thing = image.astype(np.float32), thing.copy()
     for _ in range(int(rng.integers(1, SETTINGS.most + 1))):
-        chosen = cutouts[rng.integers(len(cutouts))]
+        chosen = cutouts[int(rng.integers(len(cutouts)))]
         placed = _placed(chosen, thing.shape, rng)
         colour, share = placed[..., :3], placed[..., 3]
         mask = share > 0.5
@@ -122,7 +122,7 @@ def _ramp(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
 def _shadow(share: Array, rng: np.random.Generator) -> Array:
     """[H, W] factor: a soft, shifted copy of opacity [H, W], dark."""
     side = max(share.shape)
-    shift = np.float32([[1, 0, rng.normal(0, 0.03) * side], [0, 1, rng.uniform(0, 0.04) * side]])
-    moved = cv2.warpAffine(share, shift, share.shape[::-1])
+    shift = np.array([[1, 0, rng.normal(0, 0.03) * side], [0, 1, rng.uniform(0, 0.04) * side]], np.float32)
+    moved = cv2.warpAffine(share, shift, (share.shape[1], share.shape[0]))
     soft = cv2.GaussianBlur(moved, (0, 0), rng.uniform(0.005, 0.04) * side)
     return 1 - rng.uniform(0.2, 0.7) * soft

@@ -60,9 +60,7 @@ View = dict[str, Array]
 depth [H, W] float16; thing [H, W] int16, number of what is seen, negative for walls and the like, 0 for nothing."""
 
 
-def produce_views(
-    data: Path, folder: Path, cutouts: Path | None = None, progress: Progress = lambda *_: None
-) -> None:
+def produce_views(data: Path, folder: Path, cutouts: Path | None = None, progress: Progress = lambda *_: None) -> None:
     """Make the views that FOLDER lacks, by the bundled network: one of each picture, PASTED more with cut-outs.
 
     `cutouts` is a folder of things photographed or drawn, with transparency around them; None for none. Raises
