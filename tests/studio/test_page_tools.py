@@ -97,7 +97,8 @@ def test_selecting_by_clicks(page):
     both = page.evaluate(MASK)
     click_photo(page, 0.39, 0.5)  # again: taken away
     page.wait_for_function(f"(old) => {MASK} !== old", arg=both)
-    assert not mask(page)[24, 25]
+    left = mask(page)
+    assert left is None or not left[24, 25]
 
 
 @pytest.mark.slow

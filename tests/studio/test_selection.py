@@ -12,8 +12,9 @@ def test_click_add_and_remove():
     scene = room()
     one = Selection().click(scene, 25, 24, "new")
     assert one.mask is not None and overlap(one.mask, block()) > 0.9
-    two = one.click(scene, 50, 40, "add")
-    assert two.mask is not None and two.mask[40, 50] and two.mask[24, 25]
+    both = one.click(scene, 50, 40, "add").mask
+    assert both is not None and both[40, 50] and both[24, 25]
+    two = one.brush(scene, [[44, 40], [56, 40]], 4, "add")
     again = two.click(scene, 25, 24, "add").mask
     assert again is not None and (again >= two.mask).all(), "adding takes nothing away"
     assert two.click(scene, 25, 24, "new").mask[24, 25] == False  # noqa: E712 - on what is selected: taken away

@@ -11,7 +11,7 @@ import torch
 from made_samples import write_set
 
 from materialist.errors import InputError
-from materialist.predict.clicks.features import CHANNELS
+from materialist.predict.clicks.features import BOX, CHANNELS, SPOT
 from materialist.procedural.dataset import produce as produce_set
 from materialist.procedural.options import DataSetOptions
 from materialist.train.clicks import PASTED, click_losses, draw_click, load_views, produce_views
@@ -24,10 +24,13 @@ def test_clicks_lie_on_what_they_ask_for():
     for _ in range(60):
         maps, mask = draw_click(view, 64, rng)
         assert maps.shape == (CHANNELS, 64, 64) and mask.shape == (64, 64) and mask.any()
-        spots = maps[-2] == 1
-        assert spots.any() and mask[spots].all(), "every click lies on the object"
-        seen.add(bool(mask.mean() > 0.5))
-    assert seen == {True, False}, "things mostly, the floor at times"
+        spots, box = maps[SPOT] == 1, maps[BOX] == 1
+        assert spots.any() != box.any(), "clicks or a box"
+        assert mask[spots].all(), "every click lies on the object"
+        if box.any():
+            assert mask[box].sum() > 0.85 * mask.sum(), "a box holds about all of it"
+        seen.add((bool(mask.mean() > 0.5), bool(box.any())))
+    assert len(seen) == 4, "things mostly, the floor at times; clicks and boxes"
 
 
 def test_the_loss_has_a_closed_form():

@@ -2,8 +2,10 @@
 
 Synthetic pictures whose objects are known (those of `bench light`); two clicks on every object of at least 400 pixels,
 one in its middle and one anywhere, and two boxes around it, exact and a tenth too large. `bundled` maps are the bundled
-network's, `true` ones the truth; `network` is what `select` does by itself, `grabcut` the same without ClickNet. IoU is
-intersection over union with the object's mask; `good` and `lost` are the shares above 0.8 and below 0.3.
+network's, `true` ones the truth. Where DATA has photos of `assets/outlines.yaml`, the same on their objects, which were
+outlined by eye; clicks on a whole keep off its parts that are listed. `network` is what `select` does by itself,
+`grabcut` goes by colours. IoU is intersection over union with the object's mask; `good` and `lost` are the shares above
+0.8 and below 0.3.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +23,6 @@ from skimage.draw import polygon
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
 from materialist.bench.edits import true_scene
 from materialist.bench.report import Column, Report
-from materialist.edits.select.objects import Box
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
@@ -29,6 +30,7 @@ from materialist.geometry.silhouette import window
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict.bundled.predictor import BundledPredictor
+from materialist.predict.clicks.features import Box
 from materialist.procedural.arrangements import arrangement
 from materialist.procedural.synthetic import make_sample
 from materialist.types import Array, Scene

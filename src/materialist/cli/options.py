@@ -62,7 +62,7 @@ class Place(OperationOptions):
 @dataclass(frozen=True, kw_only=True)
 class Region(Place):
     method: str = option(
-        "network", "network: edges and ClickNet; grabcut: edges alone; sam2 needs its weights.", kind="word",
+        "network", "network: ClickNet; grabcut: colours alone; sam2 needs its weights.", kind="word",
         choices=("network", "grabcut", "sam2"), flag="--with")
 
 

@@ -20,6 +20,7 @@ class PasteSettings:
     """How cut-outs are placed; lengths in sides of the picture; tuned by eye."""
 
     most: int = 4  # cut-outs in a picture, at least one
+    again: float = 0.3  # share of cut-outs that are the last one once more: another of its kind is another thing
     size: tuple[float, float] = (0.15, 0.8)  # longer side, from and to
     turned: float = 12.0  # standard deviation of the rotation, degrees
     visible: float = 0.6  # least share of a cut-out that lies inside the picture
@@ -71,10 +72,10 @@ def paste(image: Array, thing: Array, cutouts: Sequence[Array], rng: np.random.G
     Each is scaled, mirrored, turned, exposed as its surroundings are, shaded by a ramp, and often casts a soft shadow.
     Their numbers in the map follow those of the picture's own things.
     """
-    image, thing = image.astype(np.float32), thing.copy()
+    image, thing, last = image.astype(np.float32), thing.copy(), -1
     for _ in range(int(rng.integers(1, SETTINGS.most + 1))):
-        chosen = cutouts[int(rng.integers(len(cutouts)))]
-        placed = _placed(chosen, thing.shape, rng)
+        last = last if last >= 0 and rng.random() < SETTINGS.again else int(rng.integers(len(cutouts)))
+        placed = _placed(cutouts[last], thing.shape, rng)
         colour, share = placed[..., :3], placed[..., 3]
         mask = share > 0.5
         if not mask.any():

@@ -16,7 +16,7 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.io.samples import SampleFolder, claim, complete, read_arrays, read_sample
 from materialist.predict.bundled.predictor import BundledPredictor
-from materialist.predict.clicks.features import features
+from materialist.predict.clicks.features import Box, features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.network import UNetArchitecture
 from materialist.procedural.cutouts import cutout_files, load_cutout, paste
@@ -45,7 +45,9 @@ class ClickDraw:
     fewest_pixels: int = 60  # of a view; smaller things are not clicked on
     depth_inside: float = 2.5  # pixels from the border of a thing to a click, where the thing is as large
     things: float = 0.85  # share of clicks on things; the others are on walls, floors and the like
-    several: float = 0.25  # share of examples with two or three clicks
+    several: float = 0.25  # share of those with clicks that have two or three
+    boxed: float = 0.35  # share of examples with a box
+    loose: tuple[float, float] = (-0.03, 0.2)  # what each side of a box is too far out, shorter sides, from and to
     smallest_crop: float = 0.4  # smallest part of a view's side that an example shows
     worsened: float = 0.5  # share with worse maps: the bundled network knows these pictures better than photos
     blur: tuple[float, float] = (0.008, 0.1)  # of worse maps, as a part of the side, from and to
@@ -103,7 +105,7 @@ def load_views(folder: Path) -> list[View]:
 
 
 def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:
-    """([C, side, side] features, [side, side] bool) of a random part of a view and a click in it; None without things.
+    """([C, side, side] features, [side, side] bool) of a part of a view, and clicks or a box; None without things.
 
     The part is mirrored or not and recoloured, its maps are made worse at times; some examples have several clicks.
     """
@@ -127,14 +129,16 @@ def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, 
         return None
     mask = thing == chosen
     count = int(rng.integers(2, 4)) if rng.random() < DRAW.several else 1
-    known = mask & (depth > 0)
+    known, box = mask & (depth > 0), None
     clicks = [place for _ in range(count) if (place := click_in(known, rng, DRAW.depth_inside)) is not None]
     if not clicks:
         return None
+    if rng.random() < DRAW.boxed:
+        clicks, box = [], box_around(mask, rng)
     if rng.random() < DRAW.worsened:
         normal, depth = worse(normal, depth, rng)
     rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
-    return features(rgb, normal, depth, clicks), mask
+    return features(rgb, normal, depth, clicks, box), mask
 
 
 def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -163,6 +167,16 @@ def click_in(mask: Array, rng: np.random.Generator, inside: float) -> tuple[int,
         return None
     row, column = places[rng.integers(len(places))]
     return int(column), int(row)
+
+
+def box_around(mask: Array, rng: np.random.Generator) -> Box:
+    """A box around a mask [H, W] bool as somebody might draw it, inside the picture."""
+    rows, columns = np.nonzero(mask)
+    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
+    off = rng.uniform(*DRAW.loose, (2, 2)) * (high - low).min()
+    x0, y0 = np.maximum(np.rint(low - off[0]).astype(int), 0).tolist()
+    x1, y1 = np.minimum(np.rint(high + off[1]).astype(int), mask.shape[::-1]).tolist()
+    return x0, y0, max(x1, x0 + 1), max(y1, y0 + 1)
 
 
 def _chosen(thing: Array, rng: np.random.Generator) -> int | None:

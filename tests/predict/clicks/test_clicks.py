@@ -5,14 +5,15 @@ import pytest
 import torch
 
 from materialist.camera import pixel_rays
-from materialist.predict.clicks.features import CHANNELS, NORMAL_X, features
+from materialist.errors import InputError
+from materialist.predict.clicks.features import BOX, CHANNELS, NORMAL_X, SPOT, features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.clicks.segment import object_at
 from materialist.predict.network import UNetArchitecture
 from materialist.types import Camera
 
 SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
-DISTANCE, SPOT, COSINE = -1, -2, -3
+DISTANCE, COSINE = 13, 11
 COLOUR = slice(8, 11)
 
 
@@ -58,6 +59,17 @@ def test_features_have_closed_forms():
     assert maps[COSINE, 66, 80] > 0.99
 
 
+def test_a_box_stands_for_a_click_in_its_middle():
+    photo, _ = scene()
+    maps = features(*photo, box=(60, 40, 101, 91))
+    rows, columns = np.nonzero(maps[BOX])
+    assert (columns.min(), rows.min(), columns.max(), rows.max()) == (60, 40, 100, 90)
+    assert maps[BOX].sum() == 41 * 51 and not maps[SPOT].any() and maps[DISTANCE, 65, 80] == 0
+    inner = np.median(photo[0][52:79, 70:91].reshape(-1, 3), 0)
+    np.testing.assert_allclose(maps[COLOUR], np.moveaxis(np.abs(photo[0] - inner), -1, 0), atol=1e-6)
+    assert not features(*photo, [(80, 66)])[BOX].any()
+
+
 def test_a_mirrored_photo_has_mirrored_features():
     (rgb, normal, depth), _ = scene()
     other = rgb[:, ::-1], normal[:, ::-1] * [-1, 1, 1], depth[:, ::-1]
@@ -73,8 +85,21 @@ def test_photos_of_any_shape(untrained, size):
     assert object_at(*photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape == size
 
 
-@pytest.mark.parametrize("click", [(80, 66), (92, 80)])
-def test_the_weights_that_ship_find_a_ball(click):
+@pytest.mark.parametrize("box", [(158, 0, 160, 1), (0, 0, 160, 119), (3, 50, 4, 120)])
+def test_boxes_of_any_shape(untrained, box):
+    photo, _ = scene()
+    found = object_at(*photo, box=box, weights=untrained)
+    assert found.shape == (120, 160) and np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("where", [{}, {"clicks": [(160, 3)]}, {"box": (5, 5, 5, 9)}, {"box": (0, 0, 161, 9)}])
+def test_places_outside_are_errors(untrained, where):
+    with pytest.raises(InputError, match="inside 160 x 120 pixels"):
+        object_at(*scene()[0], **where, weights=untrained)
+
+
+@pytest.mark.parametrize("where", [{"clicks": [(80, 66)]}, {"clicks": [(92, 80)]}, {"box": (48, 34, 112, 98)}])
+def test_the_weights_that_ship_find_a_ball(where):
     photo, ball = scene()
-    found = object_at(*photo, [click]) > 0.5
+    found = object_at(*photo, **where) > 0.5
     assert (found & ball).sum() / (found | ball).sum() > 0.6

@@ -1,4 +1,4 @@
-"""The object at clicks or in a box: by ClickNet, and where that finds none by GrabCut (Rother et al. 2004)."""
+"""The object at clicks or in a box: by ClickNet, or by GrabCut (Rother et al. 2004)."""
 
 import warnings
 from collections.abc import Sequence
@@ -14,22 +14,15 @@ from materialist.color import linear_to_srgb
 from materialist.geometry.silhouette import disc, window
 from materialist.predict.bundled.edges import GuidedFilter, grabcut
 from materialist.predict.clicks import segment
+from materialist.predict.clicks.features import Box
 from materialist.types import Array, Scene
-
-Box = tuple[int, int, int, int]
-"""(x0, y0, x1, y1), the latter two beyond it."""
 
 
 @dataclass(frozen=True)
 class SelectSettings:
     """Where ClickNet and GrabCut look; lengths in longer sides; tuned by eye unless said otherwise."""
 
-    places: tuple[tuple[float, float], ...] = ((0.5, 0.5), (0.3, 0.3), (0.7, 0.3), (0.3, 0.7), (0.7, 0.7))
-    """Places in a box, shares of its sides, at which ClickNet is asked for the object there."""
-    within: float = 0.8  # share of an object that must lie in the box: a table's does not
-    fills: float = 0.6  # overlap of an object's own box with the given one from which ClickNet's is taken
-    least: float = 0.25  # overlap below which nothing was found in the box: it is misplaced
-    growth: tuple[float, ...] = (0.0, 0.04, 0.08, 0.16)  # margins tried until a box is filled, shorter sides of it
+    least: float = 0.25  # overlap of an object's own box with the given one below which the box is misplaced
     core: float = 0.01  # radius around a click that is certainly of the object
     probable: float = 0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
     possible: float = 0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
@@ -48,31 +41,22 @@ SETTINGS = SelectSettings()
 def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on."""
     if network:
-        likely = clicknet(scene, points)
-        if all(likely[y, x] > 0.5 for x, y in points):
-            return outlined(scene, likely, points)
+        return outlined(scene, _divided(linear_to_srgb(scene.photo.linear), clicknet(scene, points)), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
 def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
-    """[H, W] bool of the object in a box, by ClickNet where it finds one that fills the box, else by GrabCut.
+    """[H, W] bool of the object in a box; empty where what is found does not fill it.
 
-    GrabCut takes for the object what is not seen outside of the box: a tight box suits it. Empty where nothing found
-    fills the box.
+    GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
     """
-    likely = _in_box(scene, box) if network else np.zeros(scene.depth.shape, np.float32)
-    known = outlined(scene, likely, ())
-    if box_overlap(known, box) >= SETTINGS.fills:
-        return known
-    best = known
-    for share in SETTINGS.growth:
-        more = round(share * min(box[2] - box[0], box[3] - box[1]))
-        label = np.zeros(scene.depth.shape, np.uint8)
-        label[max(box[1] - more, 0) : box[3] + more, max(box[0] - more, 0) : box[2] + more] = cv2.GC_PR_FGD
-        best = max(tidy(grabcut(scene.photo.linear, label), ()), best, key=lambda mask: box_overlap(mask, box))
-        if box_overlap(best, box) >= SETTINGS.fills:
-            break
-    return best if box_overlap(best, box) >= SETTINGS.least else np.zeros_like(best)
+    inside = np.zeros(scene.depth.shape, np.uint8)
+    inside[box[1] : box[3], box[0] : box[2]] = 1
+    if network:
+        found = outlined(scene, clicknet(scene, (), box) * inside, ())
+    else:
+        found = tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
+    return found if box_overlap(found, box) >= SETTINGS.least else np.zeros_like(found)
 
 
 def box_overlap(mask: Array, box: Box) -> float:
@@ -85,9 +69,9 @@ def box_overlap(mask: Array, box: Box) -> float:
     return overlap(own, given)
 
 
-def clicknet(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] in [0, 1]: ClickNet's likelihood that a pixel is of the object that all (column, row) points lie on."""
-    return segment.object_at(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth, points)
+def clicknet(scene: Scene, points: Sequence[tuple[int, int]], box: Box | None = None) -> Array:
+    """[H, W] in [0, 1]: ClickNet's likelihood of the object that all (column, row) points lie on, or that in a box."""
+    return segment.object_at(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth, points, box=box)
 
 
 def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
@@ -100,34 +84,21 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     return label
 
 
-def _in_box(scene: Scene, box: Box) -> Array:
-    """[H, W] in [0, 1], 0 outside of the box: ClickNet's likelihood that a pixel is of an object in the box."""
-    x0, y0, x1, y1 = box
-    inside = np.zeros(scene.depth.shape, bool)
-    inside[y0:y1, x0:x1] = True
-    found = np.zeros(scene.depth.shape, np.float32)
-    for across, down in SETTINGS.places:
-        x, y = int(x0 + across * (x1 - x0)), int(y0 + down * (y1 - y0))
-        if scene.depth[y, x] > 0 and found[y, x] <= 0.5:  # else it is sky, or of an object that was found already
-            likely = clicknet(scene, [(x, y)])
-            if (likely * inside).sum() > SETTINGS.within * likely.sum():
-                found = np.maximum(found, likely * inside)
-    return found
-
-
 def outlined(scene: Scene, likely: Array, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] bool of the object at points (column, row), from likelihoods [H, W] in [0, 1].
 
-    Where they are unsure, edges of the photo divide: a random walk (Grady 2006) shares those pixels out at a small
-    size, a guided filter (He et al. 2013) sharpens the outline.
+    The outline moves to edges of the photo near it (guided filter, He et al. 2013).
     """
-    radius, photo = max(2, round(SETTINGS.reach * max(likely.shape))), linear_to_srgb(scene.photo.linear)
-    guide = GuidedFilter(photo, radius=radius, eps=SETTINGS.grain**2)
-    return tidy(guide.share(_divided(photo, likely)) > 0.5, points)
+    radius = max(2, round(SETTINGS.reach * max(likely.shape)))
+    guide = GuidedFilter(linear_to_srgb(scene.photo.linear), radius=radius, eps=SETTINGS.grain**2)
+    return tidy(guide.share(likely) > 0.5, points)
 
 
 def _divided(photo: Array, likely: Array) -> Array:
-    """[H, W] float32 in [0, 1]: likelihoods with unsure pixels given to what they lie with in the photo [H, W, 3]."""
+    """[H, W] float32 in [0, 1]: likelihoods with unsure pixels given to what they lie with in the photo [H, W, 3] sRGB.
+
+    A random walk (Grady 2006) at a small size. A click leaves much unsure; what a box finds is worse with it.
+    """
     height, width = likely.shape
     scale = min(1.0, SETTINGS.side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
-from materialist.edits.select.objects import Box, object_at, object_in
+from materialist.edits.select.objects import object_at, object_in
 from materialist.errors import InputError
 from materialist.io.image import read_mask
 from materialist.option_kinds import numbers, several
+from materialist.predict.clicks.features import Box
 from materialist.types import Array, Scene
 
 METHODS = ("network", "grabcut", "sam2")
@@ -25,7 +26,7 @@ def select(
     Args:
         click: (x, y) at working size, or several, all of them on the object. box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
-        method: `network` (ClickNet and GrabCut), `grabcut` (without ClickNet) or `sam2` (needs its weights).
+        method: `network` (ClickNet), `grabcut` (by colours alone) or `sam2` (needs its weights).
         device: `auto`, `cpu` or `cuda`, for `sam2`.
 
     Raises InputError for none or several of click, box and mask; a click or box outside the photo or on the sky; an

@@ -1,4 +1,4 @@
-"""What ClickNet sees of a photo: its colours, normals and depth, and how they differ from those at the clicks."""
+"""What ClickNet sees of a photo: colours, normals and depth, and how they differ from those at clicks or in a box."""
 
 from collections.abc import Sequence
 
@@ -6,24 +6,30 @@ import numpy as np
 
 from materialist.types import Array
 
-CHANNELS = 14
+Box = tuple[int, int, int, int]
+"""(x0, y0, x1, y1) in pixels, the latter two beyond it."""
+CHANNELS = 15
 NORMAL_X = 3
 """First channel of the normals."""
 SPOT = 12
 """The channel that is high at the clicks."""
+BOX = 14
+"""The channel that is 1 in a box."""
 NEAR = 3.0
 """Pixels within which a click is told sharply."""
 DEEP = 2.0
 """Largest difference of logarithms of depth that is told from larger ones."""
 
 
-def features(rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]]) -> Array:
+def features(
+    rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]] = (), box: Box | None = None
+) -> Array:
     """The maps [CHANNELS, H, W] float32 that ClickNet reads of rgb [H, W, 3] sRGB in [0, 1], normal [H, W, 3] unit,
-    depth [H, W] planar in any unit, 0 = no surface, and clicks (column, row) on one object, at least one.
+    depth [H, W] planar in any unit, 0 = no surface, and either clicks (column, row) on one object or a box around it.
 
     rgb - 0.5; normal; log depth over that of the clicks; surface; |rgb - clicks'| (3); cosine to the clicks' normals; a
-    spot at the clicks; the distance to them, in units of the longer side. Of several clicks, the one that a pixel is
-    most like counts.
+    spot at the clicks; the distance to them, in units of the longer side; the box. Of several clicks, the one that a
+    pixel is most like counts; of a box, the inner half of its width and height stands for a click in its middle.
     """
     height, width = depth.shape
     surface = depth > 0
@@ -31,8 +37,14 @@ def features(rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int
     rows, columns = np.indices(depth.shape)
     level, colour = np.full(depth.shape, np.inf), np.full(rgb.shape, np.inf)
     cosine, away = np.full(depth.shape, -1.0), np.full(depth.shape, np.inf)
-    for x, y in clicks:
-        near = np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]
+    inside = np.zeros(depth.shape)
+    places = [(x, y, np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]) for x, y in clicks]
+    if box is not None:
+        x0, y0, x1, y1 = box
+        inside[y0:y1, x0:x1] = 1
+        right, down = (x1 - x0) // 4, (y1 - y0) // 4
+        places = [((x0 + x1) // 2, (y0 + y1) // 2, np.s_[y0 + down : y1 - down, x0 + right : x1 - right])]
+    for x, y, near in places:
         here = np.median(log[near][surface[near]]) if surface[near].any() else 0.0
         other = np.clip(log - here, -DEEP, DEEP)
         level = np.where(np.abs(other) < np.abs(level), other, level)
@@ -41,9 +53,9 @@ def features(rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int
         facing = normal[near].reshape(-1, 3).mean(0)
         cosine = np.maximum(cosine, normal @ (facing / max(float(np.linalg.norm(facing)), 1e-6)))
         away = np.minimum(away, np.hypot(rows - y, columns - x))
-    spot = np.exp(-((away / NEAR) ** 2) / 2)
+    spot = np.exp(-((away / NEAR) ** 2) / 2) if box is None else np.zeros(depth.shape)
     parts = [
         rgb - 0.5, normal, np.where(surface, level, DEEP)[..., None], surface[..., None], colour, cosine[..., None],
-        spot[..., None], (away / max(height, width))[..., None],
+        spot[..., None], (away / max(height, width))[..., None], inside[..., None],
     ]  # fmt: skip
     return np.ascontiguousarray(np.moveaxis(np.concatenate(parts, -1), -1, 0), np.float32)

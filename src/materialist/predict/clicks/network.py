@@ -1,4 +1,4 @@
-"""ClickNet: a small U-Net from the photo, its maps and a click to the object that was clicked on.
+"""ClickNet: a small U-Net from the photo, its maps and clicks or a box to the object that is meant.
 
 Clicks are told as Xu et al. 2016 do it, by maps of the distance to them, and by how every pixel differs from them: in
 colour, in geometry, and in the features of an image classifier, which know parts of one thing by their kind.
@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from materialist.predict.clicks.features import CHANNELS, SPOT
+from materialist.predict.clicks.features import BOX, CHANNELS, SPOT
 from materialist.predict.efficientnet import shipped, unit_power, zero_convolutions
 from materialist.predict.network import UNet, UNetArchitecture
 
@@ -18,7 +18,7 @@ DEFAULT = UNetArchitecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
 class ClickNet(UNet):
     """Features in, one logit a pixel out."""
 
-    FORMAT, COMMAND = "materialist-clicks-1", "materialist train clicks"
+    FORMAT, COMMAND = "materialist-clicks-2", "materialist train clicks"
 
     def __init__(self, architecture: UNetArchitecture | None = None):
         a = architecture or DEFAULT
@@ -33,16 +33,17 @@ class ClickNet(UNet):
             return self.raw(maps)[:, 0]
         with torch.no_grad():
             features = self.encoder((maps[:, :3] + 0.5).clamp(0, 1))
-            seen = [related(unit_power(found), maps[:, SPOT : SPOT + 1]) for found in features]
+            meant = maps[:, SPOT : SPOT + 1] + maps[:, BOX : BOX + 1]
+            seen = [related(unit_power(found), meant) for found in features]
         return self.raw(maps, [part(found) for part, found in zip(self.told, seen, strict=True)])[:, 0]
 
 
-def related(features: Tensor, spot: Tensor) -> Tensor:
-    """[B, 2 C + 1, h, w]: features [B, C, h, w], how they differ from those at the clicks, and the cosine to those.
+def related(features: Tensor, meant: Tensor) -> Tensor:
+    """[B, 2 C + 1, h, w]: features [B, C, h, w], how they differ from those that are meant, and the cosine to those.
 
-    spot: [B, 1, S, S] high at the clicks.
+    meant: [B, 1, S, S] weights of the pixels whose mean they are: high at the clicks, or in the box.
     """
-    weight = F.adaptive_avg_pool2d(spot, (features.shape[-2], features.shape[-1])).to(features.dtype)
+    weight = F.adaptive_avg_pool2d(meant, (features.shape[-2], features.shape[-1])).to(features.dtype)
     here = (features * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp(min=1e-6)
     cosine = F.cosine_similarity(features.float(), here.float(), dim=1)[:, None]
     return torch.cat([features, (features - here).abs(), cosine.to(features.dtype)], 1)

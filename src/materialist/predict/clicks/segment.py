@@ -1,4 +1,4 @@
-"""From clicks on a photo to the object that they lie on."""
+"""From clicks on a photo, or a box in it, to the object that is meant."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ import numpy as np
 from materialist.camera import unit
 from materialist.errors import InputError
 from materialist.predict import resample
-from materialist.predict.clicks.features import NORMAL_X, features
+from materialist.predict.clicks.features import NORMAL_X, Box, features
 from materialist.types import Array
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
@@ -19,13 +19,15 @@ SIDE = 224
 
 
 def object_at(
-    rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]], *, weights: str | Path = ""
-) -> Array:
-    """[H, W] float32 in [0, 1]: how likely each pixel belongs to the object that all clicks lie on.
+    rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]] = (), *, box: Box | None = None,
+    weights: str | Path = "",
+) -> Array:  # fmt: skip
+    """[H, W] float32 in [0, 1]: how likely each pixel belongs to the object that all clicks lie on, or in the box.
 
     The mean over the photo and its mirror image. rgb: [H, W, 3] sRGB in [0, 1]. normal: [H, W, 3] unit. depth: [H, W]
-    planar, 0 = no surface. clicks: (column, row), at least one. weights: a file of `materialist train clicks`, or ""
-    for those in the package. Raises InputError for no click or one outside, WeightsError.
+    planar, 0 = no surface. clicks: (column, row), at least one where there is no box. weights: a file of
+    `materialist train clicks`, or "" for those in the package. Raises InputError for neither or both, or for a click or
+    a box that is not inside, WeightsError.
     """
     import torch
 
@@ -33,15 +35,18 @@ def object_at(
     from materialist.predict.network import STRIDE, loaded
 
     height, width = depth.shape
-    if not clicks or not all(0 <= x < width and 0 <= y < height for x, y in clicks):
-        raise InputError(f"The clicks are {list(clicks)}; give at least one inside {width} x {height} pixels.")
+    if bool(clicks) == (box is not None) or not all(0 <= x < width and 0 <= y < height for x, y in clicks):
+        raise InputError(f"The clicks are {list(clicks)}; give some inside {width} x {height} pixels, or a box.")
+    if box is not None and not (0 <= box[0] < box[2] <= width and 0 <= box[1] < box[3] <= height):
+        raise InputError(f"The box is {box}; give (x0, y0, x1, y1) inside {width} x {height} pixels.")
     network = loaded(ClickNet, Path(weights) if str(weights) else WEIGHTS)
     scale = SIDE / max(height, width)
     rows, columns = size = resample.with_longer_side(depth.shape, SIDE)
     whole = [np.ascontiguousarray(v, np.float32) for v in (rgb, normal, depth)]
     nearest = np.asarray(cv2.resize(whole[2], (columns, rows), interpolation=cv2.INTER_NEAREST))
     places = [(min(int((x + 0.5) * scale), columns - 1), min(int((y + 0.5) * scale), rows - 1)) for x, y in clicks]
-    maps = features(resample.values(whole[0], size), unit(resample.values(whole[1], size)), nearest, places)
+    frame = None if box is None else _scaled(box, scale, (columns, rows))
+    maps = features(resample.values(whole[0], size), unit(resample.values(whole[1], size)), nearest, places, frame)
     below, beside = -maps.shape[1] % STRIDE, -maps.shape[2] % STRIDE
     padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
     mirrored = padded.flip(-1)
@@ -50,3 +55,10 @@ def object_at(
         both = (network(padded) + network(mirrored).flip(-1)) / 2
     share = both[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
     return np.asarray(cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR))
+
+
+def _scaled(box: Box, scale: float, size: tuple[int, int]) -> Box:
+    """The box in a picture that is `scale` times as large, of that (width, height); at least a pixel."""
+    x0, y0 = (min(int(box[k] * scale), size[k] - 1) for k in (0, 1))
+    x1, y1 = (min(max(round(box[2 + k] * scale), low + 1), size[k]) for k, low in ((0, x0), (1, y0)))
+    return x0, y0, x1, y1
