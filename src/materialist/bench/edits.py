@@ -23,7 +23,7 @@ from materialist.procedural.arrangements import Item
 from materialist.procedural.objects import shapes
 from materialist.procedural.objects.shapes import Solid
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
-from materialist.types import Array, Body, Prediction, Scene
+from materialist.types import Array, Body, Photo, Prediction, Scene
 
 SHIFTS = {f"{name}{sign}": (name, float(f"{sign}0.5")) for name in ("roughness", "metallic") for sign in "+-"}
 """The paper's "high" and "low" (Material Editing): what is shifted, and by how much."""
@@ -170,8 +170,10 @@ def true_scene(
     sample: SyntheticSample, maps: Prediction | None = None, *, completion: str = "auto", seed: int = 0
 ) -> Scene:  # fmt: skip
     """The sample as a fit without any error: true maps on the mesh of the true depth, true light; or other `maps`."""
-    maps, photo = maps or sample.truth, sample.photo
+    return scene_of(sample.photo, maps or sample.truth, sample.envmap, completion=completion, seed=seed)
+
+
+def scene_of(photo: Photo, maps: Prediction, envmap: Array, *, completion: str = "auto", seed: int = 0) -> Scene:
+    """A photo with those maps and that light [h, 2h, 3], as they are: nothing is fitted."""
     geometry = build_geometry(maps.depth, maps.normal, photo.camera, completion=completion, seed=seed)
-    return Scene(
-        photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, sample.envmap, photo.linear
-    )  # fmt: skip
+    return Scene(photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, envmap, photo.linear)

@@ -21,11 +21,10 @@ from scipy.ndimage import distance_transform_edt
 from skimage.draw import polygon
 
 from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
-from materialist.bench.edits import true_scene
+from materialist.bench.edits import scene_of, true_scene
 from materialist.bench.report import Column, Report
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.geometry.build import build_geometry
 from materialist.geometry.silhouette import window
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
@@ -79,11 +78,7 @@ class SelectBench(Benchmark):
                 continue
             photo = read_photo(str(folder / name), size=self.photo_size)
             maps = predictor.predict(photo)
-            geometry = build_geometry(maps.depth, maps.normal, photo.camera)
-            light = np.ones((16, 32, 3), np.float32)
-            scene = Scene(
-                photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, light, photo.linear
-            )
+            scene = scene_of(photo, maps, np.ones((16, 32, 3), np.float32))
             things = clickable(objects, maps.depth.shape)
             for row in self._selected(scene, things, k):
                 yield {**row, "method": f"{row['method']}, photos", "sample": f"{name} {row['sample']}"}

@@ -53,7 +53,7 @@ def load_cutout(path: Path) -> Array | None:
             picture = file.convert("RGBA")
             picture.thumbnail((SETTINGS.longest, SETTINGS.longest))
             pixels = np.asarray(picture)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, Image.DecompressionBombError) as error:
         raise InputError(f"{path} cannot be read ({error}); remove it.") from error
     opaque = pixels[..., 3] > 127
     if not opaque.any():

@@ -41,7 +41,9 @@ SETTINGS = SelectSettings()
 def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on."""
     if network:
-        return outlined(scene, _divided(linear_to_srgb(scene.photo.linear), clicknet(scene, points)), points)
+        photo = linear_to_srgb(scene.photo.linear)
+        likely = segment.object_at(photo, scene.normal, scene.depth, points)
+        return outlined(photo, _divided(photo, likely), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
@@ -53,7 +55,8 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside = np.zeros(scene.depth.shape, np.uint8)
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
-        found = outlined(scene, clicknet(scene, (), box) * inside, ())
+        photo = linear_to_srgb(scene.photo.linear)
+        found = outlined(photo, segment.object_at(photo, scene.normal, scene.depth, box=box) * inside, ())
     else:
         found = tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
     return found if box_overlap(found, box) >= SETTINGS.least else np.zeros_like(found)
@@ -69,11 +72,6 @@ def box_overlap(mask: Array, box: Box) -> float:
     return overlap(own, given)
 
 
-def clicknet(scene: Scene, points: Sequence[tuple[int, int]], box: Box | None = None) -> Array:
-    """[H, W] in [0, 1]: ClickNet's likelihood of the object that all (column, row) points lie on, or that in a box."""
-    return segment.object_at(linear_to_srgb(scene.photo.linear), scene.normal, scene.depth, points, box=box)
-
-
 def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] uint8 labels for GrabCut: discs around the clicks."""
     label = np.zeros(scene.depth.shape, np.uint8)
@@ -84,13 +82,13 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     return label
 
 
-def outlined(scene: Scene, likely: Array, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool of the object at points (column, row), from likelihoods [H, W] in [0, 1].
+def outlined(photo: Array, likely: Array, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] bool of the object at points (column, row), from likelihoods [H, W] in [0, 1]; photo [H, W, 3] sRGB.
 
     The outline moves to edges of the photo near it (guided filter, He et al. 2013).
     """
     radius = max(2, round(SETTINGS.reach * max(likely.shape)))
-    guide = GuidedFilter(linear_to_srgb(scene.photo.linear), radius=radius, eps=SETTINGS.grain**2)
+    guide = GuidedFilter(photo, radius=radius, eps=SETTINGS.grain**2)
     return tidy(guide.share(likely) > 0.5, points)
 
 
