@@ -25,7 +25,7 @@ from materialist.bench.benchmark import COUNT_OR_0, SIZE, Benchmark, Row, names,
 from materialist.bench.real.layouts import LAYOUTS, Layout, located
 from materialist.bench.real.measures import albedo_figures, light_figures, map_figures
 from materialist.bench.real.photos import Reading, RealPhoto
-from materialist.bench.real.sheet import SheetRow, maps_row, sheet, truth_row
+from materialist.bench.real.sheet import SheetRow, sheet, truth_row
 from materialist.bench.report import Column, Report
 from materialist.edits.composite.composite import composite
 from materialist.edits.light.relight import relight
@@ -95,13 +95,13 @@ class RealBench(Benchmark):
             yield {"method": "photo", **untouched}
         for spec, source in sources.items():
             prior, cost = timed(source.predict, photo, seed=self.seed)
-            shown.append(maps_row(spec, "photo", photo.linear, prior))
+            shown.append(SheetRow(spec, "photo", photo.linear, prior.materials.albedo, prior.normal, prior.depth))
             yield {"method": spec, **map_figures(prior, real), "seconds": cost["seconds"]}
             if real.other is None or self.prior_only:
                 continue
             scene, picture, seconds = self._relit(photo, prior, real.other.envmap)
             name = f"{spec}, fitted"
-            shown.append(maps_row(name, "relit", picture, scene))
+            shown.append(SheetRow(name, "relit", picture, scene.materials.albedo))
             figures = albedo_figures(scene.materials.albedo, real) | light_figures(picture, real)
             yield {"method": name, **figures, "seconds": seconds}
 

@@ -11,7 +11,7 @@ from materialist.bench.real.photos import RealPhoto
 from materialist.color import srgb_levels
 from materialist.io import display
 from materialist.metrics.maps import best_scale
-from materialist.types import Array, Prediction, Scene
+from materialist.types import Array
 
 WIDTH, CAPTION, GAP, TEXT = 360, 26, 8, 15
 """Pixels: a tile's width, the line below it, the gap between tiles, the height of the text."""
@@ -28,13 +28,8 @@ class SheetRow:
     picture: Array | None
     """[H, W, 3] linear."""
     albedo: Array | None
-    normal: Array | None
-    depth: Array | None
-
-
-def maps_row(name: str, title: str, picture: Array, maps: Prediction | Scene) -> SheetRow:
-    """The row of predicted or fitted maps."""
-    return SheetRow(name, title, picture, maps.materials.albedo, maps.normal, maps.depth)
+    normal: Array | None = None
+    depth: Array | None = None
 
 
 def truth_row(real: RealPhoto) -> SheetRow:
