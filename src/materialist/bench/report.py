@@ -149,6 +149,6 @@ def _plot(report: Report, path: Path) -> None:
             axis.plot(values, [y] * len(values), "o", color="#1f3b5c", markersize=3, alpha=0.6)
         axis.set_title(titles[key], fontsize=9)
         axis.set_yticks(range(len(table)), list(table))
-        axis.invert_yaxis()
         axis.tick_params(labelsize=8)
+    axes[0].invert_yaxis()  # they share one
     figure.savefig(path, dpi=110)

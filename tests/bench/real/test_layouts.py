@@ -76,7 +76,7 @@ def test_a_garage_by_its_disparity(photos):
 def test_published_maps_stand_for_the_truth(photos):
     (real,) = photos("official_indoor")
     np.testing.assert_allclose(real.albedo, 0.4, atol=1e-3)
-    assert real.photo.camera.fov == 35 and real.normal.any(-1).all()
+    assert real.photo.camera.fov == 35 and real.normal.any(-1).all() and real.source == "published maps"
 
 
 def test_nyu_counts_its_crop(photos):

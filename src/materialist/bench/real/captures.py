@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,4 +98,6 @@ def published_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
     """That network's maps stand where the others have truth."""
     photo = read_photo(path, size=reading.size, fov=PUBLISHED_FOV)
     maps = MapsPredictor(path.parent / "maps").predict(photo)
-    yield RealPhoto("indoor", photo, maps.materials.albedo, maps.normal, maps.depth, mask=maps.depth > 0)
+    surface = maps.depth > 0
+    reference = RealPhoto("indoor", photo, maps.materials.albedo, maps.normal, maps.depth, mask=surface)
+    yield replace(reference, source="published maps")

@@ -63,14 +63,14 @@ class RealBench(Benchmark):
             raise InputError("This benchmark needs photographs with measured truth; give --data DIR.")
         specs = names("predictor", self.predictor)
         sources = {spec: get_predictor(spec, device=self.device) for spec in specs}
-        found = located(data)
-        if not any(found.values()):
+        by_layout = located(data)
+        if not any(by_layout.values()):
             places = ", ".join(_described(layout) for layout in LAYOUTS)
             raise InputError(f"{data} holds no photographs with measured truth; it may have {places}.")
-        absent = [_described(layout) for layout in LAYOUTS if not found[layout.name]]
+        absent = [_described(layout) for layout in LAYOUTS if not by_layout[layout.name]]
         report.settings["skipped, since not there"] = "; ".join(absent) or None
         for layout in LAYOUTS:
-            items = spread(list(found[layout.name]), self.limit)
+            items = spread(list(by_layout[layout.name]), self.limit)
             yield from self._layout_rows(layout, items, sources, report)
 
     def _layout_rows(
@@ -95,14 +95,15 @@ class RealBench(Benchmark):
             yield {"method": "photo", **untouched}
         for spec, source in sources.items():
             prior, cost = timed(source.predict, photo, seed=self.seed)
-            shown.append(SheetRow(spec, "photo", photo.linear, prior.materials.albedo, prior.normal, prior.depth))
+            picture = None if shown else photo.linear
+            shown.append(SheetRow(spec, "photo", picture, prior.materials.albedo, prior.normal, prior.depth))
             yield {"method": spec, **map_figures(prior, real), "seconds": cost["seconds"]}
             if real.other is None or self.prior_only:
                 continue
-            scene, picture, seconds = self._relit(photo, prior, real.other.envmap)
+            scene, relit, seconds = self._relit(photo, prior, real.other.envmap)
             name = f"{spec}, fitted"
-            shown.append(SheetRow(name, "relit", picture, scene.materials.albedo))
-            figures = albedo_figures(scene.materials.albedo, real) | light_figures(picture, real)
+            shown.append(SheetRow(name, "relit", relit, scene.materials.albedo))
+            figures = albedo_figures(scene.materials.albedo, real) | light_figures(relit, real)
             yield {"method": name, **figures, "seconds": seconds}
 
     def _relit(self, photo: Photo, prior: Prediction, envmap: Array) -> tuple[Scene, Array, float]:

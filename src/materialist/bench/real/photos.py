@@ -54,6 +54,8 @@ class RealPhoto:
     other: OtherLight | None = None
     judgements: Path | None = None
     """A file of human judgements of brightness, as IIW has them."""
+    source: str = "truth"
+    """What the maps are called on sheets: truth, or what stands in its place."""
 
     @property
     def inside(self) -> Array:

@@ -112,8 +112,8 @@ def multi_illumination_photos(folder: Path, reading: Reading) -> Iterator[RealPh
 
 def _by_direction(folder: Path, kind: str) -> dict[int, Path]:
     """Direction of the flash -> its file dir_DIRECTION_KIND*; where there are several, the first by name."""
-    found: dict[int, Path] = {}
+    files: dict[int, Path] = {}
     for path in sorted(folder.glob(f"dir_*_{kind}*.*")):
         if match := re.match(r"dir_(\d+)_", path.name):
-            found.setdefault(int(match[1]), path)
-    return found
+            files.setdefault(int(match[1]), path)
+    return files

@@ -35,7 +35,7 @@ class SheetRow:
 def truth_row(real: RealPhoto) -> SheetRow:
     """What was measured; the picture is the photo under another light."""
     picture = None if real.other is None else real.other.picture
-    return SheetRow("truth", "under the other light", picture, real.albedo, real.normal, real.depth)
+    return SheetRow(real.source, "under the other light", picture, real.albedo, real.normal, real.depth)
 
 
 def sheet(real: RealPhoto, rows: Sequence[SheetRow]) -> Array:
