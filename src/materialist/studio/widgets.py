@@ -13,6 +13,7 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.edits.core.notes import noise_notes
 from materialist.errors import MaterialistError
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
@@ -148,7 +149,9 @@ class PageContext:
         if job.state == FAILED:
             return box(self.studio.without_folders(failure(job)), bad=True)
         if job.over:
-            return box(f"Done in {job.seconds:.0f} s.")
+            pictures = job.kind in ("final", "take")
+            notes = noise_notes() if pictures else []
+            return box(" ".join([f"Done in {job.seconds:.0f} s.", *notes]))
         part = min(1.0, job.done / job.total) if job.total else 0.0
         return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
