@@ -9,7 +9,7 @@ import urllib.request
 from types import SimpleNamespace
 
 import pytest
-from made_tasks import until
+from made_tasks import until, wait
 from studio_server import free_port
 
 from materialist.edits.recipe import Step
@@ -26,10 +26,10 @@ from materialist.studio.widgets import PageContext
 
 
 def test_people_are_kept_apart(shared):
-    anna, bert = "a" * 32, "b" * 32
+    anna, bert = (shared.person(cookie * 32) for cookie in "ab")
     project = shared.work.new("Anna's", anna)
     (project.scene).mkdir()
-    session = shared.session("page", shared.person(bert))
+    session = shared.session("page", bert)
     assert shared.projects(bert) == [] and shared.projects(anna) == [project]
     shared.start = shared.work.new("For all", LOCAL_PERSON)
     assert shared.projects(bert) == [shared.start] and shared.project(shared.start.name, bert) == shared.start
@@ -81,8 +81,13 @@ def test_bad_options_end_with_2_and_make_no_folder(refused, arguments, tmp_path)
 def test_files_are_handed_over_under_names_nobody_guesses(shared):
     file = shared.work.root / "result.png"
     file.write_bytes(b"x")
-    first, second = shared.public_copy(file), shared.public_copy(file)
-    assert first != second and first.startswith(str(shared.work.cache)) and len(first.split("/")[-2]) == 32
+    first, second = shared.public_copy("anna", file), shared.public_copy("anna", file)
+    assert first != second and first.startswith(str(shared.work.cache))
+    assert len(first.split("/")[-2]) == 32
+    assert str(shared.files.path("anna", first)) == first
+    for person, name in (("bert", first), ("anna", str(file)), ("anna", "/etc/passwd")):
+        with pytest.raises(InputError, match="not here any more"):
+            shared.files.path(person, name)
 
 
 def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
@@ -116,12 +121,11 @@ def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path):
 
 def test_one_person_cannot_fill_the_queue(shared, tmp_path):
     session = shared.session("page", "a" * 32)
-    slow = lambda: shared.submit(session, time.sleep, tmp_path)  # noqa: E731
     for _ in range(SETTINGS.jobs_a_person):
-        slow()
+        shared.submit(session, wait, tmp_path)
     with pytest.raises(InputError, match="6 jobs waiting or running"):
-        slow()
-    assert shared.submit(shared.session("other", "b" * 32), time.sleep, tmp_path)
+        shared.submit(session, wait, tmp_path)
+    assert shared.submit(shared.session("other", "b" * 32), wait, tmp_path)
 
 
 def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
@@ -199,7 +203,7 @@ def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shar
 def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
     session = shared.session("page", "a" * 32)
     for _ in range(SETTINGS.jobs_a_person):
-        shared.submit(session, time.sleep, shared.work.root)
+        shared.submit(session, wait, shared.work.root)
     with pytest.raises(InputError, match="6 jobs waiting"):
         _start_inversion(PageContext(shared), session, str(example_path("example:cat")), "auto", 512, "auto")
     assert not shared.work.projects()
@@ -210,17 +214,20 @@ def test_little_is_remembered_of_people_who_are_gone(shared, monkeypatch):
     for person in "abac":
         shared.note_last(person, "photo-001")
     assert [*shared.last] == ["a", "c"]
-    shared.note_upload("a", "10")
-    shared._uploads = [(time.monotonic() - 3601, "a", SETTINGS.upload_quota)]
-    shared.note_upload("b", "10")
-    assert len(shared._uploads) == 1
+    shared.claim("a", 10)
+    shared.quota._claims = [(time.monotonic() - 3601, "a", SETTINGS.storage_quota)]
+    shared.claim("b", 10)
+    assert len(shared.quota._claims) == 1
+    for person in "abac":
+        shared.note_sender(person, "1.2.3.4")
+    assert [*shared.senders] == ["a", "c"]
 
 
 def test_the_disk_of_the_photos_counts_too(shared, monkeypatch):
     free = {shared.work.cache: 10**12, shared.work.root: 10}
     monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=free[place]))
     with pytest.raises(InputError, match="disk of the studio is full"):
-        shared.note_upload("a", "10")
+        shared.claim("a", 10)
 
 
 def test_path_traced_pictures_of_a_page_are_files_of_their_own_and_the_last_stays(shared, monkeypatch):

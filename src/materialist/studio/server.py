@@ -99,7 +99,7 @@ def serve(
     import uvicorn
     from fastapi import FastAPI
 
-    from materialist.studio.gate import Gate
+    from materialist.studio.access.gate import Gate
     from materialist.studio.page import build
 
     page = build(studio)
@@ -147,7 +147,7 @@ def _fetch_nothing() -> None:
 
 def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
     """A studio on a work folder. Raises OutputError where it cannot be written."""
-    return Studio(WorkFolder(work), JobQueue(workers), single_user, seed=seed, device=device)
+    return Studio(WorkFolder(work), JobQueue(workers, SETTINGS.job_memory), single_user, seed=seed, device=device)
 
 
 def _theme(gr: Any) -> Any:

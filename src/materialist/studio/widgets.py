@@ -22,7 +22,7 @@ from materialist.studio.controls import CONTROLS, control_values, set_option
 from materialist.studio.edit_list import summary
 from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
-from materialist.studio.studio import PERSON, Studio
+from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
 LIVE: dict[str, Any] = {
     "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
@@ -106,7 +106,9 @@ class PageContext:
         sent.failure(lambda: None, None, part, **LIVE)
 
     def session(self, request: Any) -> Session:
-        return self.studio.session(request.session_hash, self.studio.person(dict(request.cookies).get(PERSON)))
+        """The session of a request, whose person the gate has told."""
+        person = LOCAL_PERSON if self.studio.single_user else request.headers.get(PERSON_HEADER, "")
+        return self.studio.session(request.session_hash, person)
 
     def message(self, error: Exception) -> Exception:
         """An exception as Gradio shows it; what was not foreseen goes to the terminal."""
