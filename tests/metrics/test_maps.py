@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.metrics.maps import depth_figures, ordinal_accuracy, score, summary
+from materialist.metrics.maps import depth_figures, ordinal_accuracy, score, spread_coverage, summary
 from materialist.types import Materials, Prediction
 
 
@@ -81,3 +81,18 @@ def test_pooled_psnr_is_of_the_mean_error():
     found = summary([{"metallic_mse": 0.01, "metallic_psnr": 20.0}, {"metallic_mse": 0.0, "metallic_psnr": 100.0}])
     assert found["metallic_psnr"] == 60 and found["metallic_psnr_pooled"] == pytest.approx(23.01, abs=0.01)
     assert summary([]) == {}
+
+
+def test_half_of_the_errors_are_within_a_calibrated_spread(truth):
+    rng = np.random.default_rng(1)
+    scale = rng.uniform(0.01, 0.05, truth.depth.shape)
+    errors = rng.laplace(0, scale)
+    rough = replace(truth.materials, roughness=truth.materials.roughness + errors)
+    depth = np.where(truth.depth > 0, truth.depth * np.exp(errors), 0) * 3
+    spread = {"roughness": scale, "depth": scale, "metallic": 0 * scale}
+    predicted = replace(truth, materials=rough, depth=depth, spread=spread)
+    coverage = spread_coverage(predicted, truth, truth.depth > 0)
+    assert coverage["roughness_coverage"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["depth_coverage"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["metallic_coverage"] == 0
+    assert spread_coverage(truth, truth, truth.depth > 0) == {}
