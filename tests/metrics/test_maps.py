@@ -12,6 +12,7 @@ from materialist.metrics.maps import (
     mean_angle,
     ordinal_accuracy,
     score,
+    spread_coverage,
     summary,
 )
 from materialist.types import Materials, Prediction
@@ -120,3 +121,18 @@ def test_pictures_after_one_factor():
     spoilt = picture.copy()
     spoilt[:4] = 1
     assert aligned_psnr(spoilt, picture, np.arange(8)[:, None] * np.ones(8) >= 4) > 90
+
+
+def test_half_of_the_errors_are_within_a_calibrated_spread(truth):
+    rng = np.random.default_rng(1)
+    scale = rng.uniform(0.01, 0.05, truth.depth.shape)
+    errors = rng.laplace(0, scale)
+    rough = replace(truth.materials, roughness=truth.materials.roughness + errors)
+    depth = np.where(truth.depth > 0, truth.depth * np.exp(errors), 0) * 3
+    spread = {"roughness": scale, "depth": scale, "metallic": 0 * scale}
+    predicted = replace(truth, materials=rough, depth=depth, spread=spread)
+    coverage = spread_coverage(predicted, truth, truth.depth > 0)
+    assert coverage["roughness_coverage"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["depth_coverage"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["metallic_coverage"] == 0
+    assert spread_coverage(truth, truth, truth.depth > 0) == {}

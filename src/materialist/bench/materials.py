@@ -9,7 +9,9 @@ linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]
 square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a PSNR is at most 100.
 Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without it; SI log RMSE is the
 standard deviation of log depth error; `order` the part of random pixel pairs in the right order (a constant gets 0.5).
-Normals: mean angle, degrees. sheet.png: the photo, and the maps of each predictor and the true ones under each other.
+Normals: mean angle, degrees. `within its spread`: share of pixels whose error is below the median that the predictor
+expects, where it says what it expects; 0.5 is calibrated. sheet.png: the photo, and the maps of each predictor and the
+true ones under each other.
 """
 
 from collections.abc import Iterator
@@ -56,6 +58,7 @@ class MaterialsBench(Benchmark):
         Column("depth_order", "depth order", "higher"),
         Column("normal_angle", "normal angle", "lower", 1),
         Column("mask_iou", "surface IoU", "higher"),
+        *(Column(f"{name}_coverage", f"{name} within its spread") for name in MAPS),
         Column("seconds", "s", "lower", 2),
     )
     plotted = ("albedo_psnr", "normal_angle")

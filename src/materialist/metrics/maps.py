@@ -34,8 +34,39 @@ def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
         found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
     found |= depth_figures(predicted.depth, true.depth, surface)
     found["normal_angle"] = mean_angle(predicted.normal, true.normal, surface)
+    found |= spread_coverage(predicted, true, surface)
     p, t = predicted.depth > 0, true.depth > 0
     return {**found, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
+
+
+def spread_coverage(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, float]:
+    """Share of the surface whose error is below the median that the prediction expects: 0.5 where it is calibrated.
+
+    Keys: albedo_coverage, roughness_coverage, ...; none without a spread. The median of a Laplace distribution's
+    absolute error is ln 2 times its mean. Depth is compared where both have it, after its median difference is removed.
+    """
+    both = surface & (predicted.depth > 0)
+    if not predicted.spread or not both.any():
+        return {}
+    errors = map_errors(predicted, true, both)
+    return {
+        f"{name}_coverage": float((errors[name] < np.log(2) * spread[both]).mean())
+        for name, spread in predicted.spread.items()
+    }
+
+
+def map_errors(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, Array]:
+    """[N] absolute errors over a surface [H, W] bool, as `Prediction.spread` counts them."""
+    encoded = [linear_to_srgb(one.materials.albedo[surface]) for one in (predicted, true)]
+    errors = {"albedo": np.abs(encoded[0] - encoded[1]).mean(-1)}
+    for name in ("roughness", "metallic"):
+        ours, theirs = (getattr(one.materials, name)[surface] for one in (predicted, true))
+        errors[name] = np.abs(ours - theirs)
+    cosine = (predicted.normal * true.normal).sum(-1)[surface]
+    errors["normal"] = np.arccos(np.clip(cosine, -1, 1))
+    difference = np.log(predicted.depth[surface]) - np.log(true.depth[surface])
+    errors["depth"] = np.abs(difference - np.median(difference))
+    return errors
 
 
 def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
