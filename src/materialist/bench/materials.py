@@ -26,7 +26,7 @@ from materialist.errors import InputError
 from materialist.io.datasets import InteriorVerse, open_sources
 from materialist.io.display import strip
 from materialist.io.photo import read_photo
-from materialist.io.samples import SampleFolder
+from materialist.io.samples import Sample, SampleFolder
 from materialist.metrics.maps import ordinal_accuracy, score, summary
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
@@ -101,12 +101,15 @@ class MaterialsBench(Benchmark):
             sample = source.read(index)
             spoilt = self.photographic and isinstance(source, SampleFolder)
             seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
-            linear = np.clip(seen.image, 0, 1).astype(np.float32)
-            height, width = linear.shape[:2]
-            fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
-            camera = Camera(width, height, float(fov))
-            photo = Photo(linear=linear, camera=camera, original=linear, fov_source="option")
-            yield f"{index:07d}", photo, sample.truth()
+            yield f"{index:07d}", photo_of(seen), sample.truth()
+
+
+def photo_of(sample: Sample) -> Photo:
+    """The picture of a sample as an ordinary photograph, clipped to [0, 1], with its true field of view."""
+    linear = np.clip(sample.image, 0, 1).astype(np.float32)
+    height, width = linear.shape[:2]
+    fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
+    return Photo(linear, Camera(width, height, float(fov)), original=linear, fov_source="option")
 
 
 def photo_folders(data: Path) -> list[Path]:
