@@ -12,7 +12,7 @@ from materialist.metrics.maps import (
     mean_angle,
     ordinal_accuracy,
     score,
-    spread_coverage,
+    spread_calibration,
     summary,
 )
 from materialist.types import Materials, Prediction
@@ -131,8 +131,8 @@ def test_half_of_the_errors_are_within_a_calibrated_spread(truth):
     depth = np.where(truth.depth > 0, truth.depth * np.exp(errors), 0) * 3
     spread = {"roughness": scale, "depth": scale, "metallic": 0 * scale}
     predicted = replace(truth, materials=rough, depth=depth, spread=spread)
-    coverage = spread_coverage(predicted, truth, truth.depth > 0)
-    assert coverage["roughness_coverage"] == pytest.approx(0.5, abs=0.06)
-    assert coverage["depth_coverage"] == pytest.approx(0.5, abs=0.06)
-    assert coverage["metallic_coverage"] == 0
-    assert spread_coverage(truth, truth, truth.depth > 0) == {}
+    coverage = spread_calibration(predicted, truth, truth.depth > 0)
+    assert coverage["roughness_calibration"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["depth_calibration"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["metallic_calibration"] == 0
+    assert spread_calibration(truth, truth, truth.depth > 0) == {}

@@ -58,7 +58,7 @@ class MaterialsBench(Benchmark):
         Column("depth_order", "depth order", "higher"),
         Column("normal_angle", "normal angle", "lower", 1),
         Column("mask_iou", "surface IoU", "higher"),
-        *(Column(f"{name}_coverage", f"{name} within its spread") for name in MAPS),
+        *(Column(f"{name}_calibration", f"{name} within its spread") for name in MAPS),
         Column("seconds", "s", "lower", 2),
     )
     plotted = ("albedo_psnr", "normal_angle")

@@ -34,15 +34,15 @@ def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
         found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
     found |= depth_figures(predicted.depth, true.depth, surface)
     found["normal_angle"] = mean_angle(predicted.normal, true.normal, surface)
-    found |= spread_coverage(predicted, true, surface)
+    found |= spread_calibration(predicted, true, surface)
     p, t = predicted.depth > 0, true.depth > 0
     return {**found, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
 
 
-def spread_coverage(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, float]:
+def spread_calibration(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, float]:
     """Share of the surface whose error is below the median that the prediction expects: 0.5 where it is calibrated.
 
-    Keys: albedo_coverage, roughness_coverage, ...; none without a spread. The median of a Laplace distribution's
+    Keys: albedo_calibration, roughness_calibration, ...; none without a spread. The median of a Laplace distribution's
     absolute error is ln 2 times its mean. Depth is compared where both have it, after its median difference is removed.
     """
     both = surface & (predicted.depth > 0)
@@ -50,7 +50,7 @@ def spread_coverage(predicted: Prediction, true: Prediction, surface: Array) -> 
         return {}
     errors = map_errors(predicted, true, both)
     return {
-        f"{name}_coverage": float((errors[name] < np.log(2) * spread[both]).mean())
+        f"{name}_calibration": float((errors[name] < np.log(2) * spread[both]).mean())
         for name, spread in predicted.spread.items()
     }
 
