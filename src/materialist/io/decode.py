@@ -14,6 +14,7 @@ from materialist.io import bitmap
 from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
 from materialist.io.exr import exr_bytes, exr_headers, exr_size, read_exr
+from materialist.io.tiff import read_tiff
 
 RAW_SUFFIXES = frozenset(
     f".{name}"
@@ -89,7 +90,7 @@ def decode(path: Path) -> Decoded:
         if head.startswith(_RADIANCE):
             return Decoded(np.ascontiguousarray(bitmap.stored_pixels(path)[0]), True)  # RGBE
         if head.startswith(_TIFF):
-            return bitmap.read_tiff(path)
+            return read_tiff(path)
         return bitmap.read_bitmap(path)
     except (MaterialistError, MemoryError):
         raise
