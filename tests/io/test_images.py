@@ -20,6 +20,7 @@ from materialist.io.atomic import whole_file
 from materialist.io.bitmap import pixel_limit_lifted
 from materialist.io.decode import decode
 from materialist.io.exr import read_exr, write_exr
+from materialist.io.exr_photo import read_exr_photo
 from materialist.io.image import ensure_image_writable, read_map, read_mask, write_image
 from materialist.io.overview import overview
 
@@ -129,20 +130,26 @@ LAYERS = {f"{name}.{c}": value + k for name, value in (("albedo", 1), ("beauty",
     ],
 )
 def test_the_picture_among_the_channels_of_an_exr(tmp_path, channels, photo, expected):
-    found = read_exr(write_channels(tmp_path / "a.exr", **channels), photo=photo)
+    file = write_channels(tmp_path / "a.exr", **channels)
+    if photo:
+        decoded = read_exr_photo(file)
+        alpha = [] if decoded.alpha is None else [decoded.alpha]
+        found = np.concatenate([decoded.linear, *alpha], -1)
+    else:
+        found = read_exr(file)
     np.testing.assert_array_equal(found[0, 0], expected)
 
 
 def test_a_depth_is_no_photo(tmp_path):
     """Alone it is refused; before the picture, as a part of its own, it is passed over."""
     with pytest.raises(InputError, match="RGB or Y is needed"):
-        read_exr(write_channels(tmp_path / "depth.exr", Z=7), photo=True)
+        read_exr_photo(write_channels(tmp_path / "depth.exr", Z=7))
     pixels = lambda value: np.full((9, 12), value, np.float32)  # noqa: E731
     parts = [OpenEXR.Part({}, {"Z": pixels(7)}, "depth"),
              OpenEXR.Part({}, {"R": pixels(0.25), "G": pixels(0.5), "B": pixels(0.75)}, "rgb")]  # fmt: skip
     with OpenEXR.File(parts) as file:
         file.write(str(tmp_path / "parts.exr"))
-    assert np.allclose(read_exr(tmp_path / "parts.exr", photo=True), [0.25, 0.5, 0.75])
+    assert np.allclose(read_exr_photo(tmp_path / "parts.exr").linear, [0.25, 0.5, 0.75])
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,8 @@ MIN_SIDE = 8
 """Shortest side accepted, pixels."""
 MAX_ASPECT = 8
 """Longest shape accepted, long side over short side."""
+_PIXEL_SHAPE = 8
+"""Widest and narrowest pixel that is believed, width over height."""
 _LIMIT = threading.RLock()
 
 
@@ -73,6 +75,26 @@ def light_and_alpha(light: Array, alpha: Array | None, warnings: list[str] | Non
     if alpha is None or bool(np.all(alpha >= 1)):
         return Decoded(light, True, warnings=notes)
     return Decoded(light, True, warnings=[*notes, OVER_WHITE], alpha=np.clip(alpha.astype(np.float32), 0, 1))
+
+
+def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
+    """A scene-linear picture whose pixels are `shape` times as wide as high, with square ones: stretched, never shrunk.
+
+    A shape that no camera or film has is not believed, with a warning. Raises InputError for what becomes too large.
+    """
+    if not 1 / _PIXEL_SHAPE <= shape <= _PIXEL_SHAPE:
+        decoded.warnings.append(f"The file states pixels of {shape:g}:1, which are taken as square.")
+        return decoded
+    if abs(shape - 1) < 1e-3:
+        return decoded
+    height, width = decoded.linear.shape[:2]
+    size = (round(width * max(shape, 1)), round(height * max(1 / shape, 1)))
+    check_size(*size, path)
+    decoded.linear = np.asarray(cv2.resize(decoded.linear, size, interpolation=cv2.INTER_LINEAR))
+    if decoded.alpha is not None:
+        decoded.alpha = cv2.resize(decoded.alpha, size, interpolation=cv2.INTER_LINEAR)[..., None]
+    decoded.warnings.append(f"The file's pixels are {shape:.4g}:1; the photo is stretched to square ones.")
+    return decoded
 
 
 def read_bitmap(path: Path) -> Decoded:

@@ -136,7 +136,7 @@ def _of_gamma(chunks: Mapping[bytes, bytes]) -> ColourSpace | None:
     if b"cHRM" in chunks:
         white_x, white_y, *colours = (value / 1e5 for value in struct.unpack(">8I", chunks[b"cHRM"]))
         primaries = (*colours, white_x, white_y)
-    curve = spaces.srgb_curve
+    curve: Curve = spaces.srgb_curve
     if b"gAMA" in chunks:
         (gamma,) = struct.unpack(">I", chunks[b"gAMA"])
         if not 10_000 <= gamma <= 500_000:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tifffile import TiffFile, TiffPage
+from tifffile import TiffFile
 
 from materialist.errors import InputError
 from materialist.io.bitmap import (
@@ -44,7 +44,7 @@ class _Layout:
     frames: int
 
     @classmethod
-    def of(cls, page: TiffPage, frames: int) -> "_Layout":
+    def of(cls, page: Any, frames: int) -> "_Layout":
         tags = page.tags
         extra = tuple(int(kind) for kind in np.atleast_1d(tags.valueof("ExtraSamples", 2)))
         return cls(
@@ -143,8 +143,9 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
     lab = stored.astype(np.float32)
     if layout.meaning == _CIELAB:
         lab[..., 1:] = stored[..., 1:].astype(np.int16)
-        lab *= np.float32([100 / 65535, 1 / 256, 1 / 256])
+        lab *= np.array([100 / 65535, 1 / 256, 1 / 256], np.float32)
     else:
-        lab = lab * np.float32([100 / 65280, 1 / 256, 1 / 256]) - np.float32([0, 128, 128])
+        lab *= np.array([100 / 65280, 1 / 256, 1 / 256], np.float32)
+        lab[..., 1:] -= 128
     tags = file_tags(path)
     return Decoded(upright(lab_to_rec709(lab), tags), False, tags, frames_note(layout.frames))
