@@ -51,6 +51,10 @@ def test_exr_errors(tmp_path):
 
 def test_write_image_is_whole_and_asks_before_replacing(tmp_path, monkeypatch):
     linear = np.random.default_rng(0).random((5, 9, 3), np.float32)
+    with pytest.raises(OutputError, match=r"no folder .*mkdir -p .*new"):
+        write_image(tmp_path / "new/a.exr", linear)
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "new").mkdir()
     write_image(tmp_path / "new/a.exr", linear)
     np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear)
     with pytest.raises(OutputError, match="--force"):

@@ -21,7 +21,7 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.atomic import whole_file, write_whole, writing
+from materialist.io.atomic import require_parent, whole_file, write_whole, writing
 from materialist.types import Array, Camera, Materials, Prediction, Progress
 
 LIGHT_ROWS = 16
@@ -193,6 +193,7 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
 
     Raises InputError when FOLDER holds a set whose description differs in one of `keys`, or other things.
     """
+    require_parent(folder)
     with writing(folder):
         if folder.is_dir() and any(folder.iterdir()):
             old = described(folder / name)
