@@ -103,6 +103,31 @@ def test_masks(tmp_path):
         read_mask(tmp_path / "photo.png", (40, 60))
 
 
+@pytest.mark.parametrize("side", [6, 30])
+@pytest.mark.parametrize("kind", ["colour", "grey", "black", "white"])
+def test_a_cut_out_object_is_a_mask_by_its_alpha(tmp_path, side, kind):
+    rgba = np.zeros((40, 60, 4), np.uint8)
+    noise = np.random.default_rng(0).integers(20, 230, (side, side, 3)).astype(np.uint8)
+    object_colours = {"colour": noise, "grey": noise[..., :1], "black": 0, "white": 255}
+    rgba[4 : 4 + side, 10 : 10 + side, :3] = object_colours[kind]
+    rgba[4 : 4 + side, 10 : 10 + side, 3] = 255
+    cv2.imwrite(str(tmp_path / "cut.png"), rgba)
+    np.testing.assert_array_equal(read_mask(tmp_path / "cut.png", (40, 60)), rgba[..., 3] > 0)
+
+
+def test_black_and_white_that_is_painted_on_transparency_is_a_mask(tmp_path):
+    rgba = np.zeros((40, 60, 4), np.uint8)
+    rgba[:30, :, 3] = 255
+    rgba[5:12, 8:20, :3] = 255
+    cv2.imwrite(str(tmp_path / "painted.png"), rgba)
+    np.testing.assert_array_equal(read_mask(tmp_path / "painted.png", (40, 60)), rgba[..., 0] > 0)
+
+
+def test_the_reported_cut_out(real_data):
+    mask = read_mask(real_data("data/reported/mask_cutout/cutout0.png"), (64, 96))
+    assert mask.sum() == 384 and mask[16:32, 24:48].all()
+
+
 @pytest.mark.parametrize("shape", [(40, 40), (60, 24), (96, 12), (24, 60), (12, 96)])
 def test_overview_of_any_shape(shape):
     sheet = overview(make_scene(*shape))

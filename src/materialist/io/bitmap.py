@@ -52,8 +52,12 @@ class Decoded:
 
     def exposed(self, stops: int = 0) -> Array:
         """[H, W, 3] times 2**stops, with white behind what is transparent."""
-        linear = self.linear * np.float32(2.0**stops) if stops else self.linear
-        return linear if self.alpha is None else linear + (1 - self.alpha)
+        if self.alpha is None and not stops:
+            return self.linear
+        linear = self.linear * np.float32(2.0**stops)
+        if self.alpha is not None:
+            linear += 1 - self.alpha
+        return linear
 
 
 def check_size(width: int, height: int, name: object) -> None:
@@ -108,16 +112,19 @@ def read_bitmap(path: Path) -> Decoded:
         chunks = png_chunks(path) if image.format == "PNG" else {}
         profile = None if b"cICP" in chunks else _profile(image, path)
         space = None if profile else stated_space(path, image.format, tags, warnings)
-        # Pillow cuts PNG of 16 bits a channel to 8.
-        if image.mode[0] in "IF" or chunks.get(b"IHDR", b"")[8:9] == b"\x10":
+        # Pillow cuts PNG and HEIC of more bits a channel to 8.
+        bits = int(image.info.get("bit_depth", 8)) if image.format == "HEIF" else 8
+        if bits > 8:
+            image.close()
+            levels = (*_heif_levels(path, bits), deep_space(profile, warnings) if profile else space)
+        elif image.mode[0] in "IF" or chunks.get(b"IHDR", b"")[8:9] == b"\x10":
             image.close()
             levels = (*_deep_levels(path, chunks.get(b"tRNS")), deep_space(profile, warnings) if profile else space)
         else:
             levels = _shallow(image, profile, space, warnings)
-    decoded = flattened(*levels, warnings)
-    decoded.linear, decoded.tags = upright(decoded.linear, tags), tags
-    if decoded.alpha is not None:
-        decoded.alpha = upright(decoded.alpha, tags)
+    colour, alpha, space = levels
+    decoded = flattened(upright(colour, tags), None if alpha is None else upright(alpha, tags), space, warnings)
+    decoded.tags = tags
     return decoded
 
 
@@ -200,6 +207,19 @@ def _deep_levels(path: Path, transparent: bytes | None) -> tuple[Array, Array | 
         return colour, alpha
     clear = (colour == np.frombuffer(transparent, ">u2")).all(-1, keepdims=True)
     return colour, np.where(clear, np.uint16(0), np.uint16(65535))
+
+
+def _heif_levels(path: Path, bits: int) -> tuple[Array, Array | None]:
+    """RGB and alpha of a HEIC of more than 8 bits a channel, stretched to 16. Raises InputError for odd alpha."""
+    from pillow_heif import open_heif
+
+    heif: Any = open_heif(path, convert_hdr_to_8bit=False)
+    if heif.premultiplied_alpha:
+        raise InputError(f"{path} has premultiplied alpha at {bits} bits; save it as plain 16-bit PNG.")
+    pixels = np.atleast_3d(np.asarray(heif))
+    pixels = pixels | pixels >> bits  # white is 65535
+    colour = pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, -1)
+    return colour, pixels[..., -1:] if heif.has_alpha else None
 
 
 def stored_pixels(path: Path) -> tuple[Array, Array | None]:

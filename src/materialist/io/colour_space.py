@@ -116,15 +116,11 @@ def d50_to_rec709() -> Array:
 
 
 def lab_to_rec709(lab: Array) -> Array:
-    """CIELab under D50, [H, W, 3] with L in [0, 100], to [H, W, 3] float32 linear Rec.709, clipped to [0, 1]."""
-    out: Array = np.empty(lab.shape, np.float32)
-    for start in range(0, len(lab), ROWS):
-        rows = lab[start : start + ROWS].astype(np.float64)
-        y = (rows[..., 0] + 16) / 116
-        root = np.stack([y + rows[..., 1] / 500, y, y - rows[..., 2] / 200], -1)
-        xyz = np.where(root > 6 / 29, root**3, 3 * (6 / 29) ** 2 * (root - 4 / 29)) * _D50_WHITE
-        out[start : start + ROWS] = np.clip(xyz @ d50_to_rec709().T, 0, 1)
-    return out
+    """CIELab under D50, [..., 3] with L in [0, 100], to [..., 3] float32 linear Rec.709, clipped to [0, 1]."""
+    y = (lab[..., 0] + 16) / 116
+    root = np.stack([y + lab[..., 1] / 500, y, y - lab[..., 2] / 200], -1)
+    xyz = np.where(root > 6 / 29, root**3, 3 * (6 / 29) ** 2 * (root - 4 / 29)) * _D50_WHITE
+    return np.clip(xyz @ d50_to_rec709().T, 0, 1).astype(np.float32)
 
 
 # Transfer curves

@@ -87,6 +87,17 @@ def decoded_bytes(path: Path) -> int:
         return exr_bytes(path) if file.read(4) == _EXR else 12 * math.prod(image_size(path))
 
 
+def peak_bytes(path: Path) -> int:
+    """The most memory that reading a photo takes, bytes, by its header. Otherwise as `image_size`.
+
+    Measured for each kind over its pixels: at most 24 bytes over what an EXR or a float TIFF holds, else 32.
+    """
+    with path.open("rb") as file:
+        is_exr = file.read(4) == _EXR
+    pixels = math.prod(image_size(path))
+    return exr_bytes(path) + 24 * pixels if is_exr else path.stat().st_size + 32 * pixels
+
+
 def decode(path: Path, layer: str | None = None) -> Decoded:
     """Read any supported image file, or one layer of an EXR.
 

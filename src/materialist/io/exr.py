@@ -140,8 +140,12 @@ def layers_of(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
 
 
 def stacked(parts: dict[str, Array], names: str) -> Array:
-    """[H, W, C] float32, with alpha where there is one."""
-    return np.stack([parts[c].astype(np.float32) for c in (names + "A" if "A" in parts else names)], -1)
+    """[H, W, C] float32, with alpha where there is one; each channel leaves `parts`, which bounds the memory."""
+    wanted = names + "A" if "A" in parts else names
+    out: Array = np.empty((*parts[wanted[0]].shape, len(wanted)), np.float32)
+    for index, name in enumerate(wanted):
+        out[..., index] = parts.pop(name)
+    return out
 
 
 def no_picture(channels: dict[str, Array], path: Path) -> InputError:

@@ -75,11 +75,13 @@ def read_exr_photo(path: Path, wished: str | None = None) -> Decoded:
     if not layers:
         raise no_picture({name: pixels for channels in parts for name, pixels in channels.items()}, path)
     chosen = min(layers, key=lambda one: one.rank) if wished is None else _named(layers, wished, path)
-    notes = [_choice(layers, chosen)] if len(layers) > 1 else []
+    several = len(layers) > 1
+    notes = [_choice(layers, chosen)] if several else []
     header = headers[chosen.part]
     check_size(*window(header, "displayWindow")[2:], path)
+    del parts, layers  # the pixels of the others
     decoded = square_pixels(_light(chosen, header, path, notes), float(header.get("pixelAspectRatio", 1)), path)
-    decoded.layer = chosen.name if len(layers) > 1 else None
+    decoded.layer = chosen.name if several else None
     return decoded
 
 

@@ -125,7 +125,7 @@ def decode_photo(file: Path, layer: str | None = None) -> Decoded:
             )
         if (pixels < 0).any():
             decoded.warnings.append("Negative values are set to 0.")
-            decoded.linear = np.maximum(pixels, 0)
+            np.maximum(pixels, 0, out=pixels)
     return decoded
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from tifffile import TiffFile
 
+from materialist.color import ROWS
 from materialist.errors import InputError
 from materialist.io.bitmap import (
     Decoded,
@@ -140,12 +141,17 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
     stored = page.asarray()
     if stored.ndim != 3 or stored.shape[-1] != 3:
         raise InputError(f"{path} holds CIELab of another shape than three channels; save it as RGB.")
-    lab = stored.astype(np.float32)
-    if layout.meaning == _CIELAB:
-        lab[..., 1:] = stored[..., 1:].astype(np.int16)
-        lab *= np.array([100 / 65535, 1 / 256, 1 / 256], np.float32)
-    else:
-        lab *= np.array([100 / 65280, 1 / 256, 1 / 256], np.float32)
-        lab[..., 1:] -= 128
+    linear: Array = np.empty(stored.shape, np.float32)
+    for start in range(0, len(stored), ROWS):  # bounds the memory
+        rows = slice(start, start + ROWS)
+        linear[rows] = lab_to_rec709(_lab_values(stored[rows], layout.meaning))
     tags = file_tags(path)
-    return Decoded(upright(lab_to_rec709(lab), tags), False, tags, frames_note(layout.frames))
+    return Decoded(upright(linear, tags), False, tags, frames_note(layout.frames))
+
+
+def _lab_values(stored: Array, meaning: int) -> Array:
+    """CIELab of levels of 16 bits: L in [0, 100], a and b around 0."""
+    if meaning == _CIELAB:
+        signed = stored[..., 1:].astype(np.int16)
+        return np.concatenate([stored[..., :1] * (100 / 65535), signed / 256], -1)
+    return stored * np.array([100 / 65280, 1 / 256, 1 / 256]) - np.array([0, 128, 128])

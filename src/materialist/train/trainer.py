@@ -13,7 +13,7 @@ import torch
 from torch import Tensor, nn
 
 from materialist.errors import InputError
-from materialist.io.atomic import make_folder, require_parent, writing
+from materialist.io.atomic import make_folder, writing
 from materialist.train import checkpoint, stream
 from materialist.train.schedule import Budget, TrainingSchedule, stop_requests
 from materialist.train.task import Batch, Task
@@ -74,7 +74,6 @@ class Trainer:
         self.last_scores: dict[str, Any] = {}
         if state is not None:
             self._restore(state)
-        require_parent(folder)
         with writing(folder):
             make_folder(folder)
         for text in task.notes:
