@@ -18,7 +18,7 @@ from made_scene import make_scene
 
 from materialist.edits.light.relight import read_envmap
 from materialist.errors import InputError
-from materialist.io import exr_photo
+from materialist.io import exr
 from materialist.io.colour_space import ACES_AP1, CIE_XYZ, REC2020
 from materialist.io.exr import picture_rank, read_exr, write_exr
 from materialist.io.exr_photo import read_exr_photo
@@ -223,9 +223,10 @@ def test_windows_that_do_not_meet_or_are_huge_are_refused(tmp_path):
 
 def test_all_channels_of_a_file_are_bounded(tmp_path, monkeypatch):
     file = parts(tmp_path / "a.exr", rgba=quadrants(), normal=quadrants())
-    monkeypatch.setattr(exr_photo, "LARGEST_BYTES", 12 * 96 * 64)
-    with pytest.raises(InputError, match="in all its channels"):
-        read_photo(file)
+    monkeypatch.setattr(exr, "LARGEST_BYTES", 12 * 96 * 64)
+    for read in (read_photo, read_exr):
+        with pytest.raises(InputError, match="in all its channels"):
+            read(file)
 
 
 @pytest.mark.parametrize(("shape", "step"), [(2.0, (1, 2)), (0.5, (2, 1))])
@@ -301,6 +302,13 @@ def test_pixels_of_a_radiance_picture_that_are_not_square(tmp_path):
     photo = read_photo(radiance(tmp_path / "a.hdr", quadrants()[:, ::2], "PIXASPECT=0.5\n"))
     assert photo.original.shape == (64, 96, 3)
     assert_right(photo, 0.01)
+
+
+def test_a_folder_for_temporaries_that_is_read_only_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("OPENCV_TEMP_PATH", str(tmp_path))
+    monkeypatch.setattr("os.access", lambda path, mode: str(path) != str(tmp_path))
+    with pytest.raises(InputError, match=f"{tmp_path} is read-only; set OPENCV_TEMP_PATH"):
+        read_photo(radiance(tmp_path / "a.hdr", quadrants()))
 
 
 def test_plain_files_stay_bit_for_bit(tmp_path):
