@@ -16,7 +16,7 @@ from made_colours import (
 )
 from made_scene import make_scene
 
-from materialist.edits.light.relight import read_envmap
+from materialist.edits.light.relight import read_envmap, relight
 from materialist.errors import InputError
 from materialist.io import exr
 from materialist.io.colour_space import ACES_AP1, CIE_XYZ, REC2020
@@ -69,6 +69,13 @@ def test_chromaticities_of_an_environment_map(tmp_path):
     pixels = channels(sky @ TO_ACESCG.T)
     envmap = read_envmap(write(tmp_path / "sky.exr", pixels, chromaticities=tuple(ACES_AP1)))
     np.testing.assert_allclose(envmap, sky, atol=1e-3)
+
+
+def test_what_was_assumed_of_an_environment_map_is_a_warning_of_the_scene(tmp_path):
+    sky = np.full((32, 64, 3), 0.5)
+    file = parts(tmp_path / "sky.exr", normal=sky, rgba=sky)
+    warnings = relight(make_scene(24, 33), envmap=file).report.warnings
+    assert any("sky.exr" in note and "rgba is taken" in note for note in warnings)
 
 
 def test_stated_colours_that_cannot_be_used_are_told_of(tmp_path):
