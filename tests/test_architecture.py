@@ -8,7 +8,8 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
-NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "option_kinds", "options", "plain"}
+NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "forks"}
+NOUNS |= {"option_kinds", "options", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
 KINDS = ("select", "material", "light", "remove", "glass", "insert", "drop", "core", "composite")
 EDITING = {"edits", *(f"edits.{kind}" for kind in KINDS)}

@@ -16,6 +16,7 @@ import numpy as np
 from materialist import metrics
 from materialist.color import CLIPPED, linear_to_srgb
 from materialist.errors import InputError
+from materialist.forks import check_process
 from materialist.io.image import read_mask
 from materialist.io.photo import HDR_CLIP, exposed, read_photo
 from materialist.metrics.residual import shading_residual
@@ -47,6 +48,7 @@ def invert(
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
     """
+    check_process()
     start = last = time.perf_counter()
     stages: list[dict] = []
 

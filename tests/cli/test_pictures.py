@@ -1,5 +1,7 @@
 """select, edit, relight, glass, remove, insert, drop and apply on a small scene: files, exit codes, one error table."""
 
+import sys
+
 import numpy as np
 import pytest
 from edit_scenes import MASK, rendered_scene
@@ -8,6 +10,7 @@ from PIL import Image
 
 from materialist.color import linear_to_srgb
 from materialist.edits.insert.insert import insert
+from materialist.io import package
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
 from materialist.render import variant
@@ -68,6 +71,29 @@ def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(done, 
     large = ["--full-render", "--no-denoise", "--upscale", f"{tmp_path / 'f.py'}:twice"]
     done(*common, *large, "-o", tmp_path / "l.png")
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "l.png")), full.repeat(2, 0).repeat(2, 1))
+
+
+def test_a_picture_without_the_denoiser_says_so(run, done, folder, tmp_path, monkeypatch):
+    command = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5"]
+    command += ["--spp", 4, "-o", tmp_path / "o.png"]
+    assert done(*command)["denoised"] is True
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    facts = done(*command, "--force")
+    assert facts["denoised"] is False
+    assert any("not denoised" in note for note in facts["warnings"])
+    assert "Note: The picture is not denoised" in run(*command, "--force")[1]
+    facts = done(*command, "--force", "--no-denoise")
+    assert facts["denoised"] is False and facts["warnings"] == []
+
+
+@pytest.mark.parametrize("command", ["edit", "render"])
+def test_an_explicit_wish_for_the_denoiser_fails_before_the_work(command, refused, folder, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    monkeypatch.setattr(package, "load_scene", lambda path: pytest.fail("the work was begun"))
+    region = ["--mask", folder / "block.png", "--value", "-0.5"] if command == "edit" else []
+    error = refused(command, folder / "a.scene", *region, "--denoise", "-o", tmp_path / "o.png")
+    assert "pip install pyoidn" in error
+    assert not (tmp_path / "o.png").exists()
 
 
 def test_apply_replays_the_list(run, done, folder, tmp_path):

@@ -16,6 +16,8 @@ from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
 from materialist.studio.session import Session
 
+pytestmark = pytest.mark.usefixtures("opens_here")
+
 
 @pytest.fixture
 def packed(session, tmp_path):
@@ -23,8 +25,12 @@ def packed(session, tmp_path):
     write_png(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
     write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
     click(session)
-    session.set("edit", texture=uploads.stored(session.workspace, tmp_path / "wood.png", "texture"), roughness="0.3")
-    session.light(envmap=uploads.stored(session.workspace, tmp_path / "sky.exr", "envmap"), gain="auto")
+
+    def upload(name, option, use):
+        uploads.used(session.workspace, tmp_path / name, option, use)
+
+    upload("wood.png", "texture", lambda name: session.set("edit", texture=name, roughness="0.3"))
+    upload("sky.exr", "envmap", lambda name: session.light(envmap=name, gain="auto"))
     objects.set_option(session, "mesh", library_file(session, "Cube"))
     objects.place(session, 50, 40)
     session.edits = session.edits.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))

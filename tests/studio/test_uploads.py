@@ -7,7 +7,6 @@ import pytest
 from made_png import png_header
 from studio_scenes import zipped, zipped_package
 
-from materialist.edits.insert.meshes import read_model
 from materialist.errors import InputError, SceneError
 from materialist.io.decode import decoded_bytes, image_size
 from materialist.io.exr import write_exr
@@ -15,6 +14,8 @@ from materialist.io.package import load_scene
 from materialist.studio import StudioSettings, archives, tab_open, uploads
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
+
+pytestmark = pytest.mark.usefixtures("opens_here")
 
 
 @pytest.mark.parametrize(
@@ -58,7 +59,7 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
 def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_path, monkeypatch):
     file = zipped_package(tmp_path)
     before = studio.work.projects()
-    monkeypatch.setattr(tab_open, "SETTINGS", StudioSettings(decoded_bytes=100_000))
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(decoded_bytes=100_000))
     with pytest.raises(SceneError, match="GB of memory") as error:
         tab_open._unpack(PageContext(studio), Session("me"), file)
     assert studio.work.projects() == before and str(studio.work.root) not in studio.without_folders(str(error.value))
@@ -81,7 +82,7 @@ def test_meshes_name_no_other_files(tmp_path):
     obj = tmp_path / "a.obj"
     obj.write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
     with pytest.raises(InputError, match="outside of its folder"):
-        uploads.used(tmp_path, obj, "mesh", lambda name: read_model(tmp_path / name))
+        uploads.used(tmp_path, obj, uploads.MESH, lambda name: None)
     assert [file.name for file in tmp_path.iterdir()] == ["a.obj"]  # what was refused does not stay
     with pytest.raises(InputError, match="not a mesh"):
         uploads.checked_mesh(obj.with_suffix(".gltf"))

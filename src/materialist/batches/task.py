@@ -123,7 +123,12 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
 def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
     from materialist.edits.composite.composite import write_composite
-    from materialist.edits.core.notes import effect_notes, mean_change, warnings_since
+    from materialist.edits.core.notes import (
+        effect_notes,
+        mean_change,
+        noise_notes,
+        warnings_since,
+    )
     from materialist.edits.recipe import apply
 
     report("edit", 0, 1)
@@ -134,7 +139,9 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
         raise InputError(f"The scene is there, but not its edit: {error}") from error
     picture = mt.composite(scene, edited, spp=task.how.spp, seed=seed, device=device, progress=report)
     write_composite(task.picture, picture, scene.photo, force=True)
-    return picture, [*warnings_since(scene, edited), *effect_notes(scene, edited, mean_change(scene, picture))]
+    change = mean_change(scene, picture)
+    notes = [*warnings_since(scene, edited), *effect_notes(scene, edited, change), *noise_notes()]
+    return picture, notes
 
 
 def _thumbnails(pictures: list[Array]) -> bytes:

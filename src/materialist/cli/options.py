@@ -72,8 +72,9 @@ class Rendering(Run):
 
     spp: int = option(
         PATHS, "Paths per pixel, of both renderings.", kind="whole", low=2, high=1_000_000, called="--spp")
-    denoise: bool = option(
-        True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")
+    denoise: bool | None = option(
+        None, "Clean the renderings (with pyoidn); default: where it is installed.", kind="switch",
+        flag="--denoise/--no-denoise")
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
     upscale: Any = option(
         None, "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.", kind="function",

@@ -34,6 +34,7 @@ def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
     from materialist.io.atomic import ensure_writable
     from materialist.io.image import ensure_image_writable
     from materialist.io.video import ensure_video_writable
+    from materialist.render.denoise import require_denoiser
 
     save = how.save
     if save is not None:
@@ -46,6 +47,8 @@ def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
             raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
         ensure_writable(save, how.force)
     (ensure_video_writable if video else ensure_image_writable)(output, force=how.force)
+    if how.denoise:
+        require_denoiser()
     if how.device != "auto":
         from materialist.render.variant import setup
 
@@ -61,7 +64,7 @@ def write_result(
     with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
             scene, edited, spp=how.spp, seed=how.seed, full_render=how.full_render,
-            upscale=how.upscale, denoise=how.denoise, device=how.device, progress=progress,
+            upscale=how.upscale, denoise=how.denoise is not False, device=how.device, progress=progress,
         )  # fmt: skip
     write_composite(output, picture, scene.photo, force=how.force)
     told = {"image": str(output), "spp": how.spp, "seconds": time.monotonic() - start}
@@ -89,7 +92,7 @@ def write_film(
 
     with stage_progress(quiet=how.as_json) as progress:
         made = pictures(
-            scene, kept("scene", film), spp=how.spp, seed=how.seed, denoise=how.denoise, device=how.device,
+            scene, kept("scene", film), spp=how.spp, seed=how.seed, denoise=how.denoise is not False, device=how.device,
             full_render=how.full_render, upscale=how.upscale, progress=progress, count=frames,
         )  # fmt: skip
         write_frames(output, kept("picture", made), fps=fps, force=how.force)
@@ -103,14 +106,17 @@ def finish(
 ) -> None:  # fmt: skip
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
-    from materialist.edits.core.notes import effect_notes, mean_change, warnings_since
+    from materialist.edits.core.notes import effect_notes, mean_change, noise_notes, warnings_since
 
-    save, warnings = how.save, warnings_since(scene, edited)
+    save = how.save
+    grainy = noise_notes(how.denoise is not False)
+    warnings = [*warnings_since(scene, edited), *grainy]
     if not how.full_render:
         warnings += effect_notes(scene, edited, mean_change(scene, picture) if change is None else change)
     lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
         mt.save_scene(developed(scene, edited, picture, seed=how.seed, device=how.device), save, force=how.force)
         lines.append(f"The edited scene is {save}")
+    told["denoised"] = how.denoise is not False and not grainy
     told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
     report_success(command, how.as_json, lines, **told)

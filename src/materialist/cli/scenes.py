@@ -58,15 +58,19 @@ def render(
     from materialist.edits.composite.composite import write_composite
     from materialist.edits.core.notes import PICTURED, is_pictured
     from materialist.io.image import ensure_image_writable
+    from materialist.render.denoise import require_denoiser
 
     ensure_image_writable(output, force=run.force)
+    if denoise:
+        require_denoiser()
     loaded = mt.load_scene(scene)
     with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
         image = mt.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
     write_composite(output, image, loaded.photo, force=run.force)
     notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) else []
     shown = [*(f"Note: {note}" for note in notes), f"Look at {output}"]
-    report_success("render", run.as_json, shown, image=str(output), spp=spp, warnings=notes)
+    facts = {"image": str(output), "spp": spp, "denoised": denoise, "warnings": notes}
+    report_success("render", run.as_json, shown, **facts)
 
 
 def export(

@@ -57,7 +57,9 @@ class Job:
 class JobQueue:
     """Runs at most `limit` jobs at a time, in the order they came."""
 
-    def __init__(self, limit: int = 1):
+    def __init__(self, limit: int = 1, memory: int = 0):
+        """limit: jobs at a time. memory: bytes of data that each may hold; 0: no limit."""
+        self._memory = memory
         self._threads = ThreadPoolExecutor(limit, thread_name_prefix="job")
         self._lock = threading.Lock()
         self._jobs: list[Job] = []
@@ -97,7 +99,7 @@ class JobQueue:
                 return
             job.state, job.stage, job.began = RUNNING, "start", time.monotonic()
             try:
-                job.worker = worker = Worker(niceness=NICENESS)
+                job.worker = worker = Worker(niceness=NICENESS, memory=self._memory)
             except OSError as error:
                 job.end(FAILED, f"The work cannot be started: {error}.")
                 return

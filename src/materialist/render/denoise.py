@@ -22,14 +22,9 @@ def denoise(image: Array, albedo: Array, normal: Array) -> Array:
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide.shape != image.shape:
             raise InputError(f"The {name} guide is {guide.shape}, the image is {image.shape}; they must be equal.")
+    require_denoiser()
     on_card = torch_device() == "cuda"
-    try:
-        pyoidn = _pyoidn(with_torch=on_card)
-    except (ImportError, OSError) as error:
-        raise SetupError(
-            f"Denoising needs the package pyoidn ({error}); install it with: {sys.executable} -m pip install pyoidn, "
-            "or render with --no-denoise."
-        ) from error
+    pyoidn = _pyoidn(with_torch=on_card)
     height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
     pictures: list[Any] = [_padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
@@ -38,6 +33,25 @@ def denoise(image: Array, albedo: Array, normal: Array) -> Array:
     clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True)
     clean = clean.cpu().numpy() if on_card else clean
     return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
+
+
+def denoiser_problem() -> str | None:
+    """Why the denoiser cannot be loaded here; None where it can."""
+    try:
+        _pyoidn(with_torch=torch_device() == "cuda")
+    except (ImportError, OSError) as error:
+        return str(error)
+    return None
+
+
+def require_denoiser() -> None:
+    """Raise SetupError, with the command that installs it, where the denoiser cannot be loaded."""
+    problem = denoiser_problem()
+    if problem is not None:
+        raise SetupError(
+            f"Denoising needs the package pyoidn ({problem}); install it with: "
+            f"{sys.executable} -m pip install pyoidn, or render with --no-denoise."
+        )
 
 
 def _pyoidn(with_torch: bool) -> Any:

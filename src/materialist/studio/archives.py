@@ -11,12 +11,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
+from materialist.io.package import load_scene
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.workspace import with_plain_files
+from materialist.studio.workspace import store, with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
@@ -35,41 +37,64 @@ def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
 
     Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
     """
-    shown = uploads.shown_name(archive)
-    advice = "give the zip that 'edits.yaml with its masks' makes"
     with tempfile.TemporaryDirectory(dir=workspace, prefix=".load-") as place:
         folder = Path(place)
-        with _members(archive, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (given, members):
-            name = "edits.yaml" if "edits.yaml" in members else "edits.yml"
-            _extract(given, {name: members[name]}, folder, shown)
-            steps = read_recipe(folder / name)
-            wanted = _named(steps)
-            if lacking := sorted(wanted - {*members}):
-                raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")
-            _extract(given, {name: members[name] for name in wanted}, folder, shown)
+        steps, suffixes = uploads.opened(extract_list, archive, folder=folder)
 
         def moved(option: str, name: str) -> str:
             file = folder / name
             if (workspace / name).is_file() and filecmp.cmp(workspace / name, file, shallow=False):
                 return name
-            return uploads.stored(workspace, file, option)
+            return store(workspace, option, file.read_bytes(), suffixes[name])
 
         return tuple(replace(with_plain_files(step, moved), folder=workspace) for step in steps)
 
 
 def unpack_scene(archive: Path, target: Path) -> None:
-    """Unpack a zipped scene package into `target`: known members only.
+    """Unpack a zipped scene package into `target`: known members only, and only a scene that can be loaded.
 
     Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
     """
-    shown = uploads.shown_name(archive)
-    missing = "no scene package (no scene.json); zip the folder that invert wrote"
     try:
-        with _members(archive, shown, r"scene\.json", missing) as (given, members):
-            _extract(given, {name: one for name, one in members.items() if _MEMBER.fullmatch(name)}, target, shown)
+        uploads.opened(extract_scene, archive, target=target, limit=SETTINGS.decoded_bytes)
     except InputError:
         shutil.rmtree(target, ignore_errors=True)
         raise
+
+
+# --- In the process with limits ---
+
+
+def read_list(report: Any, file: Path) -> list[Step]:
+    """The steps of a list of edits, a YAML file. Raises InputError."""
+    return read_recipe(file)
+
+
+def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dict[str, str]]:
+    """The steps of a zipped list of edits, whose files it writes to a folder, and the suffix of each by its name."""
+    shown = uploads.shown_name(file)
+    advice = "give the zip that 'edits.yaml with its masks' makes"
+    with _members(file, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (archive, members):
+        name = "edits.yaml" if "edits.yaml" in members else "edits.yml"
+        _extract(archive, {name: members[name]}, folder, shown)
+        steps = read_recipe(folder / name)
+        options = _named(steps)
+        lacking = sorted(options.keys() - members.keys())
+        if lacking:
+            raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")
+        _extract(archive, {name: members[name] for name in options}, folder, shown)
+    suffixes = {name: uploads.checked(report, folder / name, option) for name, option in options.items()}
+    return steps, suffixes
+
+
+def extract_scene(report: Any, file: Path, target: Path, limit: int) -> None:
+    """Unpack a zipped scene package and load it once; limit: bytes of its pictures in memory, by their headers."""
+    shown = uploads.shown_name(file)
+    missing = "no scene package (no scene.json); zip the folder that invert wrote"
+    with _members(file, shown, r"scene\.json", missing) as (archive, members):
+        known = {name: one for name, one in members.items() if _MEMBER.fullmatch(name)}
+        _extract(archive, known, target, shown)
+    load_scene(target, most=limit)
 
 
 @contextmanager
@@ -80,7 +105,6 @@ def _members(
 
     Raises InputError for what is no zip, and where there is no marker.
     """
-    uploads.check_bytes(archive, shown)
     try:
         with zipfile.ZipFile(archive) as given:
             infos = given.infolist()[:10_000]
@@ -100,14 +124,17 @@ def _extract(given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder
     if total > SETTINGS.unpacked_bytes:
         most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
         raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
+    folder.mkdir(parents=True, exist_ok=True)
+    if shutil.disk_usage(folder).free - total < SETTINGS.disk_left:
+        raise InputError(f"The disk of the studio has no room for {shown}.")
     for name, entry in members.items():
         entry.filename = name
         given.extract(entry, folder)
 
 
-def _named(steps: Iterable[Step]) -> set[str]:
-    """The files that steps name. Raises InputError for a name that is a path."""
-    names: set[str] = set()
+def _named(steps: Iterable[Step]) -> dict[str, str]:
+    """The files that steps name, and the option that names each. Raises InputError for a name that is a path."""
+    options: dict[str, str] = {}
     for step in steps:
-        with_plain_files(step, lambda _, name: names.add(name))
-    return names
+        with_plain_files(step, lambda option, name: options.setdefault(name, option))
+    return options

@@ -3,8 +3,10 @@
 import ctypes
 import gc
 import sys
+import threading
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +19,7 @@ from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.errors import InputError
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass
-from materialist.studio.edit_list import kept, summary
+from materialist.studio.edit_list import kept, key_of, summary
 from materialist.types import Array, Body, Scene
 
 
@@ -73,15 +75,21 @@ class LivePreview:
     def _after(self, steps: tuple[Step, ...]) -> Scene:
         """The scene after the steps; the last scenes are kept, so moving the last step replays none before it."""
 
-        def make() -> Scene:
-            before, step = self._after(steps[:-1]), steps[-1]
-            try:
-                return apply(self.scene, [step], onto=before)
-            except InputError as error:
-                reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
-                raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+        counts = range(len(steps), 0, -1)
+        known = next((n for n in counts if key_of(steps[:n]) in self._kept), 1)
+        scene = self.scene
+        for n in range(known, len(steps) + 1):
+            make = partial(self._applied, scene, steps[n - 1])
+            scene = kept(self._kept, steps[:n], make, SETTINGS.scenes_kept)
+        return scene
 
-        return kept(self._kept, steps, make, SETTINGS.scenes_kept) if steps else self.scene
+    def _applied(self, before: Scene, step: Step) -> Scene:
+        """The scene `before` with one more step. Raises InputError with the step's summary."""
+        try:
+            return apply(self.scene, [step], onto=before)
+        except InputError as error:
+            reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
+            raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
 
     def _glass(self, step: Step) -> tuple[Array, Colour]:
         """Region [H, W] bool and tint of a glass step; builds nothing. Raises InputError where it cannot be."""
@@ -131,14 +139,22 @@ def _build(scene: Scene, file: Path | None) -> Any:
     return Preview(scene, file)
 
 
-def free_memory() -> Future[None]:
-    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
-    if "torch" not in sys.modules:  # no scene was open
-        done = Future[None]()
-        done.set_result(None)
-        return done
+class _Freeing:
+    """Gives memory back on the thread of the previews: once for all who ask before it has begun."""
 
-    def free() -> None:
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: Future[None] | None = None
+
+    def submit(self) -> Future[None]:
+        with self._lock:
+            if self._waiting is None:
+                self._waiting = _THREAD.submit(self._free)
+            return self._waiting
+
+    def _free(self) -> None:
+        with self._lock:
+            self._waiting = None
         gc.collect()
         if "drjit" in sys.modules:
             sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
@@ -146,7 +162,17 @@ def free_memory() -> Future[None]:
         with suppress(OSError, AttributeError):  # glibc has it
             ctypes.CDLL(None).malloc_trim(0)
 
-    return _THREAD.submit(free)
+
+_FREEING = _Freeing()
+
+
+def free_memory() -> Future[None]:
+    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
+    if "torch" not in sys.modules:  # no scene was open
+        done = Future[None]()
+        done.set_result(None)
+        return done
+    return _FREEING.submit()
 
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:

@@ -11,13 +11,13 @@ import materialist as mt
 from materialist.edits.recipe import REGION, Step, region_of, write_recipe
 from materialist.errors import InputError
 from materialist.jobs.queue import Job, JobQueue
-from materialist.studio import SETTINGS
-from materialist.studio.archives import unpack
+from materialist.studio import SETTINGS, uploads
+from materialist.studio.archives import read_list, unpack
 from materialist.studio.edit_list import EditList, with_options
 from materialist.studio.glass import GlassClient
 from materialist.studio.preview import LivePreview
 from materialist.studio.selection import ADD, REMOVE, Selection
-from materialist.studio.workspace import Project, read_steps, write_mask
+from materialist.studio.workspace import Project, located, read_steps, write_mask
 from materialist.types import Scene
 
 EDITS = "edits.yaml"
@@ -241,14 +241,21 @@ class Session:
         """
         with self.lock:
             _ = self.scene
-            read = unpack if file.suffix.lower() == ".zip" else read_steps
-            self.change("load", EditList(read(self.workspace, file)))
+            if file.suffix.lower() == ".zip":
+                steps = unpack(self.workspace, file)
+            else:
+                steps = located(self.workspace, uploads.opened(read_list, file))
+            self.change("load", EditList(steps))
 
     # Within
 
     def change(self, what: str, after: EditList, *, moving: bool = False) -> None:
         """Set another list of edits, with a way back. Raises InputError, and changes nothing, where it is not valid."""
         assert self.live is not None
+        if len(after.steps) > SETTINGS.edits:
+            raise InputError(
+                f"That would be {len(after.steps)} edits; a photo takes up to {SETTINGS.edits}. Take some away first."
+            )
         self.live.edited(after.active)
         self.remember(what, moving=moving)
         self.edits = after

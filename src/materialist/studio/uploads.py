@@ -1,4 +1,8 @@
-"""Uploaded files: checked by size and header before anything is decoded, and stored under names of ours."""
+"""Uploaded files: opened in a process with limits first, then stored under names of ours.
+
+The functions that take a `report` run in that process, the others in the server, which opens no file before one of
+them has.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,23 +10,42 @@ from typing import Any
 
 from materialist.errors import InputError
 from materialist.io.bitmap import check_size
-from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decoded_bytes, image_size
+from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decode, decoded_bytes, image_size
+from materialist.io.image import read_map
+from materialist.jobs.limited import Limits, run_limited
 from materialist.studio import SETTINGS
 from materialist.studio.workspace import store
 
 MESHES = (".glb", ".ply", ".obj", ".stl")
+PHOTO, MESH = "photo", "mesh"
+"""Options that are no data of an edit's picture: the photo to take apart, and the mesh of an object."""
+_COLOURS = ("texture", "background", "envmap")
+"""Options whose picture is colour; the others are masks and maps of numbers."""
 
 
-def stored(workspace: Path, file: Path, option: str) -> str:
-    """Check an uploaded file and copy it to a workspace, for an option of an edit; returns its name there."""
-    suffix = (checked_mesh if option == "mesh" else checked_picture)(file)
-    return store(workspace, option, file.read_bytes(), suffix)
+# --- In the server ---
+
+
+def opened(task: Callable[..., Any], file: Path, **arguments: Any) -> Any:
+    """What `task(report, file=..., **arguments)` returns of an uploaded file, done in a process with limits.
+
+    Raises InputError, which names the file as its owner does.
+    """
+    shown = shown_name(file)
+    check_bytes(file, shown)
+    limits = Limits(SETTINGS.opening_memory, SETTINGS.opening_seconds)
+    try:
+        return run_limited(task, limits, file=file, **arguments)
+    except InputError as error:
+        reason = str(error)
+        raise InputError(reason if shown in reason else f"{shown}: {reason}") from error
 
 
 def used(workspace: Path, file: Path, option: str, use: Callable[[str], Any]) -> None:
-    """`stored`, and use(name); a file that is refused there does not stay."""
+    """Check an uploaded file, copy it to a workspace and `use(name)` it; one that is refused does not stay."""
+    suffix = opened(checked, file, option=option)
     before = {*workspace.iterdir()}
-    name = stored(workspace, file, option)
+    name = store(workspace, option, file.read_bytes(), suffix)
     try:
         use(name)
     except Exception:
@@ -31,8 +54,42 @@ def used(workspace: Path, file: Path, option: str, use: Callable[[str], Any]) ->
         raise
 
 
+def check_bytes(path: Path, shown: str) -> None:
+    """Raises InputError for a file that was cleared away, an empty one, and one that is too large."""
+    if not path.is_file():
+        raise InputError(f"{shown} is no longer here; give it again.")
+    size = path.stat().st_size
+    if size == 0:
+        raise InputError(f"{shown} is empty (0 bytes); copy it again.")
+    if size > SETTINGS.upload_megabytes * 1e6:
+        raise InputError(f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {SETTINGS.upload_megabytes} MB.")
+
+
+def shown_name(path: Path) -> str:
+    """The user's name of a file, on one line for a message."""
+    return " ".join(path.name.split())[:60] or "The file"
+
+
+# --- In the process with limits ---
+
+
+def checked(report: Any, file: Path, option: str) -> str:
+    """The suffix of a file that can be read as an option needs it: its header first, then all of it.
+
+    A photo's header alone is read: its inversion has a process of its own. Raises InputError.
+    """
+    if option == MESH:
+        suffix = checked_mesh(file)
+        _read_mesh(file)
+        return suffix
+    suffix = checked_picture(file)
+    if option != PHOTO:
+        _read_picture(file, option)
+    return suffix
+
+
 def checked_picture(path: Path) -> str:
-    """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large."""
+    """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large, by its header."""
     suffix, shown = path.suffix.lower(), shown_name(path)
     if suffix not in SUFFIXES:
         raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
@@ -62,17 +119,14 @@ def checked_mesh(path: Path) -> str:
     return suffix
 
 
-def shown_name(path: Path) -> str:
-    """The user's name of a file, on one line for a message."""
-    return " ".join(path.name.split())[:60] or "The file"
+def _read_mesh(path: Path) -> None:
+    from materialist.edits.insert.meshes import read_model
+
+    read_model(path)
 
 
-def check_bytes(path: Path, shown: str) -> None:
-    """Raises InputError for a file that was cleared away, an empty one, and one that is too large."""
-    if not path.is_file():
-        raise InputError(f"{shown} is no longer here; give it again.")
-    size = path.stat().st_size
-    if size == 0:
-        raise InputError(f"{shown} is empty (0 bytes); copy it again.")
-    if size > SETTINGS.upload_megabytes * 1e6:
-        raise InputError(f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {SETTINGS.upload_megabytes} MB.")
+def _read_picture(path: Path, option: str) -> None:
+    if option in _COLOURS:
+        decode(path)
+    else:
+        read_map(path)

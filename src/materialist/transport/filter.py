@@ -81,6 +81,7 @@ def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables
     grid[pixels] = stack
     smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
     levels = list(tables.specular)
-    for k, values in zip(some, smooth[:, 9:].split(6, -1), strict=True):
-        levels[k] = torch.where(placed(wide[k]), values, levels[k])
+    for n, k in enumerate(some):  # none where every pixel is nearly a mirror
+        first = 9 + 6 * n
+        levels[k] = torch.where(placed(wide[k]), smooth[:, first : first + 6], levels[k])
     return Tables(smooth[:, :9].contiguous(), torch.stack(levels))
