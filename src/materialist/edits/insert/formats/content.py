@@ -1,0 +1,86 @@
+"""What the readers give: triangles with their materials, in the axes and units of the file."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from materialist.types import Array, Surface
+
+
+@dataclass(frozen=True)
+class TextureLayout:
+    """Where a texture lies on a mesh."""
+
+    uv_set: int = 0
+    """Number of the file's texture coordinates."""
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    """Radians; see KHR_texture_transform."""
+    scale: tuple[float, float] = (1.0, 1.0)
+    wrap: tuple[str, str] = ("repeat", "repeat")
+    """What lies outside of [0, 1] along u and v: `repeat`, `mirror` or `clamp`."""
+
+    def placed(self, uv: Array) -> Array:
+        """uv [V, 2], v DOWN, under the transform."""
+        cos, sin = np.cos(self.rotation), np.sin(self.rotation)
+        return uv * self.scale @ np.array([[cos, -sin], [sin, cos]]) + self.offset
+
+
+@dataclass(frozen=True, eq=False)
+class Paint:
+    """A material of a file."""
+
+    surface: Surface
+    layout: TextureLayout = field(default_factory=TextureLayout)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPart:
+    """Triangles with one material."""
+
+    vertices: Array
+    """[V, 3] float, finite or not."""
+    faces: Array
+    """[F, 3] whole numbers below V."""
+    paint: Any = None
+    """Key of its material; None for the grey of a file that says nothing."""
+    name: str = "mesh"
+    normals: Array | None = None
+    """[V, 3] of any length."""
+    uv: Array | None = None
+    """[V, 2] v DOWN, as the layout of its material places them."""
+    face_colours: Array | None = None
+    """[F, 3] linear; they take the place of the material's albedo."""
+
+
+@dataclass
+class MeshContent:
+    """All that is shown of a file."""
+
+    parts: list[MeshPart] = field(default_factory=list)
+    paints: dict[Any, Paint] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    """What the file has and the model has not, as in "its normal map"."""
+    notes: list[str] = field(default_factory=list)
+    """What differs from the file, as sentences without the file's name."""
+
+
+def mean_of_corners(colours: Array, faces: Array) -> Array:
+    """[F, 3] float32 mean of the colours [V, 3] of each face's corners."""
+    mean = colours[faces[:, 0]].astype(np.float32)
+    for k in (1, 2):
+        mean += colours[faces[:, k]]
+    return mean / 3
+
+
+def strip_faces(corners: Array) -> Array:
+    """[n - 2, 3] triangles of a strip of corners [n]; every other one is turned, so that all face one way."""
+    faces = np.stack([corners[:-2], corners[1:-1], corners[2:]], -1)
+    faces[1::2] = faces[1::2, ::-1]
+    return faces
+
+
+def fan_faces(corners: Array) -> Array:
+    """[n - 2, 3] triangles of a fan of corners [n] about the first."""
+    return np.stack([np.broadcast_to(corners[:1], len(corners) - 2), corners[1:-1], corners[2:]], -1)

@@ -1,0 +1,221 @@
+"""Wavefront OBJ, read a block of lines at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from materialist.color import srgb_to_linear
+from materialist.edits.insert.formats.content import MeshContent, MeshPart, mean_of_corners
+from materialist.edits.insert.formats.mtl import MtlLibrary
+from materialist.edits.insert.formats.polygons import triangulated
+from materialist.edits.insert.formats.source import MeshSource
+from materialist.edits.insert.formats.text import floats, line_blocks
+from materialist.types import Array
+
+NONE = -1
+"""Number of a texture coordinate or a normal that a corner does not have."""
+LEFT_OUT = {
+    b"l": "its lines and points",
+    b"p": "its lines and points",
+    b"curv": "its curves and curved surfaces",
+    b"surf": "its curves and curved surfaces",
+}
+
+
+@dataclass
+class _Lines:
+    """What the lines of one block say, sorted by kind."""
+
+    values: dict[bytes, list[list[bytes]]] = field(default_factory=lambda: {b"v": [], b"vt": [], b"vn": []})
+    """Words of vertices, texture coordinates and normals."""
+    corners: list[bytes] = field(default_factory=list)
+    """As in `3/1/2`, polygon after polygon."""
+    counts: list[int] = field(default_factory=list)
+    """Corners of each polygon."""
+    before: list[tuple[int, int, int]] = field(default_factory=list)
+    """How many vertices, texture coordinates and normals of this block come before each polygon."""
+
+
+@dataclass
+class _Obj:
+    """The file as far as it is read."""
+
+    values: dict[bytes, list[Array]] = field(default_factory=lambda: {b"v": [], b"vt": [], b"vn": []})
+    """Blocks of [n, 6] (position and colour; NaN for none), [n, 2] and [n, 3]."""
+    sizes: dict[bytes, int] = field(default_factory=lambda: {b"v": 0, b"vt": 0, b"vn": 0})
+    corners: list[Array] = field(default_factory=list)
+    """Blocks of [n, 3] int32: numbers of vertex, texture coordinate and normal, from 0."""
+    counts: list[Array] = field(default_factory=list)
+    polygons: int = 0
+    triangles: int = 0
+    materials: list[bytes] = field(default_factory=lambda: [b""])
+    changes: list[tuple[int, int]] = field(default_factory=lambda: [(0, 0)])
+    """(first polygon, number of its material)."""
+    libraries: list[str] = field(default_factory=list)
+    left_out: list[str] = field(default_factory=list)
+
+
+def read_obj(source: MeshSource) -> MeshContent:
+    """The faces of an OBJ, a part for each material; groups and smoothing groups are not kept.
+
+    Colours behind the vertices are read as sRGB, in 0 to 1 or, where one exceeds 1, in 0 to 255.
+    Raises InputError for damaged text, and beyond the limits.
+    """
+    obj = _Obj()
+    for lines in line_blocks(source, source.data):
+        _add(source, obj, _sorted_lines(source, obj, lines))
+    content = MeshContent(left_out=list(dict.fromkeys(obj.left_out)))
+    if obj.polygons:
+        _fill(source, obj, content)
+    return content
+
+
+def _sorted_lines(source: MeshSource, obj: _Obj, lines: Sequence[bytes]) -> _Lines:
+    block = _Lines()
+    vertices, uvs, normals = block.values.values()
+    for line in lines:
+        words = line.split()
+        if not words:
+            continue
+        kind = words[0]
+        if kind in block.values:
+            block.values[kind].append(_uncommented(words)[1:])
+        elif kind == b"f":
+            corners = _uncommented(words)[1:]
+            block.corners += corners
+            block.counts.append(len(corners))
+            block.before.append((len(vertices), len(uvs), len(normals)))
+        elif kind == b"usemtl":
+            _use_material(source, obj, line.split(None, 1)[1:], obj.polygons + len(block.counts))
+        elif kind == b"mtllib":
+            obj.libraries += [one.decode("utf-8", "replace") for one in line.split(None, 1)[1:]]
+        elif kind in LEFT_OUT:
+            obj.left_out.append(LEFT_OUT[kind])
+    return block
+
+
+def _uncommented(words: list[bytes]) -> list[bytes]:
+    for k, word in enumerate(words):
+        if word.startswith(b"#"):
+            return words[:k]
+    return words
+
+
+def _use_material(source: MeshSource, obj: _Obj, name: list[bytes], polygon: int) -> None:
+    key = name[0].strip() if name else b""
+    if key not in obj.materials:
+        obj.materials.append(key)
+        source.check("materials", len(obj.materials))
+    obj.changes.append((polygon, obj.materials.index(key)))
+
+
+def _add(source: MeshSource, obj: _Obj, block: _Lines) -> None:
+    """Add the numbers of a block, after a look at how many there are."""
+    before = dict(obj.sizes)
+    for kind, columns in ((b"v", 6), (b"vt", 2), (b"vn", 3)):
+        rows = block.values[kind]
+        if rows:
+            obj.sizes[kind] += len(rows)
+            source.check("vertices", obj.sizes[kind])
+            obj.values[kind].append(_table(source, rows, columns))
+    if not block.counts:
+        return
+    counts = np.array(block.counts, np.int32)
+    obj.polygons += len(counts)
+    obj.triangles += int(np.maximum(counts - 2, 0).sum())
+    source.check("faces", obj.triangles)
+    obj.counts.append(counts)
+    numbers = _corner_numbers(source, block.corners)
+    start = np.array(block.before, np.int64) + list(before.values())
+    start = np.repeat(start, counts, axis=0)  # numbers below zero count back from their line
+    numbers = np.where(numbers < 0, numbers + start, numbers - 1)
+    numbers[numbers < 0] = NONE
+    if (numbers[:, 0] == NONE).any() or (numbers >= 2**31).any():
+        raise source.damaged("a face begins with a vertex that does not exist")
+    obj.corners.append(numbers.astype(np.int32))
+
+
+def _table(source: MeshSource, rows: list[list[bytes]], columns: int) -> Array:
+    """[n, columns] float64 of lines of words; NaN where a line has fewer."""
+    lengths = {len(row) for row in rows}
+    if columns == 6 and lengths & {4, 7}:  # x y z w, or x y z r g b a
+        rows = [row[:3] if len(row) == 4 else row[:6] for row in rows]
+    if lengths != {columns}:
+        rows = [(row + [b"nan"] * columns)[:columns] for row in rows]
+    return floats(source, [word for row in rows for word in row]).reshape(-1, columns)
+
+
+def _corner_numbers(source: MeshSource, corners: list[bytes]) -> Array:
+    """[n, 3] int64 of corners as in `3`, `3/1`, `3//2` or `3/1/2`, as the file counts; 0 for none."""
+    slashes = corners[0].count(b"/") if corners else 0
+    text = b" ".join(corners)
+    if slashes <= 2 and all(corner.count(b"/") == slashes for corner in corners):
+        words = text.replace(b"//", b"/0/").replace(b"/", b" ").split()
+        if len(words) == len(corners) * (slashes + 1):
+            numbers = floats(source, words).reshape(-1, slashes + 1)
+            return _whole(source, np.pad(numbers, ((0, 0), (0, 2 - slashes))))
+    parts = [[*corner.split(b"/"), b"0", b"0"][:3] for corner in corners]
+    return _whole(source, floats(source, [word or b"0" for part in parts for word in part]).reshape(-1, 3))
+
+
+def _whole(source: MeshSource, numbers: Array) -> Array:
+    if not (np.abs(numbers) < 2**31).all():
+        raise source.damaged("a face has a number that is none")
+    return numbers.astype(np.int64)
+
+
+def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
+    """Make the parts of all that was read; empties the lists on the way."""
+    columns = {b"v": 6, b"vt": 2, b"vn": 3}
+    tables = {}
+    for kind, blocks in obj.values.items():
+        tables[kind] = np.concatenate([np.zeros((0, columns[kind])), *blocks])
+        blocks.clear()
+    corners = np.concatenate(obj.corners)
+    obj.corners.clear()
+    for column, table in enumerate(tables.values()):
+        if len(corners) and corners[:, column].max() >= len(table):
+            raise source.damaged("a face has a vertex, texture coordinate or normal that does not exist")
+    positions, colours = tables[b"v"][:, :3], tables[b"v"][:, 3:]
+    faces, polygon = triangulated(source, positions, np.concatenate(obj.counts), corners[:, 0])
+
+    first, number = np.array(obj.changes, np.int64).T
+    material = number[np.searchsorted(first, polygon, "right") - 1]
+    used = np.unique(material)
+    names = {int(k): obj.materials[k].decode("utf-8", "replace") for k in used}
+    MtlLibrary(source, obj.libraries).paints(names.values(), content)
+    for k, name in names.items():
+        paint = content.paints.get(name)
+        chosen = corners[faces[material == k].ravel()]
+        part = _part(chosen, positions, tables, None if paint else colours)
+        if paint and part.uv is not None:
+            part = replace(part, uv=paint.layout.placed(part.uv))
+        content.parts.append(replace(part, paint=paint and name, name=name or source.path.stem))
+    if content.paints and np.isfinite(colours).any():
+        content.left_out.append("the colours of its vertices")
+
+
+def _part(corners: Array, positions: Array, tables: dict[bytes, Array], colours: Array | None) -> MeshPart:
+    """The part of corners [3 F, 3]; corners that agree in everything become one vertex."""
+    key = corners[:, 0].astype(np.int64)
+    has_uv = bool((corners[:, 1] != NONE).all())
+    has_normals = bool((corners[:, 2] != NONE).all())
+    for column in (1,) * has_uv + (2,) * has_normals:
+        _, key = np.unique(key, return_inverse=True)  # keeps the product below within 64 bits
+        key = key * (int(corners[:, column].max()) + 1) + corners[:, column]
+    _, first, faces = np.unique(key, return_index=True, return_inverse=True)
+    faces = faces.reshape(-1, 3).astype(np.int32)
+    vertex, uv, normal = corners[first].T
+    face_colours = None
+    if colours is not None and np.isfinite(colours[vertex]).all():
+        scale = 255 if colours[vertex].max() > 1 else 1
+        linear = srgb_to_linear(np.clip(colours[vertex] / scale, 0, 1))
+        face_colours = mean_of_corners(linear, faces)
+    return MeshPart(
+        positions[vertex],
+        faces,
+        normals=tables[b"vn"][normal] if has_normals else None,
+        uv=tables[b"vt"][uv] * [1, -1] + [0, 1] if has_uv else None,
+        face_colours=face_colours,
+    )

@@ -1,0 +1,119 @@
+"""Pictures of mesh files as arrays."""
+
+import io
+import math
+from collections.abc import Hashable
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from materialist.edits.insert.formats.source import MeshSource
+from materialist.io.bitmap import pixel_limit_lifted
+from materialist.types import Array, Surface
+
+GREY = 0.5
+"""Albedo and roughness where a file says nothing."""
+KINDS = ("PNG", "JPEG", "WEBP", "AVIF", "BMP", "TGA", "TIFF", "GIF", "PPM", "DDS")
+"""Pillow's readers that a texture may wake; some of the others start programs."""
+
+
+class Textures:
+    """The pictures of a file: first the sizes of all, then their pixels one by one."""
+
+    def __init__(self, source: MeshSource):
+        self.source = source
+        self.damaged = 0
+        """How many cannot be read."""
+        self._images: dict[Hashable, Any] = {}
+        self._stored = 0
+
+    def add(self, key: Hashable, data: bytes) -> None:
+        """Look at the header of a picture. Raises InputError beyond the limits of pictures and pixels."""
+        if key in self._images:
+            return
+        self._images[key] = None
+        self.source.check("pictures", len(self._images))
+        try:
+            with pixel_limit_lifted():
+                image = Image.open(io.BytesIO(data), formats=KINDS)
+        except (OSError, ValueError, SyntaxError):
+            self.damaged += 1
+            return
+        pixels = math.prod(image.size)
+        self._stored += pixels
+        self.source.check("picture_pixels", pixels)
+        self.source.check("all_picture_pixels", self._stored)
+        self._images[key] = image
+
+    def pixels(self, key: Hashable, mode: str = "RGB") -> Array | None:
+        """[h, w, 3] as stored: uint8, or float32 in [0, 1] of deeper greys; None for none, or a damaged one.
+
+        mode: `RGB`, or `RGBA` for [h, w, 4] uint8. Pictures are shrunk where their longer side exceeds `side`.
+        """
+        image = self._images.get(key)
+        if image is None:
+            return None
+        try:
+            with pixel_limit_lifted():
+                return self._decoded(image, mode)
+        except (OSError, ValueError, SyntaxError, EOFError):
+            self.damaged += 1
+            self._images[key] = None
+            return None
+
+    @property
+    def side(self) -> int:
+        """Longest side that is kept, pixels: the limit, halved until all pictures together keep theirs."""
+        side = self.source.limits.texture
+        sizes = [image.size for image in self._images.values() if image is not None]
+        while side > 16 and sum(_kept(size, side) for size in sizes) > self.source.limits.texture_pixels:
+            side //= 2
+        return side
+
+    def notes(self) -> list[str]:
+        """Sentences on what could not be kept as it is in the file."""
+        notes = ["a texture cannot be read; a constant takes its place."] * bool(self.damaged)
+        side = self.side
+        if side < self.source.limits.texture and any(max(i.size) > side for i in self._images.values() if i):
+            notes.append(f"its textures are shrunk to {side} pixels, because they are large together.")
+        return notes
+
+    def _decoded(self, image: Any, mode: str) -> Array:
+        side = self.side
+        if mode == "RGB" and image.mode.startswith(
+            ("I", "F")
+        ):  # greys of 16 bits or floats: "RGB" would clip them at 255
+            values = np.asarray(image, np.float32) / np.float32(1 if image.mode == "F" else 65535)
+            image = _shrunk(Image.fromarray(values), side)
+            return np.repeat(np.asarray(image, np.float32)[..., None], 3, -1)
+        return np.asarray(_shrunk(image, side).convert(mode))
+
+
+def _kept(size: tuple[int, int], side: int) -> float:
+    """Pixels that are left of a picture (width, height)."""
+    return math.prod(size) * min(1.0, side / max(size)) ** 2
+
+
+def _shrunk(image: Any, side: int) -> Any:
+    if max(image.size) > side:
+        if image.mode in ("P", "1"):
+            image = image.convert("RGBA")
+        image.thumbnail((side, side))  # in place: the large one is let go
+    return image
+
+
+def unit_range(pixels: Array) -> Array:
+    """float32 in [0, 1] of pixels as stored."""
+    return pixels.astype(np.float32) / np.float32(255) if pixels.dtype == np.uint8 else pixels
+
+
+def clipped_surface(albedo: Array, roughness: Array, metallic: Array) -> Surface:
+    """A surface of maps [h, w, 3], [h, w], [h, w] that may leave [0, 1]."""
+    return Surface(_clipped(albedo), _clipped(roughness), _clipped(metallic))
+
+
+def _clipped(values: Array) -> Array:
+    values = np.array(values, np.float32, order="C")
+    np.nan_to_num(values, copy=False)
+    return np.clip(values, 0, 1, out=values)
