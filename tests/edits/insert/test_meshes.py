@@ -9,8 +9,8 @@ from PIL import Image
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import edge_faults
 from materialist.edits.insert import meshes
-from materialist.edits.insert.insert import insert
 from materialist.edits.insert.formats.limits import MeshLimits
+from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import files_beside, read_model, repainted
 from materialist.edits.insert.normals import creased_normals
 from materialist.errors import InputError

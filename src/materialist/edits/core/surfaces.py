@@ -73,7 +73,7 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
 
 
 def welded(vertices: Array) -> Array:
-    """[V] int32 number of the place of each vertex [V, 3], in float32: equal ones share a number."""
+    """[V] int32 number of the place of each vertex [V, n], in float32: equal ones share a number."""
     places = np.asarray(vertices, np.float32) + np.float32(0)  # no -0
     order = np.lexsort(places.T)
     steps = np.zeros(len(places), np.int32)

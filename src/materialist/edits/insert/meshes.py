@@ -7,7 +7,7 @@ import numpy as np
 
 from materialist.camera import unit
 from materialist.edits.core.surfaces import edge_faults, uniform_surface
-from materialist.edits.insert.formats.content import MeshContent, MeshPart, Paint
+from materialist.edits.insert.formats.content import MeshContent, MeshPart, Paint, joined_part
 from materialist.edits.insert.formats.gltf import read_gltf
 from materialist.edits.insert.formats.limits import MeshLimits
 from materialist.edits.insert.formats.obj import read_obj
@@ -39,7 +39,7 @@ class MeshModel:
     """A thing to be put into a scene: its parts in one frame, +Y up, front to +Z, in the units of its file."""
 
     parts: tuple[Body, ...]
-    """One for each material of the file."""
+    """One for each material of the file; two where only some of its meshes have normals."""
     name: str
     warnings: tuple[str, ...] = ()
     closed: bool = True
@@ -108,25 +108,29 @@ def repainted(model: MeshModel, material: str) -> MeshModel:
 
 def _bodies(source: MeshSource, content: MeshContent) -> list[Body]:
     """The parts of a file as bodies about the middle of all, one for each material."""
-    parts = [_without_empty(source, part) for part in content.parts]
+    groups: dict[tuple, list[MeshPart]] = {}
+    for part in content.parts:
+        key = (part.paint, part.face_colours is None, part.normals is None)
+        groups.setdefault(key, []).append(part)
     content.parts.clear()
-    parts = [part for part in parts if len(part.faces)]
+    parts = []
+    for group in groups.values():
+        part = _without_empty(source, joined_part(group))
+        group.clear()  # each was copied
+        if len(part.faces):
+            parts.append(part)
     if not parts:
         raise InputError(f"{source.path} has no triangles with an area; give a mesh with faces.")
     low = np.min([part.vertices.min(0) for part in parts], axis=0)
     high = np.max([part.vertices.max(0) for part in parts], axis=0)
     origin = (low + high) / 2  # in float64: scans lie far from their origin
-    groups: dict[tuple, list[MeshPart]] = {}
-    for part in parts:
-        near = replace(part, vertices=(part.vertices - origin).astype(np.float32))
-        key = (part.paint, part.face_colours is None)
-        groups.setdefault(key, []).append(_with_normals(near, source.limits.crease))
-    parts.clear()
     grey = Paint(uniform_surface(GREY, GREY, 0.0))
     bodies = []
-    for (key, _), group in groups.items():
-        bodies.append(_body(source, content, group, content.paints.get(key, grey)))
-        group.clear()
+    while parts:
+        part = parts.pop(0)
+        part = replace(part, vertices=(part.vertices - origin).astype(np.float32))
+        smooth = _with_normals(part, source.limits.crease)
+        bodies.append(_body(source, content, smooth, content.paints.get(part.paint, grey)))
     return bodies
 
 
@@ -137,19 +141,24 @@ def _without_empty(source: MeshSource, part: MeshPart) -> MeshPart:
     used[faces.ravel()] = True
     if not np.isfinite(part.vertices[used]).all():
         raise InputError(f"{source.path} has vertices that are NaN or infinite; repair it, in Blender for example.")
-    with np.errstate(over="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # vertices as far as numbers go
         kept = area_vectors(part.vertices, faces).any(1)
     if kept.all() and used.all():
-        return replace(part, vertices=part.vertices.astype(np.float64))
+        return replace(part, vertices=part.vertices.astype(np.float64, copy=False))
     used[:] = False
     used[faces[kept].ravel()] = True
     number = np.cumsum(used, dtype=np.int32) - 1
+
+    def chosen(values: Array | None) -> Array | None:
+        return None if values is None else values[used]
+
     return replace(
         part,
         vertices=part.vertices[used].astype(np.float64),
         faces=number[faces[kept]],
-        normals=None if part.normals is None else part.normals[used],
-        uv=None if part.uv is None else part.uv[used],
+        normals=chosen(part.normals),
+        uv=chosen(part.uv),
+        pieces=chosen(part.pieces),
         face_colours=None if part.face_colours is None else part.face_colours[kept],
     )
 
@@ -158,7 +167,7 @@ def _with_normals(part: MeshPart, crease: float) -> MeshPart:
     """The part with unit normals; where it has none, its vertices are divided at creases."""
     if part.normals is not None:
         return replace(part, normals=_unit(part.normals).astype(np.float32))
-    number, normals = creased_normals(part.vertices, part.faces, crease)
+    number, normals = creased_normals(part.vertices, part.faces, crease, part.pieces)
     key = number.ravel().astype(np.int64)
     if part.uv is not None:  # vertices at one place that differ in texture stay apart
         key = key * len(part.vertices) + part.faces.ravel()
@@ -173,22 +182,22 @@ def _with_normals(part: MeshPart, crease: float) -> MeshPart:
     )
 
 
-def _body(source: MeshSource, content: MeshContent, group: list[MeshPart], paint: Paint) -> Body:
-    """Parts of one material as one body; all of them have colours of faces, or none."""
-    vertices, faces = joined_faces(group)
-    normals = np.concatenate([part.normals for part in group])
-    surface, name = paint.surface, group[0].name
-    if group[0].face_colours is not None:
-        surface, of_face = coloured(surface, np.concatenate([part.face_colours for part in group]))
-        vertices, normals, uv = vertices[faces.ravel()], normals[faces.ravel()], np.repeat(of_face, 3, 0)
+def _body(source: MeshSource, content: MeshContent, part: MeshPart, paint: Paint) -> Body:
+    """A part with normals as a body."""
+    vertices, faces, normals = part.vertices, part.faces.astype(np.int32), part.normals
+    assert normals is not None
+    if part.face_colours is not None:
+        surface, of_face = coloured(paint.surface, part.face_colours)
+        corners = faces.ravel()
         faces = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-        return Body(vertices, faces, normals, uv, surface, name)
-    uv = np.concatenate([np.zeros((len(p.vertices), 2)) if p.uv is None else p.uv for p in group])
+        uv = np.repeat(of_face, 3, 0)
+        return Body(vertices[corners], faces, normals[corners], uv, surface, part.name)
+    uv = np.zeros((len(vertices), 2)) if part.uv is None else part.uv
     uv = np.clip(np.nan_to_num(uv), -FARTHEST_UV, FARTHEST_UV)
-    surface, uv, exact = wrapped(surface, uv, faces, paint.layout.wrap, source.limits.texture_pixels)
+    surface, uv, exact = wrapped(paint.surface, uv, faces, paint.layout.wrap, source.limits.texture_pixels)
     if not exact:
         content.notes.append("a clamped texture is cut off where its coordinates lie far outside of it.")
-    return Body(vertices, faces, normals, uv.astype(np.float32), surface, name)
+    return Body(vertices, np.ascontiguousarray(faces), normals, uv.astype(np.float32), surface, part.name)
 
 
 def coloured(surface: Surface, colours: Array) -> tuple[Surface, Array]:

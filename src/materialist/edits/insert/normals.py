@@ -11,13 +11,15 @@ CHUNK = 1 << 18
 """Faces that are looked at in one go: bounds the memory."""
 
 
-def creased_normals(vertices: Array, faces: Array, degrees: float) -> tuple[Array, Array]:
+def creased_normals(vertices: Array, faces: Array, degrees: float, pieces: Array | None = None) -> tuple[Array, Array]:
     """(number [F, 3] of the normal of each corner, unit normals [N, 3] float64) of vertices [V, 3], faces [F, 3].
 
     Faces that meet at a sharper angle keep an edge; those that meet at a smaller one, or are linked by such, share
-    the mean of their normals, weighted by their angles. Vertices at one place count as one.
+    the mean of their normals, weighted by their angles. Vertices at one place count as one, but for those of
+    different `pieces` [V].
     """
-    corners = welded(vertices)[faces]
+    places = vertices if pieces is None else np.column_stack([vertices, pieces])
+    corners = welded(places)[faces]
     flat = _unit(area_vectors(vertices, faces))
     group = _smooth_groups(corners, flat, np.cos(np.radians(degrees)))
     key = group[:, None].astype(np.int64) * (int(corners.max(initial=0)) + 1) + corners

@@ -52,6 +52,8 @@ class MeshPart:
     """[V, 2] v DOWN, as the layout of its material places them."""
     face_colours: Array | None = None
     """[F, 3] linear; they take the place of the material's albedo."""
+    pieces: Array | None = None
+    """[V] number of the mesh that a vertex belongs to, where the part was joined of several; edges stay between."""
 
 
 @dataclass
@@ -64,6 +66,27 @@ class MeshContent:
     """What the file has and the model has not, as in "its normal map"."""
     notes: list[str] = field(default_factory=list)
     """What differs from the file, as sentences without the file's name."""
+
+
+def joined_part(parts: list[MeshPart]) -> MeshPart:
+    """Parts of one material as one; all of them have normals, or none, and all have colours, or none."""
+    if len(parts) == 1:
+        return parts[0]
+    sizes = [len(part.vertices) for part in parts]
+    first = np.cumsum(sizes) - sizes
+    uv = None
+    if any(part.uv is not None for part in parts):
+        uv = np.concatenate([np.zeros((n, 2)) if p.uv is None else p.uv for p, n in zip(parts, sizes)])
+    return MeshPart(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32),
+        parts[0].paint,
+        parts[0].name,
+        None if parts[0].normals is None else np.concatenate([part.normals for part in parts]),
+        uv,
+        None if parts[0].face_colours is None else np.concatenate([part.face_colours for part in parts]),
+        np.repeat(np.arange(len(parts), dtype=np.int32), sizes),
+    )
 
 
 def mean_of_corners(colours: Array, faces: Array) -> Array:

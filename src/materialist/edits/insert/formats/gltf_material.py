@@ -87,7 +87,8 @@ class GltfMaterials:
         """
         colour_info, packed_info = _infos(entry)
         colour, packed = self._pixels(colour_info), self._pixels(packed_info)
-        layout = self._layout(colour_info if colour is not None else packed_info)
+        leads = packed_info if colour is None and packed is not None else colour_info
+        layout = self._layout(leads)
         if colour is not None and packed is not None and self._layout(packed_info) != layout:
             self.left_out.append("its roughness texture, which lies otherwise than its colour")
             packed = None
@@ -103,12 +104,13 @@ class GltfMaterials:
         gloss = extension(entry, GLOSS)
         diffuse = _tinted(colour, gloss.get("diffuseFactor"))
         specular = np.asarray(gloss.get("specularFactor", (1, 1, 1)), np.float32).reshape(1, 1, 3)
-        glossiness = np.full((1, 1), gloss.get("glossinessFactor", 1.0), np.float32)
+        factor = float(gloss.get("glossinessFactor", 1))
+        glossiness = np.full((1, 1), factor, np.float32)
         info = gloss.get("specularGlossinessTexture")
         pixels = None if info is None else self.pictures.pixels(self._image(info), "RGBA")
         if pixels is not None:
             specular = srgb_to_linear(pixels[..., :3]) * specular
-            glossiness = unit_range(pixels[..., 3]) * glossiness
+            glossiness = unit_range(pixels[..., 3], factor)
         albedo, metallic = _metals(diffuse, specular)
         return clipped_surface(albedo, 1 - glossiness, metallic)
 
@@ -133,17 +135,20 @@ def base_factor(entry: dict[str, Any]) -> Array:
 def _tinted(colour: Array | None, factor: Any) -> Array:
     """[h, w, 3] linear."""
     tint = np.asarray((1, 1, 1) if factor is None else factor, np.float32)[:3].reshape(1, 1, 3)
-    return tint if colour is None else srgb_to_linear(colour) * tint
+    if colour is None:
+        return np.array(tint)
+    linear = srgb_to_linear(colour)
+    linear *= tint
+    return linear
 
 
 def _metallic(entry: dict[str, Any], colour: Array | None, packed: Array | None) -> Surface:
     pbr = entry.get("pbrMetallicRoughness") or {}
     albedo = _tinted(colour, pbr.get("baseColorFactor"))
-    roughness = np.full((1, 1), pbr.get("roughnessFactor", 1.0), np.float32)
-    metallic = np.full((1, 1), pbr.get("metallicFactor", 1.0), np.float32)
-    if packed is not None:
-        roughness = unit_range(packed[..., 1]) * roughness
-        metallic = unit_range(packed[..., 2]) * metallic
+    rough, metal = float(pbr.get("roughnessFactor", 1)), float(pbr.get("metallicFactor", 1))
+    if packed is None:
+        return clipped_surface(albedo, np.full((1, 1), rough), np.full((1, 1), metal))
+    roughness, metallic = unit_range(packed[..., 1], rough), unit_range(packed[..., 2], metal)
     return clipped_surface(albedo, roughness, metallic)
 
 

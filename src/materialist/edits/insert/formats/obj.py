@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from materialist.types import Array
 
 NONE = -1
 """Number of a texture coordinate or a normal that a corner does not have."""
+COLUMNS = {b"v": 3, b"vt": 2, b"vn": 3}
+"""Lines of numbers -> how many are read of each, at least."""
 LEFT_OUT = {
     b"l": "its lines and points",
     b"p": "its lines and points",
@@ -42,7 +45,7 @@ class _Obj:
     """The file as far as it is read."""
 
     values: dict[bytes, list[Array]] = field(default_factory=lambda: {b"v": [], b"vt": [], b"vn": []})
-    """Blocks of [n, 6] (position and colour; NaN for none), [n, 2] and [n, 3]."""
+    """Blocks of [n, 3] or [n, 6] (position, and colour), [n, 2] and [n, 3]; NaN for what a line does not have."""
     sizes: dict[bytes, int] = field(default_factory=lambda: {b"v": 0, b"vt": 0, b"vn": 0})
     corners: list[Array] = field(default_factory=list)
     """Blocks of [n, 3] int32: numbers of vertex, texture coordinate and normal, from 0."""
@@ -76,13 +79,15 @@ def _sorted_lines(source: MeshSource, obj: _Obj, lines: Sequence[bytes]) -> _Lin
     vertices, uvs, normals = block.values.values()
     for line in lines:
         words = line.split()
+        if b"#" in line:
+            words = _uncommented(words)
         if not words:
             continue
         kind = words[0]
         if kind in block.values:
-            block.values[kind].append(_uncommented(words)[1:])
+            block.values[kind].append(words[1:])
         elif kind == b"f":
-            corners = _uncommented(words)[1:]
+            corners = words[1:]
             block.corners += corners
             block.counts.append(len(corners))
             block.before.append((len(vertices), len(uvs), len(normals)))
@@ -113,7 +118,7 @@ def _use_material(source: MeshSource, obj: _Obj, name: list[bytes], polygon: int
 def _add(source: MeshSource, obj: _Obj, block: _Lines) -> None:
     """Add the numbers of a block, after a look at how many there are."""
     before = dict(obj.sizes)
-    for kind, columns in ((b"v", 6), (b"vt", 2), (b"vn", 3)):
+    for kind, columns in COLUMNS.items():
         rows = block.values[kind]
         if rows:
             obj.sizes[kind] += len(rows)
@@ -137,13 +142,16 @@ def _add(source: MeshSource, obj: _Obj, block: _Lines) -> None:
 
 
 def _table(source: MeshSource, rows: list[list[bytes]], columns: int) -> Array:
-    """[n, columns] float64 of lines of words; NaN where a line has fewer."""
-    lengths = {len(row) for row in rows}
-    if columns == 6 and lengths & {4, 7}:  # x y z w, or x y z r g b a
-        rows = [row[:3] if len(row) == 4 else row[:6] for row in rows]
-    if lengths != {columns}:
-        rows = [(row + [b"nan"] * columns)[:columns] for row in rows]
-    return floats(source, [word for row in rows for word in row]).reshape(-1, columns)
+    """[n, columns] float64 of lines of words, [n, 6] where vertices have colours; NaN where a line has fewer."""
+    lengths = set(map(len, rows))
+    if columns == 3 and max(lengths) >= 6:
+        columns = 6
+        rows = [row[:3] if len(row) < 6 else row for row in rows]  # x y z w
+        lengths = set(map(len, rows))
+    if len(lengths) == 1 and lengths >= {columns}:
+        return floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
+    rows = [[*row, *[b"nan"] * columns][:columns] for row in rows]
+    return floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
 
 
 def _corner_numbers(source: MeshSource, corners: list[bytes]) -> Array:
@@ -167,17 +175,14 @@ def _whole(source: MeshSource, numbers: Array) -> Array:
 
 def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
     """Make the parts of all that was read; empties the lists on the way."""
-    columns = {b"v": 6, b"vt": 2, b"vn": 3}
-    tables = {}
-    for kind, blocks in obj.values.items():
-        tables[kind] = np.concatenate([np.zeros((0, columns[kind])), *blocks])
-        blocks.clear()
+    tables = {kind: _joined_blocks(blocks, COLUMNS[kind]) for kind, blocks in obj.values.items()}
     corners = np.concatenate(obj.corners)
     obj.corners.clear()
     for column, table in enumerate(tables.values()):
         if len(corners) and corners[:, column].max() >= len(table):
             raise source.damaged("a face has a vertex, texture coordinate or normal that does not exist")
-    positions, colours = tables[b"v"][:, :3], tables[b"v"][:, 3:]
+    positions = tables[b"v"][:, :3]
+    colours = tables[b"v"][:, 3:] if tables[b"v"].shape[1] == 6 else None
     faces, polygon = triangulated(source, positions, np.concatenate(obj.counts), corners[:, 0])
 
     first, number = np.array(obj.changes, np.int64).T
@@ -192,8 +197,20 @@ def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
         if paint and part.uv is not None:
             part = replace(part, uv=paint.layout.placed(part.uv))
         content.parts.append(replace(part, paint=paint and name, name=name or source.path.stem))
-    if content.paints and np.isfinite(colours).any():
+    if content.paints and colours is not None:
         content.left_out.append("the colours of its vertices")
+
+
+def _joined_blocks(blocks: list[Array], columns: int) -> Array:
+    """The rows of all blocks, which are let go."""
+    width = max((block.shape[1] for block in blocks), default=columns)
+    table = np.full((sum(map(len, blocks)), width), np.nan)
+    start = 0
+    for block in blocks:
+        table[start : start + len(block), : block.shape[1]] = block
+        start += len(block)
+    blocks.clear()
+    return table
 
 
 def _part(corners: Array, positions: Array, tables: dict[bytes, Array], colours: Array | None) -> MeshPart:

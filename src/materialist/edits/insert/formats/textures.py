@@ -2,6 +2,7 @@
 
 import io
 import math
+from collections import Counter
 from collections.abc import Hashable
 from typing import Any
 
@@ -26,10 +27,15 @@ class Textures:
         self.damaged = 0
         """How many cannot be read."""
         self._images: dict[Hashable, Any] = {}
+        self._uses: Counter[Hashable] = Counter()
         self._stored = 0
 
     def add(self, key: Hashable, data: bytes) -> None:
-        """Look at the header of a picture. Raises InputError beyond the limits of pictures and pixels."""
+        """Look at the header of a picture, once for each use of it.
+
+        Raises InputError beyond the limits of pictures and pixels.
+        """
+        self._uses[key] += 1
         if key in self._images:
             return
         self._images[key] = None
@@ -64,10 +70,10 @@ class Textures:
 
     @property
     def side(self) -> int:
-        """Longest side that is kept, pixels: the limit, halved until all pictures together keep theirs."""
-        side = self.source.limits.texture
-        sizes = [image.size for image in self._images.values() if image is not None]
-        while side > 16 and sum(_kept(size, side) for size in sizes) > self.source.limits.texture_pixels:
+        """Longest side that is kept, pixels: the limit, halved until the maps made of all keep theirs."""
+        limits, side = self.source.limits, self.source.limits.texture
+        images = [(image.size, self._uses[key]) for key, image in self._images.items() if image]
+        while side > 16 and sum(n * _kept(size, side) for size, n in images) > limits.texture_pixels:
             side //= 2
         return side
 
@@ -103,17 +109,19 @@ def _shrunk(image: Any, side: int) -> Any:
     return image
 
 
-def unit_range(pixels: Array) -> Array:
-    """float32 in [0, 1] of pixels as stored."""
-    return pixels.astype(np.float32) / np.float32(255) if pixels.dtype == np.uint8 else pixels
+def unit_range(pixels: Array, factor: float = 1.0) -> Array:
+    """float32 of pixels as stored, times a factor."""
+    values = pixels.astype(np.float32)
+    values *= np.float32(factor / 255 if pixels.dtype == np.uint8 else factor)
+    return values
 
 
 def clipped_surface(albedo: Array, roughness: Array, metallic: Array) -> Surface:
-    """A surface of maps [h, w, 3], [h, w], [h, w] that may leave [0, 1]."""
+    """A surface of maps [h, w, 3], [h, w], [h, w] that may leave [0, 1]; float32 ones are changed in place."""
     return Surface(_clipped(albedo), _clipped(roughness), _clipped(metallic))
 
 
 def _clipped(values: Array) -> Array:
-    values = np.array(values, np.float32, order="C")
-    np.nan_to_num(values, copy=False)
-    return np.clip(values, 0, 1, out=values)
+    values = np.ascontiguousarray(values, np.float32)
+    np.fmax(values, 0, out=values)  # NaN becomes 0
+    return np.fmin(values, 1, out=values)
