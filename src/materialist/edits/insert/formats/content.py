@@ -68,6 +68,17 @@ class MeshContent:
     """What differs from the file, as sentences without the file's name."""
 
 
+def compacted(corners: Array, count: int) -> tuple[Array, Array]:
+    """(numbers [n] int32 of the corners [n] among the used, the used [V] in order) of `count` vertices."""
+    if count > 4 * len(corners):  # a few of many
+        rows, places = np.unique(corners, return_inverse=True)
+        return places.astype(np.int32), rows
+    used = np.zeros(count, bool)
+    used[corners] = True
+    number = np.cumsum(used, dtype=np.int32) - 1
+    return number[corners], np.flatnonzero(used)
+
+
 def joined_part(parts: list[MeshPart]) -> MeshPart:
     """Parts of one material as one; all of them have normals, or none, and all have colours, or none."""
     if len(parts) == 1:

@@ -6,7 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from materialist.edits.insert.formats.content import MeshContent, MeshPart, fan_faces, mean_of_corners, strip_faces
+from materialist.edits.insert.formats.content import (
+    MeshContent,
+    MeshPart,
+    compacted,
+    fan_faces,
+    mean_of_corners,
+    strip_faces,
+)
 from materialist.edits.insert.formats.gltf_file import GltfFile
 from materialist.edits.insert.formats.gltf_material import GltfMaterials, base_factor
 from materialist.edits.insert.formats.gltf_nodes import GltfNodes
@@ -142,9 +149,9 @@ def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
         corners = file.accessor(one.primitive["indices"], 1)[:, 0]
         if corners.dtype.kind == "f":
             raise file.source.damaged("its indices are no whole numbers")
-        corners = corners.astype(np.int64)
+        corners = np.minimum(corners, np.iinfo(np.int32).max).astype(np.int32)
     else:
-        corners = np.arange(file.count(position))
+        corners = np.arange(file.count(position), dtype=np.int32)
     if len(corners) < 3:
         return np.zeros((0, 3), np.int32), np.zeros(0, np.int64)
     if mode == TRIANGLES:
@@ -153,8 +160,8 @@ def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
         faces = strip_faces(corners) if mode == STRIP else fan_faces(corners)
     if int(faces.min()) < 0 or int(faces.max()) >= file.count(position):
         raise file.source.damaged("it has faces of vertices that do not exist")
-    rows, places = np.unique(faces, return_inverse=True)
-    return places.reshape(-1, 3).astype(np.int32), rows
+    places, rows = compacted(faces.ravel(), file.count(position))
+    return places.reshape(-1, 3), rows
 
 
 def _shape(file: GltfFile, nodes: GltfNodes, one: Drawn, rows: Array) -> tuple[Array, Array | None]:

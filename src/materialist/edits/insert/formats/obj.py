@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 
 from materialist.color import srgb_to_linear
-from materialist.edits.insert.formats.content import MeshContent, MeshPart, mean_of_corners
+from materialist.edits.insert.formats.content import MeshContent, MeshPart, compacted, mean_of_corners
 from materialist.edits.insert.formats.mtl import MtlLibrary
 from materialist.edits.insert.formats.polygons import triangulated
 from materialist.edits.insert.formats.source import MeshSource
@@ -201,6 +201,17 @@ def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
         content.left_out.append("the colours of its vertices")
 
 
+def _distinct(corners: Array) -> tuple[Array, Array]:
+    """(number [n] int32 of each row among the different ones, where each of those is first) of rows [n, k]."""
+    key = corners[:, 0].astype(np.int64)
+    for column in range(1, corners.shape[1]):
+        if column > 1:
+            _, key = np.unique(key, return_inverse=True)  # keeps the product below within 64 bits
+        key = key * (int(corners[:, column].max()) + 1) + corners[:, column]
+    _, first, number = np.unique(key, return_index=True, return_inverse=True)
+    return number.astype(np.int32), first
+
+
 def _joined_blocks(blocks: list[Array], columns: int) -> Array:
     """The rows of all blocks, which are let go."""
     width = max((block.shape[1] for block in blocks), default=columns)
@@ -215,15 +226,15 @@ def _joined_blocks(blocks: list[Array], columns: int) -> Array:
 
 def _part(corners: Array, positions: Array, tables: dict[bytes, Array], colours: Array | None) -> MeshPart:
     """The part of corners [3 F, 3]; corners that agree in everything become one vertex."""
-    key = corners[:, 0].astype(np.int64)
     has_uv = bool((corners[:, 1] != NONE).all())
     has_normals = bool((corners[:, 2] != NONE).all())
-    for column in (1,) * has_uv + (2,) * has_normals:
-        _, key = np.unique(key, return_inverse=True)  # keeps the product below within 64 bits
-        key = key * (int(corners[:, column].max()) + 1) + corners[:, column]
-    _, first, faces = np.unique(key, return_index=True, return_inverse=True)
-    faces = faces.reshape(-1, 3).astype(np.int32)
-    vertex, uv, normal = corners[first].T
+    if has_uv or has_normals:
+        faces, first = _distinct(corners[:, [True, has_uv, has_normals]])
+        vertex, uv, normal = corners[first].T
+    else:
+        faces, vertex = compacted(corners[:, 0], len(positions))
+        uv = normal = vertex
+    faces = faces.reshape(-1, 3)
     face_colours = None
     if colours is not None and np.isfinite(colours[vertex]).all():
         scale = 255 if colours[vertex].max() > 1 else 1

@@ -102,11 +102,18 @@ def _kept(size: tuple[int, int], side: int) -> float:
 
 
 def _shrunk(image: Any, side: int) -> Any:
-    if max(image.size) > side:
-        if image.mode in ("P", "1"):
-            image = image.convert("RGBA")
+    if max(image.size) <= side:
+        return image
+    if image.mode in ("P", "PA", "1"):
+        image = image.convert("RGBA")
+    if len(image.getbands()) == 1 or image.mode in ("RGB", "YCbCr", "CMYK"):
         image.thumbnail((side, side))  # in place: the large one is let go
-    return image
+        return image
+    bands = []
+    for name in image.getbands():  # Pillow would multiply a copy of all of it by alpha
+        bands.append(image.getchannel(name))
+        bands[-1].thumbnail((side, side))
+    return Image.merge(image.mode, bands)
 
 
 def unit_range(pixels: Array, factor: float = 1.0) -> Array:
