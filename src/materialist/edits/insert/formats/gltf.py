@@ -149,7 +149,9 @@ def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
         corners = file.accessor(one.primitive["indices"], 1)[:, 0]
         if corners.dtype.kind == "f":
             raise file.source.damaged("its indices are no whole numbers")
-        corners = np.minimum(corners, np.iinfo(np.int32).max).astype(np.int32)
+        if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < file.count(position):
+            raise file.source.damaged("it has faces of vertices that do not exist")
+        corners = corners.astype(np.int32)
     else:
         corners = np.arange(file.count(position), dtype=np.int32)
     if len(corners) < 3:
@@ -158,8 +160,6 @@ def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
         faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
     else:
         faces = strip_faces(corners) if mode == STRIP else fan_faces(corners)
-    if int(faces.min()) < 0 or int(faces.max()) >= file.count(position):
-        raise file.source.damaged("it has faces of vertices that do not exist")
     places, rows = compacted(faces.ravel(), file.count(position))
     return places.reshape(-1, 3), rows
 

@@ -20,7 +20,9 @@ def read_stl(source: MeshSource) -> MeshContent:
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= HEADER else 0
     fits = len(data) >= HEADER + count * FACET.itemsize
     exact = len(data) == HEADER + count * FACET.itemsize
-    is_text = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"solid") and b"vertex" in data[:65536]
+    is_text = (
+        data[:512].lstrip(b"\xef\xbb\xbf \t\r\n").lower().startswith(b"solid") and b"vertex" in data[:65536].lower()
+    )
     if is_text and not exact:
         return _content(source, _text_corners(source))
     if not fits or count == 0:

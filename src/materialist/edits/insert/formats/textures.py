@@ -27,8 +27,8 @@ class Textures:
         self.damaged = 0
         """How many cannot be read."""
         self._images: dict[Hashable, Any] = {}
+        self._sizes: dict[Hashable, tuple[int, int]] = {}
         self._uses: Counter[Hashable] = Counter()
-        self._stored = 0
 
     def add(self, key: Hashable, data: bytes) -> None:
         """Look at the header of a picture, once for each use of it.
@@ -46,11 +46,10 @@ class Textures:
         except (OSError, ValueError, SyntaxError):
             self.damaged += 1
             return
-        pixels = math.prod(image.size)
-        self._stored += pixels
-        self.source.check("picture_pixels", pixels)
-        self.source.check("all_picture_pixels", self._stored)
+        self.source.check("picture_pixels", math.prod(image.size))
         self._images[key] = image
+        self._sizes[key] = image.size
+        self.source.check("all_picture_pixels", sum(map(math.prod, self._sizes.values())))
 
     def pixels(self, key: Hashable, mode: str = "RGB") -> Array | None:
         """[h, w, 3] as stored: uint8, or float32 in [0, 1] of deeper greys; None for none, or a damaged one.
@@ -72,7 +71,7 @@ class Textures:
     def side(self) -> int:
         """Longest side that is kept, pixels: the limit, halved until the maps made of all keep theirs."""
         limits, side = self.source.limits, self.source.limits.texture
-        images = [(image.size, self._uses[key]) for key, image in self._images.items() if image]
+        images = [(size, self._uses[key]) for key, size in self._sizes.items()]
         while side > 16 and sum(n * _kept(size, side) for size, n in images) > limits.texture_pixels:
             side //= 2
         return side
@@ -81,7 +80,7 @@ class Textures:
         """Sentences on what could not be kept as it is in the file."""
         notes = ["a texture cannot be read; a constant takes its place."] * bool(self.damaged)
         side = self.side
-        if side < self.source.limits.texture and any(max(i.size) > side for i in self._images.values() if i):
+        if side < self.source.limits.texture and any(max(size) > side for size in self._sizes.values()):
             notes.append(f"its textures are shrunk to {side} pixels, because they are large together.")
         return notes
 
