@@ -8,8 +8,11 @@ from materialist.errors import InputError
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """Limits checked in headers, before the memory is taken. Rendering's are tuned by eye, the others keep the
-    memory near ten times the file's size plus 300 MB (`tests/edits/insert/test_mesh_bombs.py`)."""
+    """Limits checked in headers, before the memory is taken.
+
+    Together they keep a reading process near ten times the file's size plus 300 MB, and within 0.8 GB where a file says
+    much in few bytes (`tests/edits/insert/test_mesh_bombs.py`).
+    """
 
     faces: int = 2_000_000
     """Triangles, copies counted; above it rendering runs out of memory on ordinary machines."""

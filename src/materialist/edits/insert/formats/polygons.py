@@ -52,10 +52,11 @@ def _cut(source: MeshSource, points: Array, corners: Array, index: Array) -> Ite
     simple = ~reflex.any(1)
     fans = np.stack([np.repeat(index[:, :1], size - 2, 1), index[:, 1:-1], index[:, 2:]], -1)
     yield fans[simple].reshape(-1, 3), np.repeat(np.flatnonzero(simple), size - 2)
-    for row in np.flatnonzero(~simple):
+    hollow = np.flatnonzero(~simple)
+    if len(hollow):
         source.check("polygon", int(size))
-        triangles = index[row][_ears(outline[row], normal[row])]
-        yield triangles, np.full(len(triangles), row)
+        triangles, row = _ears(outline[hollow], normal[hollow])
+        yield index[hollow[row, None], triangles], hollow[row]
 
 
 def _turns(outline: Array, normal: Array) -> Array:
@@ -68,18 +69,19 @@ def _turns(outline: Array, normal: Array) -> Array:
     return turn / np.where(scale > 0, scale, 1)
 
 
-def _ears(outline: Array, normal: Array) -> Array:
-    """[F, 3] corners of the triangles of one outline [n, 3]; they face as its normal does."""
-    across = np.eye(3)[np.abs(normal).argmin()]
+def _ears(outline: Array, normal: Array) -> tuple[Array, Array]:
+    """(triangles [F, 3] as corners, row [F]) of outlines [P, n, 3]; they face as their normals [P, 3] do."""
+    across = np.eye(3)[np.abs(normal).argmin(1)]
     right = np.cross(across, normal)
     plane = np.stack([right, np.cross(normal, right)], -1)
-    plane = plane / np.maximum(np.linalg.norm(plane, axis=0), 1e-300)
-    flat = np.ascontiguousarray(outline @ plane)
-    if not np.isfinite(flat).all():
-        return np.zeros((0, 3), np.int64)
-    ears = mapbox_earcut.triangulate_float64(flat, np.array([len(flat)], np.uint32))
-    triangles = np.asarray(ears, np.int64).reshape(-1, 3)
-    first, second = flat[triangles[:, 1]] - flat[triangles[:, 0]], flat[triangles[:, 2]] - flat[triangles[:, 0]]
+    plane = plane / np.maximum(np.linalg.norm(plane, axis=1, keepdims=True), 1e-300)
+    flat = np.nan_to_num(outline @ plane, posinf=0, neginf=0)  # [P, n, 2]; such vertices are refused later
+    ring = np.array([outline.shape[1]], np.uint32)
+    ears = [np.asarray(mapbox_earcut.triangulate_float64(corners, ring), np.int64) for corners in flat]
+    triangles = np.concatenate(ears).reshape(-1, 3)
+    row = np.repeat(np.arange(len(flat)), [len(ear) // 3 for ear in ears])
+    corner = flat[row[:, None], triangles]
+    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
     behind = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
     triangles[behind] = triangles[behind, ::-1]
-    return triangles
+    return triangles, row
