@@ -295,7 +295,7 @@ def change(path, value):
         (change(("meshes", 0, "primitives"), 3), "damaged"),
         (change(("nodes", 0, "matrix"), [1, 2, 3]), "damaged"),
     ],
-)  # fmt: skip
+)
 def test_documents_that_do_not_hold_together(made, tmp_path, changes, sentence):
     made.tetrahedron()
     changes(made.tree)

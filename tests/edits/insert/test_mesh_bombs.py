@@ -104,6 +104,16 @@ def many_targets(path):
     return made.write(path)
 
 
+def many_joints(path):
+    made = GltfBuilder()
+    joints, weights = made.accessor(np.zeros((4, 4), np.uint8)), made.accessor(np.ones((4, 4), np.float32))
+    sets = {f"JOINTS_{k}": joints for k in range(1000)} | {f"WEIGHTS_{k}": weights for k in range(1000)}
+    made.tetrahedron(**sets)
+    made.tree["skins"] = [{"joints": [0]}]
+    made.tree["nodes"][0]["skin"] = 0
+    return made.write(path)
+
+
 def many_accessors(path):
     made = GltfBuilder()
     made.tetrahedron()
@@ -169,6 +179,7 @@ def many_faces(path):
         (many_instances, "million copies of meshes|copies of meshes, more than 20000"),
         (many_triangles, "3 million triangles, more than 2 million"),
         (many_targets, "10000 morph targets in one mesh, more than 512"),
+        (many_joints, "1000 sets of joints for a vertex, more than 8"),
         (many_accessors, "0.1 million accessors or buffer views, more than 0.1 million"),
         (many_brackets, "1.8 million entries in its JSON, more than 1.5 million"),
         (nested_brackets, "nests too deep"),
@@ -265,6 +276,15 @@ def test_the_most_that_a_compact_file_may_ask_for(tmp_path):
     made.mesh({"POSITION": made.accessor(points)}, indices=corners, mode=5)
     peak, said = read(made.write(tmp_path / "a.glb"))
     assert int(said) > 1_900_000 and peak < 800e6
+    made = GltfBuilder()
+    loose = {"POSITION": np.resize(points, (3000, 3)), "NORMAL": np.ones((3000, 3), np.float32)}
+    loose["TEXCOORD_0"] = np.zeros((3000, 2), np.float32)
+    made.mesh({name: made.accessor(values) for name, values in loose.items()}, material=0)
+    made.tree["materials"] = [{}]
+    places = {"TRANSLATION": made.accessor(np.random.default_rng(0).random((2000, 3)).astype(np.float32))}
+    made.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": places}}
+    peak, said = read(made.write(tmp_path / "c.glb"))
+    assert int(said) > 1_900_000 and peak < 900e6
     file = io.BytesIO()
     Image.new("RGBA", (8192, 8192)).save(file, "PNG")
     peak, said = read(one_picture(tmp_path / "b.glb", file.getvalue()))

@@ -226,8 +226,13 @@ def test_counts_that_the_bytes_do_not_hold(tmp_path):
         (write(tmp_path / "c.ply", ply_header(little, 1000, XYZ, 1)), "1000 of 'vertex', at least 12000 bytes, and 0"),
         (write(tmp_path / "d.ply", ply_header("ascii", 0, XYZ, 10**9)), "more than 2 million"),
         (
-            write(tmp_path / "e.ply", ply_header(little, 1, XYZ, 1, ("uint int vertex_indices",)).encode()
-                  + b"\0" * 12 + struct.pack("<I", 4 * 10**9) + b"\0" * 40),
+            write(
+                tmp_path / "e.ply",
+                ply_header(little, 1, XYZ, 1, ("uint int vertex_indices",)).encode()
+                + b"\0" * 12
+                + struct.pack("<I", 4 * 10**9)
+                + b"\0" * 40,
+            ),
             "row 1 of 'face' does not end",
         ),
         (write(tmp_path / "f.ply", "ply\nformat ascii 1.0\nelement vertex -3\nend_header\n"), "element vertex -3"),
@@ -238,7 +243,7 @@ def test_counts_that_the_bytes_do_not_hold(tmp_path):
         (write(tmp_path / "k.obj", "v 0 0 0\nf 1 1 4\n"), "does not exist"),
         (write(tmp_path / "l.obj", "v 0 0 0\nf -2 1 1\n"), "does not exist"),
         (write(tmp_path / "m.obj", "v 0 0 0\nf" + " 1" * 600_000), "bytes in one line"),
-    ]  # fmt: skip
+    ]
     for path, sentence in bad:
         with pytest.raises(InputError, match=sentence):
             read_model(path)

@@ -136,7 +136,7 @@ def _parts(file: GltfFile, nodes: GltfNodes, content: MeshContent, one: Drawn) -
         linear = place[:3, :3]
         turned = faces[:, ::-1] if np.linalg.det(linear) < 0 else faces
         moved = points @ linear.T + place[:3, 3]
-        facing = None if normals is None else normals @ np.linalg.pinv(linear)
+        facing = None if normals is None else (normals @ np.linalg.pinv(linear)).astype(np.float32)
         parts.append(MeshPart(moved, turned, key, name, facing, uv, face_colours))
     return parts
 
@@ -192,34 +192,31 @@ def _skinned(
         if len(inverse) < len(joints):
             raise file.source.damaged("a skin has fewer matrices than joints")
         joints = joints @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
-    numbers, weights = _joint_weights(file, one, rows)
-    if len(numbers) and int(numbers.max()) >= len(joints):
-        raise file.source.damaged("it names joints that do not exist")
     turns = np.linalg.pinv(joints[:, :3, :3])
     moved, facing = np.zeros_like(points), None if normals is None else np.zeros_like(normals)
     for start in range(0, len(points), CHUNK):
         chunk = slice(start, start + CHUNK)
-        for k in range(numbers.shape[1]):
-            joint, share = numbers[chunk, k], weights[chunk, k, None]
-            bent = np.einsum("nij,nj->ni", joints[joint, :3, :3], points[chunk])
-            moved[chunk] += share * (bent + joints[joint, :3, 3])
+        numbers, weights = _joint_weights(file, one, rows[chunk])
+        if int(numbers.max()) >= len(joints):
+            raise file.source.damaged("it names joints that do not exist")
+        for joint, weight in zip(numbers.T, weights.T):
+            bent = np.einsum("nij,nj->ni", joints[joint, :3, :3], points[chunk]) + joints[joint, :3, 3]
+            moved[chunk] += weight[:, None] * bent
             if facing is not None and normals is not None:
-                facing[chunk] += share * np.einsum("nj,nji->ni", normals[chunk], turns[joint])
+                turned = np.einsum("nj,nji->ni", normals[chunk], turns[joint])
+                facing[chunk] += weight[:, None] * turned
     return moved, facing
 
 
 def _joint_weights(file: GltfFile, one: Drawn, rows: Array) -> tuple[Array, Array]:
     """(joints [V, n], their weights [V, n], which sum to 1)."""
-    numbers, weights = [], []
-    k = 0
-    while f"JOINTS_{k}" in one.attributes:
-        numbers.append(file.accessor(one.attributes[f"JOINTS_{k}"], 4, rows).astype(np.int64))
-        weights.append(file.accessor(one.attributes[f"WEIGHTS_{k}"], 4, rows).astype(np.float64))
-        k += 1
-    weight = np.concatenate(weights, -1)
-    total = weight.sum(-1, keepdims=True)
-    first = np.eye(1, weight.shape[1])
-    return np.concatenate(numbers, -1), np.where(total > 0, weight / np.where(total > 0, total, 1), first)
+    sets = [k for k in range(len(one.attributes)) if f"JOINTS_{k}" in one.attributes]
+    file.source.check("joint_sets", len(sets))
+    numbers = np.concatenate([file.accessor(one.attributes[f"JOINTS_{k}"], 4, rows) for k in sets], -1)
+    weights = np.concatenate([file.accessor(one.attributes[f"WEIGHTS_{k}"], 4, rows) for k in sets], -1)
+    total = weights.astype(np.float64).sum(-1, keepdims=True)
+    first = np.eye(1, weights.shape[1])
+    return numbers.astype(np.int64), np.where(total > 0, weights / np.where(total > 0, total, 1), first)
 
 
 def _uv(file: GltfFile, content: MeshContent, one: Drawn, rows: Array) -> Array | None:
@@ -232,7 +229,8 @@ def _uv(file: GltfFile, content: MeshContent, one: Drawn, rows: Array) -> Array 
     if name not in one.attributes:
         content.left_out += ["a texture, whose coordinates are missing"] * textured
         return None
-    return paint.layout.placed(file.accessor(one.attributes[name], 2, rows).astype(np.float64))
+    uv = file.accessor(one.attributes[name], 2, rows).astype(np.float64)
+    return paint.layout.placed(uv).astype(np.float32)
 
 
 def _colours(file: GltfFile, content: MeshContent, one: Drawn, rows: Array) -> Array | None:

@@ -25,10 +25,18 @@ READ = (
 )
 """Beginnings of the extensions that a file may require."""
 LISTS = {
-    "nodes": "nodes", "accessors": "accessors", "bufferViews": "accessors", "images": "pictures",
-    "materials": "materials", "textures": "materials", "samplers": "materials", "meshes": "nodes", "skins": "nodes",
-    "buffers": "pictures", "scenes": "nodes",
-}  # fmt: skip
+    "nodes": "nodes",
+    "accessors": "accessors",
+    "bufferViews": "accessors",
+    "images": "pictures",
+    "materials": "materials",
+    "textures": "materials",
+    "samplers": "materials",
+    "meshes": "nodes",
+    "skins": "nodes",
+    "buffers": "pictures",
+    "scenes": "nodes",
+}
 """List of the document -> the limit of its length."""
 
 
@@ -114,9 +122,9 @@ class GltfFile:
         data = self.view(entry["bufferView"])
         offset, width = _whole(entry.get("byteOffset", 0)), columns * kind.itemsize
         stride = _whole(view.get("byteStride", 0)) or width
-        wanted = offset + (count - 1) * stride + width if count else 0
-        if stride < width or wanted > len(data):
-            raise self.source.damaged(f"{name} takes {wanted} bytes of a buffer view of {len(data)}")
+        needed = offset + (count - 1) * stride + width if count else 0
+        if stride < width or needed > len(data):
+            raise self.source.damaged(f"{name} takes {needed} bytes of a buffer view of {len(data)}")
         if not count:
             return np.zeros((0, columns), kind)
         return np.ndarray((count, columns), kind, data.data, offset, (stride, kind.itemsize))

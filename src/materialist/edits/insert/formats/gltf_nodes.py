@@ -98,12 +98,12 @@ class GltfNodes:
         """These nodes and all below them."""
         for root in roots:
             self.file.entry("nodes", root)
-        found: dict[int, None] = {}
+        reached: dict[int, None] = {}
         level = roots
         while level:
-            found.update(dict.fromkeys(level))
-            level = [child for number in level for child in self.children[number] if child not in found]
-        return list(found)
+            reached.update(dict.fromkeys(level))
+            level = [child for number in level for child in self.children[number] if child not in reached]
+        return list(reached)
 
 
 def rotations(quaternions: Array) -> Array:

@@ -10,7 +10,7 @@ from materialist.errors import InputError
 class MeshLimits:
     """Limits checked in headers, before the memory is taken.
 
-    Together they keep a reading process near ten times the file's size plus 300 MB, and within 0.8 GB where a file says
+    Together they keep a reading process near ten times the file's size plus 300 MB, and within 0.9 GB where a file says
     much in few bytes (`tests/edits/insert/test_mesh_bombs.py`).
     """
 
@@ -44,6 +44,8 @@ class MeshLimits:
     """Primitives times the nodes and instances that show them; about 0.2 ms each."""
     targets: int = 512
     """Morph targets of a primitive; a face has about 50."""
+    joint_sets: int = 8
+    """Sets of four joints that move a vertex; exporters write one or two."""
     polygon: int = 10_000
     """Corners of a polygon that is not convex: cut into triangles in 0.1 s, with the square of it beyond."""
     line_bytes: int = 1_000_000
@@ -77,6 +79,7 @@ _WORDS = {
     "node_depth": ("levels of nodes", "apply its parents first (Blender: Object > Parent > Clear)"),
     "copies": ("copies of meshes", _JOIN),
     "targets": ("morph targets in one mesh", "apply them first"),
+    "joint_sets": ("sets of joints for a vertex", "limit it to four joints first"),
     "polygon": ("corners in one polygon", "triangulate it first (Blender: Face > Triangulate)"),
     "line_bytes": ("bytes in one line", _EXPORT),
 }

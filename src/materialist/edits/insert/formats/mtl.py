@@ -15,9 +15,20 @@ from materialist.edits.insert.formats.textures import GREY, Textures, clipped_su
 from materialist.types import Array
 
 OPTIONS = {
-    "-s": 3, "-o": 3, "-t": 3, "-mm": 2, "-blendu": 1, "-blendv": 1, "-cc": 1, "-clamp": 1, "-texres": 1,
-    "-bm": 1, "-imfchan": 1, "-type": 1, "-boost": 1,
-}  # fmt: skip
+    "-s": 3,
+    "-o": 3,
+    "-t": 3,
+    "-mm": 2,
+    "-blendu": 1,
+    "-blendv": 1,
+    "-cc": 1,
+    "-clamp": 1,
+    "-texres": 1,
+    "-bm": 1,
+    "-imfchan": 1,
+    "-type": 1,
+    "-boost": 1,
+}
 """Options before the name of a map -> how many words follow them at most."""
 
 
