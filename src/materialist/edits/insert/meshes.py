@@ -67,8 +67,9 @@ def read_model(path: str | Path, *, up: str = "auto") -> MeshModel:
     if up not in ("auto", "y", "z"):
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
     source = MeshSource(path, LIMITS)
-    content = READERS[source.suffix](source)
-    parts = _bodies(source, content)
+    with np.errstate(over="ignore", invalid="ignore"):  # numbers of damaged files; what is not finite is refused
+        content = READERS[source.suffix](source)
+        parts = _bodies(source, content)
     if up == "z" or (up == "auto" and source.suffix == ".stl"):
         parts = [replace(p, vertices=_upright(p.vertices), normals=_upright(p.normals)) for p in parts]
     missing = [f"{name} is missing; a constant takes its place." for name in source.folder.missing]
@@ -81,7 +82,8 @@ def files_beside(path: Path) -> list[Path]:
     """Files that a mesh file refers to and that were opened for it; none for a file that cannot be read."""
     try:
         source = MeshSource(path, LIMITS)
-        READERS[source.suffix](source)
+        with np.errstate(over="ignore", invalid="ignore"):
+            READERS[source.suffix](source)
     except InputError:
         return []
     return list(dict.fromkeys(source.folder.opened))
@@ -141,8 +143,7 @@ def _without_empty(source: MeshSource, part: MeshPart) -> MeshPart:
     used[faces.ravel()] = True
     if not np.isfinite(part.vertices[used]).all():
         raise InputError(f"{source.path} has vertices that are NaN or infinite; repair it, in Blender for example.")
-    with np.errstate(over="ignore", invalid="ignore"):  # vertices as far as numbers go
-        kept = area_vectors(part.vertices, faces).any(1)
+    kept = area_vectors(part.vertices, faces).any(1)
     if kept.all() and used.all():
         return replace(part, vertices=part.vertices.astype(np.float64, copy=False))
     used[:] = False
