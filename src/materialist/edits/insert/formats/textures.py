@@ -26,7 +26,7 @@ class Textures:
         self.source = source
         self.damaged = 0
         """How many cannot be read."""
-        self._images: dict[Hashable, Any] = {}
+        self._encoded: dict[Hashable, bytes | None] = {}
         self._sizes: dict[Hashable, tuple[int, int]] = {}
         self._uses: Counter[Hashable] = Counter()
 
@@ -36,10 +36,10 @@ class Textures:
         Raises InputError beyond the limits of pictures and pixels.
         """
         self._uses[key] += 1
-        if key in self._images:
+        if key in self._encoded:
             return
-        self._images[key] = None
-        self.source.check("pictures", len(self._images))
+        self._encoded[key] = None
+        self.source.check("pictures", len(self._encoded))
         try:
             with pixel_limit_lifted():
                 image = Image.open(io.BytesIO(data), formats=KINDS)
@@ -47,7 +47,7 @@ class Textures:
             self.damaged += 1
             return
         self.source.check("picture_pixels", math.prod(image.size))
-        self._images[key] = image
+        self._encoded[key] = data
         self._sizes[key] = image.size
         self.source.check("all_picture_pixels", sum(map(math.prod, self._sizes.values())))
 
@@ -56,15 +56,15 @@ class Textures:
 
         mode: `RGB`, or `RGBA` for [h, w, 4] uint8. Pictures are shrunk where their longer side exceeds `side`.
         """
-        image = self._images.get(key)
-        if image is None:
+        data = self._encoded.get(key)
+        if data is None:
             return None
         try:
             with pixel_limit_lifted():
-                return self._decoded(image, mode)
+                return self._decoded(Image.open(io.BytesIO(data), formats=KINDS), mode)
         except (OSError, ValueError, SyntaxError, EOFError):
             self.damaged += 1
-            self._images[key] = None
+            self._encoded[key] = None
             return None
 
     @property
