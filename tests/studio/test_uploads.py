@@ -98,6 +98,6 @@ def test_a_picture_is_measured_by_what_it_holds_and_not_by_its_name(tmp_path):
     (tmp_path / "a.exr").rename(tmp_path / "a.png")
     assert decoded_bytes(tmp_path / "a.png") == 400 * 500 * 20 * 4
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(uploads, "SETTINGS", StudioSettings(upload_pixels=1_000_000))
+        patch.setattr(uploads, "SETTINGS", StudioSettings(opening_memory=10_000_000))
         with pytest.raises(InputError, match="save its colours alone"):
             uploads.checked_picture(tmp_path / "a.png")

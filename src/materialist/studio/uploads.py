@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.io.bitmap import check_size
-from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decode, decoded_bytes, image_size
+from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decode, image_size, peak_bytes
 from materialist.io.image import read_map, write_image
 from materialist.jobs.limited import Limits, run_limited
 from materialist.studio import SETTINGS
@@ -105,15 +105,17 @@ def checked_picture(path: Path) -> str:
     check_bytes(path, shown)
     if suffix not in RAW_SUFFIXES:
         try:
-            (width, height), decoded = image_size(path), decoded_bytes(path)
+            (width, height), peak = image_size(path), peak_bytes(path)
         except InputError:
             raise
         except Exception as error:  # decoders raise anything
             raise InputError(f"{shown} is not an image that can be read; export it as PNG or JPEG.") from error
-        if decoded > 12 * SETTINGS.upload_pixels:
+        megapixels = width * height / 1e6
+        if width * height > SETTINGS.upload_pixels or peak > SETTINGS.opening_memory:
             raise InputError(
-                f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels, {decoded / 1e6:.0f} MB in "
-                f"memory, above {12e-6 * SETTINGS.upload_pixels:.0f} MB: shrink it, or save its colours alone."
+                f"{shown} is {width} x {height} = {megapixels:.0f} megapixels and takes {peak / 1e9:.1f} GB to read; "
+                f"the studio takes up to {SETTINGS.upload_pixels / 1e6:g} megapixels and "
+                f"{SETTINGS.opening_memory / 1e9:g} GB: shrink it, or save its colours alone."
             )
         check_size(width, height, shown)
     return suffix
