@@ -196,6 +196,9 @@ class InvertOptions(OperationOptions):
     size: int = option(
         512, "Working size: longer side, pixels.", kind="whole", low=8, high=8192, called="working size", unit="pixels")
     """Of the working picture; a Photo keeps the size that it was read at."""
+    layer: str | None = option(
+        None, "Which layer or part of an EXR is the photo; else chosen by their names.", kind="name", metavar="NAME")
+    """A Photo keeps the layer that it was read with."""
     envmap_size: tuple[int, int] = option((512, 256), "Size of the environment map.", kind="size", metavar="WxH")
     """(width, height), with width = 2 * height."""
     completion: str = option(

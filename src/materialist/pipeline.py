@@ -60,7 +60,10 @@ def invert(
     preset = "paper" if wanted.engine == "path" else wanted.preset
     tick, tell = progress or (lambda *_: None), on_stage or (lambda *_: None)
     tick("read", 0, 1)
-    picture = exposed(photo) if isinstance(photo, Photo) else read_photo(photo, size=wanted.size, fov=wanted.fov)
+    if isinstance(photo, Photo):
+        picture = exposed(photo)
+    else:
+        picture = read_photo(photo, size=wanted.size, fov=wanted.fov, layer=wanted.layer)
     if isinstance(photo, Photo) and wanted.fov != "auto":
         picture = replace(picture, camera=replace(picture.camera, fov=cast(float, wanted.fov)), fov_source="option")
     mask = _mask(wanted.mask, picture)

@@ -72,6 +72,8 @@ class Photo:
     """True when it comes from a display file of more than 8 bits a channel that is not in `source` any more."""
     stops: int = 0
     """Exposure of `linear` and `original` over the values of an HDR file, see `io.photo.read_photo`."""
+    layer: str | None = None
+    """Name of the layer or part that it is, of an EXR that has several."""
 
     @property
     def name(self) -> str:

@@ -59,7 +59,9 @@ def test_a_report_is_three_files_of_valid_content(tmp_path):
 
 
 def test_a_folder_with_something_in_it_is_kept(tmp_path):
-    assert claim(tmp_path / "new" / "deep").is_dir()
+    with pytest.raises(OutputError, match="no folder"):
+        claim(tmp_path / "new" / "deep")
+    assert claim(tmp_path / "new").is_dir() and claim(tmp_path / "new" / "deep").is_dir()
     (tmp_path / "file").write_text("mine")
     with pytest.raises(OutputError, match="--force"):
         claim(tmp_path)

@@ -63,6 +63,10 @@ def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
 
 
 def test_the_files_of_the_contract(scene, tmp_path):
+    with pytest.raises(OutputError, match="no folder"):
+        save_scene(scene, tmp_path / "deep/down/a.scene")
+    assert not (tmp_path / "deep").exists()
+    (tmp_path / "deep/down").mkdir(parents=True)
     save_scene(scene, tmp_path / "deep/down/a.scene")
     root = tmp_path / "deep/down/a.scene"
     maps = ("albedo", "roughness", "metallic", "normal", "depth")

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from materialist.errors import InputError, OutputError
-from materialist.io.atomic import make_folder, writing
+from materialist.io.atomic import make_folder, require_parent, writing
 
 LEDGER = "batch.jsonl"
 FORMAT = 1
@@ -66,6 +66,7 @@ def open_ledger(
     folder = Path(runs)
     path = folder / LEDGER
     options = json.loads(json.dumps(options))  # as they will be read again: tuples are lists
+    require_parent(folder)
     with writing(folder):
         make_folder(folder)
         held = path.is_file()

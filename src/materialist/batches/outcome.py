@@ -32,6 +32,8 @@ class Outcome:
     seconds: float
     """Wall clock of this call."""
     options: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    """What of the source was passed over."""
 
     def of(self, status: str) -> list[Row]:
         return [row for row in self.rows if row["status"] == status]

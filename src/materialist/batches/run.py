@@ -58,13 +58,16 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     check_options(asked)
     if how.recipe is not None:
         edits_for(how.recipe, "")  # a list that cannot be read is told before anything is written
-    photos, folder = list_photos(source, runs=runs), Path(runs)
+    notes: list[str] = []
+    photos, folder = list_photos(source, runs=runs, notes=notes), Path(runs)
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
         template = PhotoTask("", "", "", folder.resolve(), asked, how)
         tasks = {task.id: task for task in plan(photos, ledger, template)}
-        run = _Run(folder, photos, ledger, tasks, asked, progress or (lambda _: None), start)
+        run = _Run(folder, photos, ledger, tasks, asked, progress or (lambda _: None), start, notes)
         try:
+            for note in notes:
+                run.tell(note)
             if how.recipe is not None and (notice := _lacking(how.recipe, [*tasks.values()])):
                 run.tell(notice)
             if tasks:
@@ -129,6 +132,8 @@ class _Run:
     options: dict[str, Any]
     watch: Watch
     start: float
+    notes: list[str]
+    """Sentences on what the source holds beside photos."""
     stages: dict[str, str] = field(default_factory=dict)
     """Photo id -> stage, of the photos at work."""
     tries: Counter[str] = field(default_factory=Counter)
@@ -156,7 +161,7 @@ class _Run:
 
     def outcome(self) -> Outcome:
         rows, kept = tuple(self._row(photo) for photo in self.photos), len(self.photos) - len(self.tasks)
-        return Outcome(self.runs, rows, kept, time.monotonic() - self.start, self.options)
+        return Outcome(self.runs, rows, kept, time.monotonic() - self.start, self.options, tuple(self.notes))
 
     def write(self) -> None:
         outcome = self.outcome()

@@ -101,11 +101,12 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
         return mt.load_scene(task.scene), dict(task.kept)
     ensure_writable(task.scene, force=True)
     options = task.named_options()
-    size, fov = options.pop("size"), options.pop("fov")
+    size, fov, layer = options.pop("size"), options.pop("fov"), options.pop("layer", None)
     report("read", 0, 1)
     photo_version = fingerprint(task.location)
     with local_copy(task.location) as file:
-        photo = mt.read_photo(file if str(file) != task.location else task.location, size=size, fov=fov)
+        source = file if str(file) != task.location else task.location
+        photo = mt.read_photo(source, size=size, fov=fov, layer=layer)
     place = task.id if is_url(task.location) else task.location
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     report("start", 0, 1)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.atomic import make_folder, whole_file, write_whole, writing
+from materialist.io.atomic import make_folder, require_parent, whole_file, write_whole, writing
 from materialist.io.display import write_sheet
 from materialist.plain import plain
 from materialist.types import Array
@@ -58,6 +58,7 @@ def strip(*pictures: Array) -> Array:
 
 def claim(folder: Path, *, force: bool = False) -> Path:
     """Make the folder for a report; raises OutputError when it holds something, unless `force`."""
+    require_parent(folder)
     with writing(folder):
         if folder.is_dir() and any(folder.iterdir()) and not force:
             raise OutputError(f"{folder} is not empty; choose another folder, or add --force to write into it.")

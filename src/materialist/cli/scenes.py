@@ -24,7 +24,7 @@ def invert(
 
     # Everything that can be wrong is found before the work starts.
     ensure_writable(output, run.force)
-    picture = mt.read_photo(photo, size=options.size, fov=options.fov)
+    picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
     start = time.monotonic()
     with stage_progress(quiet=run.as_json) as progress:
         scene = mt.invert(picture, options, progress=progress)

@@ -11,7 +11,7 @@ from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.glb import glb_bytes, write_hdr
 from materialist.exporters.parts import Part, body_parts, scene_parts
-from materialist.io.atomic import whole_file, write_whole
+from materialist.io.atomic import ensure_writable, whole_file, write_whole
 from materialist.options import ExportOptions
 from materialist.types import Scene
 
@@ -133,5 +133,6 @@ def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
 def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.exporters.page import page
 
+    ensure_writable(path, force, None)
     write_whole(path, page(scene, parts), force)
     return Exported(path)

@@ -109,7 +109,7 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "original": original,
             "has_source": photo.source is not None,
             "camera": asdict(photo.camera),
-            **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "warnings")},
+            **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "layer", "warnings")},
         },
         "prior": {key: getattr(scene.prior, key) for key in ("predictor", "warnings", "sources")},
         "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
@@ -137,12 +137,13 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     """The Photo; its native pixels are decoded again from the original file."""
     file, stops = folder / Path(meta["original"]).name, int(meta.get("stops", 0))
     if meta["has_source"]:
-        original, source = decode_photo(file).exposed(stops), file.read_bytes()
+        original, source = decode_photo(file, meta.get("layer")).exposed(stops), file.read_bytes()
     else:
         original, source = read_exr(file), None
     return Photo(
         package_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
         meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
+        meta.get("layer"),
     )  # fmt: skip
 
 
