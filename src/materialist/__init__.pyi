@@ -38,6 +38,7 @@ from .types import Materials as Materials
 from .types import Mesh as Mesh
 from .types import Photo as Photo
 from .types import Prediction as Prediction
+from .types import Prior as Prior
 from .types import Scene as Scene
 from .types import Surface as Surface
 
