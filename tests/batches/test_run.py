@@ -58,7 +58,7 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     (source / "d.png").unlink()
     photos(source, "x", "new")  # the first is only there to make the second another picture
     (source / "x.png").unlink()
-    with pytest.raises(InputError, match="--resume"):
+    with pytest.raises(InputError, match="resume=True"):
         run(source, tmp_path / "runs")
     again = run(source, tmp_path / "runs", resume=True)
     assert again.kept == 1 and again.exit_code == 0 and again.count("done") == 4

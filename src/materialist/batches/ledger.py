@@ -74,7 +74,8 @@ def open_ledger(
             raise InputError(f"{folder} is not empty and holds no batch; name another folder.")
         if held and not (resume or force):
             raise InputError(
-                f"{folder} holds a batch; add `resume=True` to go on with it, `force=True` to begin anew, or name another folder."
+                f"{folder} holds a batch; add `resume=True` to go on with it, `force=True` to begin anew, or name "
+                "another folder."
             )
         file = path.open("ab", buffering=0)
     with file:

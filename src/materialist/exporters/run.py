@@ -4,7 +4,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Unpack
 
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError, SetupError

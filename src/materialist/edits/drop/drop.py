@@ -18,9 +18,8 @@ from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
-from materialist.option_kinds import numbers, several
 from materialist.keywords import DropKeywords
-from materialist.option_kinds import documented
+from materialist.option_kinds import documented, numbers, several
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import chain
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
