@@ -16,6 +16,7 @@ from .errors import SceneError as SceneError
 from .errors import SetupError as SetupError
 from .errors import WeightsError as WeightsError
 from .exporters.run import export as export
+from .io.out.encode import save_image as save_image
 from .io.package import load_scene as load_scene
 from .io.package import save_scene as save_scene
 from .io.photo import read_photo as read_photo

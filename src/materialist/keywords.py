@@ -130,6 +130,8 @@ class BatchKeywords(InvertKeywords, total=False):
     """Fields of `batches.options.BatchOptions`, beside those of `InvertOptions`."""
 
     apply: str | Path | None
+    format: str
+    quality: int | None
     workers: int | None
     ray: str | None
     resume: bool

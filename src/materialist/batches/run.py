@@ -43,7 +43,7 @@ SETTINGS = BatchSettings()
 def batch(
     source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Unpack[BatchKeywords]
 ) -> Outcome:
-    """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.png.
+    """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.FORMAT.
 
     A photo that cannot be inverted is recorded with its reason and stops nothing; a worker that dies loses only its
     photo, which is begun again, `BatchSettings.tries` times in all. The results do not depend on the number of workers.
