@@ -4,6 +4,7 @@ from .edits.drop.drop import drop as drop
 from .edits.drop.drop import settle as settle
 from .edits.glass.glass import glass as glass
 from .edits.insert.insert import insert as insert
+from .edits.layers import save_layers as save_layers
 from .edits.light.relight import lamp as lamp
 from .edits.light.relight import relight as relight
 from .edits.material.material import edit as edit

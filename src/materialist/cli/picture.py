@@ -86,7 +86,7 @@ def write_picture(output: Path, picture: Any, scene: Any, shown: Any, how: Pictu
     """Write a picture of the scene `shown`, made of the photo of `scene`; returns notes."""
     if not how.exr_layers:
         return mt.save_image(output, picture, scene, **how.encoding)
-    from materialist.edits.composite.parts import save_layers
+    from materialist.edits.layers import save_layers
 
     return save_layers(output, shown, picture, device=how.device, force=how.force)
 

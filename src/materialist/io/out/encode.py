@@ -36,6 +36,8 @@ LOSSLESS = 100
 """Quality from which WebP loses nothing."""
 LONGEST = {"JPEG": 65_535, "WEBP": 16_383, "AVIF": 65_535}
 """Longest side that the format has, pixels."""
+_SUBSAMPLING = {"JPEG": 0, "AVIF": "4:4:4"}
+"""Colour at every pixel: borders of edits are where both change."""
 _EXIF_BYTES = 65_000
 """Room for EXIF in a JPEG."""
 _MAKER_NOTE = 37_500
@@ -123,7 +125,8 @@ def _encoded(
     settings: dict[str, Any] = {"exif": described, "icc_profile": colours.profile}
     if kind in QUALITY:
         settings["quality"] = QUALITY[kind] if quality is None else quality
-    settings |= {"JPEG": {"subsampling": 0}, "AVIF": {"subsampling": "4:4:4"}}.get(kind, {})
+    if kind in _SUBSAMPLING:
+        settings["subsampling"] = _SUBSAMPLING[kind]
     if kind == "WEBP" and quality == LOSSLESS:
         settings |= {"lossless": True, "quality": 75}  # then it says how hard it tries
     buffer = io.BytesIO()
