@@ -20,6 +20,8 @@ from materialist.types import Array, Photo
 UNKEPT = "The photo's colours are of a kind that is not written ({}); the picture is sRGB."
 _TOLERANCE = 1e-6
 """Linear difference up to which a pixel is the photo's: far less than a level of 16 bits but in the darkest."""
+_MOVED = 0.25
+"""Share of what clipping took by which a channel is well above 0 (by eye)."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,8 @@ class PhotoColours:
     def _of_the_photo(self, rows: slice, picture: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
         """(which pixels [h, W] are the photo's, [h, W, 3] those rows with what clipping took from the photo).
 
-        A pixel that an edit made darker has less of it, by its most darkened channel; a channel that is no longer at
-        the end where it was clipped has none.
+        A pixel that an edit made darker has less of it, by its most darkened channel. A channel that was below 0 and is
+        well above it now is one of a new colour, and has none.
         """
         if self.space is None or self.stored is None or self.stored.shape != shape:
             return np.zeros(picture.shape[:2], bool), picture
@@ -76,8 +78,8 @@ class PhotoColours:
         kept = (np.abs(picture - inside) <= _TOLERANCE).all(-1)
         share = np.clip((picture + _TOLERANCE) / (inside + _TOLERANCE), 0, 1).min(-1, keepdims=True)
         share[kept] = 1
-        inwards = np.where(lost < 0, picture, 1 - picture)
-        at_end = np.clip(1 - inwards / np.maximum(np.abs(lost), _TOLERANCE), 0, 1)
+        at_end = np.clip(1 - picture / np.maximum(-_MOVED * lost, _TOLERANCE), 0, 1)
+        at_end[lost > 0] = 1
         return kept, np.where(lost != 0, picture + share * at_end * lost, picture).astype(np.float32)
 
 
@@ -106,7 +108,7 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
         chunks = png_chunks(file) if kind == "PNG" else {}
         profile = None if b"cICP" in chunks else image.info.get("icc_profile")
         colours = matrix_profile(profile) if profile else stated_space(file, kind, tags, [])
-        if mode in ("L", "LA", "1", "I;16") or (colours is None and not profile):
+        if mode in ("L", "LA", "1", "I;16") or (colours is None and not profile and mode != "CMYK"):
             return SRGB
         if colours is None or mode == "CMYK" or colours.is_light:
             return PhotoColours(SRGB.profile, notes=(UNKEPT.format(_reason(mode, profile)),))
