@@ -8,20 +8,8 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
-NOUNS = {
-    "types",
-    "errors",
-    "color",
-    "camera",
-    "envmap",
-    "metrics",
-    "buffers",
-    "keywords",
-    "option_kinds",
-    "options",
-    "plain",
-    "records",
-}
+NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "forks", "records"}
+NOUNS |= {"option_kinds", "options", "keywords", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
 KINDS = ("select", "material", "light", "remove", "glass", "insert", "drop", "core", "composite")
 EDITING = {"edits", *(f"edits.{kind}" for kind in KINDS)}

@@ -16,6 +16,7 @@ import numpy as np
 from materialist import __version__, metrics
 from materialist.color import CLIPPED, linear_to_srgb
 from materialist.errors import InputError
+from materialist.forks import check_process
 from materialist.io.given import PhotoInput, photo_of
 from materialist.io.image import read_mask
 from materialist.io.photo import HDR_CLIP, exposed
@@ -54,6 +55,7 @@ def invert(
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
     """
+    check_process()
     start = last = time.perf_counter()
     stages: list[dict] = []
 

@@ -112,6 +112,12 @@ class Prediction(Record):
     """Map -> where it comes from, where several predictors or weights are behind them; empty: all of `predictor`."""
     light: Array | None = None
     """[h, 2h, 4] float32 environment map: linear radiance, and the scale of the error of its logarithm."""
+    spread: dict[str, Array] = field(default_factory=dict)
+    """Map -> [H, W] float32 expected absolute error, where the predictor knows it.
+
+    Of the sRGB-encoded albedo (mean over RGB), of roughness and metallic, of the normal's angle in radians, and of the
+    natural logarithm of relative depth.
+    """
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -96,7 +96,8 @@ def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
     [
         ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "seed is -1"),
         ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "workers is 0; it must lie"),
-        ({"apply": "none.yaml"}, "cannot be read"), ({"quality": 80}, "png has none"), ({"settings": object()}, "texts and numbers"),
+        ({"quality": 80}, "png has none"),
+        ({"apply": "none.yaml"}, "cannot be read"), ({"settings": object()}, "texts and numbers"),
     ],
 )  # fmt: skip
 def test_options_that_fit_no_photo_are_refused_before_anything_is_written(tmp_path, options, said):

@@ -108,7 +108,7 @@ def test_stated_colours_that_make_no_sense_are_told_of(tmp_path, bad, words):
         ("p3.heic", lambda: srgb(quadrants(TO_P3)), (12, 13, 6), False),
         ("pq.heic", lambda: pq(quadrants(TO_2020)), (9, 16, 9), True),
         ("hlg.heic", lambda: hlg(quadrants(TO_2020)), (9, 18, 9), True),
-        ("video.heic", lambda: srgb(quadrants()), (1, 13, 6), False),
+        ("srgb.heic", lambda: srgb(quadrants()), (1, 13, 6), False),
     ],
 )
 @pytest.mark.parametrize("bits", [8, 10])
@@ -120,6 +120,13 @@ def test_nclx_of_heic(tmp_path, name, encode, codes, is_hdr, bits):
     photo = read_photo(tmp_path / name)
     assert_right(photo, 0.02)
     assert photo.hdr == is_hdr and any("is read as" in warning for warning in photo.warnings) == is_hdr
+
+
+@pytest.mark.parametrize("codes", [(1, 1), (6, 6), (5, 6)])
+def test_the_codes_of_video_are_srgb_in_a_still(tmp_path, codes):
+    photo = read_photo(png(tmp_path / "a.png", levels(srgb(quadrants())), (b"cICP", bytes([*codes, 0, 1]))))
+    assert_right(photo)
+    assert any("taken as sRGB" in warning for warning in photo.warnings)
 
 
 @pytest.mark.parametrize(
@@ -265,6 +272,16 @@ def test_a_fourth_channel_that_is_no_alpha_is_left_out(tmp_path, dtype):
     photo = read_photo(tmp_path / "a.tif")
     assert_right(photo, 0.01)
     assert any("no transparency" in warning for warning in photo.warnings)
+
+
+@pytest.mark.parametrize("kind", ["unassalpha", "unspecified"])
+def test_a_second_channel_of_a_deep_grey_tiff_is_told_of(tmp_path, kind):
+    grey = levels(srgb(quadrants()), np.uint16)[..., :1]
+    pixels = np.concatenate([grey, grey * 0 + 9], -1)
+    tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="minisblack", extrasamples=[kind], planarconfig="contig")
+    photo = read_photo(tmp_path / "a.tif")
+    np.testing.assert_allclose(medians(photo), np.tile(COLOURS[:, :1], 3), atol=0.01)
+    assert any("transparency" in warning for warning in photo.warnings)
 
 
 @pytest.mark.parametrize("colours", [1, 3])

@@ -1,5 +1,6 @@
 """The photo in an EXR: its layer, colours, windows and pixels; and Radiance pictures beside it."""
 
+import struct
 from dataclasses import replace
 
 import cv2
@@ -15,9 +16,9 @@ from made_colours import (
 )
 from made_scene import make_scene
 
-from materialist.edits.light.relight import read_envmap
+from materialist.edits.light.relight import read_envmap, relight
 from materialist.errors import InputError
-from materialist.io import exr_photo
+from materialist.io import exr
 from materialist.io.colour_space import ACES_AP1, CIE_XYZ, REC2020
 from materialist.io.exr import picture_rank, read_exr, write_exr
 from materialist.io.exr_photo import read_exr_photo
@@ -70,6 +71,13 @@ def test_chromaticities_of_an_environment_map(tmp_path):
     np.testing.assert_allclose(envmap, sky, atol=1e-3)
 
 
+def test_what_was_assumed_of_an_environment_map_is_a_warning_of_the_scene(tmp_path):
+    sky = np.full((32, 64, 3), 0.5)
+    file = parts(tmp_path / "sky.exr", normal=sky, rgba=sky)
+    warnings = relight(make_scene(24, 33), envmap=file).report.warnings
+    assert any("sky.exr" in note and "rgba is taken" in note for note in warnings)
+
+
 def test_stated_colours_that_cannot_be_used_are_told_of(tmp_path):
     pixels = channels(quadrants())
     broken = read_photo(write(tmp_path / "a.exr", pixels, chromaticities=(0.3,) * 8))
@@ -84,21 +92,39 @@ def test_the_name_of_a_colour_space(tmp_path):
     assert_right(photo, 0.003)
 
 
+def attribute(name, kind, value):
+    return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+
+
+def write_sparse(path, channels):
+    """An uncompressed EXR of half channels by hand: name -> ([H, W] values, every how many pixels one is kept)."""
+    height, width = next(iter(channels.values()))[0].shape
+    names = sorted(channels)
+    steps = {name: channels[name][1] for name in names}
+    listed = b"".join(name.encode() + b"\0" + struct.pack("<iiii", 1, 0, steps[name], steps[name]) for name in names)
+    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    header = b"\x76\x2f\x31\x01" + struct.pack("<i", 2)
+    header += attribute("channels", "chlist", listed + b"\0") + attribute("compression", "compression", b"\0")
+    header += attribute("dataWindow", "box2i", box) + attribute("displayWindow", "box2i", box)
+    header += attribute("lineOrder", "lineOrder", b"\0") + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    header += attribute("screenWindowCenter", "v2f", bytes(8))
+    header += attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
+    lines = []
+    for y in range(height):
+        kept = [name for name in names if y % steps[name] == 0]
+        line = b"".join(channels[name][0][y, :: steps[name]].astype("<f2").tobytes() for name in kept)
+        lines.append(struct.pack("<ii", y, len(line)) + line)
+    starts = len(header) + 8 * height + np.cumsum([0, *map(len, lines[:-1])])
+    path.write_bytes(header + starts.astype("<u8").tobytes() + b"".join(lines))
+    return path
+
+
 @pytest.mark.parametrize("step", [1, 2])
 def test_luminance_and_chroma(tmp_path, step):
-    """The older interface of the library writes channels that have every second sample."""
-    import Imath
-
-    picture, half = quadrants(), Imath.PixelType(Imath.PixelType.HALF)
+    picture = quadrants()
     y = picture @ np.array([0.2126, 0.7152, 0.0722])
-    chroma = {"RY": (picture[..., 0] - y) / y, "BY": (picture[..., 2] - y) / y}
-    header = OpenEXR.Header(96, 64)
-    header["channels"] = {"Y": Imath.Channel(half)} | dict.fromkeys(chroma, Imath.Channel(half, step, step))
-    file = OpenEXR.OutputFile(str(tmp_path / "a.exr"), header)
-    sparse = {name: values[::step, ::step] for name, values in chroma.items()}
-    file.writePixels({name: values.astype(np.float16).tobytes() for name, values in {"Y": y, **sparse}.items()})
-    file.close()
-    assert_right(read_photo(tmp_path / "a.exr"), 0.005)
+    chroma = {"RY": ((picture[..., 0] - y) / y, step), "BY": ((picture[..., 2] - y) / y, step)}
+    assert_right(read_photo(write_sparse(tmp_path / "a.exr", {"Y": (y, 1), **chroma})), 0.005)
 
 
 # Layers
@@ -204,9 +230,10 @@ def test_windows_that_do_not_meet_or_are_huge_are_refused(tmp_path):
 
 def test_all_channels_of_a_file_are_bounded(tmp_path, monkeypatch):
     file = parts(tmp_path / "a.exr", rgba=quadrants(), normal=quadrants())
-    monkeypatch.setattr(exr_photo, "LARGEST_BYTES", 12 * 96 * 64)
-    with pytest.raises(InputError, match="in all its channels"):
-        read_photo(file)
+    monkeypatch.setattr(exr, "LARGEST_BYTES", 12 * 96 * 64)
+    for read in (read_photo, read_exr):
+        with pytest.raises(InputError, match="in all its channels"):
+            read(file)
 
 
 @pytest.mark.parametrize(("shape", "step"), [(2.0, (1, 2)), (0.5, (2, 1))])
@@ -282,6 +309,13 @@ def test_pixels_of_a_radiance_picture_that_are_not_square(tmp_path):
     photo = read_photo(radiance(tmp_path / "a.hdr", quadrants()[:, ::2], "PIXASPECT=0.5\n"))
     assert photo.original.shape == (64, 96, 3)
     assert_right(photo, 0.01)
+
+
+def test_a_folder_for_temporaries_that_is_read_only_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("OPENCV_TEMP_PATH", str(tmp_path))
+    monkeypatch.setattr("os.access", lambda path, mode: str(path) != str(tmp_path))
+    with pytest.raises(InputError, match=f"{tmp_path} is read-only; set OPENCV_TEMP_PATH"):
+        read_photo(radiance(tmp_path / "a.hdr", quadrants()))
 
 
 def test_plain_files_stay_bit_for_bit(tmp_path):

@@ -12,6 +12,7 @@ import tifffile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from made_png import png_header
 from made_scene import make_scene
 from PIL import Image
 
@@ -78,6 +79,13 @@ def test_maps_of_8_and_16_bits_are_scaled_not_decoded(tmp_path):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match="readable"):
             read_map(tmp_path / name)
+
+
+def test_maps_of_more_pixels_than_a_photo_are_refused_by_their_header(tmp_path):
+    (tmp_path / "huge.png").write_bytes(png_header(20000, 20000))
+    for read in (read_map, lambda path: read_mask(path, (20, 20))):
+        with pytest.raises(InputError, match="the limit is 200 megapixels"):
+            read(tmp_path / "huge.png")
 
 
 def test_masks(tmp_path):

@@ -264,3 +264,17 @@ def test_profiles_say_what_the_space_does(space):
     theirs = ImageCms.profileToProfile(image, source, ImageCms.createProfile("sRGB"), renderingIntent=1)
     ours = srgb_levels(space.linear(np.asarray(image)))
     assert np.abs(np.asarray(theirs, np.int16) - ours).max() <= 2
+
+
+@pytest.mark.parametrize("bits", [8, 10])
+def test_a_heic_of_more_bits_is_a_deep_photo(bits, tmp_path):
+    from pillow_heif import from_bytes
+
+    deep = np.random.default_rng(7).integers(0, 65536, (64, 64, 3)).astype(np.uint16)
+    pixels, mode = (deep, "RGB;16") if bits > 8 else ((deep >> 8).astype(np.uint8), "RGB")
+    from_bytes(mode, (64, 64), pixels.tobytes()).save(str(tmp_path / "a.heic"), quality=90)
+    photo = read_photo(tmp_path / "a.heic")
+    mt.save_image(tmp_path / "out.png", photo.original, photo)
+    stored = cv2.imread(str(tmp_path / "out.png"), cv2.IMREAD_UNCHANGED)
+    assert stored.dtype == (np.uint16 if bits > 8 else np.uint8)
+    assert np.abs(read_photo(tmp_path / "out.png").original - photo.original).max() < (1e-4 if bits > 8 else 1e-6)

@@ -26,7 +26,7 @@ MARKER = "scene.json"
 _MAPS = r"(albedo|roughness|metallic|normal|depth)\.exr"
 SCENE_FILES = re.compile(
     r"(scene\.json|report\.json|(photo|rerender)\.(exr|png)|envmap\.exr|mesh\.ply|plane_label\.png|overview\.png"
-    rf"|(prior|maps)/{_MAPS}|prior/light\.exr|maps/shading_residual\.exr|bodies/\d+(\.ply|\.{_MAPS}))"
+    rf"|(prior|maps)/{_MAPS}|prior/light\.exr|prior/(albedo|roughness|metallic|normal|depth)_spread\.exr|maps/shading_residual\.exr|bodies/\d+(\.ply|\.{_MAPS}))"
 )
 """Files of a package, beside the photo as it was given."""
 FILE_MANAGER_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")

@@ -154,12 +154,6 @@ def _narrow(encoded: Array, curve: Curve) -> Array:
     return curve(np.clip((encoded * 255 - 16) / 219, 0, 1))
 
 
-def rec709_curve(encoded: Array) -> Array:
-    """The inverse of the camera curve of BT.709, BT.601 and BT.2020."""
-    power = ((np.maximum(encoded, 0) + 0.099) / 1.099) ** (1 / 0.45)
-    return np.where(encoded < 0.081, encoded / 4.5, power)
-
-
 def pq_curve(encoded: Array) -> Array:
     """SMPTE ST 2084, in units of HDR_WHITE."""
     root = np.clip(encoded, 0, 1) ** (32 / 2523)

@@ -29,7 +29,6 @@ _PRIMARIES: dict[int, Primaries] = {
 }
 """ColourPrimaries of ITU-T H.273."""
 _TRANSFERS: dict[int, tuple[str, Curve]] = {
-    **dict.fromkeys((1, 6, 11, 14, 15), ("the BT.709 curve", spaces.rec709_curve)),
     4: ("gamma 2.2", spaces.power_curve(2.2)),
     5: ("gamma 2.8", spaces.power_curve(2.8)),
     8: ("linear", spaces.identity),
@@ -39,6 +38,9 @@ _TRANSFERS: dict[int, tuple[str, Curve]] = {
 }
 """TransferCharacteristics of ITU-T H.273."""
 _UNSPECIFIED = 2
+_VIDEO_TRANSFERS, _VIDEO_PRIMARIES = (1, 6, 11, 14, 15), (5, 6, 7)
+"""The camera curve of BT.709, BT.601 and BT.2020, and the primaries of BT.601: encoders of stills have written them for
+years over plain sRGB (libheif 1.17, libultrahdr, Android)."""
 HDR_NOTES = {
     "PQ": f"The photo is PQ: it is read as light, and {spaces.HDR_WHITE:g} cd/m2 are white.",
     "HLG": "The photo is HLG: it is read as the light of the scene, and 75 % of the signal are white.",
@@ -80,6 +82,11 @@ def cicp_space(primaries: int, transfer: int, notes: list[str], *, full_range: b
 
     Without `full_range`, black and white are the levels 16 and 235 of 255.
     """
+    if transfer in _VIDEO_TRANSFERS:
+        notes.append(
+            f"The file states the curve of video cameras (code {transfer}, ITU-T H.273); it is taken as sRGB's."
+        )
+        primaries, transfer = 1 if primaries in _VIDEO_PRIMARIES else primaries, 13
     name, curve = _TRANSFERS.get(transfer, _TRANSFERS[13])
     if primaries not in (0, _UNSPECIFIED, *_PRIMARIES) or transfer not in (0, _UNSPECIFIED, *_TRANSFERS):
         notes.append(
@@ -90,8 +97,8 @@ def cicp_space(primaries: int, transfer: int, notes: list[str], *, full_range: b
         notes.append(HDR_NOTES[name])
     if not full_range:
         curve = spaces.narrow(curve)
-    found = space(name, _PRIMARIES.get(primaries, spaces.REC709), curve, is_light=name in HDR_NOTES)
-    return None if found.is_srgb else found
+    stated = space(name, _PRIMARIES.get(primaries, spaces.REC709), curve, is_light=name in HDR_NOTES)
+    return None if stated.is_srgb else stated
 
 
 def exif_space(tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
@@ -105,8 +112,8 @@ def exif_space(tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
         gamma = tags.get("Gamma")
         try:
             curve = spaces.power_curve(float(gamma)) if gamma else spaces.srgb_curve
-            found = space("EXIF", [float(value) for value in (*primaries, *white)], curve)
-            return None if found.is_srgb else found
+            colours = space("EXIF", [float(value) for value in (*primaries, *white)], curve)
+            return None if colours.is_srgb else colours
         except (TypeError, ValueError, ZeroDivisionError):
             notes.append("The primaries in EXIF cannot be used; the photo is taken as sRGB.")
             return None
@@ -144,8 +151,8 @@ def _of_gamma(chunks: Mapping[bytes, bytes]) -> ColourSpace | None:
         # Files in sRGB carry 1 / 2.2 for programs that know no more; a wider space means the power itself.
         if gamma != 45_455 or not _is_rec709(primaries):
             curve = spaces.power_curve(1e5 / gamma)
-    found = space("gAMA and cHRM", primaries, curve)
-    return None if found.is_srgb else found
+    stated = space("gAMA and cHRM", primaries, curve)
+    return None if stated.is_srgb else stated
 
 
 def _is_rec709(primaries: Sequence[float]) -> bool:

@@ -88,9 +88,9 @@ def decoded_bytes(path: Path) -> int:
 
 
 def peak_bytes(path: Path) -> int:
-    """The most memory that reading a photo takes, bytes, by its header. Otherwise as `image_size`.
+    """The most memory that `read_photo` takes, bytes, predicted from the header. Otherwise as `image_size`.
 
-    Measured for each kind over its pixels: at most 24 bytes over what an EXR or a float TIFF holds, else 32.
+    At most 24 bytes a pixel beside all channels of an EXR, 32 beside the file of any other kind, as measured.
     """
     with path.open("rb") as file:
         is_exr = file.read(4) == _EXR

@@ -11,9 +11,12 @@ import numpy as np
 import OpenEXR
 
 from materialist.errors import InputError, OutputError
+from materialist.io.bitmap import MAX_PIXELS
 from materialist.plain import is_utf8
 from materialist.types import Array
 
+LARGEST_BYTES = 12 * MAX_PIXELS
+"""Most bytes of all channels of a file together, as float32."""
 GREY = ("Y", "V", "L", "Z", "depth")
 """Channels that are a grey map."""
 _PICTURES = (
@@ -45,6 +48,7 @@ def read_exr(path: str | Path) -> Array:
     Raises InputError when the file is missing, is not an EXR, is damaged, or holds no picture we know how to read.
     """
     path = Path(path)
+    check_exr(path)
     with opened_exr(path, separate_channels=True) as file:
         header = dict(file.parts[0].header)
         channels = {name: channel.pixels for name, channel in file.channels(0).items()}
@@ -88,6 +92,15 @@ def exr_bytes(path: Path) -> int:
     if any("deep" in str(header.get("type")) for header in headers):
         raise InputError(f"{path} holds deep pixels; save it as a plain picture.")
     return 4 * sum(math.prod(exr_size(header)) * len(header["channels"]) for header in headers)
+
+
+def check_exr(path: Path) -> None:
+    """Refuse a file that takes too much memory, before its pixels are decoded: the library decodes all channels."""
+    if (total := exr_bytes(path)) > LARGEST_BYTES:
+        raise InputError(
+            f"{path} holds {total / 1e9:.1f} GB in all its channels; the limit is {LARGEST_BYTES / 1e9:.1f}: save its "
+            "picture alone."
+        )
 
 
 def displayed(pixels: Array, header: dict[str, Any], path: Path) -> Array:
@@ -141,9 +154,9 @@ def layers_of(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
 
 def stacked(parts: dict[str, Array], names: str) -> Array:
     """[H, W, C] float32, with alpha where there is one; each channel leaves `parts`, which bounds the memory."""
-    wanted = names + "A" if "A" in parts else names
-    out: Array = np.empty((*parts[wanted[0]].shape, len(wanted)), np.float32)
-    for index, name in enumerate(wanted):
+    order = names + "A" if "A" in parts else names
+    out: Array = np.empty((*parts[order[0]].shape, len(order)), np.float32)
+    for index, name in enumerate(order):
         out[..., index] = parts.pop(name)
     return out
 

@@ -11,12 +11,12 @@ import numpy as np
 import OpenEXR
 
 from materialist.errors import InputError
-from materialist.io.bitmap import MAX_PIXELS, Decoded, check_size, light_and_alpha, square_pixels
+from materialist.io.bitmap import Decoded, check_size, light_and_alpha, square_pixels
 from materialist.io.colour_space import REC709, Primaries, rgb_to_xyz, to_rec709, transformed
 from materialist.io.exr import (
     GREY,
+    check_exr,
     displayed,
-    exr_bytes,
     layers_of,
     no_picture,
     opened_exr,
@@ -26,8 +26,6 @@ from materialist.io.exr import (
 )
 from materialist.types import Array
 
-LARGEST_BYTES = 12 * MAX_PIXELS
-"""Most bytes of all channels together: OpenEXR decodes every one."""
 PLAIN = "RGB"
 """What channels without a layer are called."""
 _LIGHT = ("Y", "L")
@@ -60,11 +58,7 @@ def read_exr_photo(path: Path, wished: str | None = None) -> Decoded:
 
     Raises InputError where there is none, for a layer that is not there, and for more data than memory should hold.
     """
-    if (total := exr_bytes(path)) > LARGEST_BYTES:
-        raise InputError(
-            f"{path} holds {total / 1e9:.1f} GB in all its channels; the limit is {LARGEST_BYTES / 1e9:.1f}: save its "
-            "picture alone."
-        )
+    check_exr(path)
     with opened_exr(path, separate_channels=True) as file:
         headers = [dict(part.header) for part in file.parts]
         names = [str(part.name() or "") for part in file.parts]
@@ -87,7 +81,7 @@ def read_exr_photo(path: Path, wished: str | None = None) -> Decoded:
 
 def _layers(part_name: str, part: int, channels: dict[str, Array], parts: int) -> list[_Layer]:
     """The layers of a part that have colours, or light alone."""
-    found = []
+    layers = []
     for layer, values in layers_of(channels).items():
         colours = {"R", "G", "B"} <= set(values) or {"Y", "RY", "BY"} <= set(values)
         grey = next((name for name in _LIGHT if name in values), None)
@@ -96,8 +90,8 @@ def _layers(part_name: str, part: int, channels: dict[str, Array], parts: int) -
         if colours or grey:
             name = _full_name(part_name if parts > 1 else "", layer)
             is_plain = parts == 1 and not layer
-            found.append(_Layer(name, part, values, None if colours else grey, is_plain))
-    return found
+            layers.append(_Layer(name, part, values, None if colours else grey, is_plain))
+    return layers
 
 
 def _full_name(part: str, layer: str) -> str:

@@ -9,7 +9,8 @@ from PIL import Image
 from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable, whole_file, writing
-from materialist.io.bitmap import stored_pixels
+from materialist.io.bitmap import MAX_PIXELS, stored_pixels
+from materialist.io.decode import image_size
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
@@ -66,10 +67,23 @@ def _with_alpha(path: str | Path) -> tuple[Array, Array | None]:
         return (array[..., :3] if array.ndim == 3 else array), alpha
     if not path.is_file():
         raise InputError(f"There is no map at {path}.")
+    _check_pixels(path)
     colour, alpha = stored_pixels(path)
     scale = np.float32({"uint8": 255, "uint16": 65535}.get(colour.dtype.name, 1))
     array = np.ascontiguousarray(colour if colour.shape[2] == 3 else colour[..., 0], np.float32) / scale
     return array, None if alpha is None else alpha[..., 0] / scale
+
+
+def _check_pixels(path: Path) -> None:
+    """Refuse more pixels than a photo may have, by the header. What has none `stored_pixels` refuses."""
+    try:
+        width, height = image_size(path)
+    except Exception:  # decoders raise anything
+        return
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{path} is {width} x {height} pixels; the limit is {MAX_PIXELS / 1e6:.0f} megapixels: shrink it."
+        )
 
 
 def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:

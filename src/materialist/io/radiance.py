@@ -1,6 +1,7 @@
 """Radiance HDR pictures (.hdr): their header's colours, exposure and orientation, around OpenCV's decoder."""
 
 import math
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,6 +60,9 @@ def read_radiance(path: Path) -> Decoded:
     # OpenCV knows one orientation and one format; the pixels of all are packed in the same way.
     plain = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {lines} +X {length}\n".encode()
     content = np.concatenate([np.frombuffer(plain, np.uint8), np.fromfile(path, np.uint8, offset=header.bytes)])
+    scratch = os.environ.get("OPENCV_TEMP_PATH", "/tmp")
+    if os.path.isdir(scratch) and not os.access(scratch, os.W_OK):  # where OpenCV puts the file before it decodes it
+        raise InputError(f"{path} cannot be decoded: {scratch} is read-only; set OPENCV_TEMP_PATH to another folder.")
     light = levels_of(content, path)[0]
     if light.dtype != np.float32:
         raise InputError(f"{path} is no Radiance picture that can be read; export it as EXR.")

@@ -43,6 +43,8 @@ class _Layout:
     compression: str
     profile: bytes | None
     frames: int
+    samples: int
+    """Channels of a pixel."""
 
     @classmethod
     def of(cls, page: Any, frames: int) -> "_Layout":
@@ -56,6 +58,7 @@ class _Layout:
             page.compression.name,
             tags.valueof("InterColorProfile"),
             frames,
+            int(tags.valueof("SamplesPerPixel", 1)),
         )
 
 
@@ -74,9 +77,11 @@ def read_tiff(path: Path) -> Decoded:
     _require_known(layout, path)
     colour, alpha = rgb_levels(path)
     tags, warnings = file_tags(path), frames_note(layout.frames)
-    if alpha is not None and layout.extra[0] == _UNSPECIFIED:
+    if layout.extra[0] == _UNSPECIFIED:
         warnings.append(FOURTH)
         alpha = None
+    elif layout.samples == 2 and alpha is None:  # OpenCV reads the grey channel alone, at 8 bits
+        warnings.append("The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it.")
     space = _space(layout, tags, warnings, is_float=colour.dtype.kind == "f")
     premultiplied = _PREMULTIPLIED in layout.extra
     if colour.dtype.kind == "f":

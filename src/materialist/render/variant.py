@@ -11,6 +11,7 @@ from functools import lru_cache
 from glob import glob
 
 from materialist.errors import InputError, SetupError
+from materialist.forks import check_process
 
 MINIMUM_LLVM = 17
 """Dr.Jit refuses 14; 15 and 16 start, but abort the process in a path-tracing kernel (they cannot select fminimum)."""
@@ -114,10 +115,11 @@ def setup(device: str = "auto"):
     variant runs on the processors this process may use, or on OMP_NUM_THREADS of them, as torch does.
 
     device: `auto` (CUDA where a driver answers), `cpu` or `cuda`. Raises InputError for an unknown one, SetupError
-    where LLVM or CUDA is missing, or another device was chosen before.
+    where LLVM or CUDA is missing, another device was chosen before, or this process is a fork of one that computes.
     """
     if device not in ("auto", "cpu", "cuda"):
         raise InputError(f"Device is '{device}'; choose auto, cpu or cuda.")
+    check_process()
     _point_to_llvm(device)
     try:
         import mitsuba as mi

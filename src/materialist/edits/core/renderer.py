@@ -10,6 +10,7 @@ import numpy as np
 from materialist.color import CLIPPED
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.envmap import environment, paste_visible_sky, texel_directions
+from materialist.forks import check_process
 from materialist.geometry.silhouette import window
 from materialist.io.photo import HDR_CLIP
 from materialist.render.bodies import is_glowing, is_transparent
@@ -53,6 +54,7 @@ class EditRenderer:
     """
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
+        check_process()
         self.scene, self.device = scene, device
         self._built: dict[bool, tuple[Scene, Any]] = {}
         """The base's (True) and those of the last edit of other shapes."""

@@ -2,6 +2,7 @@
 
 import io
 from pathlib import Path
+from typing import Any
 
 from tifffile import TiffFile
 
@@ -9,6 +10,8 @@ from materialist.io.decode import RAW_SUFFIXES
 from materialist.types import Photo
 
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_HEIC = tuple(b"ftyp" + brand for brand in (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"))
+"""How files of these formats begin, HEIC from its fifth byte on."""
 
 
 def is_tiff(content: bytes) -> bool:
@@ -17,7 +20,7 @@ def is_tiff(content: bytes) -> bool:
 
 
 def is_deep(photo: Photo) -> bool:
-    """Whether the photo came from a display file of more than 8 bits a channel: 16-bit PNG, TIFF, camera RAW."""
+    """Whether the photo came from a display file of more than 8 bits a channel: PNG, TIFF, HEIC, camera RAW."""
     if photo.deep:
         return True
     source = photo.source or b""
@@ -25,4 +28,13 @@ def is_deep(photo: Photo) -> bool:
         return len(source) > 24 and source[24] == 16
     if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
         return True
-    return is_tiff(source) and TiffFile(io.BytesIO(source)).pages.first.bitspersample > 8
+    if is_tiff(source):
+        return TiffFile(io.BytesIO(source)).pages.first.bitspersample > 8
+    return source[4:12] in _HEIC and _heic_bits(source) > 8
+
+
+def _heic_bits(source: bytes) -> int:
+    from pillow_heif import open_heif
+
+    heif: Any = open_heif(io.BytesIO(source), convert_hdr_to_8bit=False)
+    return int(heif.info.get("bit_depth", 8))
