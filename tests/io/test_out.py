@@ -22,8 +22,15 @@ from materialist.io.out.tiff import tiff_bytes
 from materialist.io.photo import read_photo
 
 LEVELS = np.random.default_rng(1).integers(0, 256, (30, 41, 3)).astype(np.uint8)
+
+
+def video_curve(encoded):
+    """The inverse of BT.2020's: neither a power nor sRGB's, so a profile has samples of it."""
+    return np.where(encoded < 0.081, encoded / 4.5, ((np.maximum(encoded, 0) + 0.099) / 1.099) ** (1 / 0.45))
+
+
 P3 = profile_of(spaces.space("Display P3", spaces.DISPLAY_P3, spaces.srgb_curve))
-WIDE = profile_of(spaces.space("Rec. 2020", spaces.REC2020, spaces.rec709_curve))
+WIDE = profile_of(spaces.space("Rec. 2020", spaces.REC2020, video_curve))
 ADOBE = profile_of(spaces.space("Adobe RGB", spaces.ADOBE_RGB, spaces.power_curve(563 / 256)))
 EDITED = (slice(4, 9), slice(6, 12))
 LEVELS[EDITED] = LEVELS[EDITED] // 8 + 100  # colours that every space has
@@ -248,7 +255,7 @@ def test_arrays_and_files_that_are_refused(tmp_path):
     [
         spaces.space("sRGB", spaces.REC709, spaces.srgb_curve),
         spaces.space("Adobe RGB", spaces.ADOBE_RGB, spaces.power_curve(563 / 256)),
-        spaces.space("Rec. 2020", spaces.REC2020, spaces.rec709_curve),
+        spaces.space("Rec. 2020", spaces.REC2020, video_curve),
     ],
     ids=lambda space: space.name,
 )
