@@ -2,6 +2,7 @@
 
 import tempfile
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from PIL import Image, UnidentifiedImageError
 
 from materialist.color import ROWS, srgb_levels
 from materialist.io.bitmap import pixel_limit_lifted, rgb_levels, upright
-from materialist.io.colour_space import ColourSpace
+from materialist.io.colour_space import ColourSpace, transformed
 from materialist.io.colour_tags import png_chunks, stated_space
 from materialist.io.exif import image_tags
 from materialist.io.icc import matrix_profile
@@ -64,6 +65,14 @@ class PhotoColours:
             out[rows] = self._of_the_photo(rows, picture[rows], picture.shape)[1]
         return out
 
+    @cached_property
+    def _tables(self) -> list[Array]:
+        """Each channel's linear value, by its stored level."""
+        if self.space is None or self.stored is None:
+            return []
+        top = np.iinfo(self.stored.dtype).max
+        return [curve(np.arange(top + 1) / top).astype(np.float32) for curve in self.space.curves]
+
     def _of_the_photo(self, rows: slice, picture: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
         """(which pixels [h, W] are the photo's, [h, W, 3] those rows with what clipping took from the photo).
 
@@ -72,10 +81,13 @@ class PhotoColours:
         """
         if self.space is None or self.stored is None or self.stored.shape != shape:
             return np.zeros(picture.shape[:2], bool), picture
-        stored = self.stored[rows]
-        inside = self.space.linear(stored)
-        lost = self.space.linear(stored / np.iinfo(stored.dtype).max) - inside
+        unclipped = np.stack([table[self.stored[rows][..., k]] for k, table in enumerate(self._tables)], -1)
+        transformed(unclipped, self.space.matrix)
+        inside = np.clip(unclipped, 0, 1)
+        lost = unclipped - inside
         kept = (np.abs(picture - inside) <= _TOLERANCE).all(-1)
+        if not lost.any():
+            return kept, picture
         share = np.clip((picture + _TOLERANCE) / (inside + _TOLERANCE), 0, 1).min(-1, keepdims=True)
         share[kept] = 1
         at_end = np.clip(1 - picture / np.maximum(-_MOVED * lost, _TOLERANCE), 0, 1)
