@@ -78,6 +78,8 @@ class Photo(Record):
     """Exposure of `linear` and `original` over the values of an HDR file, see `io.photo.read_photo`."""
     layer: str | None = None
     """Name of the layer or part that it is, of an EXR that has several."""
+    exif: bytes | None = field(default=None, repr=False)
+    """EXIF of the file that it was made of, where `source` is not there any more."""
 
     @property
     def name(self) -> str:

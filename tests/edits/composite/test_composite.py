@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from edit_scenes import MASK, flat_scene, rendered_scene
+from PIL import Image
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
@@ -253,6 +254,22 @@ def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):
     assert again.photo.source is None and is_deep(again.photo)
     save_scene(developed(FLAT, FLAT, FLAT.photo.original), tmp_path / "c.scene")
     assert not is_deep(load_scene(tmp_path / "c.scene").photo)
+
+
+def test_a_saved_edit_keeps_the_exif_of_the_photo(tmp_path):
+    exif = Image.Exif()
+    exif[0x010F], exif[0x0112] = "Canon", 1
+    exif.get_ifd(0x8769)[0xA405] = 28
+    Image.new("RGB", (48, 36), "grey").save(tmp_path / "a.jpg", exif=exif)
+    scene = replace(FLAT, photo=photo_from(tmp_path / "a.jpg"))
+    once = developed(scene, scene, scene.photo.original)
+    save_scene(once, tmp_path / "b.scene")
+    again = load_scene(tmp_path / "b.scene")
+    assert again.photo.exif == once.photo.exif and again.photo.source is None
+    for saved in (again, developed(again, again, again.photo.original)):
+        write_composite(tmp_path / "o.jpg", saved.photo.original, saved.photo, force=True)
+        found = Image.open(tmp_path / "o.jpg").getexif()
+        assert found[0x010F] == "Canon" and found.get_ifd(0x8769)[0xA405] == 28
 
 
 def test_a_renderer_goes_with_its_last_user():

@@ -18,6 +18,7 @@ from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
 from materialist.io.out.depth import is_deep
 from materialist.io.out.encode import save_image
+from materialist.io.out.exif import copied_exif
 from materialist.options import PATHS
 from materialist.types import Array, Photo, Scene
 
@@ -138,7 +139,12 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     same = picture.shape[:2] == size[::-1]
     linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
     photo = replace(
-        scene.photo, linear=linear.astype(np.float32), original=picture, source=None, deep=is_deep(scene.photo)
+        scene.photo,
+        linear=linear.astype(np.float32),
+        original=picture,
+        source=None,
+        deep=is_deep(scene.photo),
+        exif=copied_exif(scene.photo).tobytes(),
     )
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
     figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}

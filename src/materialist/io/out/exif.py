@@ -53,10 +53,14 @@ def copied_exif(photo: Photo | None, *, srgb: bool = True) -> Image.Exif:
 
 def _of_file(photo: Photo | None) -> Image.Exif:
     """The EXIF of the photo's file; empty where there is none, or it is damaged."""
-    source = photo.source if photo is not None else None
-    if photo is None or source is None:
+    if photo is None:
         return Image.Exif()
+    source = photo.source
     with suppress(Exception):  # a photo with damaged EXIF is read, so pictures of it are written
+        if source is None:
+            exif = Image.Exif()
+            exif.load(photo.exif or b"")
+            return exif
         if is_tiff(source) or Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
             exif = Image.Exif()
             exif.load_from_fp(io.BytesIO(source))
