@@ -285,3 +285,17 @@ def test_a_heic_of_more_bits_is_a_deep_photo(bits, tmp_path):
     stored = cv2.imread(str(tmp_path / "out.png"), cv2.IMREAD_UNCHANGED)
     assert stored.dtype == (np.uint16 if bits > 8 else np.uint8)
     assert np.abs(read_photo(tmp_path / "out.png").original - photo.original).max() < (1e-4 if bits > 8 else 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("primaries", "curve", "name"),
+    [
+        (spaces.DISPLAY_P3, spaces.srgb_curve, "Display P3"),
+        (spaces.REC709, spaces.power_curve(1.8), "sRGB primaries"),
+        (spaces.REC2020, video_curve, "Rec.2020 primaries"),
+        (spaces.ACES_AP1, spaces.srgb_curve, "mine"),
+    ],
+)
+def test_profiles_have_the_names_that_people_know(primaries, curve, name):
+    profile = ImageCms.ImageCmsProfile(io.BytesIO(profile_of(spaces.space("mine", primaries, curve)))).profile
+    assert profile.profile_description == name

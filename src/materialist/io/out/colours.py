@@ -6,12 +6,14 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from materialist.color import ROWS, srgb_levels
 from materialist.io.bitmap import pixel_limit_lifted, rgb_levels, upright
+from materialist.io.boxes import jp2_profile
 from materialist.io.colour_space import ColourSpace, transformed
 from materialist.io.colour_tags import png_chunks, stated_space
+from materialist.io.decode import RAW_SUFFIXES
 from materialist.io.exif import image_tags
 from materialist.io.icc import matrix_profile
 from materialist.io.out.depth import is_deep, is_tiff
@@ -100,14 +102,15 @@ SRGB = PhotoColours(srgb_profile())
 
 def photo_colours(photo: Photo) -> PhotoColours:
     """Those of the photo's file; sRGB for what has none, holds light, or came from memory."""
-    if photo.source is None or photo.hdr:
+    suffix = Path(photo.path or "").suffix.lower()
+    if photo.source is None or photo.hdr or suffix in RAW_SUFFIXES:
         return SRGB
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"photo{Path(photo.path or '').suffix}"
+        file = Path(folder) / f"photo{suffix}"
         file.write_bytes(photo.source)
         try:
             return _of_file(file, deep=is_deep(photo))
-        except (OSError, UnidentifiedImageError, ValueError):  # camera RAW, and formats of other readers
+        except (OSError, ValueError):  # formats that Pillow does not know: EXR, float and CIELab TIFF
             return SRGB
 
 
@@ -118,15 +121,16 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
     with pixel_limit_lifted(), file.open("rb") as opened, Image.open(opened) as image:
         tags, kind, mode = image_tags(image), image.format, image.mode
         chunks = png_chunks(file) if kind == "PNG" else {}
-        profile = None if b"cICP" in chunks else image.info.get("icc_profile")
+        embedded = jp2_profile(file) if kind == "JPEG2000" else image.info.get("icc_profile")
+        profile = None if b"cICP" in chunks else embedded
         colours = matrix_profile(profile) if profile else stated_space(file, kind, tags, [])
         if mode in ("L", "LA", "1", "I;16") or (colours is None and not profile and mode != "CMYK"):
             return SRGB
         if colours is None or mode == "CMYK" or colours.is_light:
             return PhotoColours(SRGB.profile, notes=(UNKEPT.format(_reason(mode, profile)),))
+        own = profile if profile and profile[16:20] == b"RGB " else profile_of(colours)
         if colours.is_srgb:
-            return PhotoColours(profile or SRGB.profile)
-        own = profile or profile_of(colours)
+            return PhotoColours(own if profile else SRGB.profile)
         if "A" in mode or "a" in mode or "transparency" in image.info or (kind == "HEIF" and deep):
             return PhotoColours(own, colours)
         if not deep:

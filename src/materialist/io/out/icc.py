@@ -5,7 +5,19 @@ from functools import cache
 
 import numpy as np
 
-from materialist.io.colour_space import REC709, ColourSpace, Curve, d50_to_rec709, power_curve, space, srgb_curve
+from materialist.io.colour_space import (
+    ADOBE_RGB,
+    DISPLAY_P3,
+    REC709,
+    REC2020,
+    ColourSpace,
+    Curve,
+    d50_to_rec709,
+    power_curve,
+    space,
+    srgb_curve,
+    to_rec709,
+)
 
 _SAMPLES = 4096
 """Of a curve that is neither sRGB's nor a power."""
@@ -13,13 +25,14 @@ _SRGB = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
 _DATE = (2026, 1, 1, 0, 0, 0)
 """The same for all, so that equal pictures are equal files."""
 _D50 = (0.9642, 1.0, 0.8249)
+_NAMES = {"sRGB": REC709, "Display P3": DISPLAY_P3, "Adobe RGB": ADOBE_RGB, "Rec.2020": REC2020}
 
 
 def profile_of(colours: ColourSpace) -> bytes:
     """The profile of a space of curves and a matrix, as a display's."""
     columns = np.linalg.inv(d50_to_rec709()) @ colours.matrix
     tags = {
-        b"desc": _text(colours.name),
+        b"desc": _text(_name(colours)),
         b"cprt": _text("No copyright, use freely"),
         b"wtpt": _xyz(_D50),
         **{name: _xyz(column) for name, column in zip((b"rXYZ", b"gXYZ", b"bXYZ"), columns.T)},
@@ -32,6 +45,17 @@ def profile_of(colours: ColourSpace) -> bytes:
 def srgb_profile() -> bytes:
     """The profile of sRGB."""
     return profile_of(space("sRGB", REC709, srgb_curve))
+
+
+def _name(colours: ColourSpace) -> str:
+    """What people call the space, by its primaries."""
+    known = (name for name, primaries in _NAMES.items() if np.allclose(to_rec709(primaries), colours.matrix, atol=1e-3))
+    name = next(known, None)
+    if name is None:
+        return colours.name
+    usual = power_curve(0) if name == "Adobe RGB" else srgb_curve
+    same_kind = getattr(colours.curves[0], "func", colours.curves[0]) is getattr(usual, "func", usual)
+    return name if same_kind else f"{name} primaries"
 
 
 def _file(tags: dict[bytes, bytes]) -> bytes:
@@ -65,7 +89,7 @@ def _curve(curve: Curve) -> bytes:
     if curve is srgb_curve:
         return b"para" + struct.pack(">IHH", 0, 3, 0) + _s15(*_SRGB)
     exponent = getattr(curve, "keywords", {}).get("exponent")
-    if exponent is not None and getattr(curve, "func", None) is getattr(power_curve(1), "func", None):
+    if exponent is not None:
         return b"para" + struct.pack(">IHH", 0, 0, 0) + _s15(exponent)
     samples = np.round(np.clip(curve(np.linspace(0, 1, _SAMPLES)), 0, 1) * 65535).astype(">u2")
     return b"curv" + struct.pack(">II", 0, _SAMPLES) + samples.tobytes()
