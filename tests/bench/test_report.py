@@ -70,7 +70,7 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path):
         claim(tmp_path / "new" / "deep")
     assert claim(tmp_path / "new").is_dir() and claim(tmp_path / "new" / "deep").is_dir()
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(OutputError, match="force=True"):
+    with pytest.raises(OutputError, match="--force"):
         claim(tmp_path)
     assert claim(tmp_path, force=True) == tmp_path
     with pytest.raises(OutputError, match="cannot be written"):
