@@ -12,6 +12,7 @@ from studio_scenes import block, zipped, zipped_package
 from materialist.errors import InputError
 from materialist.io.image import write_png
 from materialist.studio import StudioSettings, archives, uploads
+from materialist.studio.access.quota import Allowance
 from materialist.studio.workspace import write_mask
 
 
@@ -63,8 +64,8 @@ def test_a_small_file_of_a_large_picture(tmp_path, limited, option):
     file = large_png(tmp_path / "a.png", 7000)
     assert file.stat().st_size < 500_000
     before = psutil.Process().memory_info().rss
-    with pytest.raises(InputError, match=r"a\.png.*(needs more than 0.6 GB|too large)"):
-        uploads.used(tmp_path, file, option, lambda name: pytest.fail("it was used"))
+    with pytest.raises(InputError, match=r"a\.png.*(needs more than 0.6 GB|may have up to 8 megapixels)"):
+        uploads.used(tmp_path, file, option, Allowance(), lambda name: pytest.fail("it was used"))
     assert psutil.Process().memory_info().rss - before < 50e6
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
 
@@ -73,7 +74,7 @@ def test_a_small_file_of_a_large_mesh(tmp_path, limited):
     file = sparse_glb(tmp_path / "a.glb", 400_000_000)
     before = psutil.Process().memory_info().rss
     with pytest.raises(InputError, match=r"a\.glb"):
-        uploads.used(tmp_path, file, uploads.MESH, lambda name: pytest.fail("it was used"))
+        uploads.used(tmp_path, file, uploads.MESH, Allowance(), lambda name: pytest.fail("it was used"))
     assert psutil.Process().memory_info().rss - before < 50e6
 
 
@@ -82,16 +83,16 @@ def test_what_can_be_opened_is_stored(tmp_path):
     workspace.mkdir()
     write_png(tmp_path / "wood.png", np.full((8, 8, 3), 90, np.uint8))
     names = []
-    uploads.used(workspace, tmp_path / "wood.png", "texture", names.append)
+    uploads.used(workspace, tmp_path / "wood.png", "texture", Allowance(), names.append)
     assert (workspace / names[0]).read_bytes() == (tmp_path / "wood.png").read_bytes()
 
 
 def test_a_scene_is_unpacked_and_loaded_elsewhere(tmp_path):
-    archives.unpack_scene(zipped_package(tmp_path), tmp_path / "target")
+    archives.unpack_scene(zipped_package(tmp_path), tmp_path / "target", Allowance())
     assert (tmp_path / "target" / "scene.json").is_file()
     broken = zipped(tmp_path / "b.zip", {"scene.json": "{}"})
     with pytest.raises(InputError, match="does not describe a scene"):
-        archives.unpack_scene(broken, tmp_path / "other")
+        archives.unpack_scene(broken, tmp_path / "other", Allowance())
     assert not (tmp_path / "other").exists()
 
 

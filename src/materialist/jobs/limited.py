@@ -57,8 +57,8 @@ def _last_message(worker: Worker, deadline: float) -> Message | None:
 def _reason(message: Message, limits: Limits) -> str:
     """Why a task failed, as a sentence for who sent the file."""
     facts = message.facts
-    out_of_memory = facts.get("out_of_memory") or (message.kind == LOST and limits.memory)
-    if out_of_memory:
+    # Some libraries end the process where they get no memory.
+    if facts["out_of_memory"] or message.kind == LOST:
         return f"It is damaged, or needs more than {limits.memory / 1e9:g} GB of memory to open; give a smaller file."
     if facts["bug"]:
         return f"It cannot be read ({facts['error']}); export it again."

@@ -120,7 +120,8 @@ class RayPool:
                 message = Message(*self._ray.get(reference))
             except (self._ray.exceptions.RayError, OSError) as error:
                 reason = f"Its worker on the cluster was lost ({type(error).__name__})."
-                message = Message(LOST, {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None})
+                facts = {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}
+                message = Message(LOST, {**facts, "out_of_memory": False})
             found.append((key, message))
         return found
 

@@ -125,7 +125,14 @@ def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
         errors.seek(max(0, size - 2000))
         lines = errors.read().decode("utf-8", "replace").strip().splitlines()
         reason += f" Its last words: {lines[-1][:300]}" if lines else ""
-    return {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}
+    out_of_memory = code == -signal.SIGKILL
+    return {
+        "error": "WorkerLost",
+        "reason": reason,
+        "bug": False,
+        "trace": None,
+        "out_of_memory": out_of_memory,
+    }
 
 
 def sentence(facts: dict[str, Any]) -> str:

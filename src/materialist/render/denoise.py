@@ -38,10 +38,10 @@ def denoise(image: Array, albedo: Array, normal: Array) -> Array:
 def denoiser_problem() -> str | None:
     """Why the denoiser cannot be loaded here; None where it can."""
     try:
-        _pyoidn(with_torch=torch_device() == "cuda")
+        module = _pyoidn(with_torch=torch_device() == "cuda")
     except (ImportError, OSError) as error:
         return str(error)
-    return None
+    return None if hasattr(module, "denoise") else "it has no function denoise"
 
 
 def require_denoiser() -> None:

@@ -18,6 +18,7 @@ from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
 from materialist.io.package import load_scene
 from materialist.studio import SETTINGS, uploads
+from materialist.studio.access.quota import Allowance, folder_size
 from materialist.studio.workspace import store, with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
@@ -32,31 +33,34 @@ def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
             made.write(edits.parent / name, name)
 
 
-def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
+def unpack(workspace: Path, archive: Path, allowance: Allowance) -> tuple[Step, ...]:
     """The steps of a zip that `pack` wrote, their files in the workspace under names of ours.
 
     Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
     """
     with tempfile.TemporaryDirectory(dir=workspace, prefix=".load-") as place:
         folder = Path(place)
-        steps, suffixes = uploads.opened(extract_list, archive, folder=folder)
+        steps, readable = uploads.opened(extract_list, archive, allowance, folder=folder)
 
         def moved(option: str, name: str) -> str:
             file = folder / name
             if (workspace / name).is_file() and filecmp.cmp(workspace / name, file, shallow=False):
                 return name
-            return store(workspace, option, file.read_bytes(), suffixes[name])
+            content = readable[name].read_bytes()
+            allowance.claim(len(content))
+            return store(workspace, option, content, readable[name].suffix.lower())
 
         return tuple(replace(with_plain_files(step, moved), folder=workspace) for step in steps)
 
 
-def unpack_scene(archive: Path, target: Path) -> None:
+def unpack_scene(archive: Path, target: Path, allowance: Allowance) -> None:
     """Unpack a zipped scene package into `target`: known members only, and only a scene that can be loaded.
 
     Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
     """
     try:
-        uploads.opened(extract_scene, archive, target=target, limit=SETTINGS.decoded_bytes)
+        uploads.opened(extract_scene, archive, allowance, target=target)
+        allowance.claim(folder_size(target))
     except InputError:
         shutil.rmtree(target, ignore_errors=True)
         raise
@@ -70,8 +74,8 @@ def read_list(report: Any, file: Path) -> list[Step]:
     return read_recipe(file)
 
 
-def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dict[str, str]]:
-    """The steps of a zipped list of edits, whose files it writes to a folder, and the suffix of each by its name."""
+def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dict[str, Path]]:
+    """The steps of a zipped list of edits, whose files it writes to a folder, and the file to read for each name."""
     shown = uploads.shown_name(file)
     advice = "give the zip that 'edits.yaml with its masks' makes"
     with _members(file, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (archive, members):
@@ -83,18 +87,23 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
         if lacking:
             raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")
         _extract(archive, {name: members[name] for name in options}, folder, shown)
-    suffixes = {name: uploads.checked(report, folder / name, option) for name, option in options.items()}
-    return steps, suffixes
+    readable = {name: uploads.checked(report, folder / name, option) for name, option in options.items()}
+    return steps, readable
 
 
-def extract_scene(report: Any, file: Path, target: Path, limit: int) -> None:
-    """Unpack a zipped scene package and load it once; limit: bytes of its pictures in memory, by their headers."""
+def extract_scene(report: Any, file: Path, target: Path) -> None:
+    """Unpack a zipped scene package and load it once. Raises InputError where it is damaged, or too large."""
     shown = uploads.shown_name(file)
     missing = "no scene package (no scene.json); zip the folder that invert wrote"
     with _members(file, shown, r"scene\.json", missing) as (archive, members):
         known = {name: one for name, one in members.items() if _MEMBER.fullmatch(name)}
         _extract(archive, known, target, shown)
-    load_scene(target, most=limit)
+    camera = load_scene(target, most=SETTINGS.decoded_bytes).camera
+    if camera.width * camera.height > SETTINGS.scene_pixels:
+        raise InputError(
+            f"{shown} is a scene of {camera.width} x {camera.height} pixels; the studio takes up to "
+            f"{SETTINGS.scene_pixels / 1e6:g} megapixels. Invert its photo again at a smaller --size."
+        )
 
 
 @contextmanager

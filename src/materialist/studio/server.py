@@ -143,7 +143,7 @@ def application(
     from materialist.studio.page import build
 
     page = build(studio)
-    studio.work.kept = {*studio.work.cache.iterdir()}
+    studio.work.kept |= {*studio.work.cache.iterdir()}
     _fetch_nothing()
     page.queue(default_concurrency_limit=8, max_size=200)
     app = gr.mount_gradio_app(
@@ -167,7 +167,13 @@ def _fetch_nothing() -> None:
 
 def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
     """A studio on a work folder. Raises OutputError where it cannot be written."""
-    return Studio(WorkFolder(work), JobQueue(workers, SETTINGS.job_memory), single_user, seed=seed, device=device)
+    return Studio(
+        WorkFolder(work),
+        JobQueue(workers, SETTINGS.job_memory, SETTINGS.job_seconds),
+        single_user,
+        seed=seed,
+        device=device,
+    )
 
 
 def _theme(gr: Any) -> Any:

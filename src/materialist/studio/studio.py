@@ -1,11 +1,14 @@
 """The running studio: its work folder, its queue of jobs, and the pages that are open."""
 
+import json
 import re
 import secrets
 import shutil
 import threading
 import time
+import traceback
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,7 +21,7 @@ from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.access.files import HandedFiles
-from materialist.studio.access.quota import Quota, sender_of
+from materialist.studio.access.quota import Allowance, Quota, sender_of
 from materialist.studio.preview import free_memory
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
@@ -72,11 +75,7 @@ class Studio:
         with self._lock:
             last = now - SETTINGS.page_seconds
             gone = [name for name, one in self._sessions.items() if not one.beats and one.seen < last and name != page]
-            known = (
-                self._sessions.setdefault(page, Session(person, self.without_folders, self.single_user))
-                if page
-                else None
-            )
+            known = self._sessions.setdefault(page, self._new_session(person)) if page else None
             if known is not None and known.person == person:
                 known.seen, known.beats = now, known.beats or beats
         for name in gone:
@@ -84,6 +83,10 @@ class Studio:
         if known is None or known.person != person:
             raise InputError(LOST)
         return known
+
+    def _new_session(self, person: str) -> Session:
+        allowance = Allowance(self.quota, lambda: self.senders.get(person, person))
+        return Session(person, self.without_folders, self.single_user, allowance)
 
     def without_folders(self, text: str) -> str:
         """A text for a page: names in place of the paths of this machine."""
@@ -96,11 +99,16 @@ class Studio:
         with self._lock:
             self.senders.pop(person, None)
             self.senders[person] = sender_of(address)
-            self.senders = dict([*self.senders.items()][-SETTINGS.people :])
+            while len(self.senders) > SETTINGS.people:
+                del self.senders[next(iter(self.senders))]
 
     def claim(self, person: str, size: int) -> None:
         """Count bytes that a person is about to store. Raises InputError above the quota, or where the disk is full."""
         self.quota.claim(self.senders.get(person, person), size)
+
+    def give_back(self, person: str, size: int) -> None:
+        """Take back a part of what was claimed, and not stored."""
+        self.quota.give_back(self.senders.get(person, person), size)
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
@@ -122,7 +130,7 @@ class Studio:
         session.close()
         if had_scene:
             free_memory().result()
-        if psutil.virtual_memory().available < SETTINGS.free_for_scene:
+        if psutil.virtual_memory().available < _memory_of(project):
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
         self.note_last(session.person, name)
@@ -137,10 +145,14 @@ class Studio:
 
         Raises InputError where this person, or all together, have too many there.
         """
-        mine, all_ = len(self.jobs.unfinished(session.person)), len(self.jobs.unfinished())
+        unfinished = self.jobs.unfinished()
+        sender = self.senders.get(session.person, session.person)
+        mine = sum(self.senders.get(job.owner, job.owner) == sender for job in unfinished)
+        all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
             whose = f"You have {mine}" if mine >= SETTINGS.jobs_a_person else f"The studio has {all_}"
             raise InputError(f"{whose} jobs waiting or running; stop one, or wait until one is done.")
+        self.quota.check_disk()
         work = partial(tasks.on_device, self.device, task)
         job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
         session.note_job(job)
@@ -167,7 +179,10 @@ class Studio:
             sessions, self._left = self._left, []
         had_scene = any(session.live is not None for session in sessions)
         for session in sessions:
-            session.close()
+            try:
+                session.close()
+            except Exception as error:  # the others are closed all the same
+                traceback.print_exception(error)
         sessions.clear()
         if had_scene:
             free_memory().result()
@@ -178,8 +193,17 @@ class Studio:
         It lies in a folder with a random name, and this person may name it in requests. `name` is another name for
         the file.
         """
+        self.claim(person, file.stat().st_size)
         folder = self.work.cache / secrets.token_hex(16)
         with writing(file.name):
             folder.mkdir()
             copy = Path(shutil.copyfile(file, folder / (name or file.name)))
         return self.files.hand_out(person, copy, str(copy))
+
+
+def _memory_of(project: Project) -> float:
+    """Bytes of memory that opening a project takes, by the size of its scene."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        width, height = json.loads((project.scene / "scene.json").read_text("utf-8"))["size"]
+        return SETTINGS.free_for_scene + SETTINGS.free_a_pixel * int(width) * int(height)
+    return SETTINGS.free_for_scene

@@ -73,7 +73,7 @@ def _uploaded(session: Session, file: Path) -> Updates:
     def use(name: str) -> None:
         objects.set_option(session, "mesh", name)
 
-    uploads.used(session.workspace, file, uploads.MESH, use)
+    uploads.used(session.workspace, file, uploads.MESH, session.allowance, use)
     return {"tool": "place", "thing": None}
 
 

@@ -15,7 +15,6 @@ from materialist.io.decode import SUFFIXES
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
 from materialist.studio import archives, tasks, uploads
-from materialist.studio.access.quota import folder_size
 from materialist.studio.controls import file_field
 from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
@@ -62,7 +61,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield {"facts": box(f"{name} will be opened as a scene.")}
             return
         if file is not None:
-            uploads.opened(uploads.checked, Path(file), option=uploads.PHOTO)
+            uploads.opened(uploads.checked, Path(file), session.allowance, option=uploads.PHOTO)
         yield {"facts": box(f"{name} is ready.") if file else ""}
 
     def choose_example(session: Session, data: Any) -> Iterator[Updates]:
@@ -114,7 +113,8 @@ def _start_inversion(
     if predictor not in {value for _, value in PREDICTORS}:
         raise InputError("Choose one of the listed ways to make the first guess.")
     source = Path(file)
-    suffix = uploads.opened(uploads.checked, source, option=uploads.PHOTO)
+    uploads.opened(uploads.checked, source, session.allowance, option=uploads.PHOTO)
+    suffix = source.suffix.lower()
     project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
     try:
@@ -132,8 +132,7 @@ def _start_inversion(
 def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     project = context.studio.work.new(file.stem, session.person)
     try:
-        archives.unpack_scene(file, project.scene)
-        context.studio.claim(session.person, folder_size(project.scene))
+        archives.unpack_scene(file, project.scene, session.allowance)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise

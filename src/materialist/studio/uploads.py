@@ -4,16 +4,21 @@ The functions that take a `report` run in that process, the others in the server
 them has.
 """
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
+
 from materialist.errors import InputError
 from materialist.io.bitmap import check_size
-from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decode, decoded_bytes, image_size
-from materialist.io.image import read_map
+from materialist.io.decode import RAW_SUFFIXES, SUFFIXES, decode, image_size, peak_bytes
+from materialist.io.image import read_map, write_image
 from materialist.jobs.limited import Limits, run_limited
 from materialist.studio import SETTINGS
+from materialist.studio.access.quota import Allowance
 from materialist.studio.workspace import store
 
 MESHES = (".glb", ".ply", ".obj", ".stl")
@@ -26,26 +31,29 @@ _COLOURS = ("texture", "background", "envmap")
 # --- In the server ---
 
 
-def opened(task: Callable[..., Any], file: Path, **arguments: Any) -> Any:
+def opened(task: Callable[..., Any], file: Path, allowance: Allowance, **arguments: Any) -> Any:
     """What `task(report, file=..., **arguments)` returns of an uploaded file, done in a process with limits.
 
-    Raises InputError, which names the file as its owner does.
+    Raises InputError, which names the file as its owner does, or says that too many are being opened.
     """
     shown = shown_name(file)
     check_bytes(file, shown)
     limits = Limits(SETTINGS.opening_memory, SETTINGS.opening_seconds)
     try:
-        return run_limited(task, limits, file=file, **arguments)
+        with allowance.opening():
+            return run_limited(task, limits, file=file, **arguments)
     except InputError as error:
         reason = str(error)
         raise InputError(reason if shown in reason else f"{shown}: {reason}") from error
 
 
-def used(workspace: Path, file: Path, option: str, use: Callable[[str], Any]) -> None:
+def used(workspace: Path, file: Path, option: str, allowance: Allowance, use: Callable[[str], Any]) -> None:
     """Check an uploaded file, copy it to a workspace and `use(name)` it; one that is refused does not stay."""
-    suffix = opened(checked, file, option=option)
+    readable = opened(checked, file, allowance, option=option)
     before = {*workspace.iterdir()}
-    name = store(workspace, option, file.read_bytes(), suffix)
+    content = readable.read_bytes()
+    allowance.claim(len(content))
+    name = store(workspace, option, content, readable.suffix.lower())
     try:
         use(name)
     except Exception:
@@ -73,19 +81,20 @@ def shown_name(path: Path) -> str:
 # --- In the process with limits ---
 
 
-def checked(report: Any, file: Path, option: str) -> str:
-    """The suffix of a file that can be read as an option needs it: its header first, then all of it.
+def checked(report: Any, file: Path, option: str) -> Path:
+    """The file that the server may read for an option: the given one, or a smaller one of the same picture beside it.
 
-    A photo's header alone is read: its inversion has a process of its own. Raises InputError.
+    Its header is read first, then all of it; of a photo the header alone: its inversion has a process of its own.
+    Raises InputError for what cannot be read, and for what would be too large for the server.
     """
     if option == MESH:
-        suffix = checked_mesh(file)
+        checked_mesh(file)
         _read_mesh(file)
-        return suffix
-    suffix = checked_picture(file)
-    if option != PHOTO:
-        _read_picture(file, option)
-    return suffix
+        return file
+    checked_picture(file)
+    if option == PHOTO:
+        return file
+    return _shrunk(file) if option in _COLOURS else _read_map(file)
 
 
 def checked_picture(path: Path) -> str:
@@ -96,15 +105,17 @@ def checked_picture(path: Path) -> str:
     check_bytes(path, shown)
     if suffix not in RAW_SUFFIXES:
         try:
-            (width, height), decoded = image_size(path), decoded_bytes(path)
+            (width, height), peak = image_size(path), peak_bytes(path)
         except InputError:
             raise
         except Exception as error:  # decoders raise anything
             raise InputError(f"{shown} is not an image that can be read; export it as PNG or JPEG.") from error
-        if decoded > 12 * SETTINGS.upload_pixels:
+        megapixels = width * height / 1e6
+        if width * height > SETTINGS.upload_pixels or peak > SETTINGS.opening_memory:
             raise InputError(
-                f"{shown} is {width} x {height} = {width * height / 1e6:.0f} megapixels, {decoded / 1e6:.0f} MB in "
-                f"memory, above {12e-6 * SETTINGS.upload_pixels:.0f} MB: shrink it, or save its colours alone."
+                f"{shown} is {width} x {height} = {megapixels:.0f} megapixels and takes {peak / 1e9:.1f} GB to read; "
+                f"the studio takes up to {SETTINGS.upload_pixels / 1e6:g} megapixels and "
+                f"{SETTINGS.opening_memory / 1e9:g} GB: shrink it, or save its colours alone."
             )
         check_size(width, height, shown)
     return suffix
@@ -122,11 +133,36 @@ def checked_mesh(path: Path) -> str:
 def _read_mesh(path: Path) -> None:
     from materialist.edits.insert.meshes import read_model
 
-    read_model(path)
+    model = read_model(path)
+    faces = sum(len(part.faces) for part in model.parts)
+    if faces > SETTINGS.mesh_faces:
+        raise InputError(
+            f"{shown_name(path)} has {faces:,} faces; the studio takes up to {SETTINGS.mesh_faces:,}. Simplify it."
+        )
 
 
-def _read_picture(path: Path, option: str) -> None:
-    if option in _COLOURS:
-        decode(path)
-    else:
-        read_map(path)
+def _shrunk(path: Path) -> Path:
+    """A picture of colours that is small enough for the server: the file itself, or a PNG or EXR beside it."""
+    decoded = decode(path)
+    height, width = decoded.linear.shape[:2]
+    scale = math.sqrt(SETTINGS.edit_pixels / (width * height))
+    if scale >= 1:
+        return path
+    size = (max(1, int(width * scale)), max(1, int(height * scale)))
+    linear = np.asarray(cv2.resize(decoded.linear, size, interpolation=cv2.INTER_AREA))
+    smaller = path.with_name(f"{path.stem}.smaller{'.exr' if decoded.scene_linear else '.png'}")
+    write_image(smaller, linear, deep=True, force=True)
+    return smaller
+
+
+def _read_map(path: Path) -> Path:
+    """A map of numbers or a mask, which can be read. Raises InputError for one too large for the server."""
+    if path.suffix.lower() not in RAW_SUFFIXES:
+        width, height = image_size(path)
+        if width * height > SETTINGS.edit_pixels:
+            raise InputError(
+                f"{shown_name(path)} is {width} x {height} pixels; a mask or map may have up to "
+                f"{SETTINGS.edit_pixels / 1e6:g} megapixels: shrink it."
+            )
+    read_map(path)
+    return path

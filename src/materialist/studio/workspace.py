@@ -13,8 +13,8 @@ import tempfile
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -35,6 +35,8 @@ SCENE = "photo.scene"
 LOST = "The page has lost its session; reload it."
 _NAME = re.compile(r"photo-\d{3,6}")
 _CACHE = "materialist-cache-"
+_CACHE_MARK = "cache-of-a-studio"
+"""A file in each cache: what lacks it is somebody's own."""
 _COOKIE = re.compile(r"[a-f0-9]{32}")
 """The cookie of a person: a secret."""
 _PERSON = re.compile(r"[a-z0-9]{2,32}")
@@ -87,19 +89,25 @@ class WorkFolder:
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         self._lock = threading.Lock()
+        self.kept: set[Path] = set()  # what stays in the cache: pictures of the page itself
         with writing(root):
             make_folder(self.root)
             tempfile.TemporaryFile(dir=self.root).close()
-        self._sweep_caches()
         self.hide_cookies()
-        self.cache = Path(tempfile.mkdtemp(prefix=_CACHE, dir=self.root))
-        """Uploads and results that are handed over; they go with this object."""
-        self.kept: set[Path] = set()  # what stays there: pictures of the page itself
-        self._end = weakref.finalize(self, _remove, self.cache, _hold(self.cache))
+        with _alone_in(self.root):
+            self._sweep_caches()
+            self.cache = Path(tempfile.mkdtemp(prefix=_CACHE, dir=self.root))
+            """Uploads and results that are handed over; they go with this object."""
+            (self.cache / _CACHE_MARK).touch()
+            lock = _hold(self.cache)
+        self.kept.add(self.cache / _CACHE_MARK)
+        self._end = weakref.finalize(self, _remove, self.cache, lock)
 
     def _sweep_caches(self) -> None:
         """Remove the caches of studios that were killed: whoever works holds a lock on theirs."""
         for cache in self.root.glob(f"{_CACHE}*"):
+            if not (cache / _CACHE_MARK).is_file():
+                continue  # not ours
             lock = _hold(cache)
             if lock is not None:
                 _remove(cache, lock)
@@ -110,7 +118,8 @@ class WorkFolder:
             for edits in project.folder.glob("edits-*"):
                 cookie = edits.name.removeprefix("edits-")
                 if _COOKIE.fullmatch(cookie):
-                    edits.rename(edits.with_name(f"edits-{person_of(cookie)}"))
+                    target = edits.with_name(f"edits-{person_of(cookie)}")
+                    edits.rename(_free_name(target))
             if _COOKIE.fullmatch(project.owner):
                 card = json.loads((project.folder / CARD).read_text("utf-8"))
                 card["owner"] = person_of(project.owner)
@@ -150,6 +159,26 @@ class WorkFolder:
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
             if idle and ours and not project.ready:
                 shutil.rmtree(project.folder, ignore_errors=True)
+
+
+def _free_name(folder: Path) -> Path:
+    """The folder itself where there is none yet, else one beside it that no person has: `former-1-NAME`."""
+    if not folder.exists():
+        return folder
+    places = (folder.with_name(f"former-{number}-{folder.name}") for number in count(1))
+    return next(place for place in places if not place.exists())
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Within it no other process is within it for the same folder, where the file system has locks."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _hold(cache: Path) -> int | None:

@@ -14,6 +14,8 @@ from materialist.errors import InputError
 
 _FILE_KEYS = frozenset({"path", "url", "meta", "_type", "is_stream"})
 """Keys that make Gradio take an object for a file, or for a part of one."""
+_LOOKED_AFTER = 500
+"""Files after which those that were cleared away are looked for."""
 _GONE = "That file is not here any more; give it again."
 
 
@@ -25,7 +27,9 @@ class HandedFiles:
         self._lock = threading.Lock()
 
     def add(self, person: str, path: Path) -> str:
-        """A new id for a file that this person sent."""
+        """A new id for a file that this person sent. Now and then those of cleared files are forgotten."""
+        if len(self._files) % _LOOKED_AFTER == _LOOKED_AFTER - 1:
+            self.forget_missing()
         return self.hand_out(person, path, f"upload-{secrets.token_hex(16)}")
 
     def hand_out(self, person: str, path: Path, name: str) -> str:

@@ -87,8 +87,9 @@ class Gate:
             return await send({"type": "websocket.close", "code": 1008})
         address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
-        upload = int(SETTINGS.upload_megabytes * 1e6) if scope["path"] == _UPLOAD else 0
-        most = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes + upload
+        most = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
+        if scope["path"] == _UPLOAD:
+            most = _largest_upload()
         request = Request(scope, _limited(receive, most))
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies, address)
@@ -157,13 +158,13 @@ class Gate:
             if page := request.query_params.get("session_hash"):
                 self.studio.session(page, person)
             if path.startswith(_BEAT) and request.method == "GET":
-                self.studio.session(path.removeprefix(_BEAT), person, beats=True)
+                page = path.removeprefix(_BEAT)
+                self.studio.session(page, person, beats=True)
+                return partial(_held, self.app, self.studio, page)
             if path == _UPLOAD:
-                size = request.headers.get("content-length", "")
-                if not size.isdigit():
-                    raise InputError("An upload must say how long it is.")
-                self.studio.claim(person, int(size))
-                return partial(_upload, self.app, self.studio, person)
+                size = _promised(request)
+                self.studio.claim(person, size)
+                return partial(_upload, self.app, self.studio, person, size)
             if path in _EVENTS:
                 return await self._event(request, person)
         except InputError as error:
@@ -252,18 +253,49 @@ class Gate:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
 
 
-async def _upload(app: Application, studio: Studio, person: str, scope: Any, receive: Any, send: Any) -> None:
-    """Let Gradio store an upload, and answer with ids of ours in place of its paths."""
+async def _held(app: Application, studio: Studio, page: str, scope: Any, receive: Any, send: Any) -> None:
+    """Let a page hold its request; it is closed when that ends."""
+    try:
+        await app(scope, receive, send)
+    finally:
+        studio.leave(page)
+
+
+def _largest_upload() -> int:
+    """Bytes of the largest body of an upload: a file, and what surrounds it in a form."""
+    return int(SETTINGS.upload_megabytes * 1e6) + SETTINGS.request_bytes
+
+
+def _promised(request: Request) -> int:
+    """The length that an upload gives. Raises InputError for none, another way of saying it, and too much."""
+    size = request.headers.get("content-length", "")
+    if not size.isdigit() or "transfer-encoding" in request.headers:
+        raise InputError("An upload must say how long it is.")
+    if int(size) > _largest_upload():
+        raise InputError(f"An upload may have up to {SETTINGS.upload_megabytes} MB.")
+    return int(size)
+
+
+async def _upload(
+    app: Application, studio: Studio, person: str, size: int, scope: Any, receive: Any, send: Any
+) -> None:
+    """Let Gradio store an upload of a claimed size, and answer with ids of ours in place of its paths."""
     messages: list[Any] = []
 
     async def collect(message: Any) -> None:
         messages.append(message)
 
-    await app(scope, receive, collect)  # until the files are where it says
-    start = messages[0]
-    body = b"".join(message.get("body", b"") for message in messages[1:])
-    if start["status"] == 200:
-        body = json.dumps([studio.files.add(person, Path(path)) for path in json.loads(body)]).encode()
+    stored = 0
+    try:
+        await app(scope, receive, collect)  # until the files are where it says
+        start = messages[0]
+        body = b"".join(message.get("body", b"") for message in messages[1:])
+        if start["status"] == 200:
+            paths = [Path(path) for path in json.loads(body)]
+            stored = sum(path.stat().st_size for path in paths if path.is_file())
+            body = json.dumps([studio.files.add(person, path) for path in paths]).encode()
+    finally:
+        studio.give_back(person, max(0, size - stored))
     headers = [one for one in start["headers"] if one[0] not in _LENGTHS]
     length = (b"content-length", str(len(body)).encode())
     await send({**start, "headers": [*headers, length]})
