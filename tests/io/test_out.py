@@ -299,3 +299,12 @@ def test_a_heic_of_more_bits_is_a_deep_photo(bits, tmp_path):
 def test_profiles_have_the_names_that_people_know(primaries, curve, name):
     profile = ImageCms.ImageCmsProfile(io.BytesIO(profile_of(spaces.space("mine", primaries, curve)))).profile
     assert profile.profile_description == name
+
+
+def test_wide_colours_of_a_transparent_photo_are_told_of(tmp_path):
+    clear = np.dstack([LEVELS, np.full(LEVELS.shape[:2], 128, np.uint8)])
+    photo = photo_of_levels(tmp_path, clear, icc_profile=P3)
+    (note,) = mt.save_image(tmp_path / "out.png", photo.original, photo)
+    assert "clipped" in note and Image.open(tmp_path / "out.png").info["icc_profile"] == P3
+    half = 1.45 * 2.28 / 255 / 2  # a level near white, by the matrix from P3 to Rec.709
+    assert np.abs(read_photo(tmp_path / "out.png").original - photo.original).max() < half

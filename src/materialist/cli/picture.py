@@ -133,10 +133,13 @@ def finish(
     warnings = [*warnings_since(scene, edited), *grainy, *notes]
     if not how.full_render:
         warnings += effect_notes(scene, edited, mean_change(scene, picture) if change is None else change)
-    lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
-        mt.save_scene(developed(scene, edited, picture, seed=how.seed, device=how.device), save, force=how.force)
+        saved = developed(scene, edited, picture, seed=how.seed, device=how.device)
+        mt.save_scene(saved, save, force=how.force)
+        warnings += warnings_since(edited, saved)
         lines.append(f"The edited scene is {save}")
+    last = -2 if save is not None else -1
+    lines[last:last] = [f"Note: {note}" for note in warnings]
     told["denoised"] = how.denoise is not False and not grainy
     told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
     report_success(command, how.as_json, lines, **told)

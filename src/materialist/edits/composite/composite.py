@@ -12,10 +12,11 @@ from materialist import metrics
 from materialist.edits.composite.disclosed import compared, without_traces
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
-from materialist.edits.core.notes import PICTURED, is_pictured
+from materialist.edits.core.notes import PICTURED, is_pictured, warned
 from materialist.edits.core.renderer import EditRenderer, denoised, rendered
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
+from materialist.io.out.colours import photo_colours
 from materialist.io.out.depth import is_deep
 from materialist.io.out.encode import save_image
 from materialist.io.out.exif import copied_exif
@@ -24,6 +25,7 @@ from materialist.types import Array, Photo, Scene
 
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
+NARROWED = "The photo has colours that sRGB lacks; the saved scene has none of them, and pictures made of it are sRGB."
 RERENDERED = 64
 """Paths a pixel of the re-rendering of an edited scene that is kept."""
 
@@ -152,7 +154,8 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     stage = {"name": "edit", "edits": edited.provenance.get("edits", []), "bodies": len(edited.bodies)}
     old = edited.report
     report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})
-    return replace(edited, photo=photo, rerender=again, report=report)
+    saved = replace(edited, photo=photo, rerender=again, report=report)
+    return saved if photo_colours(scene.photo).space is None else warned(saved, NARROWED)
 
 
 def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bool = False) -> tuple[str, ...]:

@@ -21,6 +21,9 @@ from materialist.io.out.icc import profile_of, srgb_profile
 from materialist.types import Array, Photo
 
 UNKEPT = "The photo's colours are of a kind that is not written ({}); the picture is sRGB."
+CLIPPED = (
+    "Colours of the photo that sRGB lacks are clipped: they are kept of opaque photos of 8 bits, PNG and TIFF alone."
+)
 _TOLERANCE = 1e-6
 """Linear difference up to which a pixel is the photo's: far less than a level of 16 bits but in the darkest."""
 _MOVED = 0.25
@@ -132,7 +135,7 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
         if colours.is_srgb:
             return PhotoColours(own if profile else SRGB.profile)
         if "A" in mode or "a" in mode or "transparency" in image.info or (kind == "HEIF" and deep):
-            return PhotoColours(own, colours)
+            return PhotoColours(own, colours, notes=(CLIPPED,))
         if not deep:
             return PhotoColours(own, colours, upright(np.asarray(image.convert("RGB")), tags))
     levels = rgb_levels(file)[0]
