@@ -25,7 +25,7 @@ from materialist.types import Array, Photo, Scene
 
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
-NARROWED = "The photo has colours that sRGB lacks; the saved scene has none of them, and pictures made of it are sRGB."
+NARROWED = "The photo's file has another colour space than sRGB; the saved scene, and pictures made of it, have sRGB."
 RERENDERED = 64
 """Paths a pixel of the re-rendering of an edited scene that is kept."""
 

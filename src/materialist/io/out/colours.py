@@ -21,9 +21,7 @@ from materialist.io.out.icc import profile_of, srgb_profile
 from materialist.types import Array, Photo
 
 UNKEPT = "The photo's colours are of a kind that is not written ({}); the picture is sRGB."
-CLIPPED = (
-    "Colours of the photo that sRGB lacks are clipped: they are kept of opaque photos of 8 bits, PNG and TIFF alone."
-)
+CLIPPED = "Colours beyond sRGB are clipped, as of all transparent photos and of HEIC of more than 8 bits."
 _TOLERANCE = 1e-6
 """Linear difference up to which a pixel is the photo's: far less than a level of 16 bits but in the darkest."""
 _MOVED = 0.25
