@@ -55,7 +55,8 @@ def test_records_hold_no_hash_because_arrays_have_none():
 
 
 def test_the_text_of_a_scene_says_what_it_is_in_one_line():
-    edited = replace(make_scene(), provenance={"edits": [{}, {}]}, bodies=(make_body(),))
+    prior = replace(make_scene().prior, predictor="maps sha256:7f841f20b236bfc9")
+    edited = replace(make_scene(), prior=prior, provenance={"edits": [{}, {}]}, bodies=(make_body(),))
     assert repr(edited) == (
         "<Scene kitchen.PNG: 33 x 24 pixels, field of view 41.5 degrees, predictor maps, re-rendering 31.2 dB, "
         "2 edits, 1 body>"

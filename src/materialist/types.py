@@ -6,6 +6,7 @@ Conventions (see docs/conventions.md): linear Rec.709 RGB float32; camera at the
 
 import base64
 import html
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -296,7 +297,7 @@ class Scene(Record):
         facts = [
             f"{camera.width} x {camera.height} pixels",
             f"field of view {camera.fov:.4g} degrees",
-            f"predictor {self.prior.predictor}",
+            "predictor " + re.sub(" sha256:[0-9a-f]+", "", self.prior.predictor),
         ]
         quality = self.report.metrics.get("rerender_psnr_path")
         facts += [] if quality is None else [f"re-rendering {quality:.1f} dB"]
