@@ -7,6 +7,7 @@ import pytest
 from geometry_scenes import room, sphere_depth
 
 import materialist as mt
+from materialist.color import srgb_levels
 from materialist.edits.composite.composite import composite, write_composite
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
@@ -258,3 +259,19 @@ def test_maps_of_one_value_each_can_be_fitted(folder, albedo, roughness, metalli
     fitted = invert(**options(folder, predictor="auto", prior=prior, steps=2))
     for values in (*vars(fitted.materials).values(), fitted.envmap, fitted.rerender):
         assert np.isfinite(values).all()
+
+
+def test_a_photo_and_a_prior_from_memory(folder, scene):
+    known = mt.Prior(depth=scene.prior.depth, normal=scene.prior.normal)
+    levels = srgb_levels(scene.photo.original)
+    kept = {key: value for key, value in options(folder).items() if key not in ("photo", "predictor")}
+    made = invert(levels, encoded=True, predictor="constant", prior=known, **kept)
+    assert np.array_equal(made.photo.original, scene.photo.original) and np.array_equal(made.depth, scene.depth)
+    assert made.prior.sources["depth"] == "arrays" and made.prior.sources["albedo"] == "constant"
+    assert made != scene and made == made
+
+
+@pytest.mark.parametrize("prior", [{"depth": 1}, np.ones((4, 4))])
+def test_a_prior_that_is_none(folder, prior):
+    with pytest.raises(InputError, match=r"The prior is a .*; give a materialist.Prior of arrays, or a Prediction"):
+        invert(**options(folder, prior=prior))

@@ -48,7 +48,7 @@ def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     recipe.write_text("- edit: {mask: 'm/{name}.png', hue: 20}\n")
     source, runs, said = photos(recipe.parent / "photos", "one", "two"), recipe.parent / "runs", []
     options = {"apply": recipe, "function": "made_batch:made_up", "workers": 1, "device": "cpu", "spp": 2}
-    with pytest.raises(InputError, match=r"no .*/m/one.png for one.png.*--resume"):
+    with pytest.raises(InputError, match=r"no .*/m/one.png for one.png.*resume=True"):
         batch(source, runs, **options)
     assert not list(runs.glob("*.scene"))
     (recipe.parent / "m").mkdir()

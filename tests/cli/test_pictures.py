@@ -8,11 +8,12 @@ from edit_scenes import MASK, rendered_scene
 from made_meshes import box_file, floor_scene, textured_obj
 from PIL import Image
 
-from materialist.color import linear_to_srgb
+from materialist.color import linear_to_srgb, srgb_levels
 from materialist.edits.insert.insert import insert
 from materialist.io import package
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
+from materialist.io.photo import read_photo
 from materialist.render import variant
 
 
@@ -253,3 +254,46 @@ def test_the_device_is_chosen_before_anything_renders(done, folder, tmp_path, mo
     options = ["--spp", "4", "--device", "cpu", "-o", tmp_path / "out.png"]
     done("edit", tmp_path / "c.scene", "--mask", folder / "block.png", "--value", "0.1", *options)
     assert asked[:1] == ["cpu"]
+
+
+@pytest.mark.parametrize("kind", ["jpg", "tif", "webp", "avif"])
+def test_pictures_of_every_kind(kind, done, folder, tmp_path):
+    command = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5", "--spp", 4]
+    quality = [] if kind == "tif" else ["--quality", 100]
+    done(*command, *quality, "-o", tmp_path / f"o.{kind}")
+    shown = np.asarray(Image.open(tmp_path / f"o.{kind}"), np.int16)
+    photo = srgb_levels(load_scene(folder / "a.scene").photo.original)
+    assert np.abs(shown[:8] - photo[:8]).max() <= (0 if kind in ("tif", "webp") else 12)
+    assert (shown[MASK] < photo[MASK]).mean() > 0.9
+
+
+def test_layers_of_an_edit_a_rendering_and_the_photo(done, refused, folder, tmp_path):
+    edit = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5", "--spp", 4, "--exr-layers"]
+    done(*edit, "-o", tmp_path / "edit.exr")
+    render = ["render", folder / "a.scene", "--spp", 4, "--exr-layers"]
+    done(*render, "-o", tmp_path / "render.exr")
+    done(*render, "--photo", "-o", tmp_path / "photo.exr")
+    photo = load_scene(folder / "a.scene").photo.original
+    beauty = {name: read_photo(tmp_path / f"{name}.exr") for name in ("edit", "render", "photo")}
+    assert all("beauty" in read.layer for read in beauty.values())
+    assert np.allclose(beauty["photo"].original * 2.0 ** -beauty["photo"].stops, photo)
+    assert "--exr-layers writes an .exr" in refused(*edit, "-o", tmp_path / "o.png")
+    assert "--photo says nothing without" in refused(*render[:-1], "--photo", "-o", tmp_path / "o.exr")
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (("--quality", 80), "quality is 80"),
+        (("--bits", 12), "12 bits"),
+        (("--exr-layers",), "--exr-layers writes an .exr"),
+    ],
+)
+def test_encodings_are_refused_before_the_work(flags, words, refused, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(package, "load_scene", lambda path: pytest.fail("the work was begun"))
+    assert words in refused("render", folder / "a.scene", *flags, "-o", tmp_path / "o.png")
+
+
+def test_a_film_has_no_quality(refused, folder, tmp_path):
+    command = ["relight", folder / "a.scene", "--frames", 2, "-o", tmp_path / "film", "--quality", 80]
+    assert "are of pictures" in refused(*command)

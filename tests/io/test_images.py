@@ -58,7 +58,7 @@ def test_write_image_is_whole_and_asks_before_replacing(tmp_path, monkeypatch):
     (tmp_path / "new").mkdir()
     write_image(tmp_path / "new/a.exr", linear)
     np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear)
-    with pytest.raises(OutputError, match="--force"):
+    with pytest.raises(OutputError, match="force=True"):
         write_image(tmp_path / "new/a.exr", linear)
     write_image(tmp_path / "new/a.exr", linear * 2, force=True)
     np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear * 2)

@@ -94,7 +94,7 @@ def test_force_alone_replaces_a_scene_and_never_what_somebody_put_beside_it(scen
     place = tmp_path / "a.scene"
     save_scene(scene, place)
     other = replace(scene, envmap=scene.envmap * 2)
-    with pytest.raises(OutputError, match="--force"):
+    with pytest.raises(OutputError, match="force=True"):
         save_scene(other, place)
     assert_same(load_scene(place), scene)
     save_scene(other, place, force=True)

@@ -74,7 +74,8 @@ def open_ledger(
             raise InputError(f"{folder} is not empty and holds no batch; name another folder.")
         if held and not (resume or force):
             raise InputError(
-                f"{folder} holds a batch; add --resume to go on with it, --force to begin anew, or name another folder."
+                f"{folder} holds a batch; add `resume=True` to go on with it, `force=True` to begin anew, or name "
+                "another folder."
             )
         file = path.open("ab", buffering=0)
     with file:
@@ -114,5 +115,5 @@ def _require_same(events: list[dict[str, Any]], options: dict[str, Any], folder:
         if before.get(name) != options.get(name):
             raise InputError(
                 f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
-                "name another folder, or add --force to redo what differs."
+                "name another folder, or add `force=True` to redo what differs."
             )

@@ -6,7 +6,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import psutil
 
@@ -22,6 +22,8 @@ from materialist.errors import InputError
 from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import DONE, FAILED, PROGRESS
+from materialist.keywords import BatchKeywords
+from materialist.option_kinds import documented
 
 Watch = Callable[[Status], None]
 
@@ -37,8 +39,11 @@ class BatchSettings:
 SETTINGS = BatchSettings()
 
 
-def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Any) -> Outcome:
-    """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.png.
+@documented(BatchOptions)
+def batch(
+    source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Unpack[BatchKeywords]
+) -> Outcome:
+    """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.FORMAT.
 
     A photo that cannot be inverted is recorded with its reason and stops nothing; a worker that dies loses only its
     photo, which is begun again, `BatchSettings.tries` times in all. The results do not depend on the number of workers.
@@ -52,9 +57,10 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     """
     start = time.monotonic()
     own = {one.name for one in fields(BatchOptions)}
-    how = BatchOptions(**{name: value for name, value in options.items() if name in own})
+    values: dict[str, Any] = dict(options)
+    how = BatchOptions(**{name: value for name, value in values.items() if name in own})
     asked: dict[str, Any] = {"predictor": "auto", "size": 512, "fov": "auto", "seed": 0, "device": "auto"}
-    asked |= {name: value for name, value in options.items() if name not in own}
+    asked |= {name: value for name, value in values.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
         edits_for(how.recipe, "")  # a list that cannot be read is told before anything is written
@@ -117,7 +123,7 @@ def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
     task, file = found[0]
     if len(found) == len(tasks):
         raise InputError(f"No photo has the files that {recipe} names (there is no {file} for {task.id}); put them "
-                         "there, and add --resume.")  # fmt: skip
+                         "there, and add `resume=True`.")  # fmt: skip
     return (f"{len(found)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
             "they get a scene, but no edited photo unless it is there by then.")  # fmt: skip
 

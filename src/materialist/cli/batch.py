@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -31,7 +31,7 @@ def batch(
     layer: Annotated[str | None, typer.Option(help="Which layer of EXR files is the photo.")] = None,
 ) -> None:
     """Invert many photos, and apply a list of edits to each. Exit code 0: all done; 2: some failed, with reasons."""
-    chosen = {} if layer is None else {"layer": layer}
+    chosen: Any = {} if layer is None else {"layer": layer}
     try:
         with stage_progress(quiet=computing.as_json) as bars:
             outcome = mt.batch(

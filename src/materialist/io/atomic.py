@@ -112,18 +112,18 @@ def _require_replaceable(path: str | Path, target: Path, force: bool, kind: Fold
     if kind is None and target.is_dir():
         raise OutputError(f"{path} is a folder; give a file's name.")
     if not force:
-        raise OutputError(f"{path} exists; give --force to replace it, or another name.")
+        raise OutputError(f"{path} exists; give `force=True` to replace it, or another name.")
     if target.is_symlink():
-        raise OutputError(f"{path} is a link, which --force will not replace; give what it leads to.")
+        raise OutputError(f"{path} is a link, which `force=True` will not replace; give what it leads to.")
     if kind is None:
         return
     marked = target.is_dir() and (kind.marker is None or (target / kind.marker).is_file() or not any(target.iterdir()))
     if not marked:
-        raise OutputError(f"{path} is not {kind.called}, so --force will not replace it; give another name.")
+        raise OutputError(f"{path} is not {kind.called}, so `force=True` will not replace it; give another name.")
     for name in files_below(target):
         if not kind.is_member(target, name):
             raise OutputError(
-                f"{path} holds {name}, which does not belong to {kind.called}, so --force will not replace it; "
+                f"{path} holds {name}, which does not belong to {kind.called}, so `force=True` will not replace it; "
                 "move that, or give another name."
             )
 

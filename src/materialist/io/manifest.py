@@ -43,7 +43,7 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
     if total > most:
         raise SceneError(
             f"The scene {folder} takes {total / 1e9:.1f} GB of memory, more than {most / 1e9:g} GB; "
-            "invert its photo again at a smaller --size."
+            "invert its photo again at a smaller working size."
         )
 
 

@@ -1,5 +1,6 @@
 """The scene package: a folder that holds everything of a Scene (format: docs/conventions.md)."""
 
+import base64
 import json
 import math
 from dataclasses import asdict
@@ -117,6 +118,7 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "has_source": photo.source is not None,
             "camera": asdict(photo.camera),
             **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "layer", "warnings")},
+            "exif": None if photo.exif is None else base64.b64encode(photo.exif).decode("ascii"),
         },
         "prior": {key: getattr(scene.prior, key) for key in ("predictor", "warnings", "sources")},
         "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
@@ -147,10 +149,11 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
         original, source = decode_photo(file, meta.get("layer")).exposed(stops), file.read_bytes()
     else:
         original, source = read_exr(file), None
+    exif = meta.get("exif")
     return Photo(
         package_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
         meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
-        meta.get("layer"),
+        meta.get("layer"), None if exif is None else base64.b64decode(exif, validate=True),
     )  # fmt: skip
 
 

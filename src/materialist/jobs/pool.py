@@ -34,7 +34,7 @@ class LocalPool:
         try:
             place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
         except OSError as error:
-            raise SetupError(f"A worker process cannot be started: {error}; give fewer --workers.") from error
+            raise SetupError(f"A worker process cannot be started: {error}; give fewer workers.") from error
         place.key = key
         place.worker.begin(task, arguments)
 
@@ -76,7 +76,7 @@ class RayPool:
         try:
             import ray
         except ModuleNotFoundError as error:
-            raise SetupError("--ray needs Ray; install it with: pip install 'materialist[ray]'") from error
+            raise SetupError("Workers on Ray need Ray; install it with: pip install 'materialist[ray]'") from error
         self._ray = ray
         local = address == "local"  # a cluster of this machine alone, which ends with the pool
         _check_reachable(address)

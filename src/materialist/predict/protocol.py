@@ -134,5 +134,5 @@ def on_gpu(device: str) -> bool:
 
     there = torch.cuda.is_available()
     if device == "cuda" and not there:
-        raise SetupError("There is no CUDA device that PyTorch can use; choose --device cpu.")
+        raise SetupError('There is no CUDA device that PyTorch can use; choose `device="cpu"`.')
     return device != "cpu" and there

@@ -14,7 +14,7 @@ from materialist.io.atomic import whole_file
 if TYPE_CHECKING:
     from torch import Tensor, nn
 
-INSTEAD = "use another predictor (--predictor auto), or read another tool's maps with --predictor maps:DIR"
+INSTEAD = 'use another predictor (`predictor="auto"`), or read another tool\'s maps with `predictor="maps:DIR"`'
 """Advice for a person who lacks the network in question."""
 CHECKSUMS = "SHA256SUMS"
 """List beside every download: one line a file, as `sha256sum` writes and checks them."""

@@ -50,7 +50,7 @@ def require_denoiser() -> None:
     if problem is not None:
         raise SetupError(
             f"Denoising needs the package pyoidn ({problem}); install it with: "
-            f"{sys.executable} -m pip install pyoidn, or render with --no-denoise."
+            f"{sys.executable} -m pip install pyoidn, or render with `denoise=False`."
         )
 
 

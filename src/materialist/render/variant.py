@@ -133,7 +133,7 @@ def setup(device: str = "auto"):
     wanted = _VARIANTS[device]
     if current != wanted:
         if current in _VARIANTS.values():
-            raise SetupError(f"This process already renders with {current}; start a new one for --device {device}.")
+            raise SetupError(f'This process already renders with {current}; start a new one for `device="{device}"`.')
         _start(mi, device)
     _register_plugins(wanted)
     return mi
@@ -154,7 +154,7 @@ def _start(mi, device: str) -> None:
     import drjit as dr
 
     if device == "cuda" and not usable_gpus():
-        raise SetupError("No CUDA driver with OptiX answers; use --device cpu, or install the NVIDIA driver.")
+        raise SetupError('No CUDA driver with OptiX answers; use `device="cpu"`, or install the NVIDIA driver.')
     if device == "cpu":
         loaded = dr.detail.llvm_version()[0] if dr.has_backend(dr.JitBackend.LLVM) else 0
         if loaded < MINIMUM_LLVM:

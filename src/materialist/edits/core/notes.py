@@ -60,7 +60,7 @@ def noise_notes(denoise: bool = True) -> list[str]:
         return []
     return [
         f"The picture is not denoised, so it is grainy: pyoidn cannot be loaded ({problem}). "
-        "`materialist doctor` says how to install it; more --spp helps, too."
+        "`materialist doctor` says how to install it; more paths a pixel help, too."
     ]
 
 

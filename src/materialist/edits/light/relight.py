@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import cv2
 import numpy as np
@@ -17,6 +17,8 @@ from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
+from materialist.keywords import RelightKeywords
+from materialist.option_kinds import documented
 from materialist.options import Relight
 from materialist.render.envmap import check_envmap, is_peaked
 from materialist.types import Array, Lamp, Scene
@@ -35,7 +37,10 @@ class AddedLightSettings:
 SETTINGS = AddedLightSettings()
 
 
-def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Any) -> Scene:
+@documented(Relight)
+def relight(
+    scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Unpack[RelightKeywords]
+) -> Scene:
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of `Relight`.
 
     Dimmed lights become surfaces that glow and stay where they are, whatever happens to the light from around. A sun
@@ -215,7 +220,7 @@ def _warnings(scene: Scene) -> list[str]:
 
 def moving_light(
     scene: Scene | Sequence[Scene], count: int, options: Relight | None = None, *,
-    suns: tuple[tuple[float, float], ...] = (), **values: Any,
+    suns: tuple[tuple[float, float], ...] = (), **values: Unpack[RelightKeywords],
 ) -> Iterator[Scene]:  # fmt: skip
     """`count` relit scenes: the light turns by `rotate` degrees in all, or from A to B; the sun and one lamp follow
     their stations.

@@ -25,7 +25,7 @@ def segment(
     """
     import torch
 
-    with hub.advice("leave --with sam2 out"):
+    with hub.advice('leave `method="sam2"` out'):
         model = hub.load(hub.library("transformers").Sam2Model, locate(where, REPO))
     target = torch.device("cuda" if on_gpu(device) else "cpu")
     model = model.to(target).eval()
