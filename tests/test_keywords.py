@@ -20,7 +20,7 @@ PAIRS = {
     "InvertKeywords": options.InvertOptions,
     "ExportKeywords": options.ExportOptions,
 }
-FUNCTIONS = (mt.edit, mt.remove, mt.glass, mt.relight, mt.drop, mt.settle, mt.invert, mt.export, mt.batch)
+FUNCTIONS = (mt.edit, mt.remove, mt.glass, mt.relight, mt.insert, mt.drop, mt.settle, mt.invert, mt.export, mt.batch)
 
 
 @pytest.mark.parametrize("name", PAIRS)
