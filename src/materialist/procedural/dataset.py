@@ -17,7 +17,7 @@ from materialist.render.variant import setup
 from materialist.types import Progress
 
 FORMAT = 1
-CONTENT = 9
+CONTENT = 10
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")
@@ -54,7 +54,10 @@ def sample_path(folder: Path, index: int) -> Path:
 
 def _description(options: DataSetOptions) -> dict[str, Any]:
     files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}
-    drawn = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
+    drawn: dict[str, Any] = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
+    if options.real_share:
+        real = (*options.archives, *options.photographs)
+        drawn["real"] = {"share": options.real_share, "files": [f"{p.name} {p.stat().st_size}" for p in real]}
     told = {"format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT}
     return told | {"options": drawn | ({"only": options.only} if options.only else {}), "tool_version": __version__}
 

@@ -21,7 +21,7 @@ def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.Wo
     standing = Furniture(size)
     standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 3, 9, meshes))
     standing.in_the_middle(rng, _some(rng, f.IN_THE_MIDDLE, 1, 6, meshes))
-    return _world(rng, size, captures, standing.parts, _view(rng, size, standing), "room")
+    return _world(rng, size, captures, standing.parts, view_of(rng, size, standing), "room")
 
 
 def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
@@ -62,7 +62,7 @@ def _world(rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, k
     return world.World(parts, envmap, view, portals, kind)
 
 
-def _sides(size: Size) -> list[tuple[Array, float, float]]:
+def sides(size: Size) -> list[tuple[Array, float, float]]:
     """(lower left corner, turn about Y, length) of the back, right, front and left wall, as seen from inside."""
     w, d, _ = size
     corners = np.array([(-w, 0, -d), (w, 0, -d), (w, 0, d), (-w, 0, d)]) / 2
@@ -81,7 +81,7 @@ def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
     lower = m.one_of(rng, m.wall_paint, m.tiled, m.wood) if rng.random() < 0.15 else None
     wood = m.white_paint(rng) if rng.random() < 0.7 else m.wood(rng)
     x, z = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
-    for k, (corner, turn, length) in enumerate(_sides(size)):
+    for k, (corner, turn, length) in enumerate(sides(size)):
         holes = [walls.Opening(0, length, 0, h)]
         if not (is_open and k == 2):
             wall = RoomWall(length, h)
@@ -129,7 +129,7 @@ class Furniture:
     def along_walls(self, rng: np.random.Generator, pieces: list[Parts]) -> None:
         """Stand pieces with their backs to a wall, most at the back and the sides."""
         for piece in pieces:
-            corner, turn, length = _sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
+            corner, turn, length = sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
             low, high = world.bounds(piece)
             at = rng.uniform(0.04, max(0.05, length - (high - low)[0] - 0.04))
             self.add(moved(placed(piece, (at - low[0], 0, 0.04 - low[2])), corner, turn))
@@ -195,7 +195,7 @@ def _shade(rng, size, power) -> Parts:
     return placed([ScenePart(shade, glow), pole, foot], at)
 
 
-def _view(rng, size: Size, standing: Furniture) -> world.Viewpoint:
+def view_of(rng: np.random.Generator, size: Size, standing: Furniture) -> world.Viewpoint:
     """Somebody in the front half of the room who looks towards its back."""
     w, d, h = size
     for _ in range(30):

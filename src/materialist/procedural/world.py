@@ -59,6 +59,8 @@ class World:
     view: Viewpoint
     portals: list[Portal] = field(default_factory=list)
     kind: str = ""
+    backdrop: Array | None = None
+    """[h, w, 3] linear radiance that the camera sees where there is no surface, at any size; None for the envmap."""
 
 
 def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewpoint:
