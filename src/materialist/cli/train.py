@@ -61,9 +61,13 @@ def data(
         shown = write_data_sheet(output, sheet, seed=computing.seed)
         report_success("train data", computing.as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
+    from materialist.procedural.catalog.packages import missing
     from materialist.procedural.dataset import produce
 
     start = time.monotonic()
+    note = "" if wanted.real == 0 else missing(wanted.furniture)
+    if note and not computing.as_json:
+        typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
         made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
     facts = {"output": str(output), "rendered": made, "existing": count - made, "seconds": time.monotonic() - start}

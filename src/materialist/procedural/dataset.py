@@ -8,8 +8,10 @@ import numpy as np
 
 from materialist import __version__
 from materialist.errors import InputError, OutputError
+from materialist.io.atomic import write_whole
 from materialist.io.display import strip, write_sheet
 from materialist.io.samples import SampleFolder, claim, complete, described
+from materialist.procedural.catalog.cache import CREDITS, Listing, listing
 from materialist.procedural.objects import shapes
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
@@ -40,11 +42,21 @@ def produce(
         setup(options.device)
     for path in options.mesh_files:  # a damaged one must not end a long run
         shapes.load(path)
+    made_of = _listed(options, progress)
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)
+    if made_of:
+        write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
     paths = [sample_path(folder, k) for k in range(count)]
     return complete(paths, partial(make_sample, options=options), "samples", progress, workers)
+
+
+def _listed(options: DataSetOptions, progress: Progress) -> Listing | None:
+    """The models and photographs that the set is made of, read now where that was never done; None without any."""
+    if not options.real_share:
+        return None
+    return listing(options.archives, options.photographs, options.cache, progress)
 
 
 def sample_path(folder: Path, index: int) -> Path:

@@ -10,7 +10,7 @@ from materialist.procedural.catalog import packages
 
 TOY_KINDS = ("room", "table", "still-life", "outdoor")
 """Kinds of scenes of procedural things."""
-REAL_KINDS = ("furnished", "laid", "single")
+REAL_KINDS = ("furnished", "laid", "single", "outside")
 """Kinds of scenes of real things."""
 KINDS = (*TOY_KINDS, *REAL_KINDS)
 REAL_SHARE = 0.75

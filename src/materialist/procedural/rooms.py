@@ -1,5 +1,7 @@
 """Rooms: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from materialist.procedural import lights, walls, world
@@ -69,7 +71,13 @@ def sides(size: Size) -> list[tuple[Array, float, float]]:
     return list(zip(corners, (0.0, -np.pi / 2, np.pi, np.pi / 2), (w, d, w, d)))
 
 
-def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
+Hangings = Callable[[np.random.Generator, RoomWall, int], Parts]
+"""(random numbers, wall, how many) -> what hangs on the wall where there is room."""
+
+
+def shell(
+    rng: np.random.Generator, size: Size, captures: Meshes, hangings: Hangings = walls.hangings
+) -> tuple[Parts, list[world.Portal], Array]:
     """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size
     is_open = rng.random() < 0.25
@@ -91,7 +99,7 @@ def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
             makers = (m.wall_paint, m.wallpaper, m.brick, m.tiled, m.wood, m.stone)
             own += walls.surface(wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2))
             own.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
-            own += walls.hangings(rng, wall, int(rng.integers(0, 5)))
+            own += hangings(rng, wall, int(rng.integers(0, 5)))
             parts, holes = parts + moved(own, corner, turn), wall.holes
         for hole in holes:
             up = (0, hole.top - hole.bottom, 0)

@@ -8,9 +8,11 @@ import numpy as np
 from materialist.color import linear_to_srgb, luminance
 from materialist.io.samples import LIGHT_ROWS
 from materialist.procedural import outdoors, packing, rooms
+from materialist.procedural.defocus import defocused
 from materialist.procedural.options import SPLITS, DataSetOptions
 from materialist.procedural.staged.furnished import furnished_room
 from materialist.procedural.staged.laid import laid_table
+from materialist.procedural.staged.outside import outside
 from materialist.procedural.staged.single import single
 from materialist.procedural.staged.stock import Stock, stock
 from materialist.procedural.tracer import CENTRE, SampleTracer
@@ -33,11 +35,14 @@ MAKERS: dict[str, tuple[Callable[..., World], float]] = {
 }
 """Kind of scene -> its maker, and its share of the pictures of procedural things."""
 REAL_MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], float]] = {
-    "furnished": (furnished_room, 0.3),
+    "furnished": (furnished_room, 0.25),
     "laid": (laid_table, 0.3),
-    "single": (single, 0.4),
+    "single": (single, 0.35),
+    "outside": (outside, 0.1),
 }
 """The same of the pictures of real things."""
+OPEN_KINDS = ("outdoor", "still life", "single", "outside")
+"""Kinds of worlds under an open sky."""
 SINGLE_COVERS = (0.08, 0.92)
 """Least and most of a picture that a single thing may cover."""
 
@@ -78,7 +83,14 @@ def _chosen(makers: dict[str, tuple[Callable[..., World], float]], only: str) ->
 
 def stock_of(options: DataSetOptions) -> Stock:
     """Models and photographs for the options; read once a process."""
-    return stock(options.archives, options.photographs, options.cache, options.mesh_files, options.envmap_files)
+    return stock(
+        options.archives,
+        options.photographs,
+        options.cache,
+        held_out=options.split == "heldout",
+        meshes=options.mesh_files,
+        captures=options.envmap_files,
+    )
 
 
 def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
@@ -108,12 +120,19 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: D
     gain = exposure(image, rng, lit) * balance(shading, rng)
     if world.backdrop is not None:
         image = before(world.backdrop, image, covered)
-    hidden = LIGHT_HIDDEN if world.kind in ("outdoor", "still life") else 0
+    image = image * gain
+    view = world.view
+    sharp = view.aperture == 0
+    if not sharp:
+        image = defocused(image, labels["depth"], tracer.camera, view.aperture, view.focus)
+    hidden = LIGHT_HIDDEN if world.kind in OPEN_KINDS else 0
     light = tracer.light(probe, rows=LIGHT_ROWS, spp=LIGHT_SPP, seed=int(rng.integers(2**31)), hidden=hidden)
     byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
     half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
-    return {
-        "image": half(image * gain), "shading": half(shading * gain),
+    # A blurred picture is no product of its sharp maps, so that its surfaces cannot be recoloured by its shading.
+    shaded = {"shading": half(shading * gain)} if sharp else {}
+    return shaded | {
+        "image": half(image),
         "albedo": byte(linear_to_srgb(labels["albedo"])), "roughness": byte(labels["roughness"]),
         "metallic": byte(labels["metallic"]), "normal": np.rint(labels["normal"] * 127).astype(np.int8),
         "depth": half(labels["depth"]), "mask": labels["mask"].astype(np.uint8), "fov": np.float32(world.view.fov),

@@ -25,9 +25,10 @@ from materialist.procedural.materials import ColourPicture
 from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array, Progress
 
-VERSION = 2
+VERSION = 3
 """Counts the changes of what the cache holds."""
 LIST, CREDITS = "catalog.json", "ATTRIBUTION.txt"
+"""The list of what a cache holds, and who made it."""
 JPEG_QUALITY = 93
 PHOTOGRAPH_SIDE = 1024
 """Pixels of a photograph's longer side."""

@@ -28,7 +28,8 @@ def decimated(solid: Solid, share: float) -> Solid:
 
 def _merged(solid: Solid, cell: float) -> Solid:
     """Vertices of one cell of a grid and one cell of the texture as one."""
-    keys = np.concatenate([np.floor(solid.vertices / cell), np.floor(solid.uv * 16)], axis=-1).astype(np.int64)
+    texture = np.floor(solid.uv * 16 / max(float(np.ptp(solid.uv, axis=0).max()), 1.0))
+    keys = np.concatenate([np.floor(solid.vertices / cell), texture], axis=-1).astype(np.int64)
     # One number for each cell; that two cells get the same is as good as impossible.
     factors = np.random.default_rng(0).integers(1, 2**62, keys.shape[1]) | 1
     _, group = np.unique((keys * factors).sum(1), return_inverse=True)

@@ -11,6 +11,7 @@ from materialist.color import srgb_to_linear
 FAMILIES: tuple[tuple[str, str], ...] = (
     ("mirror", r"mirror|miroir|espejo|reflector"),
     ("glass", r"glass|crist|vidr|verre|water|agua|liquid|transpar|lens|window|pane"),
+    ("screen", r"screen|display|pantalla|lcd|monitor"),
     ("bulb", r"bulb|flame|ampoul|bombilla|neon|emit|lumier|^light$|^lights$|fluoresc"),
     ("cloth", r"fabric|cloth|tissu|cushion|pillow|mattress|matela|sheet|tela|couch|sofa|curtain|towel|carpet|rug|"
               r"velvet|cotton|coussin|seat|cojin|shade|wool|felt|hair|fur|blanket|cover|upper|lower|shirt|short|jean"),
@@ -26,7 +27,7 @@ FAMILIES: tuple[tuple[str, str], ...] = (
     ("rubber", r"rubber|tire|tyre|caucho|goma|wheel"),
     ("stone", r"stone|marble|granit|concrete|brick|rock|worktop|counter|soil|sand|terra|clay|pottery|marmol"),
     ("paper", r"paper|book|card|page|label|box|news"),
-    ("plastic", r"plast|button|knob|key|switch|screen|display|cable|wire"),
+    ("plastic", r"plast|button|knob|key|switch|cable|wire"),
 )  # fmt: skip
 """Family of materials -> the names that speak of it, the first one that fits."""
 _COMPILED = tuple((family, re.compile(pattern)) for family, pattern in FAMILIES)

@@ -36,13 +36,13 @@ def _plain(stem: str) -> str:
     return stem.split("_")[0]
 
 
-def missing() -> str:
-    """What is not installed and the command that installs it, in words; nothing where all is there."""
-    lacks = [
-        name
-        for name, there in (("3D models (sweethome3d-furniture)", archives()), ("photographs", photographs()))
-        if not there
-    ]
+def missing(furniture: Path | None = None) -> str:
+    """What is not there and the command that installs it, in words; nothing where all is.
+
+    furniture: folder of catalogues, that of the package by default.
+    """
+    there = (("3D models (sweethome3d-furniture)", archives(furniture)), ("photographs", photographs()))
+    lacks = [name for name, found in there if not found]
     if not lacks:
         return ""
     return f"Pictures are made without {' and '.join(lacks)}; to have them: {INSTALL}"

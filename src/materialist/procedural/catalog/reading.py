@@ -67,10 +67,10 @@ def read_catalog_model(file: zipfile.ZipFile, entry: CatalogEntry, s: ReadingSet
         if len(solid.faces):
             solids.append(solid)
             looks.append(found)
-    if not solids or whole <= 0:
-        raise InputError("it has no faces")
     if clear > s.glass * whole:
         raise InputError("it is of glass")
+    if not solids or whole <= 0:
+        raise InputError("it has no faces")
     if holed > s.holes * whole:
         raise InputError("its picture has holes")
     solids = _fitted(_lighter(solids, s), entry)

@@ -15,6 +15,8 @@ FILLED = 0.72
 """Least share of a rectangle that level faces must cover."""
 STEP = 0.012
 """Metres of height that faces of one place may differ by."""
+MARGIN = 0.005
+"""Metres from its edge and above it that other parts may reach into a place."""
 
 
 class LevelPlace(NamedTuple):
@@ -37,9 +39,10 @@ def level_places(solids: list[Solid]) -> list[LevelPlace]:
     order = np.argsort(centres)
     centres, areas, corners = centres[order], areas[order], corners[order]
     groups = np.split(np.arange(len(centres)), np.flatnonzero(np.diff(centres) > STEP) + 1)
-    everything = np.concatenate([solid.vertices[solid.faces].mean(1) for solid in solids])
+    everything = np.concatenate([solid.vertices[solid.faces] for solid in solids])
+    low, high = everything.min(1), everything.max(1)
     found = [_place(corners[g], areas[g]) for g in groups]
-    return [_with_clearance(place, everything) for place in found if place is not None]
+    return [_with_clearance(place, low, high) for place in found if place is not None]
 
 
 def _level_faces(solids: list[Solid]) -> tuple[Array, Array, Array]:
@@ -69,8 +72,9 @@ def _place(corners: Array, areas: Array) -> LevelPlace | None:
     return LevelPlace(height, float(low[0]), float(high[0]), float(low[1]), float(high[1]), 10.0)
 
 
-def _with_clearance(place: LevelPlace, centres: Array) -> LevelPlace:
-    inside = (centres[:, 0] > place.left) & (centres[:, 0] < place.right)
-    inside &= (centres[:, 2] > place.back) & (centres[:, 2] < place.front)
-    above = centres[inside & (centres[:, 1] > place.height + 0.02), 1]
+def _with_clearance(place: LevelPlace, low: Array, high: Array) -> LevelPlace:
+    """The place with the room above it, below faces whose boxes reach from low [F, 3] to high [F, 3]."""
+    inside = (high[:, 0] > place.left + MARGIN) & (low[:, 0] < place.right - MARGIN)
+    inside &= (high[:, 2] > place.back + MARGIN) & (low[:, 2] < place.front - MARGIN)
+    above = low[inside & (high[:, 1] > place.height + MARGIN), 1]
     return place._replace(clearance=float(above.min() - place.height) if len(above) else 10.0)

@@ -15,15 +15,20 @@ ROUGHNESS: dict[str, tuple[float, float]] = {
     "mirror": (0.05, 0.06), "glass": (0.05, 0.15), "bulb": (0.2, 0.5), "cloth": (0.65, 1.0), "leather": (0.3, 0.6),
     "paint": (0.12, 0.55), "metal": (0.1, 0.45), "wood": (0.2, 0.75), "ceramic": (0.06, 0.4), "leaf": (0.3, 0.65),
     "skin": (0.4, 0.65), "rubber": (0.5, 0.9), "stone": (0.25, 0.95), "paper": (0.45, 0.95), "plastic": (0.12, 0.6),
-    "other": (0.2, 0.7),
+    "screen": (0.06, 0.3), "other": (0.2, 0.7),
 }  # fmt: skip
 OUR_FINISHES: dict[str, tuple[m.Maker, ...]] = {
     "wood": (m.wood,),
     "cloth": (m.fabric, m.woven),
     "stone": (m.stone,),
     "ceramic": (m.ceramic,),
+    "other": (m.plastic, m.lacquer, m.any_object),
 }
 """What a plain surface of a family may also be."""
+
+
+EMBOSS = {"cloth": 0.002, "wood": 0.0015, "stone": 0.003}
+"""Largest height of the relief of tiles, metres."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,8 @@ class ReliefRange:
 
 RELIEFS: dict[str, tuple[ReliefRange, ...]] = {
     "cloth": (
-        ReliefRange(0.4, "folds", (0.25, 0.9), (0.1, 0.35)), ReliefRange(0.35, "rough grain", (0.02, 0.1), (0.1, 0.4)),
+        ReliefRange(0.4, "folds", (0.25, 0.9), (0.1, 0.35)),
+        ReliefRange(0.35, "rough grain hair", (0.02, 0.1), (0.1, 0.4)),
     ),
     "leather": (ReliefRange(0.6, "hammered grain", (0.03, 0.15), (0.06, 0.25)),),
     "wood": (ReliefRange(0.3, "hair rough", (0.1, 0.4), (0.04, 0.15)),),
@@ -132,7 +138,7 @@ def covered(rng: np.random.Generator, picture: ColourPicture, size: float, famil
 
 def _own(rng: np.random.Generator, family: str, stock: Stock) -> Material | None:
     """A finish of ours, or a picture from another model; None for families that stay as they are."""
-    if family not in OUR_FINISHES:
+    if family not in OUR_FINISHES or (family == "other" and rng.random() < 0.6):
         return None
     if rng.random() < 0.5 and family != "ceramic":
         picture = stock.texture(rng, family)
@@ -140,7 +146,7 @@ def _own(rng: np.random.Generator, family: str, stock: Stock) -> Material | None
             return covered(rng, picture, rng.uniform(0.3, 1.2), family)
     makers = OUR_FINISHES[family]
     made = makers[rng.integers(len(makers))](rng)
-    return replace(made, emboss=rng.uniform(0, 0.002) if family == "cloth" else 0.0)
+    return replace(made, emboss=rng.uniform(0, EMBOSS.get(family, 0.0)))
 
 
 def _metal(rng: np.random.Generator, colour: Array) -> tuple[float, Array]:

@@ -9,7 +9,7 @@ from materialist.procedural import rooms, walls, world
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.relief import Relief
 from materialist.procedural.staged.finishes import covered, pictured
-from materialist.procedural.staged.pieces import furnished_piece, piece
+from materialist.procedural.staged.pieces import backdrop_of, furnished_piece, piece
 from materialist.procedural.staged.stock import Stock
 from materialist.procedural.world import Parts, ScenePart, World, block, bounds, moved, one_thing, placed
 from materialist.types import Array
@@ -23,9 +23,10 @@ def furnished_room(rng: np.random.Generator, stock: Stock) -> World:
     """A furnished room seen by somebody who stands or sits in it."""
     size = rng.uniform([2.8, 3.2, 2.35], [6.5, 7.5, 3.2])
     standing = rooms.Furniture(size)
-    if rng.random() < 0.75:
+    group = _group(rng, stock) if rng.random() < 0.75 else []
+    if group:
         x, z = rng.uniform(-0.25, [0.25, 0.15]) * size[:2]
-        standing.add(placed(_group(rng, stock), (x, 0, z), rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)))
+        standing.add(placed(group, (x, 0, z), rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)))
     standing.along_walls(rng, some_pieces(rng, stock, int(rng.integers(5, 13)), BY_WALLS))
     standing.in_the_middle(rng, some_pieces(rng, stock, int(rng.integers(0, 5)), IN_THE_MIDDLE))
     return furnished_world(rng, size, stock, standing.parts, rooms.view_of(rng, size, standing), "furnished")
@@ -44,10 +45,13 @@ def furnished_world(
     rng: np.random.Generator, size: Array, stock: Stock, furniture: Parts, view: world.Viewpoint, kind: str
 ) -> World:
     """The room around its furniture: walls, floor, windows, what hangs there, rugs and lamps."""
-    parts, portals, envmap = rooms.shell(rng, size, stock.captures)
-    parts = _recovered(rng, parts, stock, size) + furniture + _rug(rng, stock, size) + _hung(rng, stock, size)
+    parts, portals, envmap = rooms.shell(rng, size, stock.captures, _on_wall(stock))
+    parts = _recovered(rng, parts, stock) + furniture + _rug(rng, stock, size) + _from_ceiling(rng, stock, size)
     parts += rooms.lamps(rng, size, portals, envmap)
-    return World(parts, envmap, view, portals, kind)
+    backdrop = None
+    if portals and rng.random() < 0.5:  # the view through the windows
+        backdrop = backdrop_of(rng, stock, float(envmap.mean()), 0.5)
+    return World(parts, envmap, view, portals, kind, backdrop)
 
 
 def _group(rng: np.random.Generator, stock: Stock) -> Parts:
@@ -79,7 +83,7 @@ def _copy(parts: Parts) -> Parts:
     return one_thing([ScenePart(part.solid, part.material) for part in parts])
 
 
-def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock, size: Array) -> Parts:
+def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
     """Walls, floor and ceiling with pictures of real surfaces on some, and relief on others."""
     floor = stock.texture(rng, str(rng.choice(["wood", "wood", "stone"]))) if rng.random() < 0.55 else None
     wall = stock.texture(rng, "stone") if rng.random() < 0.1 else None
@@ -121,28 +125,45 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     return placed([block((wide, 0.012, deep), (0, 0, 0), replace(rug, relief=fibre), 0.004)], at, turn)
 
 
-def _hung(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
-    """Framed photographs, and models that hang on walls, on the back and side walls."""
-    parts: Parts = []
-    for corner, turn, length in rooms.sides(size)[:4]:
-        for _ in range(int(rng.integers(0, 3))):
-            at = rng.uniform(0.5, max(length - 0.5, 0.6))
-            if rng.random() < 0.35:
-                model = stock.model(rng, "wall", high=1.5)
-                if model is None:
-                    continue
-                one = piece(rng, model, stock, lit=rng.random() < 0.5)
-                low, _ = bounds(one)
-                hung = moved(one, (at, model.entry.elevation, 0.002 - low[2]))
-            else:
-                hung = _photograph(rng, stock, at)
-            parts += moved(hung, corner, turn)
-    return parts
+def _on_wall(stock: Stock) -> rooms.Hangings:
+    """What hangs on walls: framed photographs, models, and at times what toys have."""
+
+    def hung(rng: np.random.Generator, wall: walls.RoomWall, count: int) -> Parts:
+        parts = walls.hangings(rng, wall, int(rng.random() < 0.3))
+        for _ in range(count):
+            if rng.random() < 0.3:
+                parts += _hung_model(rng, stock, wall)
+                continue
+            width = rng.uniform(0.25, 1.3)
+            at = wall.free(rng, width + 0.1)
+            parts += [] if at is None else _photograph(rng, stock, at, width)
+        return parts
+
+    return hung
 
 
-def _photograph(rng: np.random.Generator, stock: Stock, at: float) -> Parts:
-    """A framed photograph or a poster, its middle `at` metres along the wall."""
-    width = rng.uniform(0.25, 1.3)
+def _hung_model(rng: np.random.Generator, stock: Stock, wall: walls.RoomWall) -> Parts:
+    model = stock.model(rng, "wall", high=1.5)
+    if model is None or model.entry.elevation + model.entry.size[1] > wall.height:
+        return []
+    at = wall.free(rng, model.entry.size[0] + 0.05)
+    if at is None:
+        return []
+    one = piece(rng, model, stock, lit=rng.random() < 0.5)
+    return moved(one, (at, model.entry.elevation, 0.002 - bounds(one)[0][2]))
+
+
+def _from_ceiling(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
+    """A lamp or fan that hangs from the ceiling."""
+    model = stock.model(rng, "ceiling", high=1.5) if rng.random() < 0.35 else None
+    if model is None:
+        return []
+    at = rng.uniform(-0.25, 0.2, 2) * size[:2]
+    return placed(piece(rng, model, stock, lit=rng.random() < 0.7), (at[0], size[2] - model.entry.size[1], at[1]))
+
+
+def _photograph(rng: np.random.Generator, stock: Stock, at: float, width: float) -> Parts:
+    """A framed photograph or a poster of that width, its middle `at` metres along the wall."""
     height = width * float(rng.choice([0.66, 0.75, 1.0, 1.33, 1.5]))
     picture = stock.printed(rng, width / height)
     if picture is None:

@@ -34,6 +34,7 @@ def laid_table(rng: np.random.Generator, stock: Stock) -> World:
     inside = np.array([[-w / 2 + 0.1, 0.15, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
     eye = np.clip(world.orbit(target, distance, turn, up, fov).position, *inside)
     view = world.look(eye, target, fov, rng.normal() * 0.03)
+    view = world.through_lens(rng, view, float(np.linalg.norm(eye - target)), 0.35)
     return furnished_world(rng, size, stock, standing.parts, view, "laid")
 
 

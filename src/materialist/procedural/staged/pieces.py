@@ -2,16 +2,18 @@
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from materialist.procedural import materials as m
-from materialist.procedural.catalog.cache import CatalogModel
+from materialist.procedural.catalog.cache import CatalogModel, as_roots
 from materialist.procedural.catalog.support import LevelPlace
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.objects import things
-from materialist.procedural.staged.finishes import finish, style
+from materialist.procedural.staged.finishes import finish, pictured, style
 from materialist.procedural.staged.stock import Stock
 from materialist.procedural.world import Parts, ScenePart, bounds, one_thing, orb, placed
+from materialist.types import Array
 
 GLOW = (4.0, 60.0)
 """Radiance of what glows in a lamp, log-uniform; the light of a day is about 1."""
@@ -24,6 +26,9 @@ def piece(rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: b
     parts: Parts = []
     glow = np.exp(rng.uniform(*np.log(GLOW))) * np.array([1.0, rng.uniform(0.6, 0.95), rng.uniform(0.3, 0.9)])
     for solid, look, picture in zip(model.solids, model.looks, model.pictures):
+        if look.family == "screen" and picture is None and rng.random() < 0.5:
+            parts.append(ScenePart(solid, _screen(rng, solid, stock)))
+            continue
         key = (look, id(picture))
         if key not in finished:
             shines = lit and look.family == "bulb"
@@ -34,6 +39,19 @@ def piece(rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: b
         for x, y, z in model.entry.lights[:3]:
             parts.append(orb((x - width / 2, y, z - depth / 2), 0.035, m.light(rng, tuple(3 * glow)), 12))
     return one_thing(parts)
+
+
+def _screen(rng: np.random.Generator, solid: s.Solid, stock: Stock) -> m.Material:
+    """A screen that shows a photograph, lit or printed, or is off."""
+    low, high = solid.uv.min(0), solid.uv.max(0)
+    width, height = np.maximum(high - low, 1e-3)
+    picture = stock.printed(rng, float(width / height)) if 0.3 < width / height < 3.5 else None
+    if picture is None:
+        return m.uniform((0.02, 0.02, 0.025), 0.08)
+    shown = pictured(picture, np.ones(3), 0.15)
+    glow = rng.uniform(0.5, 3.0) if rng.random() < 0.5 else 0.0
+    offset = float(-low[0] / width), float(high[1] / height)
+    return replace(shown, repeat=(float(width), float(-height)), offset=offset, emission=(glow, glow, glow))
 
 
 def small_thing(rng: np.random.Generator, stock: Stock, high: float, tall: float = 1.0) -> Parts:
@@ -80,7 +98,7 @@ def _turn(rng: np.random.Generator) -> float:
 
 def furnished_piece(rng: np.random.Generator, model: CatalogModel, stock: Stock, clutter: float) -> Parts:
     """A model with things on its level places, about `clutter` a square metre and place at least."""
-    parts = piece(rng, model, stock)
+    parts = piece(rng, model, stock, lit=model.role == "lamp" and rng.random() < 0.6)
     for place in model.places:
         area = (place.right - place.left) * (place.front - place.back)
         if place.clearance > 0.12 and place.height > 0.2 and rng.random() < 0.8:
@@ -88,6 +106,12 @@ def furnished_piece(rng: np.random.Generator, model: CatalogModel, stock: Stock,
     return parts
 
 
-def raised(parts: Parts, height: float) -> Parts:
-    """The parts `height` metres higher."""
-    return [replace(part, solid=s.moved(part.solid, (0, height, 0))) for part in parts]
+def backdrop_of(rng: np.random.Generator, stock: Stock, level: float, least: float, blur: float = 0.0) -> Array | None:
+    """[h, w, 3] linear radiance about `level` of a part of a photograph, at least `least` of its shorter side, blurred
+    by `blur` pixels of 256; None where there is none."""
+    part = stock.crop(rng, 1.0, 256, least)
+    if part is None:
+        return None
+    linear = (as_roots(part) / 255.0).astype(np.float32) ** 2
+    soft = cv2.GaussianBlur(linear, (0, 0), blur) if blur > 0 else linear
+    return soft * np.float32(level * np.exp(rng.normal(0, 0.5)) / max(float(soft.mean()), 1e-3))

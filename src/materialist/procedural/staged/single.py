@@ -1,17 +1,16 @@
 """One thing, seen from close by with a long lens: before black, white or a blurred photograph, or on a ground."""
 
-import cv2
 import numpy as np
 
 from materialist.procedural import materials as m
-from materialist.procedural.catalog.cache import as_roots
+from materialist.procedural.catalog.support import LevelPlace
 from materialist.procedural.objects import shapes as s
 from materialist.procedural.staged import studio_light
 from materialist.procedural.staged.finishes import covered
-from materialist.procedural.staged.pieces import piece
+from materialist.procedural.staged.pieces import backdrop_of, laid, piece
 from materialist.procedural.staged.sculptures import sculpture
 from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, ScenePart, World, bounds, look, orbit, placed
+from materialist.procedural.world import Parts, ScenePart, World, bounds, look, orbit, placed, through_lens
 from materialist.types import Array
 
 SUBJECTS = (
@@ -29,11 +28,12 @@ def single(rng: np.random.Generator, stock: Stock) -> World:
     fov = rng.uniform(9, 26) if rng.random() < 0.75 else rng.uniform(26, 50)
     up = np.radians(rng.uniform(-8, 50) if rng.random() < 0.7 else rng.uniform(0, 20))
     turn = rng.uniform(-np.pi, np.pi) if rng.random() < 0.25 else rng.normal(0, 0.5)
-    fill = rng.uniform(0.55, 1.15)
+    fill = rng.uniform(0.65, 1.4)
     distance = size / 2 / np.tan(np.radians(fov) / 2) / fill
     target = (low + high) / 2 + rng.normal(0, 0.05, 3) * (high - low)
     around = orbit(target, distance, turn, up, fov)
     view = look(around.position, target, fov, rng.normal() * 0.05)
+    view = through_lens(rng, view, distance, 0.2)
     to_camera = (around.position - target) / distance
     hard = rng.random() < 0.65
     envmap = studio_light.hard_lamps(rng, to_camera) if hard else studio_light.soft_light(rng, stock)
@@ -49,8 +49,12 @@ def single(rng: np.random.Generator, stock: Stock) -> World:
 
 
 def _subject(rng: np.random.Generator, stock: Stock) -> Parts:
-    if rng.random() < 0.45:
+    draw = rng.random()
+    if draw < 0.45:
         return sculpture(rng, stock)
+    if draw < 0.6:  # a few things together
+        parts = laid(rng, LevelPlace(0.0, -0.3, 0.3, -0.2, 0.2, 10.0), int(rng.integers(2, 6)), stock, crowd=1.0)
+        return parts or sculpture(rng, stock)
     model = stock.model(rng, str(rng.choice(SUBJECTS)))
     return sculpture(rng, stock) if model is None else placed(piece(rng, model, stock), (0, 0, 0))
 
@@ -92,9 +96,6 @@ def _backdrop(rng: np.random.Generator, stock: Stock, level: float, black: float
         return np.zeros((4, 4, 3), np.float32)
     if draw < black + 0.12:
         return np.full((4, 4, 3), level * float(np.exp(rng.normal(0.5, 0.5))), np.float32)
-    part = stock.crop(rng, 1.0, 192, 0.3)
-    if part is None:
-        return np.full((4, 4, 3), level * rng.uniform(0.05, 1), np.float32)
-    linear = (as_roots(part) / 255.0).astype(np.float32) ** 2
-    soft = cv2.GaussianBlur(linear, (0, 0), float(np.exp(rng.uniform(np.log(1.5), np.log(14)))))
-    return soft * np.float32(level * np.exp(rng.normal(0, 0.5)) / max(float(soft.mean()), 1e-3))
+    blur = float(np.exp(rng.uniform(np.log(1.5), np.log(16))))
+    picture = backdrop_of(rng, stock, level, 0.3, blur)
+    return np.full((4, 4, 3), level * rng.uniform(0.05, 1), np.float32) if picture is None else picture

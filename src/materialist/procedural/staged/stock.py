@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from zlib import crc32
 
 import cv2
 import numpy as np
@@ -14,6 +15,8 @@ from materialist.types import Array
 
 SMALLEST_CROP = 0.2
 """Of a photograph's shorter side."""
+HELD_OUT_EVERY = 10
+"""One model and photograph in so many is never trained on."""
 FEWEST_TEXTURES = 4
 """Of a family, or all its things would look alike."""
 
@@ -23,12 +26,20 @@ class Stock:
     """Everything at hand."""
 
     listing: Listing
+    held_out: bool = False
+    """Whether it has only the models and photographs that are kept aside for testing; else only the others."""
     meshes: Meshes = ()
     captures: tuple[Path, ...] = ()
 
+    def _is_mine(self, name: str) -> bool:
+        return (crc32(name.encode()) % HELD_OUT_EVERY == 0) == self.held_out
+
+    def _mine(self, names: tuple[str, ...]) -> list[str]:
+        return [name for name in names if self._is_mine(name)]
+
     def model(self, rng: np.random.Generator, *roles: str, low: float = 0.0, high: float = 9.0) -> CatalogModel | None:
         """A model of one of the roles whose longest side is between two lengths, metres; None where there is none."""
-        keys = [key for role in roles for key in self.listing.models.get(role, ())]
+        keys = [key for role in roles for key in self._mine(self.listing.models.get(role, ()))]
         for _ in range(12 if keys else 0):
             model = self.listing.model(keys[rng.integers(len(keys))])
             if low <= max(model.entry.size) <= high:
@@ -37,7 +48,7 @@ class Stock:
 
     def texture(self, rng: np.random.Generator, family: str) -> ColourPicture | None:
         """A picture that repeats, of a surface of that family of materials; None where there is none."""
-        places = self.listing.textures.get(family, ())
+        places = [place for place in self.listing.textures.get(family, ()) if self._is_mine(place[0])]
         if len(places) < FEWEST_TEXTURES:
             return None
         key, solid = places[rng.integers(len(places))]
@@ -45,7 +56,7 @@ class Stock:
 
     def photograph(self, rng: np.random.Generator) -> Array | None:
         """[h, w, 3] uint8 sRGB; None where there is none."""
-        names = self.listing.photographs
+        names = self._mine(self.listing.photographs)
         return self.listing.photograph(names[rng.integers(len(names))]) if names else None
 
     def crop(self, rng: np.random.Generator, aspect: float, side: int, least: float = SMALLEST_CROP) -> Array | None:
@@ -80,7 +91,9 @@ class Stock:
 
 
 @lru_cache(maxsize=4)
-def stock(archives: tuple[Path, ...], photographs: tuple[Path, ...], folder: Path | None, meshes: Meshes,
-          captures: tuple[Path, ...]) -> Stock:  # fmt: skip
+def stock(
+    archives: tuple[Path, ...], photographs: tuple[Path, ...], folder: Path | None, *, held_out: bool = False,
+    meshes: Meshes = (), captures: tuple[Path, ...] = (),
+) -> Stock:  # fmt: skip
     """The stock of archives and photographs, made once a process."""
-    return Stock(listing(archives, photographs, folder), meshes, captures)
+    return Stock(listing(archives, photographs, folder), held_out, meshes, captures)
