@@ -19,7 +19,7 @@ from materialist.procedural.world import Parts, ScenePart, one_thing
 from materialist.types import Array
 
 Maker = Callable[[np.random.Generator, Stock], Solid]
-GRID = 72
+GRID = 84
 """Samples on a side of the field of a body with limbs."""
 
 
@@ -56,7 +56,7 @@ def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material
         made = makers.get(family, m.lacquer)(rng)
     shrink = rng.uniform(0.2, 0.6)
     repeat = (made.repeat[0] * shrink, made.repeat[1] * shrink)
-    return replace(made, repeat=repeat, relief=relief_of(rng, family, 0.7))
+    return replace(made, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001))
 
 
 def _displaced(rng: np.random.Generator, solid: Solid, amount: float) -> Solid:
@@ -90,7 +90,7 @@ def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
     vertices = vertices * (1 + bump(vertices))[:, None] * rng.uniform(0.55, 1.0, 3)
     faces = np.asarray(ball.faces, np.int32)
     solid = Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
-    return _displaced(rng, solid, _depth(rng, 0.002, 0.02))
+    return _displaced(rng, solid, _depth(rng, 0.004, 0.03))
 
 
 def _body(rng: np.random.Generator, stock: Stock) -> Solid:
@@ -111,7 +111,7 @@ def _body(rng: np.random.Generator, stock: Stock) -> Solid:
         field += np.exp(-soft * np.clip(distance, -0.4, 1))
     surface, faces, _, _ = marching_cubes(field, 1.0, spacing=(step,) * 3)
     solid = _of(surface.astype(float) + low, faces[:, ::-1].astype(np.int32))
-    return _displaced(rng, solid, _depth(rng, 0.0015, 0.014))
+    return _displaced(rng, solid, _depth(rng, 0.003, 0.025))
 
 
 def _of(vertices: Array, faces: Array) -> Solid:
@@ -182,7 +182,7 @@ def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
     faces = s.grid_faces(rows, columns)
     solid = _of(points.reshape(-1, 3), faces)
     lid = s.moved(s.disc(float(radius[-1]) * 0.95), (0, float(up[-1]) - 0.02, 0))
-    return s.joined([_displaced(rng, solid, _depth(rng, 0.0008, 0.01)), lid])
+    return s.joined([_displaced(rng, solid, _depth(rng, 0.001, 0.012)), lid])
 
 
 def _captured(rng: np.random.Generator, stock: Stock) -> Solid:
