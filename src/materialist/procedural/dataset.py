@@ -19,7 +19,7 @@ from materialist.render.variant import setup
 from materialist.types import Progress
 
 FORMAT = 1
-CONTENT = 10
+CONTENT = 11
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")

@@ -21,6 +21,8 @@ from materialist.render.denoise import denoise
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 
+DENOISING = "balanced"
+"""Quality of the filter: less than half of the time of 'high'."""
 LIGHT_SPP = 128
 """Rays of each of its texels."""
 LIGHT_HIDDEN = 0.1
@@ -111,10 +113,10 @@ def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
 def _developed(world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions) -> dict[str, Array]:
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)
-    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal)
+    image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, quality=DENOISING)
     # The shading is of white surfaces: a guide of their texture would print it into the shading.
     covered = (probe["owner"] >= 0).mean(2, dtype=np.float32)
-    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal)
+    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, quality=DENOISING)
     labels = labels_of(probe)
     lit = labels["mask"] if world.backdrop is not None else None
     gain = exposure(image, rng, lit) * balance(shading, rng)

@@ -27,7 +27,7 @@ def furnished_room(rng: np.random.Generator, stock: Stock) -> World:
     if group:
         x, z = rng.uniform(-0.25, [0.25, 0.15]) * size[:2]
         standing.add(placed(group, (x, 0, z), rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)))
-    standing.along_walls(rng, some_pieces(rng, stock, int(rng.integers(5, 13)), BY_WALLS))
+    standing.along_walls(rng, some_pieces(rng, stock, int(rng.integers(7, 17)), BY_WALLS))
     standing.in_the_middle(rng, some_pieces(rng, stock, int(rng.integers(0, 5)), IN_THE_MIDDLE))
     return furnished_world(rng, size, stock, standing.parts, rooms.view_of(rng, size, standing), "furnished")
 

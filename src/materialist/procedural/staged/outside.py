@@ -21,14 +21,13 @@ THINGS = ("outdoor", "outdoor", "outdoor", "vehicle", "vehicle", "person", "pers
 def outside(rng: np.random.Generator, stock: Stock) -> World:
     """Things on open ground, at times before houses or a photograph, under a sky."""
     parts = [_ground(rng, stock)]
-    behind = rng.random()
+    behind, at = rng.random(), -rng.uniform(6, 16)
     if behind < 0.45:
-        at = -rng.uniform(5, 16)
         for x, house in houses(rng, -rng.uniform(6, 14), 14, 4):
             parts += placed(house, (x, 0, at + rng.normal() * 0.3))
     elif behind < 0.6:
-        parts += placed(street.wall(rng, 40.0), (0, 0, -rng.uniform(4, 10)))
-    parts += _standing(rng, stock, int(rng.integers(3, 13)))
+        parts += placed(street.wall(rng, 40.0), (0, 0, at))
+    parts += _standing(rng, stock, int(rng.integers(3, 13)), at + 0.5 if behind < 0.6 else -9.0)
     height = rng.uniform(0.5, 1.0) if rng.random() < 0.25 else rng.uniform(1.3, 2.2)
     eye = np.array([rng.normal() * 0.8, height, rng.uniform(4, 8)])
     target = np.array([rng.normal() * 1.2, rng.uniform(0.2, 1.6), -rng.uniform(1, 5)])
@@ -47,8 +46,8 @@ def _ground(rng: np.random.Generator, stock: Stock) -> ScenePart:
     return ScenePart(sheet, m.replace(m.ground(rng), relief=relief, emboss=rng.uniform(0, 0.01)))
 
 
-def _standing(rng: np.random.Generator, stock: Stock, count: int) -> Parts:
-    """Up to `count` models that do not touch each other, the larger ones farther away."""
+def _standing(rng: np.random.Generator, stock: Stock, count: int, back: float) -> Parts:
+    """Up to `count` models before z = `back` that do not touch each other, the larger ones farther away."""
     taken: list[tuple[float, float, float]] = []
     parts: Parts = []
     for _ in range(count):
@@ -59,7 +58,7 @@ def _standing(rng: np.random.Generator, stock: Stock, count: int) -> Parts:
         low, high = bounds(one)
         radius = float(np.hypot(*(high - low)[[0, 2]]) / 2)
         for _ in range(10):
-            x, z = rng.uniform(-4.5, 4.5), rng.uniform(-7, 3.0) - radius
+            x, z = rng.uniform(-4.5, 4.5), rng.uniform(back + radius, max(3.0 - radius, back + radius))
             if all(np.hypot(x - a, z - b) > 0.8 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
                 parts += placed(one, (x, 0, z), rng.uniform(0, 2 * np.pi))
