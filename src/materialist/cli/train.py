@@ -62,10 +62,14 @@ def data(
         report_success("train data", computing.as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
     from materialist.io.atomic import require_parent
+    from materialist.procedural.catalog.packages import missing
     from materialist.procedural.dataset import produce
 
     require_parent(output)
     start = time.monotonic()
+    note = "" if wanted.real == 0 else missing(wanted.furniture)
+    if note and not computing.as_json:
+        typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
         made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
     facts = {"output": str(output), "rendered": made, "existing": count - made, "seconds": time.monotonic() - start}

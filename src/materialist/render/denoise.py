@@ -10,11 +10,12 @@ from materialist.errors import InputError, SetupError
 from materialist.types import Array
 
 
-def denoise(image: Array, albedo: Array, normal: Array) -> Array:
+def denoise(image: Array, albedo: Array, normal: Array, *, quality: str = "high") -> Array:
     """[H, W, 3] float32 linear without the path tracer's noise, guided by the scene's own maps, whose edges stay.
 
     image: [H, W, 3] linear radiance, >= 0, any range. albedo: [H, W, 3] linear, in [0, 1].
-    normal: [H, W, 3] unit, or 0 where there is no surface. The filter runs on `buffers.torch_device()`.
+    normal: [H, W, 3] unit, or 0 where there is no surface. quality: of the filter, 'high', 'balanced' or 'fast'.
+    The filter runs on `buffers.torch_device()`.
 
     Equal inputs give equal pictures on one machine. Raises InputError where the guides are not of the image's size,
     SetupError where pyoidn is missing or broken.
@@ -30,7 +31,7 @@ def denoise(image: Array, albedo: Array, normal: Array) -> Array:
     pictures: list[Any] = [_padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
     if on_card:
         pictures = [placed(p) for p in pictures]
-    clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True)
+    clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True, quality=quality)
     clean = clean.cpu().numpy() if on_card else clean
     return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
 
