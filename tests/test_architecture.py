@@ -8,7 +8,7 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
-NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "forks", "records"}
+NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "forks", "install", "records"}
 NOUNS |= {"option_kinds", "options", "keywords", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
 KINDS = ("select", "material", "light", "remove", "glass", "insert", "drop", "core", "composite")

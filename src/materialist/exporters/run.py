@@ -11,6 +11,7 @@ from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.glb import glb_bytes, write_hdr
 from materialist.exporters.parts import Part, body_parts, scene_parts
+from materialist.install import extra_command
 from materialist.io.atomic import ensure_writable, whole_file, write_whole
 from materialist.keywords import ExportKeywords
 from materialist.option_kinds import documented
@@ -121,7 +122,7 @@ def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     try:
         from materialist.exporters.usd import pack_usdz, write_usd
     except ImportError as error:
-        raise SetupError("USD needs usd-core; install it with: pip install 'materialist[usd]'") from error
+        raise SetupError(f"USD needs usd-core; install it with: {extra_command('usd')}") from error
 
     if path.suffix.lower() == ".usdz":
         with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as file:

@@ -9,6 +9,7 @@ from PIL import Image, UnidentifiedImageError
 from tifffile import TiffFile
 
 from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.install import extra_command
 from materialist.io import bitmap
 from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
@@ -141,7 +142,7 @@ def _raw(path: Path) -> Decoded:
     try:
         import rawpy
     except ImportError as error:
-        raise SetupError(f"Camera RAW needs one more package to read {path.name}: pip install rawpy") from error
+        raise SetupError(f"Camera RAW needs one more package to read {path.name}: {extra_command('raw')}") from error
     tags = file_tags(path)
     try:
         with rawpy.imread(str(path)) as raw:

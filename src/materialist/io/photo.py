@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from materialist.errors import InputError, SetupError
+from materialist.install import install_command
 from materialist.io.bitmap import MIN_SIDE, Decoded
 from materialist.io.decode import decode
 from materialist.io.exif import horizontal_fov
@@ -158,5 +159,7 @@ def example_path(name: str) -> Path:
     spec = find_spec("skimage")  # the package is located, not imported: importing it takes a while
     path = Path(spec.origin).parent / "data" / EXAMPLES[key][0] if spec and spec.origin else None
     if path is None or not path.is_file():
-        raise SetupError("The example photos come with scikit-image: pip install --force-reinstall scikit-image")
+        raise SetupError(
+            f"The example photos come with scikit-image: {install_command('--force-reinstall', 'scikit-image')}"
+        )
     return path

@@ -8,6 +8,7 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from materialist.errors import SetupError
+from materialist.install import extra_command
 from materialist.jobs.process import LOST, Message, Worker
 from materialist.jobs.worker import DONE, FAILED, Reporter, run
 
@@ -76,7 +77,7 @@ class RayPool:
         try:
             import ray
         except ModuleNotFoundError as error:
-            raise SetupError("Workers on Ray need Ray; install it with: pip install 'materialist[ray]'") from error
+            raise SetupError(f"Workers on Ray need Ray; install it with: {extra_command('ray')}") from error
         self._ray = ray
         local = address == "local"  # a cluster of this machine alone, which ends with the pool
         _check_reachable(address)

@@ -7,6 +7,7 @@ import numpy as np
 
 from materialist.buffers import placed, torch_device
 from materialist.errors import InputError, SetupError
+from materialist.install import install_command
 from materialist.types import Array
 
 
@@ -51,7 +52,7 @@ def require_denoiser() -> None:
     if problem is not None:
         raise SetupError(
             f"Denoising needs the package pyoidn ({problem}); install it with: "
-            f"{sys.executable} -m pip install pyoidn, or render with `denoise=False`."
+            f"{install_command('pyoidn')}, or render with `denoise=False`."
         )
 
 

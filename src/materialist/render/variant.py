@@ -12,6 +12,7 @@ from glob import glob
 
 from materialist.errors import InputError, SetupError
 from materialist.forks import check_process
+from materialist.install import install_command
 
 MINIMUM_LLVM = 17
 """Dr.Jit refuses 14; 15 and 16 start, but abort the process in a path-tracing kernel (they cannot select fminimum)."""
@@ -82,7 +83,7 @@ def unloaded(error: BaseException) -> str:
         error = error.__context__
     match = re.search(r"(\S+\.so\S*): cannot open shared object", str(error))
     if match is None:
-        return f"{error}; install it again with: pip install --force-reinstall mitsuba."
+        return f"{error}; install it again with: {install_command('--force-reinstall', 'mitsuba')}"
     return f"the library {match[1]} is missing; install it with: sudo apt-get install -y {package_of(match[1])}"
 
 

@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, SetupError
+from materialist.install import extra_command
 from materialist.io.photo import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
 from materialist.studio import SETTINGS, asset, uploads
@@ -134,9 +134,7 @@ def application(
     try:
         import gradio as gr
     except ImportError as error:
-        raise SetupError(
-            f"The studio needs one more package: {sys.executable} -m pip install 'gradio==6.31.*'"
-        ) from error
+        raise SetupError(f"The studio needs one more package: {extra_command('studio')}") from error
     from fastapi import FastAPI
 
     from materialist.studio.access.gate import Gate

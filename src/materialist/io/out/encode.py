@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image, features
 
 from materialist.errors import InputError, OutputError, SetupError
+from materialist.install import install_command
 from materialist.io.atomic import ensure_writable, whole_file
 from materialist.io.exr import write_exr
 from materialist.io.out.colours import SRGB, PhotoColours, photo_colours
@@ -103,7 +104,7 @@ def check_image_output(
     if bits is not None and (bits not in (8, 16) or (bits == 16 and kind not in ("PNG", "TIFF")) or kind == "EXR"):
         raise InputError(f"{path} cannot have {bits} bits a channel; PNG and TIFF have 8 or 16, EXR has floats of 32.")
     if kind == "AVIF" and not features.check("avif"):
-        raise SetupError("AVIF needs a Pillow with its encoder: pip install --upgrade 'pillow>=11.3'")
+        raise SetupError(f"AVIF needs a Pillow with its encoder: {install_command('pillow>=11.3')}")
     ensure_writable(path, force, None)
 
 
