@@ -205,7 +205,7 @@ def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_close
 
     monkeypatch.setattr("materialist.studio.studio.free_memory", free)
     for number in range(201):
-        shared.session(f"page{number}", "anna").live = SimpleNamespace(close=lambda: None)
+        shared.session(f"page{number}", f"person{number}").live = SimpleNamespace(close=lambda: None)
     shared.leave("page0")
     assert begun.wait(10)
     for number in range(1, 201):
@@ -249,7 +249,7 @@ def test_little_is_remembered_of_people_who_are_gone(shared, monkeypatch):
     for person in "abac":
         shared.note_last(person, "photo-001")
     assert [*shared.last] == ["a", "c"]
-    shared.quota._claims["a"] = deque([(time.monotonic() - 3601, SETTINGS.storage_quota)])
+    shared.quota._claims["a"] = deque([quota.Claim(time.monotonic() - 3601, SETTINGS.storage_quota)])
     shared.claim("b", 10)
     assert [*shared.quota._claims] == ["b"]
     for person in "abac":

@@ -20,7 +20,11 @@ class StudioSettings:
     disk_left: int = 2_000_000_000  # bytes of the disk that stay free
     opening_memory: int = 2_000_000_000  # bytes of data of the process that opens an upload
     opening_seconds: float = 30.0  # in which it must be done
-    openings: int = 3  # uploads that are opened at a time, one of each sender
+    openings: int = 3  # uploads that are opened at a time, one of each sender; falls count among them
+    uploads: int = 8  # that one sender sends at a time
+    body_seconds: float = 60.0  # in which the next part of an upload must come
+    pages: int = 40  # that one sender has open
+    requests: int = 16  # of one sender that change something at a time, fewer than the page has threads (40)
     edit_pixels: int = 8_000_000  # largest picture of an edit, to which a larger one is shrunk
     mesh_faces: int = 200_000  # of an object's mesh
     scene_pixels: int = 1_500_000  # largest zipped scene, at working size

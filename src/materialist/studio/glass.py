@@ -122,7 +122,11 @@ class GlassClient:
                         "This machine has too little memory free to trace glass while sliders move; press Final "
                         "picture instead."
                     )
-                self._worker = Worker(niceness=SETTINGS.glass_niceness, idle=SETTINGS.glass_idle)
+                self._worker = Worker(
+                    niceness=SETTINGS.glass_niceness,
+                    idle=SETTINGS.glass_idle,
+                    memory=SETTINGS.job_memory,
+                )
                 threading.Thread(target=self._listen, args=(self._worker,), name="glass", daemon=True).start()
         except (OSError, InputError) as error:
             self.state = GlassState(False, str(error), True)

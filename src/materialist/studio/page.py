@@ -27,6 +27,7 @@ def build(studio: Studio) -> Any:
     parts = context.parts
 
     with gr.Blocks(title="Materialist studio", analytics_enabled=False, fill_width=True) as page:
+        gr.State()  # with one, a page holds a request as long as it is open
         gr.HTML(_HEAD, elem_id="head", js_on_load=None)
         with gr.Row(elem_id="body"):
             with gr.Column(scale=5, min_width=320, elem_id="left"):

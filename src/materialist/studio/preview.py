@@ -23,6 +23,7 @@ from materialist.errors import InputError
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
+from materialist.studio.access.quota import Allowance
 from materialist.studio.edit_list import kept, key_of, summary
 from materialist.types import Array, Body, Scene
 
@@ -45,8 +46,11 @@ _LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 class LivePreview:
     """A fitted scene, its preview (seconds to build, unless `file` has its tables), and the last edited scenes."""
 
-    def __init__(self, scene: Scene, file: Path | None = None, package: Path | None = None):
-        """package: where the scene lies; things then fall in a process of their own."""
+    def __init__(
+        self, scene: Scene, file: Path | None = None, package: Path | None = None, allowance: Allowance | None = None
+    ):
+        """package: where the scene lies; things then fall in a process of their own, as the allowance allows."""
+        self._allowance = allowance or Allowance()
         self.scene = scene
         self._package = package
         self._kept: dict[str, Any] = {}
@@ -106,7 +110,8 @@ class LivePreview:
         """The scene `before` after the fall that the last step is; what falls, and for how long, is a stranger's."""
         limits = Limits(SETTINGS.opening_memory, SETTINGS.fall_seconds)
         place = str(self._package)
-        added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
+        with self._allowance.opening():
+            added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
         edits = [*before.provenance.get("edits", []), *added["edits"]]
         after = replace(
             before,

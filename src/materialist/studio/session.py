@@ -67,6 +67,10 @@ class Session:
         self._past: list[tuple[str, EditList, Selection]] = []
         self._future: list[tuple[str, EditList, Selection]] = []
         self.running: list[Job] = []
+        self.left = False
+        """Whether the page was closed."""
+        self.followers: dict[int, object] = {}
+        """Job (by its id) -> who follows it for this page: of several the last."""
         self.seen, self.beats = 0.0, False
         """When this page last asked for something, by the monotonic clock, and whether it shows that it is open."""
         self._kept: bytes | None = None
@@ -128,7 +132,7 @@ class Session:
         with self.lock:
             self.close()
             self.project, self.glass = project, GlassClient(project.scene)
-            self.live = LivePreview(loaded, project.folder / "preview.npz", project.scene)
+            self.live = LivePreview(loaded, project.folder / "preview.npz", project.scene, self.allowance)
             self.edits, self._kept = EditList(steps), kept
 
     def close(self) -> None:

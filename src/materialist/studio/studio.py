@@ -21,7 +21,7 @@ from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.access.files import HandedFiles
-from materialist.studio.access.quota import Allowance, Quota, sender_of
+from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
 from materialist.studio.preview import free_memory
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
@@ -75,7 +75,10 @@ class Studio:
         with self._lock:
             last = now - SETTINGS.page_seconds
             gone = [name for name, one in self._sessions.items() if not one.beats and one.seen < last and name != page]
-            known = self._sessions.setdefault(page, self._new_session(person)) if page else None
+            known = self._sessions.get(page or "")
+            if known is None and page:
+                self._check_pages(person)
+                known = self._sessions[page] = self._new_session(person)
             if known is not None and known.person == person:
                 known.seen, known.beats = now, known.beats or beats
         for name in gone:
@@ -84,8 +87,14 @@ class Studio:
             raise InputError(LOST)
         return known
 
+    def _check_pages(self, person: str) -> None:
+        """Raise InputError where a person's sender has too many pages open."""
+        sender = self.sender(person)
+        if sum(self.sender(one.person) == sender for one in self._sessions.values()) >= SETTINGS.pages:
+            raise InputError(f"There are {SETTINGS.pages} pages open from your address; close some.")
+
     def _new_session(self, person: str) -> Session:
-        allowance = Allowance(self.quota, lambda: self.senders.get(person, person))
+        allowance = Allowance(self.quota, lambda: self.sender(person))
         return Session(person, self.without_folders, self.single_user, allowance)
 
     def without_folders(self, text: str) -> str:
@@ -102,13 +111,13 @@ class Studio:
             while len(self.senders) > SETTINGS.people:
                 del self.senders[next(iter(self.senders))]
 
-    def claim(self, person: str, size: int) -> None:
-        """Count bytes that a person is about to store. Raises InputError above the quota, or where the disk is full."""
-        self.quota.claim(self.senders.get(person, person), size)
+    def sender(self, person: str) -> str:
+        """The address that the person's requests come from."""
+        return self.senders.get(person, person)
 
-    def give_back(self, person: str, size: int) -> None:
-        """Take back a part of what was claimed, and not stored."""
-        self.quota.give_back(self.senders.get(person, person), size)
+    def claim(self, person: str, size: int) -> Claim:
+        """Count bytes that a person is about to store. Raises InputError above the quota, or where the disk is full."""
+        return self.quota.claim(self.sender(person), size)
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
@@ -126,6 +135,8 @@ class Studio:
     def open(self, session: Session, name: str) -> None:
         """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
         project = self.project(name, session.person)
+        if session.left:
+            raise InputError("The page was closed.")
         had_scene = session.live is not None
         session.close()
         if had_scene:
@@ -146,8 +157,8 @@ class Studio:
         Raises InputError where this person, or all together, have too many there.
         """
         unfinished = self.jobs.unfinished()
-        sender = self.senders.get(session.person, session.person)
-        mine = sum(self.senders.get(job.owner, job.owner) == sender for job in unfinished)
+        sender = self.sender(session.person)
+        mine = sum(self.sender(job.owner) == sender for job in unfinished)
         all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
             whose = f"You have {mine}" if mine >= SETTINGS.jobs_a_person else f"The studio has {all_}"
@@ -166,6 +177,7 @@ class Studio:
         with self._lock:
             session = self._sessions.pop(page or "", None)
             if session is not None:
+                session.left = True
                 self._left.append(session)
                 first = len(self._left) == 1
         if session is not None:

@@ -118,6 +118,7 @@ def _start_inversion(
     project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
     try:
+        session.allowance.claim(source.stat().st_size)
         shutil.copyfile(source, photo)
         job = studio.submit(
             session, tasks.invert, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
@@ -145,7 +146,7 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     studio.note_last(session.person, project.name)
     yield {"start": gr.update(interactive=False)}
     shown = 0
-    for update in context.following(job):
+    for update in context.following(session, job):
         if len(job.found) > shown:
             latest = {f["name"]: project.folder / f["file"] for f in job.found}
             photo = latest.pop(tasks.PHOTO)
@@ -155,6 +156,8 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
             pictures = [(studio.public_copy(session.person, file), name) for name, file in latest.items()]
             update["found"] = gr.update(value=pictures, visible=bool(pictures))
         yield update
+    if not job.over:  # the page was closed, or follows the inversion anew; it goes on
+        return
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)

@@ -66,8 +66,9 @@ class PageContext:
         def run(request: gr.Request, told: gr.EventData, *values: Any) -> Any:
             try:
                 session = self.session(request)
-                further = change(session, *([told._data] if data else []), *values) or {}
-                shown = self.everything(session) if everything else self.picture(session, coarse)
+                with session.allowance.request():
+                    further = change(session, *([told._data] if data else []), *values) or {}
+                    shown = self.everything(session) if everything else self.picture(session, coarse)
                 return self._outputs(shown | further)
             except Exception as error:
                 raise self.message(error) from error
@@ -133,14 +134,26 @@ class PageContext:
         """The picture, and sliders as the current step, or the selected object, has them."""
         return self.picture(session) | (control_values(session) if session.live is not None else {})
 
-    def following(self, job: Job) -> Iterator[Updates]:
-        """Updates of the progress and its button whenever a job has moved on; the last one says how it ended."""
+    def following(self, session: Session, job: Job) -> Iterator[Updates]:
+        """Updates of the progress and its button whenever a job has moved on; the last one says how it ended.
+
+        Between two looks the thread is free for others. It ends early where the page is closed, or follows the job
+        anew; `follows` tells.
+        """
+        follower = session.followers[id(job)] = object()
         last = None
-        while not job.over:
-            if (state := self.state(job)) != last:
-                yield {"progress": (last := state), "stop": gr.update(visible=True)}
+        while not job.over and self.follows(session, job, follower):
+            state = self.state(job)
+            yield {"progress": state, "stop": gr.update(visible=True)} if state != last else {}
+            last = state
             time.sleep(SETTINGS.poll_seconds)
-        yield {"progress": self.state(job), "stop": gr.update(visible=False)}
+        if self.follows(session, job, follower):
+            yield {"progress": self.state(job), "stop": gr.update(visible=False)}
+
+    def follows(self, session: Session, job: Job, follower: object = None) -> bool:
+        """Whether a page is open, and this follower of a job (or any) the last that it has."""
+        known = session.followers.get(id(job))
+        return not session.left and (follower is None or known is follower)
 
     def state(self, job: Job) -> str:
         """The state of a job as HTML."""
@@ -161,7 +174,7 @@ class PageContext:
         """Let a task make OUTPUT of the open scene, with the updates of `following`; returns whether it did."""
         scene = str(session.opened.scene)
         job = self.studio.submit(session, task, output.parent, scene=scene, output=str(output), **arguments)
-        yield from self.following(job)
+        yield from self.following(session, job)
         return job.state == DONE
 
     def traced(self, session: Session) -> Generator[Updates, Any, FinalPicture | None]:

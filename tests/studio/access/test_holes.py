@@ -4,6 +4,7 @@ import json
 import math
 import threading
 import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -23,9 +24,11 @@ from materialist.io.decode import image_size
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
 from materialist.io.photo import example_path
+from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, StudioSettings, archives, server, uploads
 from materialist.studio.access import quota
 from materialist.studio.access.gate import Gate
+from materialist.studio.widgets import PageContext
 from materialist.studio.workspace import WorkFolder, person_of
 
 COOKIE = "0123456789abcdef" * 2
@@ -161,6 +164,44 @@ def test_jobs_are_counted_by_address(shared, tmp_path):
     shared.note_sender("another", "1.2.3.4")
     with pytest.raises(InputError, match="6 jobs waiting or running"):
         shared.submit(shared.session("page", "another"), wait, tmp_path)
+
+
+def test_a_promise_is_settled_with_the_address_that_made_it(shared):
+    """A cookie that goes on from another address gets no credit there."""
+    claim = shared.quota.claim("1.2.3.4", 50_000_000)
+    shared.quota.settle(claim, 0)
+    assert shared.quota._stored("1.2.3.4") == 0
+    shared.quota.settle(claim, 90_000_000)
+    assert shared.quota._stored("1.2.3.4") <= quota.SMALLEST
+    assert shared.quota._stored("5.6.7.8") == 0
+
+
+def test_a_page_follows_a_job_once_and_not_after_it_was_closed(shared, tmp_path):
+    """Else every reload would keep a thread of the page until the job ends."""
+    context, session = PageContext(shared), shared.session("page", "anna")
+    job = Job("invert", "anna", tmp_path, print)
+    first, second = context.following(session, job), context.following(session, job)
+    assert "progress" in next(first) and "progress" in next(second)
+    assert next(second) == {}  # the thread is free between two looks
+    assert [*first] == []
+    shared.leave("page")
+    assert [*second] == []
+
+
+def test_pages_and_changes_of_one_address_are_limited(shared):
+    for number in range(SETTINGS.pages):
+        shared.session(f"page{number}", "anna")
+    with pytest.raises(InputError, match="close some"):
+        shared.session("one more", "anna")
+    assert shared.session("another", "bert")
+    with ExitStack() as held:
+        for _ in range(SETTINGS.requests):
+            held.enter_context(shared.quota.request("1.2.3.4"))
+        with pytest.raises(InputError, match="Too many changes"), shared.quota.request("1.2.3.4"):
+            pass
+        with shared.quota.request("5.6.7.8"):
+            pass
+    assert not shared.quota._running
 
 
 def test_a_page_ends_with_the_request_that_it_holds(shared):

@@ -1,5 +1,6 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
+import asyncio
 import hmac
 import json
 import re
@@ -15,13 +16,13 @@ from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, asset
 from materialist.studio.access.files import with_known_files
-from materialist.studio.access.quota import sender_of
+from materialist.studio.access.quota import Claim, sender_of
 from materialist.studio.studio import PERSON, PERSON_HEADER, Studio
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
@@ -162,9 +163,7 @@ class Gate:
                 self.studio.session(page, person, beats=True)
                 return partial(_held, self.app, self.studio, page)
             if path == _UPLOAD:
-                size = _promised(request)
-                self.studio.claim(person, size)
-                return partial(_upload, self.app, self.studio, person, size)
+                return partial(_upload, self.app, self.studio, person, _promised(request))
             if path in _EVENTS:
                 return await self._event(request, person)
         except InputError as error:
@@ -279,23 +278,40 @@ def _promised(request: Request) -> int:
 async def _upload(
     app: Application, studio: Studio, person: str, size: int, scope: Any, receive: Any, send: Any
 ) -> None:
-    """Let Gradio store an upload of a claimed size, and answer with ids of ours in place of its paths."""
+    """Let Gradio store an upload of a promised size, and answer with ids of ours in place of its paths."""
+    quota, sender = studio.quota, studio.sender(person)
+    try:
+        with quota.uploading(sender):
+            await _stored_upload(app, studio, person, quota.claim(sender, size), scope, receive, send)
+    except InputError as error:
+        await PlainTextResponse(f"{error}\n", 403)(scope, receive, send)
+
+
+async def _stored_upload(
+    app: Application, studio: Studio, person: str, claim: Claim, scope: Any, receive: Any, send: Any
+) -> None:
     messages: list[Any] = []
 
     async def collect(message: Any) -> None:
         messages.append(message)
 
     stored = 0
+
+    async def next_part() -> Any:
+        return await asyncio.wait_for(receive(), SETTINGS.body_seconds)
+
     try:
-        await app(scope, receive, collect)  # until the files are where it says
+        await app(scope, next_part, collect)  # until the files are where it says
         start = messages[0]
         body = b"".join(message.get("body", b"") for message in messages[1:])
         if start["status"] == 200:
             paths = [Path(path) for path in json.loads(body)]
             stored = sum(path.stat().st_size for path in paths if path.is_file())
             body = json.dumps([studio.files.add(person, path) for path in paths]).encode()
+    except (ClientDisconnect, TimeoutError):  # nobody waits for an answer
+        return
     finally:
-        studio.give_back(person, max(0, size - stored))
+        studio.quota.settle(claim, stored)
     headers = [one for one in start["headers"] if one[0] not in _LENGTHS]
     length = (b"content-length", str(len(body)).encode())
     await send({**start, "headers": [*headers, length]})

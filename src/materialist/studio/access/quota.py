@@ -4,9 +4,10 @@ import ipaddress
 import shutil
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from materialist.errors import InputError
@@ -18,6 +19,15 @@ SMALLEST = 65_536
 """Bytes that a file counts at least: very many small ones would fill a disk, too."""
 
 
+@dataclass(eq=False)
+class Claim:
+    """Bytes that a sender stores, or is about to."""
+
+    time: float
+    """When, by the monotonic clock."""
+    size: int
+
+
 class Quota:
     """Bytes that each sender stored within the last hour, and files that are being opened.
 
@@ -27,13 +37,12 @@ class Quota:
     def __init__(self, *places: Path) -> None:
         """places: folders whose disks must not be filled."""
         self.places = places
-        self._claims: dict[str, deque[tuple[float, int]]] = {}
-        """Sender -> when they stored something, and how many bytes."""
-        self._opening: dict[str, int] = {}
-        """Sender -> how many of their files are being opened."""
+        self._claims: dict[str, deque[Claim]] = {}
+        self._running: Counter[tuple[str, str]] = Counter()
+        """(What is done, for which sender) -> how often at present."""
         self._lock = threading.Lock()
 
-    def claim(self, sender: str, size: int) -> None:
+    def claim(self, sender: str, size: int) -> "Claim":
         """Count bytes that a sender is about to store.
 
         Raises InputError above what one sender may store within an hour, and where the disk is full.
@@ -44,23 +53,25 @@ class Quota:
                 limit = f"{SETTINGS.storage_quota / 1e9:g} GB"
                 raise InputError(f"You have stored {limit} here within an hour; go on later.")
             self.check_disk(size)
-            self._claims.setdefault(sender, deque()).append((time.monotonic(), size))
+            claim = Claim(time.monotonic(), size)
+            self._claims.setdefault(sender, deque()).append(claim)
+            return claim
 
-    def give_back(self, sender: str, size: int) -> None:
-        """Take back a part of what a sender claimed, and did not store."""
+    def settle(self, claim: "Claim", stored: int) -> None:
+        """Let a claim count what was stored of it, at least SMALLEST where that is anything."""
         with self._lock:
-            self._claims.setdefault(sender, deque()).append((time.monotonic(), -size))
+            claim.size = min(claim.size, max(stored, SMALLEST) if stored else 0)
 
     def _stored(self, sender: str) -> int:
         """Bytes of the last hour; senders who stored nothing in it are forgotten."""
         hour_ago = time.monotonic() - HOUR
         for who in list(self._claims):
             claims = self._claims[who]
-            while claims and claims[0][0] < hour_ago:
+            while claims and claims[0].time < hour_ago:
                 claims.popleft()
             if not claims:
                 del self._claims[who]
-        return sum(size for _, size in self._claims.get(sender, ()))
+        return sum(claim.size for claim in self._claims.get(sender, ()))
 
     def check_disk(self, size: int = 0) -> None:
         """Raise InputError where so many bytes more would fill a disk."""
@@ -71,17 +82,41 @@ class Quota:
     @contextmanager
     def opening(self, sender: str) -> Iterator[None]:
         """A place among the few files that are opened at a time. Raises InputError where there is none."""
-        with self._lock:
-            if self._opening.get(sender):
-                raise InputError("Another file of yours is being opened; wait until it is there.")
-            if len(self._opening) >= SETTINGS.openings:
+        own = "Another file of yours is being opened; wait until it is there."
+        with self._place("opening", sender, 1, own):
+            with self._lock:
+                opening = sum(count for (what, _), count in self._running.items() if what == "opening")
+            if opening > SETTINGS.openings:
                 raise InputError("The studio is opening the files of others; try again in a moment.")
-            self._opening[sender] = 1
+            yield
+
+    @contextmanager
+    def uploading(self, sender: str) -> Iterator[None]:
+        """A place among the uploads of a sender. Raises InputError where there is none."""
+        with self._place("upload", sender, SETTINGS.uploads, "Too many uploads at once; send them one by one."):
+            yield
+
+    @contextmanager
+    def request(self, sender: str) -> Iterator[None]:
+        """A place among the requests of a sender. Raises InputError where there is none."""
+        with self._place("request", sender, SETTINGS.requests, "Too many changes at once; wait for the picture."):
+            yield
+
+    @contextmanager
+    def _place(self, what: str, sender: str, limit: int, refusal: str) -> Iterator[None]:
+        """One of the `limit` times that something may be done for a sender at once. Raises InputError: refusal."""
+        key = (what, sender)
+        with self._lock:
+            if self._running[key] >= limit:
+                raise InputError(refusal)
+            self._running[key] += 1
         try:
             yield
         finally:
             with self._lock:
-                del self._opening[sender]
+                self._running[key] -= 1
+                if not self._running[key]:
+                    del self._running[key]
 
 
 class Allowance:
@@ -103,6 +138,15 @@ class Allowance:
             yield
             return
         with self._quota.opening(self._sender()):
+            yield
+
+    @contextmanager
+    def request(self) -> Iterator[None]:
+        """As `Quota.request`."""
+        if self._quota is None:
+            yield
+            return
+        with self._quota.request(self._sender()):
             yield
 
 
