@@ -110,7 +110,7 @@ PAPER = FitSettings(
         encoding="srgb",
         loss="balanced",
         delta=0.1,
-        step_pixels=4096,
+        step_pixels=1024,
         stages=(
             MaterialStage(_RM, _MATERIAL),
             MaterialStage(_ALL, _MATERIAL, settled=True),
