@@ -107,7 +107,14 @@ def _coverage(count: int, of: int) -> torch.Tensor:
     return overlap.clamp_min(0) * count / of
 
 
-class MaterialMLP(nn.Module):
+class MaterialField(nn.Module):
+    """Materials of P pixels: calling it gives the maps [P, 5], or those of some rows."""
+
+    def confine(self) -> None:
+        """Bring parameters that have left their range back, after a step; most have none."""
+
+
+class MaterialMLP(MaterialField):
     """m_p + zeta * tanh(MLP_mat(x, m_p)) with learnable zeta (paper, Material Properties Optimization).
 
     The network is the published one: sines as activations, its input joined to the first and the third hidden layer
@@ -143,7 +150,7 @@ class MaterialMLP(nn.Module):
         return clamped(self.prior[rows] + self.zeta * torch.tanh(self.last(x)))
 
 
-class MaterialMaps(nn.Module):
+class MaterialMaps(MaterialField):
     """The maps themselves as parameters ("w/o Network" in the paper), the albedo as sRGB has it: a step is as far in
     a dark colour as in a light one."""
 
@@ -155,8 +162,33 @@ class MaterialMaps(nn.Module):
         maps = clamped(self.maps[rows])
         return torch.cat([decode(maps[:, :3]), maps[:, 3:]], 1)
 
+    def confine(self) -> None:
+        self.maps.clamp_(0, 1)
 
-class MaterialUNet(nn.Module):
+
+class MaterialRegions(MaterialField):
+    """The albedo as a map, as sRGB has it; of roughness and metallic one change for each region of the picture."""
+
+    prior: torch.Tensor
+    region: torch.Tensor
+
+    def __init__(self, prior: torch.Tensor, region: torch.Tensor):
+        """region: [P] int64 numbers from 0."""
+        super().__init__()
+        self.register_buffer("prior", prior)
+        self.register_buffer("region", region)
+        self.albedo = nn.Parameter(encode(prior[:, :3], "srgb"))
+        self.change = nn.Parameter(prior.new_zeros(int(region.max()) + 1, 2))
+
+    def forward(self, rows: Rows = ALL) -> torch.Tensor:
+        surface = self.prior[rows, 3:] + self.change[self.region[rows]]
+        return torch.cat([decode(clamped(self.albedo[rows])), clamped(surface)], 1)
+
+    def confine(self) -> None:
+        self.albedo.clamp_(0, 1)
+
+
+class MaterialUNet(MaterialField):
     """Residual by a U-Net with two down- and two upsampling blocks of two 3x3 convolutions (paper's ablation)."""
 
     prior: torch.Tensor
@@ -205,10 +237,10 @@ def _double_conv(inputs: int, outputs: int) -> nn.Sequential:
     )
 
 
-class Unified(nn.Module):
+class Unified(MaterialField):
     """Mask mode: one roughness and one metallic, their means, inside a mask (paper, Material Editing Settings)."""
 
-    def __init__(self, field: nn.Module, inside: torch.Tensor):
+    def __init__(self, field: MaterialField, inside: torch.Tensor):
         """inside: [P] bool."""
         super().__init__()
         self.field, self.inside = field, inside
@@ -218,3 +250,6 @@ class Unified(nn.Module):
         mean = maps[self.inside, 3:].mean(0)
         unified = torch.where(self.inside[:, None], mean, maps[:, 3:])
         return torch.cat([maps[:, :3], unified], 1)[rows]
+
+    def confine(self) -> None:
+        self.field.confine()

@@ -4,13 +4,23 @@ from collections.abc import Callable
 
 import numpy as np
 import torch
-from torch import nn
 
+from materialist.buffers import placed
 from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
-from materialist.fit.fields import ALL, MaterialMaps, MaterialMLP, MaterialUNet, Rows, Unified
+from materialist.fit.fields import (
+    ALL,
+    MaterialField,
+    MaterialMaps,
+    MaterialMLP,
+    MaterialRegions,
+    MaterialUNet,
+    Rows,
+    Unified,
+)
 from materialist.fit.losses import consistency, rendering_loss, residual
 from materialist.fit.optimise import StageResult, optimise
+from materialist.fit.regions import albedo_regions
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera, Progress
 
@@ -25,22 +35,28 @@ def remapped(prior: torch.Tensor) -> torch.Tensor:
 def material_field(
     start: torch.Tensor, settings: MaterialSettings, pixels: torch.Tensor, camera: Camera, *,
     inside: torch.Tensor | None = None, seed: int = 0,
-) -> nn.Module:  # fmt: skip
+) -> MaterialField:  # fmt: skip
     """A fresh field around `start` [P, 5]; with `inside` [P] bool, roughness and metallic are one value there."""
     torch.manual_seed(seed)
-    fresh: dict[str, Callable[[], nn.Module]] = {
+    fresh: dict[str, Callable[[], MaterialField]] = {
         "mlp": lambda: MaterialMLP(start, pixels, camera.height, camera.width), "maps": lambda: MaterialMaps(start),
         "unet": lambda: MaterialUNet(start, pixels, camera.height, camera.width),
+        "regions": lambda: MaterialRegions(start, _regions(start, pixels, camera)),
     }  # fmt: skip
     if settings.field not in fresh:
-        raise InputError(f"Material field is '{settings.field}'; choose mlp, maps or unet.")
+        raise InputError(f"Material field is '{settings.field}'; choose mlp, maps, regions or unet.")
     field = fresh[settings.field]().to(start.device)
     return field if inside is None else Unified(field, inside)
 
 
+def _regions(start: torch.Tensor, pixels: torch.Tensor, camera: Camera) -> torch.Tensor:
+    """[P] the regions of the albedo of maps [P, 5]."""
+    return placed(albedo_regions(start[:, :3].cpu().numpy(), pixels.numpy(), camera))
+
+
 def fit_materials(
-    problem: MaterialProblem, photo: torch.Tensor, field: nn.Module, prior: torch.Tensor, settings: MaterialSettings,
-    *, seed: int = 0, progress: Progress | None = None,
+    problem: MaterialProblem, photo: torch.Tensor, field: MaterialField, prior: torch.Tensor,
+    settings: MaterialSettings, *, seed: int = 0, progress: Progress | None = None,
 ) -> list[StageResult]:  # fmt: skip
     """Move `field` stage by stage: argmin L_re + delta L_cons.
 
@@ -62,13 +78,8 @@ def fit_materials(
             error = residual(problem(values, rows), photo[rows], settings.encoding, white=settings.white)
             return rendering_loss(error, settings.loss) + consistency(values, prior[rows], settings)
 
-        def into_range() -> None:
-            base = field.field if isinstance(field, Unified) else field
-            if isinstance(base, MaterialMaps):
-                base.maps.clamp_(0, 1)
-
         name = "materials" if moves.all() else "+".join(stage.targets)
-        run = optimise(name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress)
+        run = optimise(name, field.parameters(), loss, stage.schedule, after_step=field.confine, progress=progress)
         results.append(run)
     return results
 

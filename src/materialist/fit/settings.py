@@ -67,7 +67,7 @@ class MaterialStage:
 class MaterialSettings:
     """Material properties optimisation; a triple is for albedo, roughness and metallic."""
 
-    field: str = "mlp"  # `mlp`, `maps` or `unet`
+    field: str = "mlp"  # `mlp`, `maps`, `regions` or `unet`
     remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
     loss: Loss = "l1+l2"  # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
@@ -135,13 +135,13 @@ DEFAULT = FitSettings(
         prior=0.01,
     ),
     materials=MaterialSettings(
-        field="maps",
+        field="regions",
         remap=False,
         encoding="srgb",
         loss="l2",
         white=CLIPPED,
         delta=1.0,
-        weights=(0.15, 0.02, 0.1),
+        weights=(0.2, 0.02, 0.1),
         stages=(
             MaterialStage(_ALL, _DIRECT),
             MaterialStage(_ALL, replace(_DIRECT, learning_rate=0.01), settled=True),
