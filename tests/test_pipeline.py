@@ -13,7 +13,8 @@ from materialist.io.image import write_png
 from materialist.io.package import load_scene, save_scene
 from materialist.io.photo import read_photo
 from materialist.metrics import psnr
-from materialist.pipeline import invert, render_scene
+from materialist.pipeline import invert, map_trust, render_scene
+from materialist.predict import get_predictor
 from materialist.types import Camera
 
 WIDTH, HEIGHT = 24, 18
@@ -148,6 +149,12 @@ def test_mask_is_taken_at_working_size(folder):
     assert float(np.ptp(scene.materials.roughness[mask])) < 1e-6
     assert float(np.ptp(scene.materials.metallic[mask])) < 1e-6
     assert scene.provenance["mask"]["pixels"] == 48
+
+
+def test_what_a_map_is_trusted_with_goes_by_its_source(folder):
+    prior = get_predictor("constant", albedo=f"maps:{folder}").predict(read_photo(folder / "photo.png", size=24))
+    assert map_trust("auto", prior) == ("sure", "unsure", "unsure")
+    assert map_trust("none", prior) == ("none", "none", "none")
 
 
 @pytest.mark.parametrize(

@@ -79,7 +79,7 @@ def invert(
     from materialist.fit.invert import FitSetup
     from materialist.fit.settings import preset as named
 
-    settings = wanted.settings or named(preset, hdr=picture.hdr, trust=_trust(wanted.trust, prior))
+    settings = wanted.settings or named(preset, hdr=picture.hdr, trust=map_trust(wanted.trust, prior))
     fit_setup = FitSetup(
         picture, prior, settings, wanted.completion, wanted.engine,
         envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
@@ -131,7 +131,7 @@ def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     return picture, prediction
 
 
-def _trust(word: str, prior: Prediction) -> tuple[str, str, str]:
+def map_trust(word: str, prior: Prediction) -> tuple[str, str, str]:
     """How sure the prior's albedo, roughness and metallic are; see `InvertOptions.trust`."""
     from materialist.predict.registry import is_guess
 
