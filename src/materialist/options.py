@@ -187,7 +187,7 @@ class InvertOptions(OperationOptions):
         "transport", "Cached light transport, or the paper's path tracing.", kind="word",
         choices=("transport", "path"))
     preset: str = option(
-        "default", "Our schedule, or the paper's to the letter.", kind="word", choices=("default", "paper"))
+        "default", "Our schedule, or the paper's.", kind="word", choices=("default", "paper"))
     """The path engine always follows the paper."""
     trust: str = option(
         "auto", "How far the photo may move albedo, roughness and metallic: sure, hardly; none, as it likes; auto: "
