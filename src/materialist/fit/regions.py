@@ -25,9 +25,8 @@ def albedo_regions(albedo: Array, pixels: Array, camera: Camera, settings: Regio
 
     A region is joined and of like albedo [P, 3] (linear). Pixels beside the surface are black.
     """
-    picture = np.zeros((camera.height * camera.width, 3))
-    picture[pixels] = linear_to_srgb(albedo)
-    picture = picture.reshape(camera.height, camera.width, 3)
+    picture = np.zeros((camera.height, camera.width, 3))
+    picture.reshape(-1, 3)[pixels] = linear_to_srgb(albedo)
     least = max(20, round(settings.least_share * camera.width * camera.height))
     # Without a blur before it, whose edges would be regions of their own.
     labels = felzenszwalb(picture, scale=settings.scale, sigma=0, min_size=least)
