@@ -8,7 +8,8 @@ from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
 
-NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "option_kinds", "options", "plain"}
+NOUNS = {"types", "errors", "color", "camera", "envmap", "metrics", "buffers", "forks", "install", "records"}
+NOUNS |= {"option_kinds", "options", "keywords", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
 KINDS = ("select", "material", "light", "remove", "glass", "insert", "drop", "core", "composite")
 EDITING = {"edits", *(f"edits.{kind}" for kind in KINDS)}
@@ -53,7 +54,9 @@ NETWORKS = tuple(
     f"predict.{name}" for name in ("bundled.", "matnet.", "refraction.", "clicks.", "efficientnet", "network")
 )
 """Networks need torch at their top; whoever calls them imports them late."""
-LIGHT_START = ("", "types", "errors", "color", "camera", "option_kinds", "options", "plain", "cli")
+LIGHT_START = (
+    *("", "types", "errors", "records", "color", "camera", "option_kinds", "options", "keywords", "plain", "cli"),
+)
 """Modules that load at every start and so may import nothing slow at the top."""
 SLOW = HEAVY | {"cv2", "OpenEXR", "scipy", "skimage", "matplotlib", "PIL", "rawpy", "pillow_heif", "transformers"}
 

@@ -19,8 +19,8 @@ SOURCE = ROOT / "src" / "materialist"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAPER_MAP = ROOT / "docs" / "paper_map.md"
 PROGRAM = get_command(app)
-FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "--maps"}
-"""Options of Blender, the script for it, and MoGe that the pages name."""
+FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "--maps", "--no-install-recommends"}
+"""Options of Blender, the script for it, MoGe and apt-get that the pages name."""
 
 
 @pytest.fixture(params=PAGES, ids=lambda page: page.name)

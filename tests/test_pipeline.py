@@ -1,10 +1,13 @@
 """The main job on a tiny photograph with maps: every field of the scene, both engines, bad options."""
 
+import hypothesis
+import hypothesis.strategies as st
 import numpy as np
 import pytest
 from geometry_scenes import room, sphere_depth
 
 import materialist as mt
+from materialist.color import srgb_levels
 from materialist.edits.composite.composite import composite, write_composite
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
@@ -15,7 +18,7 @@ from materialist.io.photo import read_photo
 from materialist.metrics import psnr
 from materialist.pipeline import invert, map_trust, render_scene
 from materialist.predict import get_predictor
-from materialist.types import Camera
+from materialist.types import Camera, Materials, Prediction
 
 WIDTH, HEIGHT = 24, 18
 pytestmark = pytest.mark.usefixtures("mitsuba", "one_thread")  # Mitsuba before torch, as in a run
@@ -236,3 +239,50 @@ def test_depth_in_large_units_is_warned_about(folder, scene, tmp_path):
         write_exr(tmp_path / path.name, read_exr(path) * np.float32(0.002 if path.stem == "depth" else 1))
     other = invert(**options(folder, predictor=f"maps:{tmp_path}"))
     assert [any("smaller unit" in note for note in made.warnings) for made in (scene, other)] == [False, True]
+
+
+unit = st.floats(0, 1)
+direction = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.05, 1))
+
+
+@hypothesis.settings(max_examples=6, deadline=None, database=None, derandomize=True)
+@hypothesis.given(
+    albedo=st.tuples(unit, unit, unit),
+    roughness=unit,
+    metallic=unit,
+    normal=direction,
+    depth=st.floats(1e-3, 1e4),
+)
+@hypothesis.example((0.5, 0.5, 0.5), 0.1, 0.0, (0.0, 0.0, 1.0), 3.0)  # nothing but near mirrors
+@hypothesis.example((0.0, 0.0, 0.0), 0.0, 1.0, (0.0, 0.0, 1.0), 3.0)
+@hypothesis.example((1.0, 1.0, 1.0), 1.0, 1.0, (0.0, 0.0, 1.0), 3.0)
+def test_maps_of_one_value_each_can_be_fitted(folder, albedo, roughness, metallic, normal, depth):
+    size = (HEIGHT, WIDTH)
+
+    def constant(value):
+        return np.broadcast_to(np.float32(value), (*size, *np.shape(value))).copy()
+
+    prior = Prediction(
+        Materials(constant(albedo), constant(roughness), constant(metallic)),
+        constant(np.array(normal) / np.linalg.norm(normal)),
+        constant(depth),
+    )
+    fitted = invert(**options(folder, predictor="auto", prior=prior, steps=2))
+    for values in (*vars(fitted.materials).values(), fitted.envmap, fitted.rerender):
+        assert np.isfinite(values).all()
+
+
+def test_a_photo_and_a_prior_from_memory(folder, scene):
+    known = mt.Prior(depth=scene.prior.depth, normal=scene.prior.normal)
+    levels = srgb_levels(scene.photo.original)
+    kept = {key: value for key, value in options(folder).items() if key not in ("photo", "predictor")}
+    made = invert(levels, encoded=True, predictor="constant", prior=known, **kept)
+    assert np.array_equal(made.photo.original, scene.photo.original) and np.array_equal(made.depth, scene.depth)
+    assert made.prior.sources["depth"] == "arrays" and made.prior.sources["albedo"] == "constant"
+    assert made != scene and made == made
+
+
+@pytest.mark.parametrize("prior", [{"depth": 1}, np.ones((4, 4))])
+def test_a_prior_that_is_none(folder, prior):
+    with pytest.raises(InputError, match=r"The prior is a .*; give a materialist.Prior of arrays, or a Prediction"):
+        invert(**options(folder, prior=prior))

@@ -4,6 +4,7 @@ from .edits.drop.drop import drop as drop
 from .edits.drop.drop import settle as settle
 from .edits.glass.glass import glass as glass
 from .edits.insert.insert import insert as insert
+from .edits.layers import save_layers as save_layers
 from .edits.light.relight import lamp as lamp
 from .edits.light.relight import relight as relight
 from .edits.material.material import edit as edit
@@ -16,6 +17,7 @@ from .errors import SceneError as SceneError
 from .errors import SetupError as SetupError
 from .errors import WeightsError as WeightsError
 from .exporters.run import export as export
+from .io.out.encode import save_image as save_image
 from .io.package import load_scene as load_scene
 from .io.package import save_scene as save_scene
 from .io.photo import read_photo as read_photo
@@ -38,6 +40,7 @@ from .types import Materials as Materials
 from .types import Mesh as Mesh
 from .types import Photo as Photo
 from .types import Prediction as Prediction
+from .types import Prior as Prior
 from .types import Scene as Scene
 from .types import Surface as Surface
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from materialist.types import Array
+from materialist.records import Array
 
 ROWS = 256
 """Rows of a picture encoded at a time: bounds the memory."""

@@ -17,6 +17,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from materialist.errors import MaterialistError
+from materialist.install import extra_command, install_command
 from materialist.render.variant import INSTALL_LLVM, find_llvm, package_of, usable_gpus
 
 _PROBE = """
@@ -79,7 +80,7 @@ def examine(device: str = "auto") -> list[Finding]:
 
 def _pip(name: str) -> str:
     """Install into this very Python, whichever `pip` the shell would find."""
-    return f"{sys.executable} -m pip install {name}"
+    return install_command(name)
 
 
 def _llvm() -> tuple[Finding, str | None]:
@@ -128,7 +129,7 @@ def _package(name: str, extra: str = "", purpose: str = "") -> Finding:
         return Finding(name, "ok", version(name) + (f" ({purpose})" if extra else ""))
     except PackageNotFoundError:
         if extra:
-            return Finding(name, "missing", f"optional: {purpose}", _pip(f"'materialist[{extra}]'"))
+            return Finding(name, "missing", f"optional: {purpose}", extra_command(extra))
         return Finding(name, "broken", "not installed", _pip(name))
 
 

@@ -3,13 +3,15 @@
 Values may be given as texts, as a YAML file or a command line has them: "0.3", "310,220", "#ff8800".
 """
 
+import difflib
+import inspect
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, TypeVar
 
 from materialist.errors import InputError
 
@@ -17,6 +19,7 @@ Colour = tuple[float, float, float]
 """Linear R, G, B in [0, 1]."""
 ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 """How a text spells a switch."""
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
@@ -61,15 +64,40 @@ class Option:
         """The flags of the field on the command line."""
         return (self.flag or f"--{name.replace('_', '-')}").split()
 
+    def meaning(self, name: str, default: Any) -> str:
+        """A line of a docstring: what the option means, what it takes, and its default."""
+        words = [repr(word) for word in self.choices]
+        if self.kind in ("number", "whole", "span", "shift") and math.isfinite(self.low):
+            span = f"{self.ends[0]}{_text(self.low)}, {_text(self.high)}{self.ends[1]}"
+            words.insert(0, f"{self.low:g} or more" if math.isinf(self.high) else span)
+        takes = f" Takes {' or '.join(words)}." if words else ""
+        return f"{name}: {self.help}{takes} Default: {default!r}."
+
 
 def option(default: Any, help: str, **told: Any) -> Any:
     """A field of an options class; `told` are the other fields of `Option`."""
     return field(default=default, metadata={"option": Option(help, **told)})
 
 
+def documented(kind: "type[OperationOptions]") -> Callable[[Function], Function]:
+    """Decorate a function that takes the fields of an options class as keywords: its docstring then lists them."""
+
+    def listed(function: Function) -> Function:
+        if function.__doc__:
+            function.__doc__ = f"{inspect.cleandoc(function.__doc__)}\n\n{_listing(kind)}"
+        return function
+
+    return listed
+
+
 @dataclass(frozen=True, kw_only=True)
 class OperationOptions:
     operation: ClassVar[str]
+
+    def __init_subclass__(cls) -> None:
+        """The docstring of the class lists its options."""
+        if cls.__doc__:
+            cls.__doc__ = f"{inspect.cleandoc(cls.__doc__)}\n\n{_listing(cls)}"
 
     def __post_init__(self) -> None:
         for name, (declared, default) in declarations(type(self)).items():
@@ -83,7 +111,9 @@ class OperationOptions:
         known = declarations(cls)
         for name in values:
             if name not in known:
-                raise InputError(f"{cls.operation} has no option '{name}'; it takes {', '.join(known)}.")
+                near = difflib.get_close_matches(name, known, 1)
+                meant = f" Do you mean '{near[0]}'?" if near else ""
+                raise InputError(f"{cls.operation} has no option '{name}'; it takes {', '.join(known)}.{meant}")
         return replace(options or cls(), **values)
 
     @classmethod
@@ -109,6 +139,15 @@ def declarations(kind: type[OperationOptions]) -> dict[str, tuple[Option, Any]]:
     inherited = {one.name for base in kind.__bases__ for one in fields(base)}
     found = sorted(fields(kind), key=lambda one: one.name in inherited)
     return {one.name: (one.metadata["option"], one.default) for one in found}
+
+
+def _listing(kind: type[OperationOptions]) -> str:
+    """The options of a class as lines of a docstring; `kind` need not be a dataclass yet."""
+    own = {name: value for name, value in vars(kind).items() if isinstance(value, Field)}
+    inherited = getattr(kind, "__dataclass_fields__", {})
+    every = {name: one for name, one in (own | {**inherited, **own}).items() if "option" in one.metadata}
+    lines = [one.metadata["option"].meaning(name, one.default) for name, one in every.items()]
+    return "\n".join(["Options:", *(f"    {line}" for line in lines)])
 
 
 def beside(folder: Path, name: str, value: Any) -> Path:

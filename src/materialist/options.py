@@ -14,7 +14,7 @@ from materialist.errors import InputError
 from materialist.option_kinds import Colour, OperationOptions, option
 
 if TYPE_CHECKING:
-    from materialist.types import Array, Lamp, Prediction
+    from materialist.types import Array, Lamp, Prediction, Prior
 
 _SHARE: dict[str, Any] = {"low": 0, "high": 1}
 _SEED: dict[str, Any] = {"kind": "whole", "low": 0, "high": 2**31 - 1, "flag": None}
@@ -201,6 +201,9 @@ class InvertOptions(OperationOptions):
     size: int = option(
         512, "Working size: longer side, pixels.", kind="whole", low=8, high=8192, called="working size", unit="pixels")
     """Of the working picture; a Photo keeps the size that it was read at."""
+    layer: str | None = option(
+        None, "Which layer or part of an EXR is the photo; else chosen by their names.", kind="name", metavar="NAME")
+    """A Photo keeps the layer that it was read with."""
     envmap_size: tuple[int, int] = option((512, 256), "Size of the environment map.", kind="size", metavar="WxH")
     """(width, height), with width = 2 * height."""
     completion: str = option(
@@ -219,7 +222,9 @@ class InvertOptions(OperationOptions):
     seed: int = option(0, "Equal seeds give equal scenes on one machine.", **_SEED)
     device: str = option("auto", "Where to compute.", **_DEVICE)
     settings: Any = option(None, "FitSettings in place of the preset.", kind="any", flag=None)
-    prior: Prediction | None = option(None, "A Prediction in place of the predictor.", kind="any", flag=None)
+    prior: Prediction | Prior | None = option(
+        None, "Maps that are known: a Prior of some, the predictor gives the others; or a whole Prediction.",
+        kind="any", flag=None)
     spp: int | None = option(None, "Paths a pixel of the final re-rendering.", kind="whole", low=1, flag=None)
 
 

@@ -9,19 +9,23 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
 
-from materialist import metrics
+from materialist import __version__, metrics
 from materialist.color import CLIPPED, linear_to_srgb
 from materialist.errors import InputError
+from materialist.forks import check_process
+from materialist.io.given import PhotoInput, photo_of
 from materialist.io.image import read_mask
-from materialist.io.photo import HDR_CLIP, exposed, read_photo
+from materialist.io.photo import HDR_CLIP, exposed
+from materialist.keywords import InvertKeywords
 from materialist.metrics.residual import shading_residual
+from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
-from materialist.types import Array, FitReport, Photo, Prediction, Scene
+from materialist.types import Array, FitReport, Photo, Prediction, Prior, Scene
 
 if TYPE_CHECKING:
     from materialist.fit.invert import FitResult
@@ -30,15 +34,19 @@ SMALL = 0.05
 """Least median depth for which the path tracer's offsets are small."""
 
 
+@documented(InvertOptions)
 def invert(
-    photo: str | Path | Photo, options: InvertOptions | None = None, *,
+    photo: PhotoInput, options: InvertOptions | None = None, *, encoded: bool | None = None,
     progress: Callable[[str, int, int], Any] | None = None, on_stage: Callable[[str, Any], Any] | None = None,
-    **values: Any,
+    **values: Unpack[InvertKeywords],
 ) -> Scene:  # fmt: skip
     """Decompose a photograph into geometry, materials and light.
 
     Args:
-        photo: a file, `example:NAME`, or a Photo already read.
+        photo: a file's name, `example:NAME`, an open file, a picture of Pillow's, an array [H, W, 3 or 4] or [H, W],
+            or a Photo already read.
+        encoded: of an array: True where it holds sRGB display values (uint8, uint16, or floats in [0, 1]); else it
+            must be of floats, linear Rec.709, and is read as an EXR of them would be.
         options, values: see `options.InvertOptions`; `values` are fields of it, as in `invert(photo, size=256)`.
         progress: called as progress(stage, done, total).
         on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
@@ -47,6 +55,7 @@ def invert(
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
     """
+    check_process()
     start = last = time.perf_counter()
     stages: list[dict] = []
 
@@ -60,7 +69,10 @@ def invert(
     preset = "paper" if wanted.engine == "path" else wanted.preset
     tick, tell = progress or (lambda *_: None), on_stage or (lambda *_: None)
     tick("read", 0, 1)
-    picture = exposed(photo) if isinstance(photo, Photo) else read_photo(photo, size=wanted.size, fov=wanted.fov)
+    if isinstance(photo, Photo):
+        picture = exposed(photo)
+    else:
+        picture = photo_of(photo, encoded=encoded, size=wanted.size, fov=wanted.fov, layer=wanted.layer)
     if isinstance(photo, Photo) and wanted.fov != "auto":
         picture = replace(picture, camera=replace(picture.camera, fov=cast(float, wanted.fov)), fov_source="option")
     mask = _mask(wanted.mask, picture)
@@ -92,7 +104,8 @@ def invert(
         camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
         depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
         provenance={
-            "predictor": prior.predictor, "sources": prior.sources, "engine": wanted.engine, "preset": preset,
+            "tool_version": __version__, "predictor": prior.predictor, "sources": prior.sources,
+            "engine": wanted.engine, "preset": preset,
             "completion": fit_setup.completion, "completion_asked": wanted.completion,
             "tau": wanted.tau, "strategy": wanted.strategy, "trust": wanted.trust,
             "mask": _named(mask), "settings": asdict(settings) if wanted.settings else None, "seed": wanted.seed,
@@ -104,8 +117,11 @@ def invert(
 
 def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     """The photo as the predictor sees it, and the prior."""
-    if wanted.prior is not None:
-        given, (height, width) = wanted.prior, picture.linear.shape[:2]
+    known = wanted.prior
+    if known is not None and not isinstance(known, Prediction | Prior):
+        raise InputError(f"The prior is a {type(known).__name__}; give a materialist.Prior of arrays, or a Prediction.")
+    if isinstance(known, Prediction):
+        given, (height, width) = known, picture.linear.shape[:2]
         for values in (*vars(given.materials).values(), given.normal, given.depth):
             if values.shape[:2] != (height, width):
                 raise InputError(
@@ -116,11 +132,11 @@ def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     from materialist.predict import get_predictor
 
     parts = {name: getattr(wanted, name) for name in ("albedo", "roughness", "metallic", "normal", "depth")}
-    source = get_predictor(wanted.predictor, device=wanted.device, **parts)
+    source = get_predictor(wanted.predictor, device=wanted.device, prior=known, **parts)
     picture = _seen_by(source, picture)
     prediction = source.predict(picture, seed=wanted.seed)
     if not (prediction.depth > 0).any():
-        raise InputError("The predictor found no surface in the photo; give a depth map with --predictor maps:DIR.")
+        raise InputError('The predictor found no surface in the photo; give a depth map, as in `depth="maps:DIR"`.')
     middle = float(np.median(prediction.depth[prediction.depth > 0]))
     if middle < SMALL:
         note = (

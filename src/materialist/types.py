@@ -4,6 +4,9 @@ Conventions (see docs/conventions.md): linear Rec.709 RGB float32; camera at the
 +X right; pixel (0, 0) is top left with its centre at (0.5, 0.5); depth is planar along -Z, 0 where there is no surface.
 """
 
+import base64
+import html
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from materialist.errors import InputError
+from materialist.records import Array, Record
 
-Array = np.ndarray
 Progress = Callable[[str, int, int], None]
 """Called as progress(stage, done, total)."""
+_SHOWN = 960
+"""Width of a scene's picture in a notebook, pixels."""
 
 
 def _numbers(value: Any, count: int) -> tuple[float, ...]:
@@ -51,8 +56,8 @@ class Camera:
         return 0.5 * self.width / float(np.tan(np.radians(self.fov) / 2))
 
 
-@dataclass(frozen=True)
-class Photo:
+@dataclass(frozen=True, eq=False, repr=False)
+class Photo(Record):
     """A photograph at working size, with its untouched original beside it."""
 
     linear: Array
@@ -72,6 +77,10 @@ class Photo:
     """True when it comes from a display file of more than 8 bits a channel that is not in `source` any more."""
     stops: int = 0
     """Exposure of `linear` and `original` over the values of an HDR file, see `io.photo.read_photo`."""
+    layer: str | None = None
+    """Name of the layer or part that it is, of an EXR that has several."""
+    exif: bytes | None = field(default=None, repr=False)
+    """EXIF of the file that it was made of, where `source` is not there any more."""
 
     @property
     def name(self) -> str:
@@ -79,8 +88,8 @@ class Photo:
         return (self.path or "photo").replace("\\", "/").rsplit("/", 1)[-1]
 
 
-@dataclass(frozen=True)
-class Materials:
+@dataclass(frozen=True, eq=False, repr=False)
+class Materials(Record):
     """Maps of the parameters of the simplified Disney BRDF."""
 
     albedo: Array
@@ -91,8 +100,8 @@ class Materials:
     """[H, W] float32, in [0, 1]."""
 
 
-@dataclass(frozen=True)
-class Prediction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction(Record):
     """What a predictor says about a photograph: the prior of the fit."""
 
     materials: Materials
@@ -106,10 +115,40 @@ class Prediction:
     """Map -> where it comes from, where several predictors or weights are behind them; empty: all of `predictor`."""
     light: Array | None = None
     """[h, 2h, 4] float32 environment map: linear radiance, and the scale of the error of its logarithm."""
+    spread: dict[str, Array] = field(default_factory=dict)
+    """Map -> [H, W] float32 expected absolute error, where the predictor knows it.
+
+    Of the sRGB-encoded albedo (mean over RGB), of roughness and metallic, of the normal's angle in radians, and of the
+    natural logarithm of relative depth.
+    """
 
 
-@dataclass(frozen=True, eq=False)
-class Triangles:
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Prior(Record):
+    """Maps that are known of a photo, any of the five; a predictor gives the others.
+
+    Each is of the photo's shape, at working size or another one of its proportions, to which it is resampled.
+    """
+
+    albedo: Array | None = None
+    """[h, w, 3] linear, in [0, 1]."""
+    roughness: Array | None = None
+    """[h, w] perceptual roughness, in [0, 1]."""
+    metallic: Array | None = None
+    """[h, w] in [0, 1]."""
+    normal: Array | None = None
+    """[h, w, 3] unit, camera frame (+X right, +Y up, +Z to the viewer); a zero vector means unknown."""
+    depth: Array | None = None
+    """[h, w] planar depth along -Z, scene units; 0 where there is no surface."""
+
+    @property
+    def known(self) -> dict[str, Array]:
+        """The maps that are there, by name."""
+        return {name: values for name, values in vars(self).items() if values is not None}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Triangles(Record):
     """A surface of triangles, float32, camera frame, scene units."""
 
     vertices: Array
@@ -122,7 +161,7 @@ class Triangles:
     """[V, 2] u to the right, v DOWN."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Triangles):
     """The scene's: the depth surface, and the planes that continue it beyond what the picture shows.
 
@@ -136,8 +175,8 @@ class Mesh(Triangles):
     """[F] int16: -1 for the depth surface, k >= 0 for the continuation of plane k."""
 
 
-@dataclass(frozen=True)
-class Geometry:
+@dataclass(frozen=True, eq=False, repr=False)
+class Geometry(Record):
     """A mesh and the planes found in it."""
 
     mesh: Mesh
@@ -174,7 +213,7 @@ class Lamp:
         return r, g, b
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Surface(Materials):
     """The material of a body: maps of the scene's BRDF, repeated over the texture coordinates, and a share of light
     that enters instead."""
@@ -196,7 +235,7 @@ class Surface(Materials):
         return float(self.roughness.mean()) if self.glass_roughness is None else self.glass_roughness
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Body(Triangles):
     """A thing with a material of its own beside the depth surface: inserted, dropped, or turned to glass."""
 
@@ -211,8 +250,8 @@ class Body(Triangles):
         return Mesh(self.vertices, self.faces, self.normals, self.uv, pixel, plane)
 
 
-@dataclass(frozen=True)
-class FitReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class FitReport(Record):
     """What happened, stage by stage, and how good the result is; the content of report.json."""
 
     stages: tuple[dict[str, Any], ...] = ()
@@ -222,8 +261,8 @@ class FitReport:
     warnings: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Record):
     """A photograph, decomposed: everything a scene package holds."""
 
     camera: Camera
@@ -239,7 +278,7 @@ class Scene:
     """[h, 2h, 3] float32 linear radiance, >= 0; centre column along -Z, columns to the right turn to +X, top row +Y."""
     rerender: Array
     """[H, W, 3] float32 linear: the path-traced re-rendering."""
-    report: FitReport = FitReport()
+    report: FitReport = field(default_factory=FitReport)
     provenance: dict[str, Any] = field(default_factory=dict)
     """Tool version, predictor, weights hash, options, seed."""
     lamps: tuple[Lamp, ...] = ()
@@ -251,3 +290,33 @@ class Scene:
     def warnings(self) -> list[str]:
         """Those of the photo, the prior, the fit and the edits, each once."""
         return list(dict.fromkeys((*self.photo.warnings, *self.prior.warnings, *self.report.warnings)))
+
+    def __repr__(self) -> str:
+        camera, edits = self.camera, self.provenance.get("edits", ())
+        counts = (("edit", "edits", edits), ("lamp", "lamps", self.lamps), ("body", "bodies", self.bodies))
+        facts = [
+            f"{camera.width} x {camera.height} pixels",
+            f"field of view {camera.fov:.4g} degrees",
+            "predictor " + re.sub(" sha256:[0-9a-f]+", "", self.prior.predictor),
+        ]
+        quality = self.report.metrics.get("rerender_psnr_path")
+        facts += [] if quality is None else [f"re-rendering {quality:.1f} dB"]
+        facts += [f"{len(items)} {many if len(items) > 1 else one}" for one, many, items in counts if items]
+        return f"<Scene {self.photo.name}: {', '.join(facts)}>"
+
+    def _repr_png_(self) -> bytes:
+        """For notebooks: the photo beside its re-rendering, as a PNG."""
+        import cv2
+
+        from materialist.color import srgb_levels
+
+        both = np.concatenate([self.photo.linear, np.nan_to_num(self.rerender)], 1)
+        scale = min(1, _SHOWN / both.shape[1])
+        small = cv2.resize(both, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        return bytes(cv2.imencode(".png", srgb_levels(small)[..., ::-1])[1])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the picture, with what `repr` says under it."""
+        picture = base64.b64encode(self._repr_png_()).decode()
+        words = html.escape(repr(self).strip("<>"))
+        return f'<img alt="Photo and re-rendering" src="data:image/png;base64,{picture}"><div>{words}</div>'

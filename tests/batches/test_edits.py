@@ -32,7 +32,8 @@ def test_the_key_changes_with_a_mesh_and_with_nothing_else(recipe):
 def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
     (tmp_path / "look").mkdir()
     (tmp_path / "look" / "ball.mtl").write_text("newmtl a\nmap_Kd wood grain.png\n")
-    (tmp_path / "ball.obj").write_text("mtllib look/ball.mtl\nv 0 0 0\n")
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"
+    (tmp_path / "ball.obj").write_text(f"mtllib look/ball.mtl\n{triangle}")
     (tmp_path / "edits.yaml").write_text("- insert: {mesh: ball.obj, at: [3, 4]}\n")
     for name in ("wood grain.png", "nobody's.png"):
         (tmp_path / name).write_text(name)
@@ -47,7 +48,7 @@ def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     recipe.write_text("- edit: {mask: 'm/{name}.png', hue: 20}\n")
     source, runs, said = photos(recipe.parent / "photos", "one", "two"), recipe.parent / "runs", []
     options = {"apply": recipe, "function": "made_batch:made_up", "workers": 1, "device": "cpu", "spp": 2}
-    with pytest.raises(InputError, match=r"no .*/m/one.png for one.png.*--resume"):
+    with pytest.raises(InputError, match=r"no .*/m/one.png for one.png.*resume=True"):
         batch(source, runs, **options)
     assert not list(runs.glob("*.scene"))
     (recipe.parent / "m").mkdir()

@@ -26,7 +26,7 @@ def test_a_line_that_was_cut_off_is_passed_over_and_spoils_no_other(tmp_path):
 
 def test_a_folder_that_holds_something_is_refused_or_gone_on_with_or_begun_anew(tmp_path):
     write(tmp_path, ("done", "a.png"))
-    with pytest.raises(InputError, match="--resume to go on"):
+    with pytest.raises(InputError, match="`resume=True` to go on"):
         write(tmp_path)
     for how in ({"force": True}, {"resume": True}):  # begun anew, also after the next stop
         assert write(tmp_path, **how).last["a.png"]["key"] is None

@@ -38,6 +38,27 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
     assert without_secrets("ftp://user:p@ss@host/x.jpg") == "ftp://host/x.jpg"
 
 
+def test_what_is_passed_over_is_named(tmp_path):
+    photos(tmp_path, "b", "a.JPG")
+    for name in ("c.jxl", "d.psd", ".hidden", "Thumbs.db", "sub/e.txt"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    notes = []
+    list_photos(tmp_path, runs="r", notes=notes)
+    assert notes == ["Passed over, as their names are no photo's: c.jxl, d.psd, sub/e.txt."]
+    (tmp_path / "list.txt").write_text("b.png\na.JPG\nb.png\n")
+    notes.clear()
+    assert len(list_photos(tmp_path / "list.txt", runs="r", notes=notes)) == 2
+    assert notes == ["More than one line of list.txt names b.png; each is done once."]
+
+
+def test_reported_names_are_photos(real_data):
+    folder, notes = real_data("data/reported/batch_names"), []
+    assert [photo.id for photo in list_photos(folder, runs="r", notes=notes)] == ["one.jfif", "two.hif"]
+    assert notes == ["Passed over, as their names are no photo's: README."]
+    assert [photo.id for photo in list_photos(folder / "one.jfif", runs="r")] == [str(folder / "one.jfif")]
+
+
 @pytest.mark.parametrize(
     ("make", "said"), [("nothing", "There is no folder"), ("empty", "holds no photo"), ("bytes", "no list")]
 )

@@ -58,7 +58,7 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     (source / "d.png").unlink()
     photos(source, "x", "new")  # the first is only there to make the second another picture
     (source / "x.png").unlink()
-    with pytest.raises(InputError, match="--resume"):
+    with pytest.raises(InputError, match="resume=True"):
         run(source, tmp_path / "runs")
     again = run(source, tmp_path / "runs", resume=True)
     assert again.kept == 1 and again.exit_code == 0 and again.count("done") == 4
@@ -96,6 +96,7 @@ def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
     [
         ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "seed is -1"),
         ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "workers is 0; it must lie"),
+        ({"quality": 80}, "png has none"),
         ({"apply": "none.yaml"}, "cannot be read"), ({"settings": object()}, "texts and numbers"),
     ],
 )  # fmt: skip
@@ -132,6 +133,11 @@ def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(t
     recipe.write_text(RECIPE.replace("90", "200"))
     other = run(source, runs, resume=True, **options)
     assert other.kept == 0 and other.exit_code == 0 and other.rows[0]["edits"] != again.rows[0]["edits"]
+    small = run(source, runs, resume=True, **options, format="jpg", quality=60)
+    assert small.kept == 0 and Image.open(runs / "a.jpg").format == "JPEG"
+    assert run(source, runs, resume=True, **options, format="jpg", quality=60).kept == 2
+    assert run(source, runs, resume=True, **options, format="jpg", quality=90).kept == 0
+    assert 'href="a.jpg"' in (runs / "index.html").read_text() and small.rows[0]["picture"] == "a.jpg"
     assert (runs / "b.scene/scene.json").stat().st_mtime_ns == written
 
 

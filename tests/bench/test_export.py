@@ -6,7 +6,7 @@ from materialist.bench import export
 
 @pytest.mark.slow
 def test_what_was_written_looks_as_the_scene_does(measured, monkeypatch):
-    pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+    pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist-photo[usd]'")
     monkeypatch.setattr(export.pipeline, "invert", lambda *_, **__: room())
     monkeypatch.setattr(export, "find_blender", lambda _: None)
     again, ours, principled, glb, usd, none = measured("export", spp=64, device="cpu").rows

@@ -3,7 +3,9 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from materialist import bench
 from materialist.bench.glass import GlassBench
@@ -58,8 +60,15 @@ def test_a_report_is_three_files_of_valid_content(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["plot.png", "report.json", "report.md"]
 
 
+def test_larger_pictures_are_files_of_their_own(tmp_path):
+    write(replace(REPORT, pictures={"a_room": np.zeros((4, 6, 3), np.uint8)}), tmp_path)
+    assert Image.open(tmp_path / "pictures" / "a_room.png").size == (6, 4)
+
+
 def test_a_folder_with_something_in_it_is_kept(tmp_path):
-    assert claim(tmp_path / "new" / "deep").is_dir()
+    with pytest.raises(OutputError, match="no folder"):
+        claim(tmp_path / "new" / "deep")
+    assert claim(tmp_path / "new").is_dir() and claim(tmp_path / "new" / "deep").is_dir()
     (tmp_path / "file").write_text("mine")
     with pytest.raises(OutputError, match="--force"):
         claim(tmp_path)
@@ -91,6 +100,9 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path):
         ("glass", {"shapes": 0}, "nothing to measure"),
         ("invert", {"sizes": "12,x"}, "with commas"),
         ("invert", {"data": "."}, "holds neither"),
+        ("real", {}, "photographs with measured truth"),
+        ("real", {"data": "."}, r"holds no photographs .*real_light/ with NAME/lights\.json"),
+        ("real", {"data": ".", "predictor": "magic"}, "no predictor 'magic'"),
         ("plate", {"data": "."}, r"materialist_indoor1\.png"),
         ("predictor", {"runs": 0}, "runs is 0"),
         ("studio", {"photo": "/nope.jpg"}, "no photo at /nope.jpg"),

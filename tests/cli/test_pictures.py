@@ -1,15 +1,19 @@
 """select, edit, relight, glass, remove, insert, drop and apply on a small scene: files, exit codes, one error table."""
 
+import sys
+
 import numpy as np
 import pytest
 from edit_scenes import MASK, rendered_scene
 from made_meshes import box_file, floor_scene, textured_obj
 from PIL import Image
 
-from materialist.color import linear_to_srgb
+from materialist.color import linear_to_srgb, srgb_levels
 from materialist.edits.insert.insert import insert
+from materialist.io import package
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
+from materialist.io.photo import read_photo
 from materialist.render import variant
 
 
@@ -68,6 +72,29 @@ def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(done, 
     large = ["--full-render", "--no-denoise", "--upscale", f"{tmp_path / 'f.py'}:twice"]
     done(*common, *large, "-o", tmp_path / "l.png")
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "l.png")), full.repeat(2, 0).repeat(2, 1))
+
+
+def test_a_picture_without_the_denoiser_says_so(run, done, folder, tmp_path, monkeypatch):
+    command = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5"]
+    command += ["--spp", 4, "-o", tmp_path / "o.png"]
+    assert done(*command)["denoised"] is True
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    facts = done(*command, "--force")
+    assert facts["denoised"] is False
+    assert any("not denoised" in note for note in facts["warnings"])
+    assert "Note: The picture is not denoised" in run(*command, "--force")[1]
+    facts = done(*command, "--force", "--no-denoise")
+    assert facts["denoised"] is False and facts["warnings"] == []
+
+
+@pytest.mark.parametrize("command", ["edit", "render"])
+def test_an_explicit_wish_for_the_denoiser_fails_before_the_work(command, refused, folder, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    monkeypatch.setattr(package, "load_scene", lambda path: pytest.fail("the work was begun"))
+    region = ["--mask", folder / "block.png", "--value", "-0.5"] if command == "edit" else []
+    error = refused(command, folder / "a.scene", *region, "--denoise", "-o", tmp_path / "o.png")
+    assert "pip install pyoidn" in error
+    assert not (tmp_path / "o.png").exists()
 
 
 def test_apply_replays_the_list(run, done, folder, tmp_path):
@@ -227,3 +254,46 @@ def test_the_device_is_chosen_before_anything_renders(done, folder, tmp_path, mo
     options = ["--spp", "4", "--device", "cpu", "-o", tmp_path / "out.png"]
     done("edit", tmp_path / "c.scene", "--mask", folder / "block.png", "--value", "0.1", *options)
     assert asked[:1] == ["cpu"]
+
+
+@pytest.mark.parametrize("kind", ["jpg", "tif", "webp", "avif"])
+def test_pictures_of_every_kind(kind, done, folder, tmp_path):
+    command = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5", "--spp", 4]
+    quality = [] if kind == "tif" else ["--quality", 100]
+    done(*command, *quality, "-o", tmp_path / f"o.{kind}")
+    shown = np.asarray(Image.open(tmp_path / f"o.{kind}"), np.int16)
+    photo = srgb_levels(load_scene(folder / "a.scene").photo.original)
+    assert np.abs(shown[:8] - photo[:8]).max() <= (0 if kind in ("tif", "webp") else 12)
+    assert (shown[MASK] < photo[MASK]).mean() > 0.9
+
+
+def test_layers_of_an_edit_a_rendering_and_the_photo(done, refused, folder, tmp_path):
+    edit = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5", "--spp", 4, "--exr-layers"]
+    done(*edit, "-o", tmp_path / "edit.exr")
+    render = ["render", folder / "a.scene", "--spp", 4, "--exr-layers"]
+    done(*render, "-o", tmp_path / "render.exr")
+    done(*render, "--photo", "-o", tmp_path / "photo.exr")
+    photo = load_scene(folder / "a.scene").photo.original
+    beauty = {name: read_photo(tmp_path / f"{name}.exr") for name in ("edit", "render", "photo")}
+    assert all("beauty" in read.layer for read in beauty.values())
+    assert np.allclose(beauty["photo"].original * 2.0 ** -beauty["photo"].stops, photo)
+    assert "--exr-layers writes an .exr" in refused(*edit, "-o", tmp_path / "o.png")
+    assert "--photo says nothing without" in refused(*render[:-1], "--photo", "-o", tmp_path / "o.exr")
+
+
+@pytest.mark.parametrize(
+    ("flags", "words"),
+    [
+        (("--quality", 80), "quality is 80"),
+        (("--bits", 12), "12 bits"),
+        (("--exr-layers",), "--exr-layers writes an .exr"),
+    ],
+)
+def test_encodings_are_refused_before_the_work(flags, words, refused, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(package, "load_scene", lambda path: pytest.fail("the work was begun"))
+    assert words in refused("render", folder / "a.scene", *flags, "-o", tmp_path / "o.png")
+
+
+def test_a_film_has_no_quality(refused, folder, tmp_path):
+    command = ["relight", folder / "a.scene", "--frames", 2, "-o", tmp_path / "film", "--quality", 80]
+    assert "are of pictures" in refused(*command)

@@ -35,7 +35,7 @@ def test_formats(tmp_path, name, to, message):
 def test_only_an_earlier_export_is_replaced(tmp_path):
     target = tmp_path / "out"
     mt.export(room(), target, to="mitsuba")
-    with pytest.raises(mt.OutputError, match="give --force"):
+    with pytest.raises(mt.OutputError, match="give `force=True`"):
         mt.export(room(), target, to="usd")
     (target / "work").mkdir()
     (target / "work" / "comp.nk").touch()

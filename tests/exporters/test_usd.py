@@ -7,7 +7,7 @@ import pytest
 from export_scenes import CHECKS, GLASS, GLOW, LAMP, room, with_bodies
 from PIL import Image
 
-pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist[usd]'")
+pytest.importorskip("pxr", reason="needs usd-core: pip install 'materialist-photo[usd]'")
 from pxr import Usd, UsdGeom, UsdLux, UsdShade, UsdValidation
 
 import materialist as mt

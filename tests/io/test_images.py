@@ -12,6 +12,7 @@ import tifffile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from made_png import png_header
 from made_scene import make_scene
 from PIL import Image
 
@@ -20,6 +21,7 @@ from materialist.io.atomic import whole_file
 from materialist.io.bitmap import pixel_limit_lifted
 from materialist.io.decode import decode
 from materialist.io.exr import read_exr, write_exr
+from materialist.io.exr_photo import read_exr_photo
 from materialist.io.image import ensure_image_writable, read_map, read_mask, write_image
 from materialist.io.overview import overview
 
@@ -50,9 +52,13 @@ def test_exr_errors(tmp_path):
 
 def test_write_image_is_whole_and_asks_before_replacing(tmp_path, monkeypatch):
     linear = np.random.default_rng(0).random((5, 9, 3), np.float32)
+    with pytest.raises(OutputError, match=r"no folder .*mkdir -p .*new"):
+        write_image(tmp_path / "new/a.exr", linear)
+    assert not (tmp_path / "new").exists()
+    (tmp_path / "new").mkdir()
     write_image(tmp_path / "new/a.exr", linear)
     np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear)
-    with pytest.raises(OutputError, match="--force"):
+    with pytest.raises(OutputError, match="force=True"):
         write_image(tmp_path / "new/a.exr", linear)
     write_image(tmp_path / "new/a.exr", linear * 2, force=True)
     np.testing.assert_array_equal(read_exr(tmp_path / "new/a.exr"), linear * 2)
@@ -73,6 +79,13 @@ def test_maps_of_8_and_16_bits_are_scaled_not_decoded(tmp_path):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(InputError, match="readable"):
             read_map(tmp_path / name)
+
+
+def test_maps_of_more_pixels_than_a_photo_are_refused_by_their_header(tmp_path):
+    (tmp_path / "huge.png").write_bytes(png_header(20000, 20000))
+    for read in (read_map, lambda path: read_mask(path, (20, 20))):
+        with pytest.raises(InputError, match="the limit is 200 megapixels"):
+            read(tmp_path / "huge.png")
 
 
 def test_masks(tmp_path):
@@ -96,6 +109,31 @@ def test_masks(tmp_path):
     cv2.imwrite(str(tmp_path / "photo.png"), photo)
     with pytest.raises(InputError, match="a colour picture, not a mask"):
         read_mask(tmp_path / "photo.png", (40, 60))
+
+
+@pytest.mark.parametrize("side", [6, 30])
+@pytest.mark.parametrize("kind", ["colour", "grey", "black", "white"])
+def test_a_cut_out_object_is_a_mask_by_its_alpha(tmp_path, side, kind):
+    rgba = np.zeros((40, 60, 4), np.uint8)
+    noise = np.random.default_rng(0).integers(20, 230, (side, side, 3)).astype(np.uint8)
+    object_colours = {"colour": noise, "grey": noise[..., :1], "black": 0, "white": 255}
+    rgba[4 : 4 + side, 10 : 10 + side, :3] = object_colours[kind]
+    rgba[4 : 4 + side, 10 : 10 + side, 3] = 255
+    cv2.imwrite(str(tmp_path / "cut.png"), rgba)
+    np.testing.assert_array_equal(read_mask(tmp_path / "cut.png", (40, 60)), rgba[..., 3] > 0)
+
+
+def test_black_and_white_that_is_painted_on_transparency_is_a_mask(tmp_path):
+    rgba = np.zeros((40, 60, 4), np.uint8)
+    rgba[:30, :, 3] = 255
+    rgba[5:12, 8:20, :3] = 255
+    cv2.imwrite(str(tmp_path / "painted.png"), rgba)
+    np.testing.assert_array_equal(read_mask(tmp_path / "painted.png", (40, 60)), rgba[..., 0] > 0)
+
+
+def test_the_reported_cut_out(real_data):
+    mask = read_mask(real_data("data/reported/mask_cutout/cutout0.png"), (64, 96))
+    assert mask.sum() == 384 and mask[16:32, 24:48].all()
 
 
 @pytest.mark.parametrize("shape", [(40, 40), (60, 24), (96, 12), (24, 60), (12, 96)])
@@ -129,20 +167,26 @@ LAYERS = {f"{name}.{c}": value + k for name, value in (("albedo", 1), ("beauty",
     ],
 )
 def test_the_picture_among_the_channels_of_an_exr(tmp_path, channels, photo, expected):
-    found = read_exr(write_channels(tmp_path / "a.exr", **channels), photo=photo)
+    file = write_channels(tmp_path / "a.exr", **channels)
+    if photo:
+        decoded = read_exr_photo(file)
+        alpha = [] if decoded.alpha is None else [decoded.alpha]
+        found = np.concatenate([decoded.linear, *alpha], -1)
+    else:
+        found = read_exr(file)
     np.testing.assert_array_equal(found[0, 0], expected)
 
 
 def test_a_depth_is_no_photo(tmp_path):
     """Alone it is refused; before the picture, as a part of its own, it is passed over."""
     with pytest.raises(InputError, match="RGB or Y is needed"):
-        read_exr(write_channels(tmp_path / "depth.exr", Z=7), photo=True)
+        read_exr_photo(write_channels(tmp_path / "depth.exr", Z=7))
     pixels = lambda value: np.full((9, 12), value, np.float32)  # noqa: E731
     parts = [OpenEXR.Part({}, {"Z": pixels(7)}, "depth"),
              OpenEXR.Part({}, {"R": pixels(0.25), "G": pixels(0.5), "B": pixels(0.75)}, "rgb")]  # fmt: skip
     with OpenEXR.File(parts) as file:
         file.write(str(tmp_path / "parts.exr"))
-    assert np.allclose(read_exr(tmp_path / "parts.exr", photo=True), [0.25, 0.5, 0.75])
+    assert np.allclose(read_exr_photo(tmp_path / "parts.exr").linear, [0.25, 0.5, 0.75])
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,10 @@ def assert_same(a, b, where="scene"):
     elif isinstance(a, np.ndarray):
         assert a.dtype == b.dtype and a.shape == b.shape, where
         assert a.tobytes() == b.tobytes(), where
+    elif isinstance(a, dict):
+        assert a.keys() == b.keys(), where
+        for key in a:
+            assert_same(a[key], b[key], f"{where}.{key}")
     elif isinstance(a, tuple) and a and is_dataclass(a[0]):
         assert len(a) == len(b), where
         for k, (one, other) in enumerate(zip(a, b)):
@@ -50,7 +54,9 @@ def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
     body = make_body()
     coated = replace(body, name="another", surface=replace(body.surface, glass_roughness=0.25))
     light = np.random.default_rng(1).random((8, 16, 4), np.float32) * 100
-    full = replace(scene, bodies=(body, coated), prior=replace(scene.prior, light=light))
+    spread = {"albedo": scene.depth * 0 + 0.1, "normal": scene.depth * 0.2}
+    prior = replace(scene.prior, light=light, spread=spread)
+    full = replace(scene, bodies=(body, coated), prior=prior)
     if from_memory:
         original = scene.photo.original[:7, :5] * 7
         full = replace(full, photo=replace(scene.photo, source=None, path=None, original=original))
@@ -63,6 +69,10 @@ def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
 
 
 def test_the_files_of_the_contract(scene, tmp_path):
+    with pytest.raises(OutputError, match="no folder"):
+        save_scene(scene, tmp_path / "deep/down/a.scene")
+    assert not (tmp_path / "deep").exists()
+    (tmp_path / "deep/down").mkdir(parents=True)
     save_scene(scene, tmp_path / "deep/down/a.scene")
     root = tmp_path / "deep/down/a.scene"
     maps = ("albedo", "roughness", "metallic", "normal", "depth")
@@ -84,7 +94,7 @@ def test_force_alone_replaces_a_scene_and_never_what_somebody_put_beside_it(scen
     place = tmp_path / "a.scene"
     save_scene(scene, place)
     other = replace(scene, envmap=scene.envmap * 2)
-    with pytest.raises(OutputError, match="--force"):
+    with pytest.raises(OutputError, match="force=True"):
         save_scene(other, place)
     assert_same(load_scene(place), scene)
     save_scene(other, place, force=True)

@@ -14,6 +14,7 @@ from pillow_heif import register_heif_opener
 
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import InputError
+from materialist.io.decode import SUFFIXES
 from materialist.io.exr import write_exr
 from materialist.io.icc import matrix_profile
 from materialist.io.photo import decode_photo, exposed, read_photo
@@ -289,25 +290,60 @@ def test_odd_inputs_all_work(real_data):
     assert any("360" in w for w in read_photo(folder / "panorama_braunschweig_equirect.jpg").warnings)
 
 
+def write_dng(path, *tags, orientation=1):
+    """A grey ramp of 96 x 64 in a colour filter array; returns its values."""
+    ramp = np.broadcast_to(np.linspace(2000, 60000, 96), (64, 96))
+    rational = [part for row in XYZ_TO_SRGB for value in row for part in (round(value * 10000), 10000)]
+    camera = [
+        (274, "H", 1, orientation), (271, "s", 0, "Test"), (272, "s", 0, "Camera"), (33421, "H", 2, (2, 2)),
+        (33422, "B", 4, bytes([0, 1, 1, 2])), (41989, "H", 1, 50), (50706, "B", 4, bytes([1, 4, 0, 0])),
+        (50708, "s", 0, "Test Camera"), (50717, "I", 1, 65535), (50721, "2i", 9, rational), (50728, "2I", 3, [1] * 6),
+        (50778, "H", 1, 21),
+    ]  # fmt: skip
+    extra = [(*tag, True) for tag in (*camera, *tags)]
+    tifffile.imwrite(path, ramp.astype(np.uint16), photometric=32803, extratags=extra)
+    return ramp / 65535
+
+
 def test_camera_raw_is_linear_and_knows_its_lens(tmp_path):
     """A grey ramp in a DNG's colour filter array comes back as the same grey ramp, up to one exposure factor."""
     pytest.importorskip("rawpy", reason="needs rawpy")
-    ramp = np.broadcast_to(np.linspace(2000, 60000, 96), (64, 96))
-    rational = [part for row in XYZ_TO_SRGB for value in row for part in (round(value * 10000), 10000)]
-    tags = [
-        (271, "s", 0, "Test"), (272, "s", 0, "Camera"), (33421, "H", 2, (2, 2)), (33422, "B", 4, bytes([0, 1, 1, 2])),
-        (41989, "H", 1, 50), (50706, "B", 4, bytes([1, 4, 0, 0])), (50708, "s", 0, "Test Camera"),
-        (50717, "I", 1, 65535), (50721, "2i", 9, rational), (50728, "2I", 3, [1] * 6), (50778, "H", 1, 21),
-    ]  # fmt: skip
-    tifffile.imwrite(
-        tmp_path / "a.dng", ramp.astype(np.uint16), photometric=32803, extratags=[(*t, True) for t in tags]
-    )
+    ramp = write_dng(tmp_path / "a.dng")
     photo = read_photo(tmp_path / "a.dng")
     middle = photo.linear[8:-8, 8:-8]
-    ratio = middle.mean(-1) / (ramp[8:-8, 8:-8] / 65535)
+    ratio = middle.mean(-1) / ramp[8:-8, 8:-8]
     assert photo.linear.shape == (64, 96, 3) and np.ptp(middle, axis=-1).max() < 0.02
     np.testing.assert_allclose(ratio, np.median(ratio), rtol=0.02)
     assert photo.fov_source == "exif" and photo.camera.fov == pytest.approx(39.598, abs=0.01)
+
+
+ACTIVE_AREA = (50829, "I", 4, (4, 8, 60, 88))
+"""Top, left, bottom, right."""
+
+
+@pytest.mark.parametrize("orientation", [1, 3, 6, 8])
+@pytest.mark.parametrize(("active", "left", "top"), [((), 10, 4), ((ACTIVE_AREA,), 18, 8)])
+def test_the_default_crop_of_a_dng(tmp_path, active, left, top, orientation):
+    """DefaultCropOrigin counts from the active area; the picture that is turned is cut on the sides that were meant."""
+    pytest.importorskip("rawpy", reason="needs rawpy")
+    crop = (50719, "I", 2, (10, 4)), (50720, "I", 2, (60, 40))
+    ramp = write_dng(tmp_path / "a.dng", *crop, *active, orientation=orientation)
+    found = read_photo(tmp_path / "a.dng").original.mean(-1)
+    upright = {1: found, 3: found[::-1, ::-1], 6: np.rot90(found, 1), 8: np.rot90(found, -1)}[orientation]
+    assert upright.shape == (40, 60)
+    expected = ramp[top : top + 40, left : left + 60]
+    ratio = (upright / expected)[4:-4, 4:-4]
+    np.testing.assert_allclose(ratio, np.median(ratio), rtol=0.03)
+
+
+@pytest.mark.parametrize("suffix", [".jfif", ".jp2", ".hif", ".tga", ".ppm"])
+def test_more_names_of_photos(tmp_path, suffix):
+    register_heif_opener()
+    assert suffix in SUFFIXES
+    pixels, kind = picture(64, 96), {".jfif": "JPEG", ".jp2": "JPEG2000", ".hif": "HEIF"}.get(suffix)
+    Image.fromarray(pixels).save(tmp_path / f"a{suffix}", kind)
+    photo = read_photo(tmp_path / f"a{suffix}")
+    assert np.abs(linear_to_srgb(photo.linear) - pixels / 255).mean() < 0.02
 
 
 @pytest.mark.parametrize("mode", ["L", "RGBA", "CMYK", "RGB"])

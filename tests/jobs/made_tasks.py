@@ -36,3 +36,26 @@ def until(done, seconds=15.0):
         assert time.monotonic() < end, "took too long"
         time.sleep(0.02)
     return found
+
+
+def wait(report):
+    """Work for a minute."""
+    time.sleep(60)
+
+
+def surroundings(report):
+    """What a task sees of the process that started it."""
+    return {"pid": os.getpid(), "password": os.environ.get("MATERIALIST_PASSWORD")}
+
+
+def allocate(report, count):
+    """Bytes of so many numbers, in memory at once."""
+    import numpy as np
+
+    return int(np.ones(count).nbytes)
+
+
+def numbers(report, count):
+    import numpy as np
+
+    return np.arange(count)

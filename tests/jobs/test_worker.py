@@ -64,5 +64,5 @@ def test_a_worker_that_cannot_be_started_is_a_sentence(monkeypatch):
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
     monkeypatch.setattr("subprocess.Popen", none)
-    with pytest.raises(SetupError, match="Resource temporarily unavailable; give fewer --workers"):
+    with pytest.raises(SetupError, match="Resource temporarily unavailable; give fewer workers"):
         LocalPool([{}]).begin("a", answer, {})

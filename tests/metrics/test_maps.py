@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.metrics.maps import depth_figures, ordinal_accuracy, score, summary
+from materialist.metrics.maps import (
+    aligned_psnr,
+    depth_abs_rel,
+    depth_figures,
+    mean_angle,
+    ordinal_accuracy,
+    score,
+    spread_calibration,
+    summary,
+)
 from materialist.types import Materials, Prediction
 
 
@@ -81,3 +90,49 @@ def test_pooled_psnr_is_of_the_mean_error():
     found = summary([{"metallic_mse": 0.01, "metallic_psnr": 20.0}, {"metallic_mse": 0.0, "metallic_psnr": 100.0}])
     assert found["metallic_psnr"] == 60 and found["metallic_psnr_pooled"] == pytest.approx(23.01, abs=0.01)
     assert summary([]) == {}
+
+
+def test_relative_depth_after_the_median_factor():
+    true = np.array([[1, 2, 4, 0]], np.float32)
+    assert depth_abs_rel(np.array([[3, 6, 12, 5]], np.float32), true) == pytest.approx(0, abs=1e-6)
+    assert depth_abs_rel(np.array([[1, 2, 8, 5]], np.float32), true) == pytest.approx(1 / 3)
+    assert depth_abs_rel(np.array([[1, 2, 0, 5]], np.float32), true) == pytest.approx(1 / 3)  # taken for sky
+    assert depth_abs_rel(np.zeros_like(true), true) == 1
+    assert np.isnan(depth_abs_rel(true, np.zeros_like(true)))
+
+
+def test_mean_angle_of_a_part():
+    up, out = np.zeros((2, 2, 3), np.float32), np.zeros((2, 2, 3), np.float32)
+    up[..., 1], out[..., 2] = 1, 1
+    out[0] = up[0]
+    everywhere = np.ones((2, 2), bool)
+    assert mean_angle(up, out, everywhere) == pytest.approx(45)
+    assert mean_angle(up, out, np.array([[False, False], [True, True]])) == pytest.approx(90)
+    assert np.isnan(mean_angle(up, out, ~everywhere))
+
+
+def test_pictures_after_one_factor():
+    picture = np.random.default_rng(0).uniform(0.1, 0.9, (8, 8, 3)).astype(np.float32)
+    mask = np.ones((8, 8), bool)
+    assert aligned_psnr(picture / 3, picture, mask) > 90
+    assert aligned_psnr(picture[::-1], picture, mask) < 20
+    tinted = picture * np.array([1, 1, 0.5], np.float32)
+    assert aligned_psnr(tinted, picture, mask) < 30, "one factor for all channels"
+    spoilt = picture.copy()
+    spoilt[:4] = 1
+    assert aligned_psnr(spoilt, picture, np.arange(8)[:, None] * np.ones(8) >= 4) > 90
+
+
+def test_half_of_the_errors_are_within_a_calibrated_spread(truth):
+    rng = np.random.default_rng(1)
+    scale = rng.uniform(0.01, 0.05, truth.depth.shape)
+    errors = rng.laplace(0, scale)
+    rough = replace(truth.materials, roughness=truth.materials.roughness + errors)
+    depth = np.where(truth.depth > 0, truth.depth * np.exp(errors), 0) * 3
+    spread = {"roughness": scale, "depth": scale, "metallic": 0 * scale}
+    predicted = replace(truth, materials=rough, depth=depth, spread=spread)
+    coverage = spread_calibration(predicted, truth, truth.depth > 0)
+    assert coverage["roughness_calibration"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["depth_calibration"] == pytest.approx(0.5, abs=0.06)
+    assert coverage["metallic_calibration"] == 0
+    assert spread_calibration(truth, truth, truth.depth > 0) == {}

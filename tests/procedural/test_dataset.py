@@ -28,7 +28,7 @@ CONTRACT = {
 
 @pytest.fixture(scope="module")
 def options():
-    return DataSetOptions(size=SIZE, seed=11, spp=4, device="cpu")
+    return DataSetOptions(size=SIZE, seed=11, spp=4, device="cpu", real=0)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def test_a_sample_depends_on_seed_and_number_alone(made, options, tmp_path):
     stored = arrays(made, 4)
     for name in CONTRACT:
         assert np.array_equal(again[name], stored[name]), name
-    other = make_sample(4, DataSetOptions(size=SIZE, seed=12, spp=4, device="cpu"))
+    other = make_sample(4, DataSetOptions(size=SIZE, seed=12, spp=4, device="cpu", real=0))
     assert not np.array_equal(other["albedo"], stored["albedo"])
 
 
@@ -128,7 +128,7 @@ def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
     (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
     assert len(shapes.load(tmp_path / "meshes" / "chair.ply").faces) == 1
     (tmp_path / "meshes" / "vase.ply").write_text(text)
-    options = DataSetOptions(size=SIZE, device="cpu", meshes=tmp_path / "meshes")
+    options = DataSetOptions(size=SIZE, device="cpu", meshes=tmp_path / "meshes", real=0)
     with pytest.raises(InputError, match=r"vase\.ply .*; mend it"):
         produce(tmp_path / "set", options, count=1)
     assert not (tmp_path / "set").exists()
@@ -145,7 +145,7 @@ def test_the_splits_share_no_file(tmp_path):
 @pytest.mark.slow
 def test_a_killed_run_leaves_whole_samples_only(tmp_path):
     command = [sys.executable, "-m", "materialist", "train", "data", "-o", str(tmp_path / "d"), "--count", "500",
-               "--size", "32", "--spp", "4", "--seed", "11", "--device", "cpu"]  # fmt: skip
+               "--size", "32", "--spp", "4", "--seed", "11", "--device", "cpu", "--real", "0"]  # fmt: skip
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
     while len(list((tmp_path / "d" / "samples").glob("[0-9]*.npz"))) < 2 and time.monotonic() < deadline:
@@ -163,7 +163,23 @@ def test_a_killed_run_leaves_whole_samples_only(tmp_path):
 
 def test_the_command_makes_resumes_and_draws(done, refused, tmp_path):
     folder, sheet = tmp_path / "set", tmp_path / "sheet.png"
-    make = ("train", "data", "-o", folder, "--size", 32, "--spp", 1, "--seed", 5, "--device", "cpu", "--count")
+    make = (
+        "train",
+        "data",
+        "-o",
+        folder,
+        "--size",
+        32,
+        "--spp",
+        1,
+        "--seed",
+        5,
+        "--device",
+        "cpu",
+        "--real",
+        0,
+        "--count",
+    )
     for count, resume in ((1, ()), (2, ("--resume",))):
         told = done(*make, count, *resume)
         assert (told["rendered"], told["existing"]) == (1, count - 1)

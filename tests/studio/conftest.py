@@ -6,6 +6,7 @@ import studio_server
 from studio_scenes import package
 
 from materialist.jobs.queue import JobQueue
+from materialist.studio import uploads
 from materialist.studio.edit_list import EditList
 from materialist.studio.studio import Studio
 from materialist.studio.workspace import WorkFolder
@@ -53,6 +54,12 @@ def studio(tmp_path_factory):
     made.start = work.new("Room", "me", scene=package(folder))
     yield made
     made.jobs.close()
+
+
+@pytest.fixture
+def opens_here(monkeypatch):
+    """Uploads are opened in this process, which is faster, and sees limits that a test sets."""
+    monkeypatch.setattr(uploads, "run_limited", lambda task, limits, **given: task(None, **given))
 
 
 @pytest.fixture

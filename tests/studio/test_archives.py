@@ -11,10 +11,13 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.studio import StudioSettings, objects, tasks, uploads
+from materialist.studio.access.quota import Allowance
 from materialist.studio.archives import pack, unpack
 from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
 from materialist.studio.session import Session
+
+pytestmark = pytest.mark.usefixtures("opens_here")
 
 
 @pytest.fixture
@@ -23,8 +26,12 @@ def packed(session, tmp_path):
     write_png(tmp_path / "wood.png", np.full((32, 32, 3), 90, np.uint8))
     write_exr(tmp_path / "sky.exr", np.ones((32, 64, 3), np.float32))
     click(session)
-    session.set("edit", texture=uploads.stored(session.workspace, tmp_path / "wood.png", "texture"), roughness="0.3")
-    session.light(envmap=uploads.stored(session.workspace, tmp_path / "sky.exr", "envmap"), gain="auto")
+
+    def upload(name, option, use):
+        uploads.used(session.workspace, tmp_path / name, option, Allowance(), use)
+
+    upload("wood.png", "texture", lambda name: session.set("edit", texture=name, roughness="0.3"))
+    upload("sky.exr", "envmap", lambda name: session.light(envmap=name, gain="auto"))
     objects.set_option(session, "mesh", library_file(session, "Cube"))
     objects.place(session, 50, 40)
     session.edits = session.edits.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))
@@ -126,6 +133,6 @@ def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path)
     members = {"room/edits.yaml": LIST, "room/m.png": (tmp_path / "m.png").read_bytes(), "room/x.py": "x", "../e": "x"}
     desk = tmp_path / "desk"
     desk.mkdir()
-    (step,) = unpack(desk, zipped(tmp_path / "a.zip", members))
+    (step,) = unpack(desk, zipped(tmp_path / "a.zip", members), Allowance())
     assert [file.name for file in desk.iterdir()] == [step.options["mask"]] and step.folder == desk
     assert not (tmp_path / "e").exists() and EditList((step,)).active

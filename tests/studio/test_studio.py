@@ -4,12 +4,17 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
+from collections import deque
+from concurrent.futures import Future
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from made_tasks import until
+from made_tasks import until, wait
+from studio_scenes import zipped_package
 from studio_server import free_port
 
 from materialist.edits.recipe import Step
@@ -17,19 +22,20 @@ from materialist.errors import InputError
 from materialist.io.photo import example_path
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
-from materialist.studio import SETTINGS, StudioSettings, widgets
+from materialist.studio import SETTINGS, StudioSettings, preview, stage, widgets
+from materialist.studio.access import quota
 from materialist.studio.edit_list import EditList
 from materialist.studio.server import check_host
 from materialist.studio.studio import LOCAL_PERSON
-from materialist.studio.tab_open import _start_inversion
+from materialist.studio.tab_open import _start_inversion, _unpack
 from materialist.studio.widgets import PageContext
 
 
 def test_people_are_kept_apart(shared):
-    anna, bert = "a" * 32, "b" * 32
+    anna, bert = (shared.person(cookie * 32) for cookie in "ab")
     project = shared.work.new("Anna's", anna)
     (project.scene).mkdir()
-    session = shared.session("page", shared.person(bert))
+    session = shared.session("page", bert)
     assert shared.projects(bert) == [] and shared.projects(anna) == [project]
     shared.start = shared.work.new("For all", LOCAL_PERSON)
     assert shared.projects(bert) == [shared.start] and shared.project(shared.start.name, bert) == shared.start
@@ -81,8 +87,13 @@ def test_bad_options_end_with_2_and_make_no_folder(refused, arguments, tmp_path)
 def test_files_are_handed_over_under_names_nobody_guesses(shared):
     file = shared.work.root / "result.png"
     file.write_bytes(b"x")
-    first, second = shared.public_copy(file), shared.public_copy(file)
-    assert first != second and first.startswith(str(shared.work.cache)) and len(first.split("/")[-2]) == 32
+    first, second = shared.public_copy("anna", file), shared.public_copy("anna", file)
+    assert first != second and first.startswith(str(shared.work.cache))
+    assert len(first.split("/")[-2]) == 32
+    assert str(shared.files.path("anna", first)) == first
+    for person, name in (("bert", first), ("anna", str(file)), ("anna", "/etc/passwd")):
+        with pytest.raises(InputError, match="not here any more"):
+            shared.files.path(person, name)
 
 
 def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
@@ -105,9 +116,11 @@ def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
     assert f"cd {tmp_path}" in widgets.commands(session)
 
 
-def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path):
+def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path, monkeypatch):
     job = Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
     assert "Done in" in PageContext(shared).state(job)
+    monkeypatch.setitem(sys.modules, "pyoidn", None)
+    assert "not denoised" in PageContext(shared).state(job)
     job.state, job.message = FAILED, "<script>alert(1)</script>"
     shown = PageContext(shared).state(job)
     assert "<script>" not in shown and 'role="alert"' in shown
@@ -116,12 +129,11 @@ def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path):
 
 def test_one_person_cannot_fill_the_queue(shared, tmp_path):
     session = shared.session("page", "a" * 32)
-    slow = lambda: shared.submit(session, time.sleep, tmp_path)  # noqa: E731
     for _ in range(SETTINGS.jobs_a_person):
-        slow()
+        shared.submit(session, wait, tmp_path)
     with pytest.raises(InputError, match="6 jobs waiting or running"):
-        slow()
-    assert shared.submit(shared.session("other", "b" * 32), time.sleep, tmp_path)
+        shared.submit(session, wait, tmp_path)
+    assert shared.submit(shared.session("other", "b" * 32), wait, tmp_path)
 
 
 def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
@@ -177,16 +189,43 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
     assert [file.name for file in tmp_path.iterdir() if file.name != "work"] == []
 
 
-def test_a_page_that_is_closed_is_forgotten(shared):
-    """Gradio calls what is bound to the page's end when the request that the page holds has ended."""
-    gradio = pytest.importorskip("gradio", reason="needs gradio")
-    from materialist.studio.page import build
+def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_closes_them(shared, monkeypatch):
+    freed, begun, go_on = [], threading.Event(), threading.Event()
 
-    page, session = build(shared), shared.session("page", "a" * 32)
-    assert page.get_config_file()["connect_heartbeat"]
-    (end,) = [one.fn for one in page.fns.values() if any(event == "unload" for _, event in one.targets)]
-    end(gradio.Request(session_hash="page"))
-    assert shared.session("page", "a" * 32) is not session
+    class Busy(Future):
+        """Memory that is being given back until the test lets it."""
+
+        def result(self, timeout=None):
+            begun.set()
+            assert go_on.wait(10)
+
+    def free():
+        freed.append(threading.current_thread())
+        return Busy()
+
+    monkeypatch.setattr("materialist.studio.studio.free_memory", free)
+    for number in range(201):
+        shared.session(f"page{number}", "anna").live = SimpleNamespace(close=lambda: None)
+    shared.leave("page0")
+    assert begun.wait(10)
+    for number in range(1, 201):
+        shared.leave(f"page{number}")
+    go_on.set()
+    shared._closer.shutdown(wait=True)
+    assert len(freed) == 2
+    assert threading.current_thread() not in freed
+
+
+def test_one_freeing_serves_all_who_wait_for_it(monkeypatch):
+    pytest.importorskip("torch")
+    preview._THREAD.submit(lambda: None).result()
+    held = threading.Event()
+    preview._THREAD.submit(held.wait, 10)
+    futures = {preview.free_memory() for _ in range(100)}
+    held.set()
+    assert len(futures) == 1
+    futures.pop().result(30)
+    assert preview.free_memory() not in futures
 
 
 def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shared, monkeypatch):
@@ -199,7 +238,7 @@ def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shar
 def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
     session = shared.session("page", "a" * 32)
     for _ in range(SETTINGS.jobs_a_person):
-        shared.submit(session, time.sleep, shared.work.root)
+        shared.submit(session, wait, shared.work.root)
     with pytest.raises(InputError, match="6 jobs waiting"):
         _start_inversion(PageContext(shared), session, str(example_path("example:cat")), "auto", 512, "auto")
     assert not shared.work.projects()
@@ -210,17 +249,19 @@ def test_little_is_remembered_of_people_who_are_gone(shared, monkeypatch):
     for person in "abac":
         shared.note_last(person, "photo-001")
     assert [*shared.last] == ["a", "c"]
-    shared.note_upload("a", "10")
-    shared._uploads = [(time.monotonic() - 3601, "a", SETTINGS.upload_quota)]
-    shared.note_upload("b", "10")
-    assert len(shared._uploads) == 1
+    shared.quota._claims["a"] = deque([(time.monotonic() - 3601, SETTINGS.storage_quota)])
+    shared.claim("b", 10)
+    assert [*shared.quota._claims] == ["b"]
+    for person in "abac":
+        shared.note_sender(person, "1.2.3.4")
+    assert [*shared.senders] == ["a", "c"]
 
 
 def test_the_disk_of_the_photos_counts_too(shared, monkeypatch):
     free = {shared.work.cache: 10**12, shared.work.root: 10}
     monkeypatch.setattr("shutil.disk_usage", lambda place: SimpleNamespace(free=free[place]))
     with pytest.raises(InputError, match="disk of the studio is full"):
-        shared.note_upload("a", "10")
+        shared.claim("a", 10)
 
 
 def test_path_traced_pictures_of_a_page_are_files_of_their_own_and_the_last_stays(shared, monkeypatch):
@@ -239,4 +280,21 @@ def test_path_traced_pictures_of_a_page_are_files_of_their_own_and_the_last_stay
         session.edits = EditList((Step(kind, {"hue": "3"}),))
         assert [*PageContext(shared).traced(session)] == []
     assert len({*made}) == 3 and session.final.path == made[2]
-    assert [file.name for file in shared.work.cache.iterdir()] == [f"{made[2].name}.png"]
+    assert [file.name for file in shared.work.cache.glob("final-*")] == [f"{made[2].name}.png"]
+
+
+def test_the_report_carries_no_html_of_a_scene(opened):
+    scene = opened.scene
+    prior = replace(scene.prior, predictor="`<script>alert(1)</script>")
+    photo = replace(scene.photo, fov_source="<img src=x onerror=alert(2)>")
+    shown = stage.report(replace(scene, prior=prior, photo=photo))
+    assert "<script" not in shown and "<img" not in shown
+    assert "script>alert(1)" in shown
+
+
+def test_a_scene_that_is_unpacked_counts_as_stored(studio, tmp_path, monkeypatch, opens_here):
+    monkeypatch.setattr(quota, "SETTINGS", StudioSettings(storage_quota=1000))
+    before = studio.work.projects()
+    with pytest.raises(InputError, match="within an hour"):
+        _unpack(PageContext(studio), studio._new_session("me"), zipped_package(tmp_path))
+    assert studio.work.projects() == before

@@ -7,14 +7,16 @@ import pytest
 from made_png import png_header
 from studio_scenes import zipped, zipped_package
 
-from materialist.edits.insert.meshes import read_model
 from materialist.errors import InputError, SceneError
 from materialist.io.decode import decoded_bytes, image_size
 from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
 from materialist.studio import StudioSettings, archives, tab_open, uploads
+from materialist.studio.access.quota import Allowance
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
+
+pytestmark = pytest.mark.usefixtures("opens_here")
 
 
 @pytest.mark.parametrize(
@@ -50,7 +52,7 @@ def test_sizes_of_other_headers(tmp_path):
 @pytest.mark.parametrize("root", ["", "room.scene/"])
 def test_a_zipped_scene_comes_back(tmp_path, root):
     more = {f"{root}../evil.txt": "x", "/abs.txt": "x", f"{root}maps/extra.py": "x"}
-    archives.unpack_scene(zipped_package(tmp_path, root, **more), tmp_path / "target")
+    archives.unpack_scene(zipped_package(tmp_path, root, **more), tmp_path / "target", Allowance())
     assert load_scene(tmp_path / "target").camera.width == 64
     assert not list(tmp_path.rglob("evil.txt")) and not list(tmp_path.rglob("extra.py"))
 
@@ -58,7 +60,7 @@ def test_a_zipped_scene_comes_back(tmp_path, root):
 def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_path, monkeypatch):
     file = zipped_package(tmp_path)
     before = studio.work.projects()
-    monkeypatch.setattr(tab_open, "SETTINGS", StudioSettings(decoded_bytes=100_000))
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(decoded_bytes=100_000))
     with pytest.raises(SceneError, match="GB of memory") as error:
         tab_open._unpack(PageContext(studio), Session("me"), file)
     assert studio.work.projects() == before and str(studio.work.root) not in studio.without_folders(str(error.value))
@@ -67,13 +69,13 @@ def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_p
 def test_zips_that_are_none(tmp_path, monkeypatch):
     (tmp_path / "a.zip").write_bytes(b"PK\x03\x04 broken")
     with pytest.raises(InputError, match="not a readable zip"):
-        archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target")
+        archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", Allowance())
     with pytest.raises(InputError, match="no scene package"):
-        archives.unpack_scene(zipped(tmp_path / "b.zip", {"readme.txt": "x"}), tmp_path / "target")
+        archives.unpack_scene(zipped(tmp_path / "b.zip", {"readme.txt": "x"}), tmp_path / "target", Allowance())
     large = zipped(tmp_path / "c.zip", {"scene.json": "{}", "mesh.ply": b"\0" * 5_000_000})
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(unpacked_bytes=1_000_000))
     with pytest.raises(InputError, match="unpacks to"):
-        archives.unpack_scene(large, tmp_path / "target")
+        archives.unpack_scene(large, tmp_path / "target", Allowance())
     assert not (tmp_path / "target").exists()
 
 
@@ -81,7 +83,7 @@ def test_meshes_name_no_other_files(tmp_path):
     obj = tmp_path / "a.obj"
     obj.write_text("mtllib ../../secret.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n")
     with pytest.raises(InputError, match="outside of its folder"):
-        uploads.used(tmp_path, obj, "mesh", lambda name: read_model(tmp_path / name))
+        uploads.used(tmp_path, obj, uploads.MESH, Allowance(), lambda name: None)
     assert [file.name for file in tmp_path.iterdir()] == ["a.obj"]  # what was refused does not stay
     with pytest.raises(InputError, match="not a mesh"):
         uploads.checked_mesh(obj.with_suffix(".gltf"))
@@ -96,6 +98,6 @@ def test_a_picture_is_measured_by_what_it_holds_and_not_by_its_name(tmp_path):
     (tmp_path / "a.exr").rename(tmp_path / "a.png")
     assert decoded_bytes(tmp_path / "a.png") == 400 * 500 * 20 * 4
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(uploads, "SETTINGS", StudioSettings(upload_pixels=1_000_000))
+        patch.setattr(uploads, "SETTINGS", StudioSettings(opening_memory=10_000_000))
         with pytest.raises(InputError, match="save its colours alone"):
             uploads.checked_picture(tmp_path / "a.png")

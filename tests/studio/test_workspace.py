@@ -1,10 +1,12 @@
 """The work folder: names of ours, people apart, nothing lost."""
 
 import os
+import subprocess
+import sys
 
 import pytest
 
-from materialist.studio.workspace import CARD, WorkFolder
+from materialist.studio.workspace import CARD, WorkFolder, person_of
 
 
 def test_a_project_survives_a_restart(tmp_path):
@@ -64,8 +66,41 @@ def test_old_copies_go_and_what_the_page_shows_stays(tmp_path):
         (work.cache / name).mkdir()
     for name in ("old.png", "final-1.png"):
         (work.cache / name).touch()
-    work.kept = {work.cache / "page"}
+    work.kept |= {work.cache / "page"}
     for name in ("old", "page", "old.png", "final-1.png"):
         os.utime(work.cache / name, (0, 0))
     work.sweep()
-    assert sorted(place.name for place in work.cache.iterdir()) == ["final-1.png", "fresh", "page"]
+    left = {place.name for place in work.cache.iterdir()}
+    assert left - {"cache-of-a-studio"} == {"final-1.png", "fresh", "page"}
+
+
+def test_the_cache_of_a_killed_studio_is_swept_and_that_of_another_stays(tmp_path):
+    """A killed process cleans nothing up; its lock ends with it."""
+    script = f"""if True:
+        import os, signal
+        from materialist.studio.workspace import WorkFolder
+        work = WorkFolder({str(tmp_path)!r})
+        (work.cache / "upload.png").write_bytes(b"x")
+        os.kill(os.getpid(), signal.SIGKILL)
+    """
+    assert subprocess.run([sys.executable, "-c", script]).returncode == -9
+    assert len(list(tmp_path.glob("materialist-cache-*/upload.png"))) == 1
+    first = WorkFolder(tmp_path)
+    assert list(tmp_path.glob("materialist-cache-*")) == [first.cache]
+    second = WorkFolder(tmp_path)
+    assert first.cache.is_dir() and second.cache.is_dir()
+
+
+def test_folders_that_were_called_after_a_cookie_are_renamed(tmp_path):
+    cookie = "a1" * 16
+    work = WorkFolder(tmp_path)
+    project = work.new("Anna's", cookie)
+    edits = project.folder / f"edits-{cookie}"
+    edits.mkdir()
+    (edits / "edits.yaml").write_text("kept")
+    person = person_of(cookie)
+    (again,) = WorkFolder(tmp_path).projects(person)
+    assert again.name == project.name
+    assert (again.workspace(person) / "edits.yaml").read_text() == "kept"
+    assert cookie not in "".join(str(path) for path in tmp_path.rglob("*"))
+    assert WorkFolder(tmp_path).projects(person) == [again]  # once

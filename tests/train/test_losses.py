@@ -1,5 +1,7 @@
 """Losses against closed forms and slow twins."""
 
+import math
+
 import numpy as np
 import pytest
 import torch
@@ -96,3 +98,26 @@ def test_the_loss_of_the_light_is_that_of_the_weighted_directions():
     assert losses.light(found, true)[0].item() == pytest.approx(1 + np.log(np.log(1.5)), rel=1e-5)
     both = losses.light(found.expand(2, -1, -1, -1), torch.cat([true, 0 * true]))
     assert both[1].item() == pytest.approx(0.5, rel=1e-5), "a light that is not known does not count"
+
+
+def test_the_likeliest_scale_is_the_mean_error():
+    error = torch.tensor([0.1, 0.2, 0.6]).view(1, 1, 1, 3)
+    mask = torch.ones_like(error)
+
+    def loss(scale):
+        return float(losses.laplace(error, torch.full_like(error, math.log(scale)), mask))
+
+    assert loss(0.3) < min(loss(0.29), loss(0.31))
+
+
+def test_errors_of_maps_are_those_of_their_spread():
+    truth = {name: torch.full((1, 1, 2, 2), 0.5) for name in ("roughness", "metallic", "depth")}
+    truth["albedo"] = torch.full((1, 3, 2, 2), 0.5)
+    truth["normal"] = torch.tensor([0.0, 0.0, 1.0]).view(1, 3, 1, 1).expand(1, 3, 2, 2)
+    found = {**truth, "depth": truth["depth"] + 3}  # its scale is not known
+    found["albedo"] = truth["albedo"] + torch.tensor([0.3, 0.0, 0.0]).view(1, 3, 1, 1)
+    found["roughness"] = truth["roughness"] - 0.2
+    found["normal"] = torch.tensor([1.0, 0.0, 1.0]).view(1, 3, 1, 1).expand(1, 3, 2, 2)
+    errors = losses.map_errors(found, truth, torch.ones(1, 1, 2, 2))
+    expected = torch.tensor([0.1, 0.2, 0.0, math.pi / 4, 0.0])
+    torch.testing.assert_close(errors.mean((0, 2, 3)), expected)

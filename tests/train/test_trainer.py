@@ -86,6 +86,11 @@ def test_its_averaged_weights_predict_and_begin_another_run(run, data):
         for name, tensor in found.items():
             torch.testing.assert_close(tensor, state["averaged"][name], atol=2e-3, rtol=2e-3)
     assert any(not torch.equal(state["averaged"][n], state["network"][n]) for n in state["network"])
+    wider = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, spread=True))
+    wider.init = folder / checkpoint.WEIGHTS
+    grown = wider.network().state_dict()  # with an untrained head of its own
+    torch.testing.assert_close(grown["head.weight"], begun.network().state_dict()["head.weight"])
+    assert float(grown["spread.out.weight"].abs().sum()) == 0
     other = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, fine=16))
     other.init = folder / checkpoint.WEIGHTS
     with pytest.raises(WeightsError, match="is not a checkpoint of BundledNetwork"):

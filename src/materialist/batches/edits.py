@@ -32,12 +32,15 @@ def _steps(path: str | Path, content: bytes) -> "list[Step]":
     return read_recipe(path)
 
 
-def edits_key(path: str | Path, name: str, spp: int) -> str:
-    """SHA-256 (hex) of what the edited photo depends on beside the scene: steps, the files they name, samples."""
+def edits_key(path: str | Path, name: str, spp: int, quality: int | None = None) -> str:
+    """SHA-256 (hex) of what the edited photo depends on beside the scene: steps, the files they name, samples, and
+    how well it is encoded."""
     described = [
         [step.kind, step.options, [_content(file, key) for key, file in _files(step)]] for step in edits_for(path, name)
     ]
-    return hashlib.sha256(json.dumps([described, spp], sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(
+        json.dumps([described, spp, *([] if quality is None else [quality])], sort_keys=True).encode()
+    ).hexdigest()
 
 
 def missing_files(path: str | Path, name: str) -> list[str]:

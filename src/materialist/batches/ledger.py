@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from materialist.errors import InputError, OutputError
-from materialist.io.atomic import make_folder, writing
+from materialist.io.atomic import make_folder, require_parent, writing
 
 LEDGER = "batch.jsonl"
 FORMAT = 1
@@ -66,6 +66,7 @@ def open_ledger(
     folder = Path(runs)
     path = folder / LEDGER
     options = json.loads(json.dumps(options))  # as they will be read again: tuples are lists
+    require_parent(folder)
     with writing(folder):
         make_folder(folder)
         held = path.is_file()
@@ -73,7 +74,8 @@ def open_ledger(
             raise InputError(f"{folder} is not empty and holds no batch; name another folder.")
         if held and not (resume or force):
             raise InputError(
-                f"{folder} holds a batch; add --resume to go on with it, --force to begin anew, or name another folder."
+                f"{folder} holds a batch; add `resume=True` to go on with it, `force=True` to begin anew, or name "
+                "another folder."
             )
         file = path.open("ab", buffering=0)
     with file:
@@ -113,5 +115,5 @@ def _require_same(events: list[dict[str, Any]], options: dict[str, Any], folder:
         if before.get(name) != options.get(name):
             raise InputError(
                 f"{folder} was begun with {name} {before.get(name)}, not {options.get(name)}; resume with that, "
-                "name another folder, or add --force to redo what differs."
+                "name another folder, or add `force=True` to redo what differs."
             )

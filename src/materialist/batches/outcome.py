@@ -13,8 +13,8 @@ from materialist.io.atomic import write_whole
 
 COLUMNS = (
     "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
-    "peak_rss_mb", "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture_hash",
-    "photo_hash", "warnings",
+    "peak_rss_mb", "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture",
+    "picture_hash", "photo_hash", "warnings",
 )  # fmt: skip
 """Columns of the summary; a photo that failed has only the reason."""
 
@@ -32,6 +32,8 @@ class Outcome:
     seconds: float
     """Wall clock of this call."""
     options: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    """What of the source was passed over."""
 
     def of(self, status: str) -> list[Row]:
         return [row for row in self.rows if row["status"] == status]

@@ -11,11 +11,13 @@ from pathlib import Path
 from materialist.batches.ledger import LEDGER
 from materialist.batches.remote import is_url, list_url, without_secrets
 from materialist.errors import InputError
-from materialist.io.atomic import MARKER
+from materialist.io.atomic import FILE_MANAGER_FILES, MARKER
 from materialist.io.bitmap import FORMATS
 from materialist.io.decode import SUFFIXES
 from materialist.io.photo import PREFIX
 
+NAMED = 5
+"""Names in a note."""
 LONGEST_NAME = 100
 """Bytes of a name; file systems take 255, and temporaries add to it."""
 
@@ -27,25 +29,25 @@ class Listed:
     location: str
 
 
-def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
+def list_photos(source: str | Path, *, runs: str | Path, notes: list[str] | None = None) -> list[Listed]:
     """The photos of SOURCE, sorted by name, each once.
 
     SOURCE is a folder (searched with its subfolders; hidden files, scene packages and the results of batches are
     passed over), a text file with a photo or URL on each line (relative to the file; # begins a comment, behind a name
     only after a space), a single photo, or a URL of a folder, a pattern or a photo that fsspec can read. RUNS is passed
-    over in any case.
+    over in any case. `notes` get a sentence on files whose names are no photo's, and on repeated lines of a list.
 
     Raises InputError where there is nothing to do, SetupError where a URL needs a library that is not installed.
     """
-    text = str(source)
+    text, notes = str(source), [] if notes is None else notes
     if is_url(text):
         found = [Listed(without_secrets(url), url) for url in list_url(text, SUFFIXES)]
     elif text.startswith(PREFIX) or (Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()):
         found = [_named(text, Path())]
     elif Path(text).is_dir():
-        found = _of_folder(Path(text), Path(runs))
+        found = _of_folder(Path(text), Path(runs), notes)
     elif Path(text).is_file():
-        found = _of_list(Path(text))
+        found = _of_list(Path(text), notes)
     else:
         raise InputError(f"There is no folder or list of photos at {text}.")
     if not found:
@@ -53,8 +55,8 @@ def list_photos(source: str | Path, *, runs: str | Path) -> list[Listed]:
     return sorted({photo.id: photo for photo in found}.values(), key=lambda photo: photo.id)
 
 
-def _of_folder(folder: Path, runs: Path) -> list[Listed]:
-    found = []
+def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
+    found, others = list[Listed](), list[str]()
     seen = {os.path.realpath(runs)}
     if os.path.realpath(folder) in seen:
         raise InputError(f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}.")
@@ -67,27 +69,43 @@ def _of_folder(folder: Path, runs: Path) -> list[Listed]:
             seen.add(real)
             below[:] = sorted(name for name in below if not name.startswith("."))
             for name in files:
-                if not name.startswith(".") and Path(name).suffix.lower() in SUFFIXES:
-                    path = Path(place) / name
-                    # Bytes of a path that are no UTF-8 cannot be written into a table; they become escapes.
-                    id = path.relative_to(folder).as_posix().encode("utf-8", "backslashreplace").decode("utf-8")
+                if name.startswith(".") or name in FILE_MANAGER_FILES:
+                    continue
+                path = Path(place) / name
+                # Bytes of a path that are no UTF-8 cannot be written into a table; they become escapes.
+                id = path.relative_to(folder).as_posix().encode("utf-8", "backslashreplace").decode("utf-8")
+                if path.suffix.lower() in SUFFIXES:
                     found.append(Listed(id, os.path.abspath(path)))
+                else:
+                    others.append(id)
     except OSError as error:
         raise InputError(f"The folder {folder} cannot be read: {error.strerror or error}.") from error
+    if others:
+        notes.append(f"Passed over, as their names are no photo's: {_some(sorted(others))}.")
     return found
+
+
+def _some(names: list[str]) -> str:
+    """The first names, and how many more there are."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more
 
 
 def _raise(error: OSError) -> None:
     raise error
 
 
-def _of_list(file: Path) -> list[Listed]:
+def _of_list(file: Path, notes: list[str]) -> list[Listed]:
     try:
         lines = file.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{file} is no list of photos ({error}); write one path or URL on each line.") from error
     entries = [re.split(r"(?:^|\s)#", line.strip(), maxsplit=1)[0].rstrip() for line in lines]
-    return [_named(entry, file.parent) for entry in entries if entry]
+    listed = [_named(entry, file.parent) for entry in entries if entry]
+    repeated = [id for id, times in Counter(photo.id for photo in listed).items() if times > 1]
+    if repeated:
+        notes.append(f"More than one line of {file.name} names {_some(repeated)}; each is done once.")
+    return listed
 
 
 def _named(entry: str, folder: Path) -> Listed:

@@ -62,7 +62,7 @@ def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:
     if entry.get("event") != "done" or task.how.recipe is None:
         return entry.get("event") == "done"
     try:
-        same = entry.get("edits") == edits_key(task.how.recipe, task.name, task.how.spp)
+        same = entry.get("edits") == edits_key(task.how.recipe, task.name, task.how.spp, task.how.quality)
         return same and entry.get("picture_hash") == file_hash(task.picture)
     except OSError:
         return False

@@ -6,7 +6,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import psutil
 
@@ -22,6 +22,8 @@ from materialist.errors import InputError
 from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import DONE, FAILED, PROGRESS
+from materialist.keywords import BatchKeywords
+from materialist.option_kinds import documented
 
 Watch = Callable[[Status], None]
 
@@ -37,8 +39,11 @@ class BatchSettings:
 SETTINGS = BatchSettings()
 
 
-def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Any) -> Outcome:
-    """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.png.
+@documented(BatchOptions)
+def batch(
+    source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Unpack[BatchKeywords]
+) -> Outcome:
+    """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.FORMAT.
 
     A photo that cannot be inverted is recorded with its reason and stops nothing; a worker that dies loses only its
     photo, which is begun again, `BatchSettings.tries` times in all. The results do not depend on the number of workers.
@@ -52,19 +57,23 @@ def batch(source: str | Path, runs: str | Path, *, progress: Watch | None = None
     """
     start = time.monotonic()
     own = {one.name for one in fields(BatchOptions)}
-    how = BatchOptions(**{name: value for name, value in options.items() if name in own})
+    values: dict[str, Any] = dict(options)
+    how = BatchOptions(**{name: value for name, value in values.items() if name in own})
     asked: dict[str, Any] = {"predictor": "auto", "size": 512, "fov": "auto", "seed": 0, "device": "auto"}
-    asked |= {name: value for name, value in options.items() if name not in own}
+    asked |= {name: value for name, value in values.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
         edits_for(how.recipe, "")  # a list that cannot be read is told before anything is written
-    photos, folder = list_photos(source, runs=runs), Path(runs)
+    notes: list[str] = []
+    photos, folder = list_photos(source, runs=runs, notes=notes), Path(runs)
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
         template = PhotoTask("", "", "", folder.resolve(), asked, how)
         tasks = {task.id: task for task in plan(photos, ledger, template)}
-        run = _Run(folder, photos, ledger, tasks, asked, progress or (lambda _: None), start)
+        run = _Run(folder, photos, ledger, tasks, asked, progress or (lambda _: None), start, notes)
         try:
+            for note in notes:
+                run.tell(note)
             if how.recipe is not None and (notice := _lacking(how.recipe, [*tasks.values()])):
                 run.tell(notice)
             if tasks:
@@ -114,7 +123,7 @@ def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
     task, file = found[0]
     if len(found) == len(tasks):
         raise InputError(f"No photo has the files that {recipe} names (there is no {file} for {task.id}); put them "
-                         "there, and add --resume.")  # fmt: skip
+                         "there, and add `resume=True`.")  # fmt: skip
     return (f"{len(found)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
             "they get a scene, but no edited photo unless it is there by then.")  # fmt: skip
 
@@ -129,6 +138,8 @@ class _Run:
     options: dict[str, Any]
     watch: Watch
     start: float
+    notes: list[str]
+    """Sentences on what the source holds beside photos."""
     stages: dict[str, str] = field(default_factory=dict)
     """Photo id -> stage, of the photos at work."""
     tries: Counter[str] = field(default_factory=Counter)
@@ -156,7 +167,7 @@ class _Run:
 
     def outcome(self) -> Outcome:
         rows, kept = tuple(self._row(photo) for photo in self.photos), len(self.photos) - len(self.tasks)
-        return Outcome(self.runs, rows, kept, time.monotonic() - self.start, self.options)
+        return Outcome(self.runs, rows, kept, time.monotonic() - self.start, self.options, tuple(self.notes))
 
     def write(self) -> None:
         outcome = self.outcome()

@@ -40,7 +40,7 @@ THUMBNAIL = (240, 150)
 class PhotoTask:
     id: str
     name: str
-    """Its results are NAME.scene, NAME.png and thumbs/NAME.jpg."""
+    """Its results are NAME.scene, the edited photo NAME.FORMAT and thumbs/NAME.jpg."""
     location: str
     """Where the photo is read from: an absolute path, `example:NAME` or a URL."""
     runs: Path
@@ -56,7 +56,7 @@ class PhotoTask:
 
     @property
     def picture(self) -> Path:
-        return self.runs / f"{self.name}.png"
+        return self.runs / f"{self.name}.{self.how.format}"
 
     def named_options(self) -> dict[str, Any]:
         return {k: v.replace("{name}", self.name) if isinstance(v, str) else v for k, v in self.options.items()}
@@ -79,7 +79,8 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
         pictures.append(picture)
         warnings += notes
         facts |= {"edit_seconds": time.perf_counter() - begun, "picture_hash": file_hash(task.picture)}
-        facts["edits"] = edits_key(task.how.recipe, task.name, task.how.spp)
+        facts["picture"] = task.picture.name
+        facts["edits"] = edits_key(task.how.recipe, task.name, task.how.spp, task.how.quality)
     write_whole(task.runs / "thumbs" / f"{task.name}.jpg", _thumbnails(pictures))
     metrics = scene.report.metrics
     facts |= {
@@ -101,11 +102,12 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
         return mt.load_scene(task.scene), dict(task.kept)
     ensure_writable(task.scene, force=True)
     options = task.named_options()
-    size, fov = options.pop("size"), options.pop("fov")
+    size, fov, layer = options.pop("size"), options.pop("fov"), options.pop("layer", None)
     report("read", 0, 1)
     photo_version = fingerprint(task.location)
     with local_copy(task.location) as file:
-        photo = mt.read_photo(file if str(file) != task.location else task.location, size=size, fov=fov)
+        source = file if str(file) != task.location else task.location
+        photo = mt.read_photo(source, size=size, fov=fov, layer=layer)
     place = task.id if is_url(task.location) else task.location
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     report("start", 0, 1)
@@ -121,8 +123,12 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
 
 def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
-    from materialist.edits.composite.composite import write_composite
-    from materialist.edits.core.notes import effect_notes, mean_change, warnings_since
+    from materialist.edits.core.notes import (
+        effect_notes,
+        mean_change,
+        noise_notes,
+        warnings_since,
+    )
     from materialist.edits.recipe import apply
 
     report("edit", 0, 1)
@@ -132,8 +138,10 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
     except InputError as error:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
     picture = mt.composite(scene, edited, spp=task.how.spp, seed=seed, device=device, progress=report)
-    write_composite(task.picture, picture, scene.photo, force=True)
-    return picture, [*warnings_since(scene, edited), *effect_notes(scene, edited, mean_change(scene, picture))]
+    written = mt.save_image(task.picture, picture, scene, quality=task.how.quality, force=True)
+    change = mean_change(scene, picture)
+    notes = [*warnings_since(scene, edited), *effect_notes(scene, edited, change), *noise_notes(), *written]
+    return picture, notes
 
 
 def _thumbnails(pictures: list[Array]) -> bytes:

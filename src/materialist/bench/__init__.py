@@ -7,7 +7,7 @@ from typing import Any
 from materialist.errors import InputError
 
 BENCHMARKS = (
-    "photo-alone", "invert", "batch", "light", "ablation", "materials", "whdr", "predictor", "thickness",
+    "real", "photo-alone", "invert", "batch", "light", "ablation", "materials", "whdr", "predictor", "thickness",
     "select", "glass", "edit", "plate", "studio", "paper", "gpu", "export",
 )  # fmt: skip
 """Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""

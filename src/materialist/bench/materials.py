@@ -9,7 +9,9 @@ linear values); `raw` without it. Roughness and metallic: as they are, in [0, 1]
 square error over all pictures, which pictures without any metal (infinite PSNR) cannot inflate; a PSNR is at most 100.
 Depth: MAE and RMSE in units of the truth after one factor (least squares), `raw` without it; SI log RMSE is the
 standard deviation of log depth error; `order` the part of random pixel pairs in the right order (a constant gets 0.5).
-Normals: mean angle, degrees. sheet.png: the photo, and the maps of each predictor and the true ones under each other.
+Normals: mean angle, degrees. `within its spread`: share of pixels whose error is below the median that the predictor
+expects, where it says what it expects; 0.5 is calibrated. sheet.png: the photo, and the maps of each predictor and the
+true ones under each other.
 """
 
 from collections.abc import Iterator
@@ -24,7 +26,7 @@ from materialist.errors import InputError
 from materialist.io.datasets import InteriorVerse, open_sources
 from materialist.io.display import strip
 from materialist.io.photo import read_photo
-from materialist.io.samples import SampleFolder
+from materialist.io.samples import Sample, SampleFolder
 from materialist.metrics.maps import ordinal_accuracy, score, summary
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
@@ -56,6 +58,7 @@ class MaterialsBench(Benchmark):
         Column("depth_order", "depth order", "higher"),
         Column("normal_angle", "normal angle", "lower", 1),
         Column("mask_iou", "surface IoU", "higher"),
+        *(Column(f"{name}_calibration", f"{name} within its spread") for name in MAPS),
         Column("seconds", "s", "lower", 2),
     )
     plotted = ("albedo_psnr", "normal_angle")
@@ -98,12 +101,15 @@ class MaterialsBench(Benchmark):
             sample = source.read(index)
             spoilt = self.photographic and isinstance(source, SampleFolder)
             seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
-            linear = np.clip(seen.image, 0, 1).astype(np.float32)
-            height, width = linear.shape[:2]
-            fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
-            camera = Camera(width, height, float(fov))
-            photo = Photo(linear=linear, camera=camera, original=linear, fov_source="option")
-            yield f"{index:07d}", photo, sample.truth()
+            yield f"{index:07d}", photo_of(seen), sample.truth()
+
+
+def photo_of(sample: Sample) -> Photo:
+    """The picture of a sample as an ordinary photograph, clipped to [0, 1], with its true field of view."""
+    linear = np.clip(sample.image, 0, 1).astype(np.float32)
+    height, width = linear.shape[:2]
+    fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
+    return Photo(linear, Camera(width, height, float(fov)), original=linear, fov_source="option")
 
 
 def photo_folders(data: Path) -> list[Path]:

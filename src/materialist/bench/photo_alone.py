@@ -31,7 +31,7 @@ from materialist.bench.screen_space import screen_space
 from materialist.edits.composite.composite import composite
 from materialist.errors import InputError
 from materialist.fit.settings import PAPER
-from materialist.metrics.maps import best_scale, score
+from materialist.metrics.maps import aligned_psnr, best_scale, score
 from materialist.option_kinds import option
 from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Prediction, Scene
@@ -144,8 +144,9 @@ class PhotoAloneBench(Benchmark):
 
     def _scores(self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array) -> dict[str, float]:
         if edit.kind in SCALED:
-            picture = picture * np.float32(best_scale(np.minimum(picture, 1), np.minimum(truth, 1), inside))
-        found = {"inside": metrics.psnr(picture, truth, mask=inside)}
+            found = {"inside": aligned_psnr(picture, truth, inside)}
+        else:
+            found = {"inside": metrics.psnr(picture, truth, mask=inside)}
         if edit.kind in TRACED and traces.any():
             found["shadow"] = metrics.psnr(picture, truth, mask=traces)
         return found

@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.atomic import make_folder, whole_file, write_whole, writing
-from materialist.io.display import write_sheet
+from materialist.io.atomic import make_folder, require_parent, whole_file, write_whole, writing
+from materialist.io.display import encoded, write_sheet
 from materialist.plain import plain
 from materialist.types import Array
 
@@ -49,6 +49,8 @@ class Report:
     """Dicts with 'method', 'sample' and the columns' keys; a figure that does not apply is absent."""
     sheet: list[Array] = field(default_factory=list)
     """Strips of pictures, uint8 [h, w, 3] sRGB, which sheet.png has under each other."""
+    pictures: dict[str, Array] = field(default_factory=dict)
+    """Name -> a larger picture, uint8 [h, w, 3] sRGB, which becomes pictures/NAME.png."""
 
 
 def strip(*pictures: Array) -> Array:
@@ -58,6 +60,7 @@ def strip(*pictures: Array) -> Array:
 
 def claim(folder: Path, *, force: bool = False) -> Path:
     """Make the folder for a report; raises OutputError when it holds something, unless `force`."""
+    require_parent(folder)
     with writing(folder):
         if folder.is_dir() and any(folder.iterdir()) and not force:
             raise OutputError(f"{folder} is not empty; choose another folder, or add --force to write into it.")
@@ -66,7 +69,7 @@ def claim(folder: Path, *, force: bool = False) -> Path:
 
 
 def write(report: Report, folder: Path) -> None:
-    """Write report.json, report.md, plot.png and sheet.png; files of the same run that are there are replaced.
+    """Write report.json, report.md, plot.png, sheet.png and pictures/; files of that run that are there are replaced.
 
     Raises OutputError where they cannot be written.
     """
@@ -83,6 +86,10 @@ def write(report: Report, folder: Path) -> None:
         with whole_file(folder / "plot.png", force=True) as file:
             _plot(report, file)
     write_sheet(report.sheet, folder / "sheet.png")
+    if report.pictures:
+        make_folder(folder / "pictures")
+    for name, pixels in report.pictures.items():
+        write_whole(folder / "pictures" / f"{name}.png", encoded(pixels))
 
 
 def means(report: Report) -> dict[str, dict[str, float]]:
@@ -143,6 +150,6 @@ def _plot(report: Report, path: Path) -> None:
             axis.plot(values, [y] * len(values), "o", color="#1f3b5c", markersize=3, alpha=0.6)
         axis.set_title(titles[key], fontsize=9)
         axis.set_yticks(range(len(table)), list(table))
-        axis.invert_yaxis()
         axis.tick_params(labelsize=8)
+    axes[0].invert_yaxis()  # they share one
     figure.savefig(path, dpi=110)

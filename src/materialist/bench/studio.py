@@ -29,6 +29,7 @@ import psutil
 from materialist.bench.benchmark import SIZE, Benchmark, Row
 from materialist.bench.report import Column, Report
 from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.install import install_command
 from materialist.io.photo import PREFIX, example_path
 from materialist.option_kinds import option
 
@@ -218,7 +219,7 @@ def _browser() -> Iterator[Any]:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        raise SetupError(f"This benchmark needs a browser: {sys.executable} -m pip install playwright") from error
+        raise SetupError(f"This benchmark needs a browser: {install_command('playwright')}") from error
     if program is None:
         raise SetupError("This benchmark needs Chromium: apt-get install chromium")
     with sync_playwright() as driver:

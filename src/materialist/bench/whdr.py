@@ -60,24 +60,35 @@ class WhdrBench(Benchmark):
                 if source is not None:
                     found, cost = timed(source.predict, photo, seed=self.seed)
                     albedo = found.materials.albedo
-                try:
-                    error, count = whdr(albedo, json.loads(file.read_text("utf-8")), self.delta)
-                except (OSError, ValueError, KeyError, TypeError) as wrong:
-                    raise InputError(f"{file} does not hold judgements in IIW's layout ({wrong!r}).") from wrong
+                error, count = judged(albedo, file, self.delta)
                 row = {"method": spec, "sample": picture.stem, "whdr": error, "judgements": count}
                 yield row | {"seconds": cost.get("seconds", np.nan)}
 
 
 def find(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name; raises InputError when there is none."""
-    found = []
-    for judged in sorted(folder.glob("*.json")):
-        picture = next((p for s in ("png", "jpg") if (p := judged.with_suffix(f".{s}")).is_file()), None)
-        if picture is not None:
-            found.append((picture, judged))
+    found = pairs(folder)
     if not found:
         raise InputError(f"{folder} holds no picture with judgements (NAME.png and NAME.json, as IIW has them).")
     return found
+
+
+def pairs(folder: Path) -> list[tuple[Path, Path]]:
+    """(picture, judgements) of every picture in the folder, sorted by name."""
+    found = []
+    for file in sorted(folder.glob("*.json")):
+        picture = next((p for s in ("png", "jpg") if (p := file.with_suffix(f".{s}")).is_file()), None)
+        if picture is not None:
+            found.append((picture, file))
+    return found
+
+
+def judged(albedo: Array, file: Path, delta: float = 0.1) -> tuple[float, int]:
+    """`whdr` of an albedo by the judgements in a file. Raises InputError where it holds none in IIW's layout."""
+    try:
+        return whdr(albedo, json.loads(file.read_text("utf-8")), delta)
+    except (OSError, ValueError, KeyError, TypeError) as wrong:
+        raise InputError(f"{file} does not hold judgements in IIW's layout ({wrong!r}).") from wrong
 
 
 def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple[float, int]:

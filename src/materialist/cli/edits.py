@@ -131,7 +131,7 @@ def apply(
 
 def relight(
     scene: SceneArgument,
-    output: Annotated[Path, output_option("OUT", "A .png or .exr; with --frames .mp4 or a folder.")],
+    output: Annotated[Path, output_option("OUT", "A picture as for edit; with --frames .mp4 or a folder.")],
     options: MovingLight,
     lights: Place,
     how: Rendering,

@@ -17,7 +17,9 @@ def output_option(metavar: str, help: str) -> Any:
 
 Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
-PictureOutput = Annotated[Path, output_option("OUT", "A .png (as deep as the photo) or .exr (linear, HDR).")]
+PictureOutput = Annotated[
+    Path, output_option("OUT", "A .png or .tif (as deep as the photo), .jpg, .webp, .avif, or .exr (linear, HDR).")
+]
 
 # fmt: off
 
@@ -67,13 +69,31 @@ class Region(Place):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rendering(Run):
+class PictureFile(Run):
+    """How a picture is written."""
+
+    quality: int | None = option(
+        None, "Of .jpg (default 95), .webp (90, 100 loses nothing) and .avif (85).", kind="whole", low=1, high=100)
+    bits: int | None = option(
+        None, "A channel, 8 or 16, of .png and .tif; default: the photo's.", kind="whole", low=8, high=16)
+    exr_layers: bool = option(
+        False, "An .exr of many layers: beauty, albedo, diffuse, specular, N, Z, position, ...", kind="switch")
+
+    @property
+    def encoding(self) -> dict[str, Any]:
+        """Keywords of `save_image`."""
+        return {"quality": self.quality, "bits": self.bits, "force": self.force}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rendering(PictureFile):
     """How an edited scene becomes a picture or a film."""
 
     spp: int = option(
         PATHS, "Paths per pixel, of both renderings.", kind="whole", low=2, high=1_000_000, called="--spp")
-    denoise: bool = option(
-        True, "Clean the renderings (with pyoidn).", kind="switch", flag="--denoise/--no-denoise")
+    denoise: bool | None = option(
+        None, "Clean the renderings (with pyoidn); default: where it is installed.", kind="switch",
+        flag="--denoise/--no-denoise")
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
     upscale: Any = option(
         None, "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.", kind="function",

@@ -6,6 +6,7 @@ that is terminated tidies up and dies by that signal.
 
 import json
 import os
+import re
 import signal
 import sys
 import threading
@@ -24,6 +25,10 @@ KEEPING = frozenset({"train", "batch", "bench", "models", "studio"})
 """Commands that write as they go; the others write whole results, or nothing."""
 GRACE = 5.0
 """Seconds in which a command that is told to end may take its unfinished files away."""
+_KEYWORD = re.compile(r"`(\w+)=([^`]+)`")
+"""A keyword of Python in a message, as in `force=True` or `device="cpu"`."""
+FLAGS = {"method": "with"}
+"""Keywords whose flags have other names."""
 
 
 def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
@@ -36,7 +41,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
             raise KeyboardInterrupt
         return result if isinstance(result, int) else OK
     except MaterialistError as error:
-        return _fail(type(error).__name__, str(error), error.exit_code, wants_json)
+        return _fail(type(error).__name__, with_flags(str(error)), error.exit_code, wants_json)
     except (KeyboardInterrupt, typer.Abort):
         done = "what was finished is kept" if KEEPING.intersection(arguments[:1]) else "nothing was written"
         return _fail("Interrupted", f"Interrupted; {done}.", INTERRUPTED, wants_json)
@@ -88,13 +93,26 @@ def _tidy_when_terminated() -> Iterator[None]:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
+def with_flags(message: str) -> str:
+    """A message in the words of the command line: flags for the keywords of Python."""
+    return _KEYWORD.sub(_flag, message)
+
+
+def _flag(keyword: re.Match[str]) -> str:
+    name, value = keyword.groups()
+    flag = FLAGS.get(name, name).replace("_", "-")
+    if value in ("True", "False"):
+        return f"--{flag}" if value == "True" else f"--no-{flag}"
+    return f"--{flag} " + value.strip('"')
+
+
 def report_success(command: str, as_json: bool, lines: Sequence[str], **facts: Any) -> None:
     """Tell a person in `lines`, or with `as_json` a program in one last line on stdout."""
     if as_json:
         typer.echo(json.dumps(plain({"ok": True, "command": command, **facts})))
     else:
         for line in lines:
-            typer.echo(line)
+            typer.echo(with_flags(line))
 
 
 def _fail(kind: str, message: str, code: int, wants_json: bool) -> int:

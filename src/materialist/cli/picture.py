@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import materialist as mt
-from materialist.cli.options import Place, Region, Rendering
+from materialist.cli.options import PictureFile, Place, Region, Rendering
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
 from materialist.errors import InputError
@@ -32,8 +32,8 @@ def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
     All renderings of the command are then done on its device, also those that ask for `auto`.
     """
     from materialist.io.atomic import ensure_writable
-    from materialist.io.image import ensure_image_writable
     from materialist.io.video import ensure_video_writable
+    from materialist.render.denoise import require_denoiser
 
     save = how.save
     if save is not None:
@@ -45,27 +45,50 @@ def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
         if output.resolve().is_relative_to(save.resolve()):
             raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
         ensure_writable(save, how.force)
-    (ensure_video_writable if video else ensure_image_writable)(output, force=how.force)
+    if video:
+        if how.quality is not None or how.bits is not None or how.exr_layers:
+            raise InputError("--quality, --bits and --exr-layers are of pictures; leave them out for a film.")
+        ensure_video_writable(output, force=how.force)
+    else:
+        check_picture(output, how)
+    if how.denoise:
+        require_denoiser()
     if how.device != "auto":
         from materialist.render.variant import setup
 
         setup(how.device)
 
 
+def check_picture(output: Path, how: PictureFile) -> None:
+    """Raise what the output of a picture is refused for."""
+    from materialist.io.out.encode import check_image_output
+
+    check_image_output(output, **how.encoding)
+    if how.exr_layers and output.suffix.lower() != ".exr":
+        raise InputError(f"--exr-layers writes an .exr, not {output}; give another name, or leave it out.")
+
+
 def write_result(
     command: str, scene: Any, edited: Any, output: Path, how: Rendering, *, lines: Sequence[str] = ()
 ) -> None:  # fmt: skip
-    from materialist.edits.composite.composite import write_composite
-
     start = time.monotonic()
     with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
             scene, edited, spp=how.spp, seed=how.seed, full_render=how.full_render,
-            upscale=how.upscale, denoise=how.denoise, device=how.device, progress=progress,
+            upscale=how.upscale, denoise=how.denoise is not False, device=how.device, progress=progress,
         )  # fmt: skip
-    write_composite(output, picture, scene.photo, force=how.force)
+    notes = write_picture(output, picture, scene, edited, how)
     told = {"image": str(output), "spp": how.spp, "seconds": time.monotonic() - start}
-    finish(command, scene, edited, picture, how, [*lines, f"Look at {output}"], told)
+    finish(command, scene, edited, picture, how, [*lines, f"Look at {output}"], told, notes=notes)
+
+
+def write_picture(output: Path, picture: Any, scene: Any, shown: Any, how: PictureFile) -> tuple[str, ...]:
+    """Write a picture of the scene `shown`, made of the photo of `scene`; returns notes."""
+    if not how.exr_layers:
+        return mt.save_image(output, picture, scene, **how.encoding)
+    from materialist.edits.layers import save_layers
+
+    return save_layers(output, shown, picture, device=how.device, force=how.force)
 
 
 def write_film(
@@ -89,7 +112,7 @@ def write_film(
 
     with stage_progress(quiet=how.as_json) as progress:
         made = pictures(
-            scene, kept("scene", film), spp=how.spp, seed=how.seed, denoise=how.denoise, device=how.device,
+            scene, kept("scene", film), spp=how.spp, seed=how.seed, denoise=how.denoise is not False, device=how.device,
             full_render=how.full_render, upscale=how.upscale, progress=progress, count=frames,
         )  # fmt: skip
         write_frames(output, kept("picture", made), fps=fps, force=how.force)
@@ -99,18 +122,24 @@ def write_film(
 
 def finish(
     command: str, scene: Any, edited: Any, picture: Any, how: Rendering, lines: list[str],
-    told: dict[str, Any], change: float | None = None,
+    told: dict[str, Any], change: float | None = None, notes: Sequence[str] = (),
 ) -> None:  # fmt: skip
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
-    from materialist.edits.core.notes import effect_notes, mean_change, warnings_since
+    from materialist.edits.core.notes import effect_notes, mean_change, noise_notes, warnings_since
 
-    save, warnings = how.save, warnings_since(scene, edited)
+    save = how.save
+    grainy = noise_notes(how.denoise is not False)
+    warnings = [*warnings_since(scene, edited), *grainy, *notes]
     if not how.full_render:
         warnings += effect_notes(scene, edited, mean_change(scene, picture) if change is None else change)
-    lines[-1:-1] = [f"Note: {note}" for note in warnings]
     if save is not None:
-        mt.save_scene(developed(scene, edited, picture, seed=how.seed, device=how.device), save, force=how.force)
+        saved = developed(scene, edited, picture, seed=how.seed, device=how.device)
+        mt.save_scene(saved, save, force=how.force)
+        warnings += warnings_since(edited, saved)
         lines.append(f"The edited scene is {save}")
+    last = -2 if save is not None else -1
+    lines[last:last] = [f"Note: {note}" for note in warnings]
+    told["denoised"] = how.denoise is not False and not grainy
     told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
     report_success(command, how.as_json, lines, **told)

@@ -7,9 +7,10 @@ from typing import Annotated, Any
 import typer
 
 import materialist as mt
-from materialist.cli.options import Run, SceneArgument, output_option
+from materialist.cli.options import PictureFile, PictureOutput, Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
+from materialist.errors import InputError
 from materialist.options import ExportOptions, InvertOptions
 
 
@@ -24,7 +25,7 @@ def invert(
 
     # Everything that can be wrong is found before the work starts.
     ensure_writable(output, run.force)
-    picture = mt.read_photo(photo, size=options.size, fov=options.fov)
+    picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
     start = time.monotonic()
     with stage_progress(quiet=run.as_json) as progress:
         scene = mt.invert(picture, options, progress=progress)
@@ -47,26 +48,35 @@ def invert(
 
 def render(
     scene: SceneArgument,
-    output: Annotated[Path, output_option("OUT", "A .png (sRGB) or .exr (linear).")],
-    run: Run,
+    output: PictureOutput,
+    run: PictureFile,
     spp: Annotated[int, typer.Option(min=1, max=1_000_000, help="Samples per pixel.")] = 64,
     denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")] = False,
+    photo: Annotated[bool, typer.Option("--photo", help="With --exr-layers: the photo, not a rendering.")] = False,
 ) -> None:
     """Path-trace a scene package."""
     from rich.console import Console
 
-    from materialist.edits.composite.composite import write_composite
+    from materialist.cli.picture import check_picture, write_picture
     from materialist.edits.core.notes import PICTURED, is_pictured
-    from materialist.io.image import ensure_image_writable
+    from materialist.render.denoise import require_denoiser
 
-    ensure_image_writable(output, force=run.force)
+    check_picture(output, run)
+    if denoise:
+        require_denoiser()
+    if photo and not run.exr_layers:
+        raise InputError("--photo says nothing without --exr-layers; give that, too, or leave --photo out.")
     loaded = mt.load_scene(scene)
-    with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
-        image = mt.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
-    write_composite(output, image, loaded.photo, force=run.force)
-    notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) else []
+    notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) and not photo else []
+    if photo:
+        image = loaded.photo.original
+    else:
+        with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
+            image = mt.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
+    notes += write_picture(output, image, loaded, loaded, run)
     shown = [*(f"Note: {note}" for note in notes), f"Look at {output}"]
-    report_success("render", run.as_json, shown, image=str(output), spp=spp, warnings=notes)
+    facts = {"image": str(output), "spp": spp, "denoised": denoise, "warnings": notes}
+    report_success("render", run.as_json, shown, **facts)
 
 
 def export(

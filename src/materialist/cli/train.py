@@ -61,9 +61,15 @@ def data(
         shown = write_data_sheet(output, sheet, seed=computing.seed)
         report_success("train data", computing.as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
         return
+    from materialist.io.atomic import require_parent
+    from materialist.procedural.catalog.packages import missing
     from materialist.procedural.dataset import produce
 
+    require_parent(output)
     start = time.monotonic()
+    note = "" if wanted.real == 0 else missing(wanted.furniture)
+    if note and not computing.as_json:
+        typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
         made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
     facts = {"output": str(output), "rendered": made, "existing": count - made, "seconds": time.monotonic() - start}
@@ -152,6 +158,7 @@ def _train(
     `minutes` are those of a run that names neither steps nor minutes. Errors that make a run impossible are raised
     before `make_task` is called, which may take long.
     """
+    from materialist.io.atomic import require_parent
     from materialist.predict.protocol import on_gpu
     from materialist.train import checkpoint
     from materialist.train.schedule import Budget
@@ -162,6 +169,7 @@ def _train(
     options = RunOptions(checkpoint_seconds=training.every, workers=workers, seed=training.seed)
     device = "cuda" if on_gpu(training.device) else "cpu"
     note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
+    require_parent(output)
     checkpoint.load(output, kind, resume=training.resume)
     with stage_progress(quiet=training.as_json) as progress:
         trainer = Trainer(

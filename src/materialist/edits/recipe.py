@@ -178,7 +178,7 @@ def _left(scene: Scene, edited: Scene, region: Array) -> Array:
     gone = region & (edited.depth != scene.depth)
     if 2 * gone.sum() > region.sum():
         raise InputError(
-            "An earlier step took away what is there; leave this one out, or save the scene (--save) and edit that one."
+            "An earlier step took away what is there; leave this one out, or save the edited scene and edit that one."
         )
     return region & ~gone
 

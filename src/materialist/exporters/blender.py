@@ -127,7 +127,9 @@ def run_script(program: list[str], script: Path, result: Path, options: list[str
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=60 * _MINUTES)
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise SetupError(f"{command[0]} did not build the file ({error}); give another with --blender.") from error
+        raise SetupError(
+            f"{command[0]} did not build the file ({error}); give another as `blender=PROGRAM`."
+        ) from error
     if done.returncode != 0 or not result.is_file():
         lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
         last = lines[-1].strip() if lines else f"exit code {done.returncode}"

@@ -4,14 +4,17 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError, SetupError
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.glb import glb_bytes, write_hdr
 from materialist.exporters.parts import Part, body_parts, scene_parts
-from materialist.io.atomic import whole_file, write_whole
+from materialist.install import extra_command
+from materialist.io.atomic import ensure_writable, whole_file, write_whole
+from materialist.keywords import ExportKeywords
+from materialist.option_kinds import documented
 from materialist.options import ExportOptions
 from materialist.types import Scene
 
@@ -23,9 +26,11 @@ PAGE_TRIANGLES = 60_000
 """Triangles in an HTML page unless the caller says otherwise."""
 
 
+@documented(ExportOptions)
 def export(
-    scene: Scene, path: str | Path, options: ExportOptions | None = None, *, force: bool = False, **values: Any
-) -> Exported:
+    scene: Scene, path: str | Path, options: ExportOptions | None = None, *, force: bool = False,
+    **values: Unpack[ExportKeywords],
+) -> Exported:  # fmt: skip
     """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
 
     Args:
@@ -39,8 +44,7 @@ def export(
     """
     wanted, path = ExportOptions.given(options, **values), Path(path)
     to, most = check_format(path, wanted.to), wanted.max_triangles
-    chosen = {"--shadow-catcher": wanted.shadow_catcher, "--fitted-material": wanted.fitted_material}
-    flags = [flag for flag, on in chosen.items() if on]
+    flags = [f"--{name.replace('_', '-')}" for name in ("shadow_catcher", "fitted_material") if getattr(wanted, name)]
     if to != "blend" and (wanted.blender is not None or flags):
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and most is None:
@@ -87,7 +91,7 @@ def check_format(path: Path, to: str | None) -> str:
     if to is None:
         named = [name for name, end in SUFFIX.items() if end == suffix]
         if not named:
-            raise InputError(f"{path} does not say its format; give it as --to (in Python to=).")
+            raise InputError(f"{path} does not say its format; give it as `to=FORMAT`.")
         to = named[0]
     folder = to in FOLDERS and suffix not in (".usda", ".usdc", ".usd", ".xml", *SUFFIX.values())
     if not folder and suffix != SUFFIX.get(to):
@@ -118,7 +122,7 @@ def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     try:
         from materialist.exporters.usd import pack_usdz, write_usd
     except ImportError as error:
-        raise SetupError("USD needs usd-core; install it with: pip install 'materialist[usd]'") from error
+        raise SetupError(f"USD needs usd-core; install it with: {extra_command('usd')}") from error
 
     if path.suffix.lower() == ".usdz":
         with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as file:
@@ -133,5 +137,6 @@ def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
 def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.exporters.page import page
 
+    ensure_writable(path, force, None)
     write_whole(path, page(scene, parts), force)
     return Exported(path)

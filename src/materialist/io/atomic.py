@@ -26,10 +26,10 @@ MARKER = "scene.json"
 _MAPS = r"(albedo|roughness|metallic|normal|depth)\.exr"
 SCENE_FILES = re.compile(
     r"(scene\.json|report\.json|(photo|rerender)\.(exr|png)|envmap\.exr|mesh\.ply|plane_label\.png|overview\.png"
-    rf"|(prior|maps)/{_MAPS}|prior/light\.exr|maps/shading_residual\.exr|bodies/\d+(\.ply|\.{_MAPS}))"
+    rf"|(prior|maps)/{_MAPS}|prior/light\.exr|prior/(albedo|roughness|metallic|normal|depth)_spread\.exr|maps/shading_residual\.exr|bodies/\d+(\.ply|\.{_MAPS}))"
 )
 """Files of a package, beside the photo as it was given."""
-_JUNK = (".DS_Store", "Thumbs.db", "desktop.ini")
+FILE_MANAGER_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")
 """What file managers leave in folders."""
 _MARK = secrets.token_hex(4)
 """Tells this process from those of the same number on other machines that share a folder."""
@@ -84,17 +84,25 @@ def writing(path: str | Path, temporary: Path | None = None) -> Iterator[None]:
         raise OutputError(str(error).replace(str(temporary), str(path))) from error
 
 
-def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | None = SCENE) -> None:
-    """Check before the work that a folder of `kind`, or with None a file, can be written at PATH; its parents are made.
+def require_parent(path: str | Path) -> None:
+    """Raise OutputError where the folder that PATH lies in is not there: its name may be misspelt."""
+    parent = _absolute(path).parent
+    if not os.path.lexists(parent):
+        raise OutputError(f"There is no folder {parent} for {Path(path).name}; correct the name, or: mkdir -p {parent}")
 
-    PATH must not exist, or with `force` be of the same kind: nothing else is ever replaced. Raises OutputError with the
-    way out.
+
+def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | None = SCENE) -> None:
+    """Check before the work that a folder of `kind`, or with None a file, can be written at PATH.
+
+    The folder that it lies in must be there. PATH must not exist, or with `force` be of the same kind: nothing else is
+    ever replaced. Raises OutputError with the way out.
     """
     target = _absolute(path)
     with writing(path):
         if target.is_symlink() or target.exists():
             _require_replaceable(path, target, force, kind)
-        make_folder(target.parent)
+        require_parent(path)
+        make_folder(target.parent)  # says which file stands in the way
         probe = partial(target, ".probe")
         probe.touch()
         probe.unlink()
@@ -104,18 +112,18 @@ def _require_replaceable(path: str | Path, target: Path, force: bool, kind: Fold
     if kind is None and target.is_dir():
         raise OutputError(f"{path} is a folder; give a file's name.")
     if not force:
-        raise OutputError(f"{path} exists; give --force to replace it, or another name.")
+        raise OutputError(f"{path} exists; give `force=True` to replace it, or another name.")
     if target.is_symlink():
-        raise OutputError(f"{path} is a link, which --force will not replace; give what it leads to.")
+        raise OutputError(f"{path} is a link, which `force=True` will not replace; give what it leads to.")
     if kind is None:
         return
     marked = target.is_dir() and (kind.marker is None or (target / kind.marker).is_file() or not any(target.iterdir()))
     if not marked:
-        raise OutputError(f"{path} is not {kind.called}, so --force will not replace it; give another name.")
+        raise OutputError(f"{path} is not {kind.called}, so `force=True` will not replace it; give another name.")
     for name in files_below(target):
         if not kind.is_member(target, name):
             raise OutputError(
-                f"{path} holds {name}, which does not belong to {kind.called}, so --force will not replace it; "
+                f"{path} holds {name}, which does not belong to {kind.called}, so `force=True` will not replace it; "
                 "move that, or give another name."
             )
 
@@ -134,7 +142,13 @@ def whole_file(path: str | Path, force: bool = False) -> Iterator[Path]:
 
 
 def write_whole(path: str | Path, content: str | bytes, force: bool = True) -> None:
-    """Write a file whole or not at all; with `force` in place of one that is there. Raises OutputError."""
+    """Write a file whole or not at all; with `force` in place of one that is there, its folder is made if missing.
+
+    Raises OutputError.
+    """
+    if force:
+        with writing(path):
+            make_folder(_absolute(path).parent)
     with whole_file(path, force) as temporary:
         temporary.write_bytes(content.encode() if isinstance(content, str) else content)
 
@@ -160,7 +174,7 @@ def whole_folder(path: str | Path, force: bool = False, kind: FolderKind = SCENE
 def files_below(folder: Path) -> list[str]:
     """Names of the files in and below a folder, without those that file managers leave."""
     files = (file for file in folder.rglob("*") if file.is_symlink() or not file.is_dir())
-    return sorted(file.relative_to(folder).as_posix() for file in files if file.name not in _JUNK)
+    return sorted(file.relative_to(folder).as_posix() for file in files if file.name not in FILE_MANAGER_FILES)
 
 
 def interrupted_replacement(path: str | Path) -> Path | None:

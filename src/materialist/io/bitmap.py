@@ -1,4 +1,4 @@
-"""Pictures of integers and float TIFFs, by Pillow and OpenCV, to linear Rec.709."""
+"""Pictures of whole levels, by Pillow and OpenCV, to linear Rec.709."""
 
 import io
 import threading
@@ -11,15 +11,17 @@ from typing import Any
 import cv2
 import numpy as np
 from PIL import Image, ImageCms
-from tifffile import TiffFile
 
-from materialist.color import srgb_to_linear
+from materialist.color import ROWS, srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.exif import file_tags, image_tags
-from materialist.io.icc import MatrixProfile, matrix_profile
+from materialist.io.boxes import jp2_profile
+from materialist.io.colour_space import ColourSpace
+from materialist.io.colour_tags import png_chunks, stated_space
+from materialist.io.exif import image_tags
+from materialist.io.icc import matrix_profile
 from materialist.types import Array
 
-FORMATS = "PNG, JPEG, HEIC, TIFF, WEBP, EXR, HDR or camera RAW"
+FORMATS = "PNG, JPEG, JPEG 2000, HEIC, AVIF, TIFF, WEBP, EXR, HDR or camera RAW"
 OVER_WHITE = "Transparent parts are laid over white."
 MAX_PIXELS = 200_000_000
 """Largest photo accepted, pixels: the largest phone sensors; 2.4 GB as float32."""
@@ -27,9 +29,8 @@ MIN_SIDE = 8
 """Shortest side accepted, pixels."""
 MAX_ASPECT = 8
 """Longest shape accepted, long side over short side."""
-_LAYOUT = {"BitsPerSample": 8, "PlanarConfiguration": 1, "PhotometricInterpretation": 2, "ExtraSamples": 2}
-"""Tags of TIFF, and what they are by themselves: a channel's bits, whether channels lie apart (2), what values mean (0:
-white is zero), and what the channel beyond colour is (1: alpha that colours are multiplied by)."""
+_PIXEL_SHAPE = 8
+"""Widest and narrowest pixel that is believed, width over height."""
 _LIMIT = threading.RLock()
 
 
@@ -40,17 +41,23 @@ class Decoded:
     linear: Array
     """[H, W, 3] float32 linear Rec.709, upright; display files in [0, 1], scene-linear ones (EXR, HDR) as stored."""
     scene_linear: bool = False
-    """True for files that hold light rather than display values: EXR, HDR, float TIFF."""
+    """True for files that hold light rather than display values: EXR, HDR, float TIFF, PQ and HLG."""
     tags: dict[str, Any] = field(default_factory=dict)
     """EXIF by name."""
     warnings: list[str] = field(default_factory=list)
     alpha: Array | None = None
     """[H, W, 1] in [0, 1] of a scene-linear file with transparent parts, whose `linear` is the light of the rest."""
+    layer: str | None = None
+    """Which layer of an EXR of several it is."""
 
     def exposed(self, stops: int = 0) -> Array:
         """[H, W, 3] times 2**stops, with white behind what is transparent."""
-        linear = self.linear * np.float32(2.0**stops) if stops else self.linear
-        return linear if self.alpha is None else linear + (1 - self.alpha)
+        if self.alpha is None and not stops:
+            return self.linear
+        linear = self.linear * np.float32(2.0**stops)
+        if self.alpha is not None:
+            linear += 1 - self.alpha
+        return linear
 
 
 def check_size(width: int, height: int, name: object) -> None:
@@ -66,11 +73,32 @@ def check_size(width: int, height: int, name: object) -> None:
         raise InputError(f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to what matters.")
 
 
-def light_and_alpha(light: Array, alpha: Array | None) -> Decoded:
+def light_and_alpha(light: Array, alpha: Array | None, warnings: list[str] | None = None) -> Decoded:
     """A scene-linear file of [H, W, 3] light with [H, W, 1] alpha, which is dropped where it is opaque."""
+    notes = warnings or []
     if alpha is None or bool(np.all(alpha >= 1)):
-        return Decoded(light, True)
-    return Decoded(light, True, warnings=[OVER_WHITE], alpha=np.clip(alpha.astype(np.float32), 0, 1))
+        return Decoded(light, True, warnings=notes)
+    return Decoded(light, True, warnings=[*notes, OVER_WHITE], alpha=np.clip(alpha.astype(np.float32), 0, 1))
+
+
+def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
+    """A scene-linear picture whose pixels are `shape` times as wide as high, with square ones: stretched, never shrunk.
+
+    A shape that no camera or film has is not believed, with a warning. Raises InputError for what becomes too large.
+    """
+    if not 1 / _PIXEL_SHAPE <= shape <= _PIXEL_SHAPE:
+        decoded.warnings.append(f"The file states pixels of {shape:g}:1, which are taken as square.")
+        return decoded
+    if abs(shape - 1) < 1e-3:
+        return decoded
+    height, width = decoded.linear.shape[:2]
+    size = (round(width * max(shape, 1)), round(height * max(1 / shape, 1)))
+    check_size(*size, path)
+    decoded.linear = np.asarray(cv2.resize(decoded.linear, size, interpolation=cv2.INTER_LINEAR))
+    if decoded.alpha is not None:
+        decoded.alpha = cv2.resize(decoded.alpha, size, interpolation=cv2.INTER_LINEAR)[..., None]
+    decoded.warnings.append(f"The file's pixels are {shape:.4g}:1; the photo is stretched to square ones.")
+    return decoded
 
 
 def read_bitmap(path: Path) -> Decoded:
@@ -78,55 +106,83 @@ def read_bitmap(path: Path) -> Decoded:
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
     with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
         image.load()  # finds truncation, also for files whose pixels OpenCV reads below
-        warnings = _first_of(1 if image.format in ("MPO", "HEIF", "JPEG") else getattr(image, "n_frames", 1))
+        one_picture = image.format in ("MPO", "HEIF", "JPEG")
+        warnings = frames_note(1 if one_picture else getattr(image, "n_frames", 1))
         tags = image_tags(image)
-        file.seek(24)  # where a PNG has its bits a channel; Pillow cuts those of RGB to 8
-        if image.mode[0] in "IF" or (image.format == "PNG" and file.read(1) == b"\x10"):
-            linear = _deep(*_rgb(path), image.info.get("icc_profile"), warnings)
+        chunks = png_chunks(path) if image.format == "PNG" else {}
+        profile = None if b"cICP" in chunks else _profile(image, path)
+        space = None if profile else stated_space(path, image.format, tags, warnings)
+        # Pillow cuts PNG and HEIC of more bits a channel to 8.
+        bits = int(image.info.get("bit_depth", 8)) if image.format == "HEIF" else 8
+        if bits > 8:
+            image.close()
+            levels = (*_heif_levels(path, bits), deep_space(profile, warnings) if profile else space)
+        elif image.mode[0] in "IF" or chunks.get(b"IHDR", b"")[8:9] == b"\x10":
+            image.close()
+            levels = (*_deep_levels(path, chunks.get(b"tRNS")), deep_space(profile, warnings) if profile else space)
         else:
-            linear = _shallow(image, warnings)
-    return Decoded(_upright(linear, int(tags.get("Orientation", 1) or 1)), False, tags, warnings)
+            levels = _shallow(image, profile, space, warnings)
+    colour, alpha, space = levels
+    decoded = flattened(upright(colour, tags), None if alpha is None else upright(alpha, tags), space, warnings)
+    decoded.tags = tags
+    return decoded
 
 
-def read_tiff(path: Path) -> Decoded:
-    """A TIFF: scene-linear where it holds floats. What is deeper than 8 bits OpenCV reads, and turns upright itself."""
-    with TiffFile(path) as file:
-        page: Any = file.pages[0]
-        bits, planar, meaning, extra = (page.tags.valueof(name, usual) for name, usual in _LAYOUT.items())
-        profile, warnings = page.tags.valueof("InterColorProfile"), _first_of(len(file.pages))
-    if np.max(bits) <= 8:
-        return read_bitmap(path)
-    if planar == 2:  # OpenCV would read them as if they lay together
-        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
-    colour, alpha = _rgb(path)
-    floats, premultiplied = colour.dtype.kind == "f", 1 in np.atleast_1d(extra)
-    if meaning == 0 or (premultiplied and not floats):
-        raise InputError(f"{path} has inverted values or premultiplied alpha; save it as plain 16-bit RGB.")
-    if not floats:
-        return Decoded(_deep(colour, alpha, profile, warnings), False, file_tags(path), warnings)
-    light = np.ascontiguousarray(colour, np.float32)
-    if alpha is not None and not premultiplied:
-        light = light * alpha.astype(np.float32)
-    return light_and_alpha(light, alpha)
-
-
-def _first_of(frames: int) -> list[str]:
+def frames_note(frames: int) -> list[str]:
     """The warning of a file of several pictures."""
     return [f"The file holds {frames} pictures; the first is used."] if frames > 1 else []
 
 
-def _shallow(image: Image.Image, warnings: list[str]) -> Array:
-    """8 bits a channel, any Pillow mode, to [H, W, 3] float32 linear."""
-    alpha, profile = None, image.info.get("icc_profile")
+def flattened(colour: Array, alpha: Array | None, space: ColourSpace | None, warnings: list[str]) -> Decoded:
+    """Levels [H, W, 3] and straight alpha [H, W, 1], linear by a space or as sRGB, over white where transparent.
+
+    `warnings` become those of the result, and grow.
+    """
+    linear = srgb_to_linear(colour) if space is None or space.is_srgb else space.linear(colour)
+    is_light = space is not None and space.is_light
+    top = 1 if alpha is None else np.iinfo(alpha.dtype).max
+    if alpha is None or alpha.min() == top:
+        return Decoded(linear, is_light, warnings=warnings)
+    warnings.append(OVER_WHITE)
+    for start in range(0, len(linear), ROWS):  # bounds the memory
+        share = alpha[start : start + ROWS] / np.float32(top)
+        linear[start : start + ROWS] *= share
+        if not is_light:
+            linear[start : start + ROWS] += 1 - share
+    return Decoded(linear, is_light, warnings=warnings, alpha=alpha / np.float32(top) if is_light else None)
+
+
+def deep_space(profile: bytes, warnings: list[str]) -> ColourSpace | None:
+    """The space of a profile for more than 8 bits a channel; a table profile is told of and not used."""
+    space = matrix_profile(profile)
+    if space is None:
+        warnings.append(
+            "The colour profile of a photo of more than 8 bits is used only where it is a matrix: taken as sRGB."
+        )
+    return space
+
+
+def _profile(image: Image.Image, path: Path) -> bytes | None:
+    """The ICC profile of an open image."""
+    embedded = image.info.get("icc_profile")
+    return jp2_profile(path) if embedded is None and image.format == "JPEG2000" else embedded
+
+
+Levels = tuple[Array, Array | None, ColourSpace | None]
+"""[H, W, 3] whole levels, straight alpha [H, W, 1] of the same type, and what they mean."""
+
+
+def _shallow(image: Image.Image, profile: bytes | None, space: ColourSpace | None, warnings: list[str]) -> Levels:
+    """8 bits a channel, any Pillow mode."""
+    alpha = None
     if image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info:
         image_rgba = image.convert("RGBA")
         alpha = np.asarray(image_rgba)[..., 3:]
         image = image if image.mode in ("L", "LA", "La") else image_rgba
-    matrix = matrix_profile(profile) if profile else None
-    if matrix is not None and image.mode not in ("CMYK", "L", "LA", "1"):
-        return _linear(np.asarray(image.convert("RGB")), alpha, matrix, warnings)
-    flat = _through_lcms(image, profile if matrix is None else None, warnings)
-    return _linear(np.asarray(flat), alpha, None, warnings)
+    matrix = matrix_profile(profile) if profile and image.mode != "CMYK" else None
+    if matrix is None:
+        image = _through_lcms(image, profile, warnings)
+    return np.asarray(image if image.mode == "RGB" else image.convert("RGB")), alpha, matrix or space
 
 
 def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]) -> Image.Image:
@@ -141,26 +197,29 @@ def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]
             warnings.append("The embedded colour profile cannot be used; the photo is taken as sRGB.")
     if image.mode == "CMYK":
         warnings.append("CMYK without a usable profile: colours are approximate.")
-    return image.convert("RGB")
+    return image
 
 
-def _deep(colour: Array, alpha: Array | None, profile: bytes | None, warnings: list[str]) -> Array:
-    """Integers of 16 bits a channel (or 8) to [H, W, 3] float32 linear."""
-    matrix = matrix_profile(profile) if profile else None
-    if profile and matrix is None:
-        warnings.append("The colour profile of a 16-bit photo is used only where it is a matrix: taken as sRGB.")
-    return _linear(colour, alpha, matrix, warnings)
+def _deep_levels(path: Path, transparent: bytes | None) -> tuple[Array, Array | None]:
+    """RGB and alpha of a file of 16 bits a channel; `transparent` is the colour that a PNG's tRNS chunk names."""
+    colour, alpha = rgb_levels(path)
+    if transparent is None or colour.dtype != np.uint16 or len(transparent) not in (2, 6):
+        return colour, alpha
+    clear = (colour == np.frombuffer(transparent, ">u2")).all(-1, keepdims=True)
+    return colour, np.where(clear, np.uint16(0), np.uint16(65535))
 
 
-def _linear(colour: Array, alpha: Array | None, matrix: MatrixProfile | None, warnings: list[str]) -> Array:
-    """[H, W, 3] float32 linear of levels, by a profile or as sRGB; straight [H, W, 1] alpha is laid over white."""
-    linear = srgb_to_linear(colour) if matrix is None or matrix.is_srgb else matrix.linear(colour)
-    top = 1 if alpha is None else np.iinfo(alpha.dtype).max
-    if alpha is None or alpha.min() == top:
-        return linear
-    warnings.append(OVER_WHITE)
-    share = alpha / np.float32(top)
-    return linear * share + (1 - share)
+def _heif_levels(path: Path, bits: int) -> tuple[Array, Array | None]:
+    """RGB and alpha of a HEIC of more than 8 bits a channel, stretched to 16. Raises InputError for odd alpha."""
+    from pillow_heif import open_heif
+
+    heif: Any = open_heif(path, convert_hdr_to_8bit=False)
+    if heif.premultiplied_alpha:
+        raise InputError(f"{path} has premultiplied alpha at {bits} bits; save it as plain 16-bit PNG.")
+    pixels = np.atleast_3d(np.asarray(heif))
+    pixels = pixels | pixels >> bits  # white is 65535
+    colour = pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, -1)
+    return colour, pixels[..., -1:] if heif.has_alpha else None
 
 
 def stored_pixels(path: Path) -> tuple[Array, Array | None]:
@@ -168,8 +227,13 @@ def stored_pixels(path: Path) -> tuple[Array, Array | None]:
 
     They are uint8, uint16, float32 or float64. Raises InputError for other pixels, and for none.
     """
+    return levels_of(np.fromfile(path, np.uint8), path)
+
+
+def levels_of(content: Array, path: Path) -> tuple[Array, Array | None]:
+    """`stored_pixels` of the bytes of a file, which messages call `path`."""
     try:
-        decoded = cv2.imdecode(np.fromfile(path, np.uint8), cv2.IMREAD_UNCHANGED)
+        decoded = cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
     except cv2.error:  # an empty file, or a header that promises more pixels than any picture has
         decoded = None
     if decoded is None or decoded.dtype not in (np.uint8, np.uint16, np.float32, np.float64):
@@ -182,14 +246,15 @@ def stored_pixels(path: Path) -> tuple[Array, Array | None]:
     return colour, pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
 
 
-def _rgb(path: Path) -> tuple[Array, Array | None]:
+def rgb_levels(path: Path) -> tuple[Array, Array | None]:
     """`stored_pixels` with grey as RGB."""
     colour, alpha = stored_pixels(path)
     return np.broadcast_to(colour, (*colour.shape[:2], 3)), alpha
 
 
-def _upright(pixels: Array, orientation: int) -> Array:
-    """Undo an EXIF orientation (1 .. 8)."""
+def upright(pixels: Array, tags: dict[str, Any]) -> Array:
+    """Undo the orientation (1 .. 8) that EXIF states."""
+    orientation = int(tags.get("Orientation", 1) or 1)
     pixels = pixels.swapaxes(0, 1) if orientation in (5, 6, 7, 8) else pixels
     pixels = pixels[::-1] if orientation in (3, 4, 7, 8) else pixels
     return np.ascontiguousarray(pixels[:, ::-1] if orientation in (2, 3, 6, 7) else pixels)

@@ -1,7 +1,6 @@
 """Image files of any common kind to linear Rec.709 at native size, upright."""
 
 import math
-import re
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +9,15 @@ from PIL import Image, UnidentifiedImageError
 from tifffile import TiffFile
 
 from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.install import extra_command
 from materialist.io import bitmap
 from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
-from materialist.io.exr import exr_bytes, exr_headers, exr_size, read_exr
+from materialist.io.exr import exr_bytes, exr_headers, exr_size
+from materialist.io.exr_photo import read_exr_photo
+from materialist.io.radiance import MAGIC, radiance_header, read_radiance
+from materialist.io.tiff import read_tiff
+from materialist.types import Array
 
 RAW_SUFFIXES = frozenset(
     f".{name}"
@@ -24,11 +28,31 @@ RAW_SUFFIXES = frozenset(
 )
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
 SUFFIXES = RAW_SUFFIXES | {
-    ".png", ".jpg", ".jpeg", ".mpo", ".webp", ".heic", ".heif", ".avif", ".tif", ".tiff", ".bmp", ".gif", ".exr", ".hdr"
-}  # fmt: skip
+    f".{name}"
+    for name in (
+        *(
+            "png",
+            "apng",
+            "jpg",
+            "jpeg",
+            "jpe",
+            "jif",
+            "jfif",
+            "mpo",
+            "webp",
+            "heic",
+            "heif",
+            "hif",
+            "avif",
+            "bmp",
+            "dib",
+        ),
+        *("gif", "tif", "tiff", "jp2", "j2k", "jpx", "jpf", "exr", "hdr", "tga", "ppm", "pgm", "pnm"),
+    )
+}
 """Usual file names of photos; `decode` reads others, too."""
 
-_EXR, _RADIANCE = b"\x76\x2f\x31\x01", (b"#?RADIANCE", b"#?RGBE")
+_EXR = b"\x76\x2f\x31\x01"
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How files of these formats begin."""
 
@@ -39,14 +63,11 @@ def image_size(path: Path) -> tuple[int, int]:
     Raises InputError where there is no size, and whatever the readers raise for a damaged file.
     """
     with path.open("rb") as file:
-        head = file.read(65536)
+        head = file.read(32)
     if head.startswith(_EXR):
         return max((exr_size(header) for header in exr_headers(path)), key=math.prod)
-    if head.startswith(_RADIANCE):
-        size = re.search(rb"\n[-+]Y (\d{1,9}) [-+]X (\d{1,9})\n", head)
-        if size is None:
-            raise InputError(f"{path} has no size in its Radiance header; export it again.")
-        return int(size[2]), int(size[1])
+    if head.startswith(MAGIC):
+        return radiance_header(path).size
     if head.startswith(_TIFF):  # Pillow does not know some layouts, such as float RGB
         with TiffFile(path) as tiff:
             page: Any = tiff.pages[0]
@@ -67,8 +88,22 @@ def decoded_bytes(path: Path) -> int:
         return exr_bytes(path) if file.read(4) == _EXR else 12 * math.prod(image_size(path))
 
 
-def decode(path: Path) -> Decoded:
-    """Read any supported image file. Raises InputError, or SetupError when camera RAW support is not installed."""
+def peak_bytes(path: Path) -> int:
+    """The most memory that `read_photo` takes, bytes, predicted from the header. Otherwise as `image_size`.
+
+    At most 24 bytes a pixel beside all channels of an EXR, 32 beside the file of any other kind, as measured.
+    """
+    with path.open("rb") as file:
+        is_exr = file.read(4) == _EXR
+    pixels = math.prod(image_size(path))
+    return exr_bytes(path) + 24 * pixels if is_exr else path.stat().st_size + 32 * pixels
+
+
+def decode(path: Path, layer: str | None = None) -> Decoded:
+    """Read any supported image file, or one layer of an EXR.
+
+    Raises InputError, or SetupError when camera RAW support is not installed.
+    """
     try:
         with path.open("rb") as file:
             head = file.read(32)
@@ -80,30 +115,23 @@ def decode(path: Path) -> Decoded:
         raise InputError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}.") from error
     if not head:
         raise InputError(f"{path} is empty (0 bytes); copy it again.")
+    if layer is not None and not head.startswith(_EXR):
+        raise InputError(f"{path} is no EXR, so it has no layer '{layer}'; leave the layer out.")
     try:
         if path.suffix.lower() in RAW_SUFFIXES:
             return _raw(path)
         bitmap.check_size(*image_size(path), path)
         if head.startswith(_EXR):
-            return _exr(path)
-        if head.startswith(_RADIANCE):
-            return Decoded(np.ascontiguousarray(bitmap.stored_pixels(path)[0]), True)  # RGBE
+            return read_exr_photo(path, layer)
+        if head.startswith(MAGIC):
+            return read_radiance(path)
         if head.startswith(_TIFF):
-            return bitmap.read_tiff(path)
+            return read_tiff(path)
         return bitmap.read_bitmap(path)
     except (MaterialistError, MemoryError):
         raise
     except Exception as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
-
-
-def _exr(path: Path) -> Decoded:
-    """OpenEXR; alpha is premultiplied there."""
-    pixels = read_exr(path, photo=True)
-    if pixels.ndim == 2:
-        pixels = np.repeat(pixels[..., None], 3, -1)
-    alpha = pixels[..., 3:] if pixels.shape[-1] == 4 else None
-    return bitmap.light_and_alpha(np.ascontiguousarray(pixels[..., :3]), alpha)
 
 
 def _raw(path: Path) -> Decoded:
@@ -114,11 +142,32 @@ def _raw(path: Path) -> Decoded:
     try:
         import rawpy
     except ImportError as error:
-        raise SetupError(f"Camera RAW needs one more package to read {path.name}: pip install rawpy") from error
+        raise SetupError(f"Camera RAW needs one more package to read {path.name}: {extra_command('raw')}") from error
+    tags = file_tags(path)
     try:
         with rawpy.imread(str(path)) as raw:
             bitmap.check_size(raw.sizes.width, raw.sizes.height, path)
             pixels = raw.postprocess(gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16)
+            pixels = _cropped(pixels, raw.sizes) if "DNGVersion" in tags else pixels
     except rawpy.LibRawError as error:
         raise InputError(f"{path} is not a RAW file this program can read ({error}); export it as TIFF.") from error
-    return Decoded(pixels.astype(np.float32) / np.float32(65535), False, file_tags(path))
+    bitmap.check_size(pixels.shape[1], pixels.shape[0], path)
+    linear = np.empty(pixels.shape, np.float32)
+    np.divide(pixels, np.float32(65535), out=linear)
+    return Decoded(linear, False, tags)
+
+
+def _cropped(pixels: Array, sizes: Any) -> Array:
+    """Developed DNG pixels without the border outside DefaultCropOrigin and DefaultCropSize.
+
+    `sizes` are LibRaw's, of the picture before it was turned by `flip` (3: half, 5: left, 6: right).
+    """
+    left, top = sizes.crop_left_margin - sizes.left_margin, sizes.crop_top_margin - sizes.top_margin
+    right, bottom = sizes.width - left - sizes.crop_width, sizes.height - top - sizes.crop_height
+    is_whole = pixels.shape[:2] in ((sizes.height, sizes.width), (sizes.width, sizes.height))
+    if not (sizes.crop_width and sizes.crop_height and is_whole and min(left, top, right, bottom) >= 0):
+        return pixels
+    sides = [left, top, right, bottom]
+    turns = {3: 2, 5: 3, 6: 1}.get(sizes.flip, 0)  # quarters to the right
+    left, top, right, bottom = (sides[(k - turns) % 4] for k in range(4))
+    return pixels[top : pixels.shape[0] - bottom, left : pixels.shape[1] - right]

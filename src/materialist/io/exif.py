@@ -75,6 +75,9 @@ def _number(value: Any) -> float | None:
 
 
 def _named(exif: Image.Exif) -> dict[str, Any]:
-    """Tags by name, of the main and the Exif directory."""
+    """Tags by name, of the main, the Exif and the interoperability directory."""
     tags = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
-    return {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}
+    named = {ExifTags.TAGS[tag]: value for tag, value in tags.items() if tag in ExifTags.TAGS}
+    if ExifTags.IFD.Interop in tags:
+        named["InteropIndex"] = exif.get_ifd(ExifTags.IFD.Interop).get(1)
+    return named

@@ -1,6 +1,7 @@
 """OpenEXR files, through the reference library: float32 survives a round trip bit for bit."""
 
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,43 +11,59 @@ import numpy as np
 import OpenEXR
 
 from materialist.errors import InputError, OutputError
+from materialist.io.bitmap import MAX_PIXELS
 from materialist.plain import is_utf8
 from materialist.types import Array
 
-_GREY = ("Y", "V", "L", "Z", "depth")
-_LIGHT = ("Y", "L")
-"""Those of them that may be a photo."""
-_PICTURES = ("beauty", "combined", "rgba", "rgb", "image", "final")
-"""Names of the layer that is the picture, where there are several."""
+LARGEST_BYTES = 12 * MAX_PIXELS
+"""Most bytes of all channels of a file together, as float32."""
+GREY = ("Y", "V", "L", "Z", "depth")
+"""Channels that are a grey map."""
+_PICTURES = (
+    *("rgba", "rgb", "beauty", "combined", "composite", "final", "image", "main", "c", "ci", "color", "colour"),
+    *("render", "default"),
+)
+"""Words in the name of the layer that is the picture, where there are several; the first are the surest."""
+_DATA = frozenset(
+    (
+        *("albedo", "normal", "normals", "n", "ns", "ng", "position", "positions", "p", "pworld", "pref", "point"),
+        *("depth", "z", "zdepth", "distance", "vector", "vectors", "motion", "velocity", "speed", "uv", "st", "mist"),
+        *("ao", "occlusion", "id", "ids", "index", "mask", "matte", "object", "objects", "holdout", "tangent"),
+        *("diff", "diffuse", "gloss", "glossy", "spec", "specular", "reflection", "reflect", "refraction", "refract"),
+        *("trans", "transmission", "sss", "subsurface", "volume", "sheen", "coat", "emission", "emit", "emissive"),
+        *("env", "environment", "background", "shadow", "shadows", "direct", "indirect", "dir", "ind", "gi", "col"),
+        *("lighting", "illumination", "filter", "roughness", "metallic", "metalness", "variance", "samples", "noise"),
+        *("basecolor", "base", "debug", "facing", "wire", "wireframe", "thickness", "curvature", "light"),
+    )
+)
+"""Words in the names of layers that are no picture, though they have colours."""
 
 
-def read_exr(path: str | Path, *, photo: bool = False) -> Array:
-    """The picture in an EXR: [H, W, C] float32 for colour channels, [H, W] float32 for a single one.
+def read_exr(path: str | Path) -> Array:
+    """The map in an EXR: [H, W, C] float32 for colour channels, [H, W] float32 for a single one.
 
-    As a `photo` it is the first part and layer with colours, whatever lies beside them, else grey, with alpha as RGBA;
-    a depth is none. As a map it is the first part's, and a lone channel goes before layers.
-    Half and float pixels are both returned as float32; values are as stored (linear, unclipped, NaN kept).
+    It is the first part's, and a lone channel goes before layers; a photo is chosen otherwise (`exr_photo`). It covers
+    the display window, with 0 where the file has no data. Half and float pixels are both returned as float32; values
+    are as stored (linear, unclipped, NaN kept).
     Raises InputError when the file is missing, is not an EXR, is damaged, or holds no picture we know how to read.
     """
     path = Path(path)
-    with _opened(path, separate_channels=True) as file:
-        parts = [
-            {name: channel.pixels for name, channel in file.channels(k).items()}
-            for k in range(len(file.parts) if photo else 1)
-        ]
-    chosen = next((part for part in parts if _coloured(_layers(part))), parts[0])
-    return np.ascontiguousarray(_pick(chosen, path, photo), np.float32)
+    check_exr(path)
+    with opened_exr(path, separate_channels=True) as file:
+        header = dict(file.parts[0].header)
+        channels = {name: channel.pixels for name, channel in file.channels(0).items()}
+    return displayed(np.ascontiguousarray(_pick(channels, path), np.float32), header, path)
 
 
 @contextmanager
-def _opened(path: Path, **how: bool) -> Iterator[Any]:
+def opened_exr(path: Path, **settings: bool) -> Iterator[Any]:
     """An open EXR. Raises InputError, also for what goes wrong within."""
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
     if not is_utf8(str(path)):
         raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
     try:
-        with OpenEXR.File(str(path), **how) as file:
+        with OpenEXR.File(str(path), **settings) as file:
             yield file
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
         raise InputError(f"{path} is no readable EXR file (truncated or damaged): {str(error).rstrip('.')}.") from error
@@ -54,14 +71,19 @@ def _opened(path: Path, **how: bool) -> Iterator[Any]:
 
 def exr_headers(path: Path) -> list[dict[str, Any]]:
     """The header of each part of an EXR, without its pixels. Raises InputError."""
-    with _opened(path, header_only=True) as file:
+    with opened_exr(path, header_only=True) as file:
         return [dict(part.header) for part in file.parts]
 
 
+def window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
+    """Left, top, width and height of a part's dataWindow or displayWindow, pixels."""
+    low, high = (np.asarray(corner, np.int64) for corner in header[name])
+    return int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+
+
 def exr_size(header: dict[str, Any]) -> tuple[int, int]:
-    """(width, height) of a part."""
-    low, high = (np.asarray(corner, np.int64) for corner in header["dataWindow"])
-    return int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+    """(width, height) of a part's picture: of its display window, or of its data where they are more."""
+    return max((window(header, name)[2:] for name in ("displayWindow", "dataWindow")), key=math.prod)
 
 
 def exr_bytes(path: Path) -> int:
@@ -70,6 +92,34 @@ def exr_bytes(path: Path) -> int:
     if any("deep" in str(header.get("type")) for header in headers):
         raise InputError(f"{path} holds deep pixels; save it as a plain picture.")
     return 4 * sum(math.prod(exr_size(header)) * len(header["channels"]) for header in headers)
+
+
+def check_exr(path: Path) -> None:
+    """Refuse a file that takes too much memory, before its pixels are decoded: the library decodes all channels."""
+    if (total := exr_bytes(path)) > LARGEST_BYTES:
+        raise InputError(
+            f"{path} holds {total / 1e9:.1f} GB in all its channels; the limit is {LARGEST_BYTES / 1e9:.1f}: save its "
+            "picture alone."
+        )
+
+
+def displayed(pixels: Array, header: dict[str, Any], path: Path) -> Array:
+    """Pixels [H, W, ...] of the data window, cut to the display window; 0 where the file has no data.
+
+    Raises InputError where the two windows have nothing in common.
+    """
+    left, top, wide, high = window(header, "displayWindow")
+    data_left, data_top, data_wide, data_high = window(header, "dataWindow")
+    x0, x1 = max(left, data_left), min(left + wide, data_left + data_wide)
+    y0, y1 = max(top, data_top), min(top + high, data_top + data_high)
+    if x0 >= x1 or y0 >= y1:
+        raise InputError(f"{path} has no data in its display window; export it again.")
+    inside = pixels[y0 - data_top : y1 - data_top, x0 - data_left : x1 - data_left]
+    if inside.shape[:2] == (high, wide):
+        return np.ascontiguousarray(inside)
+    out = np.zeros((high, wide, *pixels.shape[2:]), pixels.dtype)
+    out[y0 - top : y1 - top, x0 - left : x1 - left] = inside
+    return out
 
 
 def write_exr(path: str | Path, array: Array) -> None:
@@ -92,40 +142,55 @@ def write_exr(path: str | Path, array: Array) -> None:
         raise OutputError(f"{path} cannot be written: {error}") from error
 
 
-def _layers(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
+def layers_of(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
     """Layer -> channel -> half or float pixels; "" is what has no layer."""
     layers: dict[str, dict[str, Array]] = {"": {}}
     for name, pixels in channels.items():
         if pixels.dtype in (np.float16, np.float32):
             layer, _, part = name.rpartition(".")
-            layers.setdefault(layer, {})[part.upper() if len(part) == 1 else part] = pixels
+            layers.setdefault(layer, {})[part.upper() if len(part) <= 2 else part] = pixels
     return layers
 
 
-def _coloured(layers: dict[str, dict[str, Array]]) -> list[str]:
-    """Names of the layers with RGB, the plain one first, then those that are named as pictures are."""
-    found = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
-    return sorted(found, key=lambda layer: (layer != "", layer.rpartition(".")[2].lower() not in _PICTURES))
+def stacked(parts: dict[str, Array], names: str) -> Array:
+    """[H, W, C] float32, with alpha where there is one; each channel leaves `parts`, which bounds the memory."""
+    order = names + "A" if "A" in parts else names
+    out: Array = np.empty((*parts[order[0]].shape, len(order)), np.float32)
+    for index, name in enumerate(order):
+        out[..., index] = parts.pop(name)
+    return out
 
 
-def _stacked(parts: dict[str, Array], names: str) -> Array:
-    """[H, W, C] float32, with alpha where there is one."""
-    return np.stack([parts[c].astype(np.float32) for c in (names + "A" if "A" in parts else names)], -1)
-
-
-def _pick(channels: dict[str, Array], path: Path, photo: bool) -> Array:
-    """The photo or the map among the channels of a part. Raises InputError where there is none."""
-    layers = _layers(channels)
-    plain, coloured = layers[""], _coloured(layers)
-    grey = [name for name in (_LIGHT if photo else _GREY) if name in plain]
-    if coloured and (photo or "" in coloured or not grey):
-        return _stacked(layers[coloured[0]], "RGB")
-    if grey:
-        return _stacked(plain, 3 * grey[0]) if photo and "A" in plain else plain[grey[0]]
-    known = [pixels for parts in layers.values() for name, pixels in parts.items() if not (photo and name in _GREY)]
-    if len(channels) == len(known) == 1:
-        return known[0]
+def no_picture(channels: dict[str, Array], path: Path) -> InputError:
+    """The error of a file without a picture."""
     odd = [str(pixels.dtype) for pixels in channels.values() if pixels.dtype not in (np.float16, np.float32)]
     if odd:
-        raise InputError(f"{path} holds {odd[0]} pixels; save it as half or float.")
-    raise InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")
+        return InputError(f"{path} holds {odd[0]} pixels; save it as half or float.")
+    return InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")
+
+
+def picture_rank(name: str) -> tuple[bool, int]:
+    """How much a layer's or a part's name says that it is the picture: the least is the most.
+
+    Names that say data (normals, albedo, one kind of light) come last, unknown ones before them.
+    """
+    words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
+    places = [_PICTURES.index(word) for word in words if word in _PICTURES]
+    is_data = any(word in _DATA or word.startswith("crypto") for word in words)
+    return is_data, min(places, default=len(_PICTURES))
+
+
+def _pick(channels: dict[str, Array], path: Path) -> Array:
+    """The map among the channels of a part. Raises InputError where there is none."""
+    layers = layers_of(channels)
+    plain = layers[""]
+    coloured = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
+    grey = [name for name in GREY if name in plain]
+    if coloured and ("" in coloured or not grey):
+        return stacked(layers[min(coloured, key=lambda layer: (layer != "", picture_rank(layer)))], "RGB")
+    if grey:
+        return plain[grey[0]]
+    known = [pixels for parts in layers.values() for pixels in parts.values()]
+    if len(channels) == len(known) == 1:
+        return known[0]
+    raise no_picture(channels, path)

@@ -9,12 +9,15 @@ from PIL import Image
 from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable, whole_file, writing
-from materialist.io.bitmap import stored_pixels
+from materialist.io.bitmap import MAX_PIXELS, stored_pixels
+from materialist.io.decode import image_size
 from materialist.io.exr import read_exr, write_exr
 from materialist.types import Array
 
 COLOURED = 0.2
 """Share of coloured pixels, neither black nor bright, from which a picture is a photo and no mask."""
+BLACK, WHITE = 0.1, 0.9
+"""Brightness up to which a pixel of a mask is black, and from which it is white."""
 
 
 def write_png(path: str | Path, picture: Array) -> None:
@@ -64,10 +67,23 @@ def _with_alpha(path: str | Path) -> tuple[Array, Array | None]:
         return (array[..., :3] if array.ndim == 3 else array), alpha
     if not path.is_file():
         raise InputError(f"There is no map at {path}.")
+    _check_pixels(path)
     colour, alpha = stored_pixels(path)
     scale = np.float32({"uint8": 255, "uint16": 65535}.get(colour.dtype.name, 1))
     array = np.ascontiguousarray(colour if colour.shape[2] == 3 else colour[..., 0], np.float32) / scale
     return array, None if alpha is None else alpha[..., 0] / scale
+
+
+def _check_pixels(path: Path) -> None:
+    """Refuse more pixels than a photo may have, by the header. What has none `stored_pixels` refuses."""
+    try:
+        width, height = image_size(path)
+    except Exception:  # decoders raise anything
+        return
+    if width * height > MAX_PIXELS:
+        raise InputError(
+            f"{path} is {width} x {height} pixels; the limit is {MAX_PIXELS / 1e6:.0f} megapixels: shrink it."
+        )
 
 
 def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
@@ -81,14 +97,11 @@ def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
 def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] | None = None) -> Array:
     """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside, what is transparent is outside.
 
+    Of an object that was cut out, with transparency around it, all that is opaque is inside, whatever its colours.
     The file may have the working size `shape`, or the photo's `native` (H0, W0), or any size of that aspect ratio;
     it is area-averaged to `shape`. Raises InputError for another aspect ratio, an empty mask, or a colour photo.
     """
-    mask, alpha = _with_alpha(path)
-    if mask.ndim == 3 and ((np.ptp(mask, axis=-1) > 0.05) & (np.abs(mask.max(-1) - 0.5) < 0.4)).mean() > COLOURED:
-        raise InputError(f"{path} is a colour picture, not a mask; paint what is inside white, and all else black.")
-    mask = mask.max(-1) if mask.ndim == 3 else mask
-    mask = mask if alpha is None else mask * np.float32(alpha)
+    mask = _marked(*_with_alpha(path), path)
     if mask.shape != shape:
         sizes = f"{shape[1]} x {shape[0]}" + (f" or {native[1]} x {native[0]}" if native else "")
         if not same_aspect(mask.shape, shape):
@@ -98,3 +111,18 @@ def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] 
     if not inside.any():
         raise InputError(f"The mask {path} is empty: no pixel is brighter than half at working size.")
     return inside
+
+
+def _marked(values: Array, alpha: Array | None, path: str | Path) -> Array:
+    """How far each pixel is inside, [H, W] in [0, 1]: by brightness, or by the alpha of a cut-out object."""
+    brightness = values.max(-1) if values.ndim == 3 else values
+    between = (brightness > BLACK) & (brightness < WHITE)
+    shown = None if alpha is None else alpha > 0.5
+    if alpha is None or shown is None or shown.all() or not shown.any():
+        if values.ndim == 3 and ((np.ptp(values, axis=-1) > 0.05) & between).mean() > COLOURED:
+            raise InputError(f"{path} is a colour picture, not a mask; paint what is inside white, and all else black.")
+        return np.asarray(brightness if alpha is None else brightness * alpha, np.float32)
+    # What is shown is a mask itself where it is black and white; else it is the object.
+    opaque = brightness[shown]
+    is_painted = (opaque <= BLACK).any() and (opaque >= WHITE).any() and between[shown].mean() <= COLOURED
+    return np.asarray(brightness * alpha if is_painted else alpha, np.float32)

@@ -21,12 +21,18 @@ LIGHT = "prior/light.exr"
 """The light of a predictor that knows any: radiance, and its scale as alpha."""
 
 
+def spread_file(name: str) -> str:
+    """Where the package has the expected error of a map of the prior, if its predictor knew one."""
+    return f"prior/{name}_spread.exr"
+
+
 def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
     """Raise SceneError unless the files are there, lie in the folder, and decode to at most `most` bytes.
 
     Raises whatever the readers of their headers raise.
     """
     pictures = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS]
+    pictures += [file for file in map(spread_file, MAPS) if (folder / file).exists()]
     pictures += ["photo.exr", "rerender.exr", "envmap.exr", *[LIGHT] * (folder / LIGHT).exists()]
     pictures += [f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3]]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
@@ -37,7 +43,7 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
     if total > most:
         raise SceneError(
             f"The scene {folder} takes {total / 1e9:.1f} GB of memory, more than {most / 1e9:g} GB; "
-            "invert its photo again at a smaller --size."
+            "invert its photo again at a smaller working size."
         )
 
 

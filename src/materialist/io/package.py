@@ -1,5 +1,6 @@
 """The scene package: a folder that holds everything of a Scene (format: docs/conventions.md)."""
 
+import base64
 import json
 import math
 from dataclasses import asdict
@@ -13,7 +14,7 @@ from materialist.errors import SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
-from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, package_map
+from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, package_map, spread_file
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
@@ -58,10 +59,15 @@ def _read(folder: Path, most: float) -> Scene:
     light = package_map(folder / LIGHT) if (folder / LIGHT).exists() else None
     if light is not None and light.shape[2:] != (4,):
         raise SceneError(f"{folder / LIGHT} is {list(light.shape)}, and needs 4 channels; the package is damaged.")
+    spread = {
+        key: package_map(folder / spread_file(key), shape) for key in MAPS if (folder / spread_file(key)).exists()
+    }
     label = package_map(folder / "plane_label.png", shape).astype(np.int16) - 1
     return Scene(
         camera=camera, photo=_read_photo(folder, photo, shape), materials=materials, normal=normal, depth=depth,
-        prior=Prediction(*before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {}), light),
+        prior=Prediction(
+            *before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {}), light, spread
+        ),
         geometry=Geometry(read_ply(folder / "mesh.ply", math.prod(shape)), label.astype(np.int8)),
         envmap=package_map(folder / "envmap.exr"), rerender=package_map(folder / "rerender.exr", (*shape, 3)),
         report=_read_report(folder), provenance=meta["provenance"],
@@ -79,6 +85,8 @@ def _write(scene: Scene, folder: Path) -> None:
         (folder / name).mkdir()
         for key, array in {**vars(maps.materials), "normal": maps.normal, "depth": maps.depth}.items():
             write_exr(folder / name / f"{key}.exr", array)
+    for key, array in scene.prior.spread.items():
+        write_exr(folder / spread_file(key), array)
     if scene.prior.light is not None:
         write_exr(folder / LIGHT, scene.prior.light)
     write_exr(folder / "maps/shading_residual.exr", shading_residual(photo.linear, scene.rerender))
@@ -109,7 +117,8 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "original": original,
             "has_source": photo.source is not None,
             "camera": asdict(photo.camera),
-            **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "warnings")},
+            **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "layer", "warnings")},
+            "exif": None if photo.exif is None else base64.b64encode(photo.exif).decode("ascii"),
         },
         "prior": {key: getattr(scene.prior, key) for key in ("predictor", "warnings", "sources")},
         "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
@@ -137,12 +146,14 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     """The Photo; its native pixels are decoded again from the original file."""
     file, stops = folder / Path(meta["original"]).name, int(meta.get("stops", 0))
     if meta["has_source"]:
-        original, source = decode_photo(file).exposed(stops), file.read_bytes()
+        original, source = decode_photo(file, meta.get("layer")).exposed(stops), file.read_bytes()
     else:
         original, source = read_exr(file), None
+    exif = meta.get("exif")
     return Photo(
         package_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
         meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
+        meta.get("layer"), None if exif is None else base64.b64decode(exif, validate=True),
     )  # fmt: skip
 
 

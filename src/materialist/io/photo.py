@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from materialist.errors import InputError, SetupError
+from materialist.install import install_command
 from materialist.io.bitmap import MIN_SIDE, Decoded
 from materialist.io.decode import decode
 from materialist.io.exif import horizontal_fov
@@ -37,10 +38,11 @@ EXAMPLES = {
 PREFIX = "example:"
 
 
-def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None) -> Photo:
+def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None, layer: str | None = None) -> Photo:
     """Read PATH (or `example:NAME`) as a Photo whose longer side is `size` pixels, or fewer where the file has fewer.
 
     `fov` is the horizontal field of view in degrees, in (1, 170); None or "auto" takes it from EXIF, else 35.
+    `layer` names the layer or part of an EXR that is the photo; None chooses by their names.
     Display files (PNG, JPEG, ...) give values in [0, 1]. Scene-linear ones (EXR, HDR, float TIFF), of any unit, are
     exposed as an ordinary photo is, by whole stops, so that no digit is lost (`Photo.stops`); at working size they are
     clipped to [0, 10] (paper, appendix "Handling HDR Images"). Shrinking is an area average in linear light.
@@ -52,7 +54,7 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     angle = None if wanted.fov == "auto" else float(wanted.fov)  # type: ignore[arg-type]
     name = str(path)
     file = example_path(name) if name.startswith(PREFIX) else Path(path)
-    decoded = decode_photo(file)
+    decoded = decode_photo(file, layer)
     hdr = decoded.scene_linear and not _is_clipped(decoded.linear)
     stops = _stops(_working(decoded.linear, size)) if hdr else 0
     original = decoded.exposed(stops)
@@ -72,7 +74,10 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
     from_exif = horizontal_fov(decoded.tags, width, height)
     source = "option" if angle else "exif" if from_exif else "default"
     camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
-    return Photo(linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings), stops=stops)
+    return Photo(
+        linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings), stops=stops,
+        layer=decoded.layer,
+    )  # fmt: skip
 
 
 def exposed(photo: Photo) -> Photo:
@@ -104,9 +109,12 @@ def _stops(linear: Array) -> int:
     return int(np.clip(np.round(np.log2(max(BRIGHT / bright, MIDDLE / middle))), -60, 60))
 
 
-def decode_photo(file: Path) -> Decoded:
-    """The file at native size with values a photograph may have: finite, >= 0. Raises InputError otherwise."""
-    decoded = decode(file)
+def decode_photo(file: Path, layer: str | None = None) -> Decoded:
+    """The file, or one layer of an EXR, at native size with values a photograph may have: finite, >= 0.
+
+    Raises InputError otherwise.
+    """
+    decoded = decode(file, layer)
     pixels = decoded.linear
     if decoded.scene_linear:
         broken = ~np.isfinite(pixels).all(-1)
@@ -118,7 +126,7 @@ def decode_photo(file: Path) -> Decoded:
             )
         if (pixels < 0).any():
             decoded.warnings.append("Negative values are set to 0.")
-            decoded.linear = np.maximum(pixels, 0)
+            np.maximum(pixels, 0, out=pixels)
     return decoded
 
 
@@ -151,5 +159,7 @@ def example_path(name: str) -> Path:
     spec = find_spec("skimage")  # the package is located, not imported: importing it takes a while
     path = Path(spec.origin).parent / "data" / EXAMPLES[key][0] if spec and spec.origin else None
     if path is None or not path.is_file():
-        raise SetupError("The example photos come with scikit-image: pip install --force-reinstall scikit-image")
+        raise SetupError(
+            f"The example photos come with scikit-image: {install_command('--force-reinstall', 'scikit-image')}"
+        )
     return path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import threading
 import zipfile
 import zlib
 from abc import ABC, abstractmethod
@@ -170,16 +171,32 @@ def complete(
     missing = [k for k, path in enumerate(paths) if not path.exists()]
     # Fresh processes: a renderer that has started does not survive a fork.
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, spawn, _one_thread) if workers > 1 else nullcontext() as pool:
+    with ProcessPoolExecutor(workers, spawn, _start_worker) if workers > 1 else nullcontext() as pool:
         written = (pool.map if pool else map)(_write, [paths[k] for k in missing], repeat(make), missing)
         for done, _ in enumerate(written, len(paths) - len(missing) + 1):
             progress(what, done, len(paths))
     return len(missing)
 
 
-def _one_thread() -> None:
-    """Renderers that start later in this process use one thread."""
+def _start_worker() -> None:
+    """Use one thread for renderers, and end with the process that started this one."""
     os.environ["OMP_NUM_THREADS"] = "1"
+    end_with_parent()
+
+
+def end_with_parent() -> None:
+    """Let this process of a pool end as soon as its parent has ended, however that happened.
+
+    The pool cannot do it: a parent that gets SIGTERM or SIGKILL runs none of its code.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_exit_after, args=(parent,), daemon=True).start()
+
+
+def _exit_after(parent: Any) -> None:
+    parent.join()
+    os._exit(3)
 
 
 def _write(path: Path, make: Callable[[int], dict[str, Array]], number: int) -> None:

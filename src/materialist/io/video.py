@@ -1,6 +1,5 @@
 """Videos and folders of frames, written whole or not at all."""
 
-import sys
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
@@ -10,6 +9,7 @@ from imageio.v2 import get_writer
 
 from materialist.color import srgb_levels
 from materialist.errors import InputError, SetupError
+from materialist.install import extra_command
 from materialist.io.atomic import FRAMES, ensure_writable, whole_file, whole_folder
 from materialist.io.image import write_png
 from materialist.types import Array
@@ -29,7 +29,7 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
         raise InputError(f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames.")
     if path.suffix and find_spec("imageio_ffmpeg") is None:
         raise SetupError(
-            f"Video needs one more package: {sys.executable} -m pip install imageio-ffmpeg; or give -o a name without "
+            f"Video needs one more package: {extra_command('video')}; or give -o a name without "
             "an ending to get PNG frames in a folder."
         )
     ensure_writable(path, force, None if path.suffix else FRAMES)

@@ -8,6 +8,7 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from materialist.errors import SetupError
+from materialist.install import extra_command
 from materialist.jobs.process import LOST, Message, Worker
 from materialist.jobs.worker import DONE, FAILED, Reporter, run
 
@@ -34,7 +35,7 @@ class LocalPool:
         try:
             place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
         except OSError as error:
-            raise SetupError(f"A worker process cannot be started: {error}; give fewer --workers.") from error
+            raise SetupError(f"A worker process cannot be started: {error}; give fewer workers.") from error
         place.key = key
         place.worker.begin(task, arguments)
 
@@ -76,7 +77,7 @@ class RayPool:
         try:
             import ray
         except ModuleNotFoundError as error:
-            raise SetupError("--ray needs Ray; install it with: pip install 'materialist[ray]'") from error
+            raise SetupError(f"Workers on Ray need Ray; install it with: {extra_command('ray')}") from error
         self._ray = ray
         local = address == "local"  # a cluster of this machine alone, which ends with the pool
         _check_reachable(address)
@@ -120,7 +121,8 @@ class RayPool:
                 message = Message(*self._ray.get(reference))
             except (self._ray.exceptions.RayError, OSError) as error:
                 reason = f"Its worker on the cluster was lost ({type(error).__name__})."
-                message = Message(LOST, {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None})
+                facts = {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}
+                message = Message(LOST, {**facts, "out_of_memory": False})
             found.append((key, message))
         return found
 

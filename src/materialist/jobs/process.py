@@ -30,17 +30,24 @@ class Worker:
     """A process of its own, in a session of its own: Ctrl-C does not reach it."""
 
     def __init__(
-        self, *, environment: Mapping[str, str] | None = None, niceness: int = 0, idle: float = 0.0,
+        self,
+        *,
+        environment: Mapping[str, str] | None = None,
+        niceness: int = 0,
+        idle: float = 0.0,
+        memory: int = 0,
         keep_errors: bool = False,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Start it. Raises OSError where no process can be started.
 
         environment: variables that differ from this process's. niceness: added to this process's. idle: seconds
-        without a task after which it ends by itself; 0: never. keep_errors: keep its stderr for the report of its end.
+        without a task after which it ends by itself; 0: never. memory: bytes of data that it may hold; 0: no limit.
+        keep_errors: keep its stderr for the report of its end.
         """
         self._errors = tempfile.TemporaryFile() if keep_errors else None  # noqa: SIM115 - read at its end
         self.connection, theirs = Pipe()
-        words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno()), str(niceness), str(idle)]
+        words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno())]
+        words += [str(niceness), str(idle), str(memory)]
         try:
             # A new program, not a fork: a renderer that has started does not survive one.
             self._process = subprocess.Popen(
@@ -118,7 +125,14 @@ def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
         errors.seek(max(0, size - 2000))
         lines = errors.read().decode("utf-8", "replace").strip().splitlines()
         reason += f" Its last words: {lines[-1][:300]}" if lines else ""
-    return {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}
+    out_of_memory = code == -signal.SIGKILL
+    return {
+        "error": "WorkerLost",
+        "reason": reason,
+        "bug": False,
+        "trace": None,
+        "out_of_memory": out_of_memory,
+    }
 
 
 def sentence(facts: dict[str, Any]) -> str:

@@ -57,7 +57,9 @@ class Job:
 class JobQueue:
     """Runs at most `limit` jobs at a time, in the order they came."""
 
-    def __init__(self, limit: int = 1):
+    def __init__(self, limit: int = 1, memory: int = 0, seconds: float = 0.0):
+        """limit: jobs at a time. memory: bytes of data of each. seconds: how long each may run. 0: no limit."""
+        self._memory, self._seconds = memory, seconds
         self._threads = ThreadPoolExecutor(limit, thread_name_prefix="job")
         self._lock = threading.Lock()
         self._jobs: list[Job] = []
@@ -97,11 +99,15 @@ class JobQueue:
                 return
             job.state, job.stage, job.began = RUNNING, "start", time.monotonic()
             try:
-                job.worker = worker = Worker(niceness=NICENESS)
+                job.worker = worker = Worker(niceness=NICENESS, memory=self._memory)
             except OSError as error:
                 job.end(FAILED, f"The work cannot be started: {error}.")
                 return
         worker.begin(job.task, job.arguments)
+        too_long = threading.Timer(self._seconds, worker.kill)
+        too_long.daemon = True
+        if self._seconds:
+            too_long.start()
         try:
             for message in worker.messages():
                 if message.kind in (DONE, FAILED, LOST):
@@ -112,13 +118,16 @@ class JobQueue:
                 elif message.kind == FOUND:
                     job.found = [*job.found, message.facts]
         finally:
+            too_long.cancel()
             worker.close()
             _sweep(job.folder, worker.pid)
         with self._lock:
             if message.kind == DONE:
                 job.end(DONE)
             else:
-                job.end(FAILED, sentence(message.facts))
+                late = bool(self._seconds) and job.seconds >= self._seconds
+                limit = f"It took more than {self._seconds / 60:.0f} minutes, which is the limit."
+                job.end(FAILED, limit if late else sentence(message.facts))
 
 
 def _sweep(folder: Path, pid: int) -> None:

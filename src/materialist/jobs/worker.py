@@ -1,5 +1,6 @@
-"""The worker process: `python -m materialist.jobs.worker FD NICENESS IDLE` does the tasks that come over a socket.
+"""The worker process: it does the tasks that come over a socket.
 
+It is started as `python -m materialist.jobs.worker FD NICENESS IDLE MEMORY`.
 It receives `(number, task)` and sends `(kind, facts, number)`. Of several waiting tasks it does the newest.
 The process ends when the other end of the socket is closed, also in the middle of a task: a coordinator that was killed
 leaves none behind. `multiprocessing` and pools on top of it (pebble) would run the caller's main module again in each
@@ -9,6 +10,7 @@ worker and import torch before the environment of a worker is set, so only its c
 import os
 import pickle
 import queue
+import resource
 import sys
 import threading
 import time
@@ -22,6 +24,8 @@ from materialist.errors import MaterialistError
 PROGRESS, FOUND, DONE, FAILED = "progress", "found", "done", "failed"
 """Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Reporter.found`; of
 DONE: what the task returned; of FAILED: see `failure`."""
+_NO_MEMORY = ("Insufficient memory", "Failed to allocate", "std::bad_alloc", "Cannot allocate memory")
+"""Words of libraries for which no MemoryError is raised where memory runs out."""
 INTERVAL = 0.1
 """Seconds between two messages about the progress of one stage."""
 
@@ -49,8 +53,13 @@ class Reporter:
         return self._waiting()
 
 
-def main(descriptor: int, niceness: int, idle: float) -> None:
-    """Do tasks until the socket is closed, or none came for `idle` seconds (0: wait for ever)."""
+def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
+    """Do tasks until the socket is closed, or none came for `idle` seconds (0: wait for ever).
+
+    memory: bytes of data that the process may hold, where the system can limit them; 0: no limit.
+    """
+    if memory:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
     os.dup2(2, 1)  # what libraries print is not the output of the command that started this process
     os.nice(niceness)
     connection: Connection = Connection(descriptor)
@@ -94,16 +103,19 @@ def run(task: bytes, report: Reporter) -> tuple[str, Any]:
 def failure(error: BaseException, stage: str) -> dict[str, Any]:
     """An exception as texts: `error` (its type), `reason`, `stage`, `bug` (whether unexpected), `trace` of bugs.
 
+    `out_of_memory` says whether memory ran out.
+
     An exception may bring more in its attribute `facts`.
     """
     bug = not isinstance(error, MaterialistError | MemoryError | OSError)
     reason = " ".join(str(error).split()) or type(error).__name__
+    out_of_memory = isinstance(error, MemoryError) or any(word in reason for word in _NO_MEMORY)
     if isinstance(error, MemoryError):
         reason = "There is not enough memory for this; take a smaller size, or fewer workers."
     trace = "".join(traceback.format_exception(error))[-4000:] if bug else None
-    found = {"error": type(error).__name__, "reason": reason, "stage": stage, "bug": bug, "trace": trace}
-    return {**getattr(error, "facts", {}), **found}
+    facts = {"error": type(error).__name__, "reason": reason, "stage": stage, "bug": bug, "trace": trace}
+    return {**getattr(error, "facts", {}), **facts, "out_of_memory": out_of_memory}
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]))
+    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))

@@ -6,7 +6,7 @@ The protocol is that of `bench materials`: the light's brightness cannot be told
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.metrics import ssim, ssim_of_values
+from materialist.metrics import mse, ssim, ssim_of_values
 from materialist.types import Array, Prediction
 
 LEAST_SURFACE = 0.01
@@ -33,10 +33,40 @@ def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
         found[f"{name}_psnr"] = decibel(found[f"{name}_mse"])
         found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
     found |= depth_figures(predicted.depth, true.depth, surface)
-    cosine = np.clip((predicted.normal * true.normal).sum(-1), -1, 1)[surface]
-    found["normal_angle"] = float(np.degrees(np.arccos(cosine)).mean())
+    found["normal_angle"] = mean_angle(predicted.normal, true.normal, surface)
+    found |= spread_calibration(predicted, true, surface)
     p, t = predicted.depth > 0, true.depth > 0
     return {**found, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
+
+
+def spread_calibration(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, float]:
+    """Share of the surface whose error is below the median that the prediction expects: 0.5 where it is calibrated.
+
+    Keys: albedo_calibration, roughness_calibration, ...; none without a spread. The median of a Laplace distribution's
+    absolute error is ln 2 times its mean. Depth is compared where both have it, after its median difference is removed.
+    """
+    both = surface & (predicted.depth > 0)
+    if not predicted.spread or not both.any():
+        return {}
+    errors = map_errors(predicted, true, both)
+    return {
+        f"{name}_calibration": float((errors[name] < np.log(2) * spread[both]).mean())
+        for name, spread in predicted.spread.items()
+    }
+
+
+def map_errors(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, Array]:
+    """[N] absolute errors over a surface [H, W] bool, as `Prediction.spread` counts them."""
+    encoded = [linear_to_srgb(one.materials.albedo[surface]) for one in (predicted, true)]
+    errors = {"albedo": np.abs(encoded[0] - encoded[1]).mean(-1)}
+    for name in ("roughness", "metallic"):
+        ours, theirs = (getattr(one.materials, name)[surface] for one in (predicted, true))
+        errors[name] = np.abs(ours - theirs)
+    cosine = (predicted.normal * true.normal).sum(-1)[surface]
+    errors["normal"] = np.arccos(np.clip(cosine, -1, 1))
+    difference = np.log(predicted.depth[surface]) - np.log(true.depth[surface])
+    errors["depth"] = np.abs(difference - np.median(difference))
+    return errors
 
 
 def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
@@ -52,6 +82,37 @@ def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, fl
         found[f"depth_rmse{suffix}"] = float(np.sqrt(np.square(estimate - t).mean()))
     found["depth_si_log_rmse"] = float(np.std(np.log(p) - np.log(t)))
     return found
+
+
+def depth_abs_rel(predicted: Array, true: Array) -> float:
+    """Mean of |predicted - true| / true of planar depth [H, W] after one factor, the median of true / predicted.
+
+    Pixels without true depth are left out; a pixel that is predicted to have none counts as an error of 1.
+    """
+    surface, both = true > 0, (true > 0) & (predicted > 0)
+    if not both.any():
+        return 1.0 if surface.any() else float("nan")
+    factor = np.median(true[both] / predicted[both])
+    error = np.where(both, np.abs(factor * predicted - true) / np.where(surface, true, 1), 1)
+    return float(error[surface].mean())
+
+
+def mean_angle(predicted: Array, true: Array, surface: Array) -> float:
+    """Mean angle in degrees between unit normals [H, W, 3] over `surface` [H, W] bool; NaN where it is empty."""
+    if not surface.any():
+        return float("nan")
+    cosine = np.clip((predicted * true).sum(-1), -1, 1)[surface]
+    return float(np.degrees(np.arccos(cosine)).mean())
+
+
+def aligned_psnr(picture: Array, true: Array, mask: Array) -> float:
+    """PSNR in dB of a linear picture [H, W, 3] after the one factor that brings it nearest to the true one.
+
+    Both are cut at 1 for the factor (least squares of linear values), as they are for the PSNR (sRGB-encoded); `mask`
+    [H, W] bool: what counts. At most 100, so that means stay finite.
+    """
+    scale = best_scale(np.minimum(picture, 1), np.minimum(true, 1), mask)
+    return decibel(mse(picture * np.float32(scale), true, mask=mask))
 
 
 def ordinal_accuracy(predicted: Array, true: Array) -> float:

@@ -15,13 +15,13 @@ import numpy as np
 from materialist.camera import unit
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import SetupError, WeightsError
+from materialist.install import extra_command
 from materialist.predict.models import locate
 from materialist.predict.protocol import MapSet, MixedPredictor, Predictor, on_gpu
 from materialist.predict.relative import planar
 from materialist.predict.weights import CHECKSUMS, INSTEAD, reason, verify_folder
 from materialist.types import Array, Photo
 
-INSTALL = "pip install 'materialist[hub]'"
 GIVES = {
     "MarigoldIntrinsicsPipeline": ("albedo", "roughness", "metallic"),
     "MarigoldNormalsPipeline": ("normal",),
@@ -48,7 +48,9 @@ def library(name: str) -> Any:
     try:
         module = importlib.import_module(name)
     except ImportError as error:
-        raise SetupError(f"This needs {name} ({error}); install it with: {INSTALL}, or {INSTEAD}.") from error
+        raise SetupError(
+            f"This needs {name} ({error}); install it with: {extra_command('hub')}, or {INSTEAD}."
+        ) from error
     # What matters is raised; their bars and hints would run through ours.
     module.utils.logging.set_verbosity_error()
     module.utils.logging.disable_progress_bar()

@@ -12,7 +12,7 @@ from materialist.errors import InputError
 from materialist.io.image import read_map as read_data
 from materialist.predict import resample
 from materialist.predict.protocol import CONSTANT, MAPS, MapSet, Predictor
-from materialist.types import Array, Photo
+from materialist.types import Array, Photo, Prior
 
 MOGE = "write it with: moge infer -i PHOTO -o DIR --maps"
 
@@ -28,6 +28,8 @@ class MapSettings:
 
 
 SETTINGS = MapSettings()
+_CHANNELS = {"albedo": (3,), "normal": (3,)}
+"""Channels of the maps that have several."""
 
 
 class MapsPredictor(Predictor):
@@ -35,7 +37,7 @@ class MapsPredictor(Predictor):
 
     def __init__(self, folder: str | Path):
         if not str(folder):
-            raise InputError("maps: needs a folder, as in --predictor maps:my_maps.")
+            raise InputError('maps: needs a folder, as in `predictor="maps:my_maps"`.')
         self.folder = Path(folder).expanduser()
         if not self.folder.is_dir():
             raise InputError(f"There is no folder {self.folder} to read maps from.")
@@ -68,6 +70,30 @@ class MapsPredictor(Predictor):
         return _CHECKS[name](read_map(path, name), path, warnings)
 
 
+class ArraysPredictor(Predictor):
+    """Maps that somebody has as arrays, checked and brought to the photo's size as files of them would be."""
+
+    name = "arrays"
+
+    def __init__(self, prior: Prior):
+        self.known = prior.known
+        self.gives = tuple(self.known)
+
+    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+        """The wanted maps. Raises InputError for another shape than the map has, and as `MapsPredictor.parts`."""
+        size, warnings = photo.linear.shape[:2], list[str]()
+        maps = {name: self._fitted(name, size, warnings) for name in wanted}
+        return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
+
+    def _fitted(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array:
+        values, called = np.asarray(self.known[name]), Path(f"The prior's {name}")
+        if values.dtype.kind not in "fiub" or values.ndim < 2 or values.shape[2:] != _CHANNELS.get(name, ()):
+            form = "[H, W, 3]" if name in _CHANNELS else "[H, W]"
+            raise InputError(f"{called} is {values.dtype}{list(values.shape)}; give numbers of the shape {form}.")
+        checked = _CHECKS[name](np.ascontiguousarray(values, np.float32), called, warnings)
+        return _fitted(np.asarray(checked, np.float32), name, size, called, warnings)
+
+
 class MogeFolder(MapsPredictor):
     """What `moge infer --maps` (Wang et al. 2025) has written: depth.exr, mask.png, normal.png, fov.json.
 
@@ -82,7 +108,7 @@ class MogeFolder(MapsPredictor):
 
     def __init__(self, folder: str | Path):
         if not str(folder):
-            raise InputError(f"moge: needs a folder, as in --depth moge:DIR; {MOGE}")
+            raise InputError(f'moge: needs a folder, as in `depth="moge:DIR"`; {MOGE}')
         super().__init__(folder)
         found = [path.parent for path in sorted((*self.folder.glob("depth.exr"), *self.folder.glob("*/depth.exr")))]
         if self.folder not in found and len(found) != 1:

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -28,6 +28,8 @@ class MapSet:
     warnings: tuple[str, ...] = ()
     light: Array | None = None
     """That of `Prediction`, from the source of the albedo, whose exposure it shares."""
+    spread: dict[str, Array] = field(default_factory=dict)
+    """That of `Prediction`, of the maps that are here."""
 
 
 class Predictor(ABC):
@@ -62,7 +64,7 @@ class Predictor(ABC):
         if not known.any():
             sources["normal"] = f"derived from the depth of {sources['depth']}"
         materials = Materials(maps["albedo"], maps["roughness"], maps["metallic"])
-        return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources, part.light)
+        return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources, part.light, part.spread)
 
 
 CONSTANT = {
@@ -112,6 +114,7 @@ class MixedPredictor(Predictor):
         sources: dict[str, str] = {}
         warnings: tuple[str, ...] = ()
         light = None
+        spread: dict[str, Array] = {}
         # The source of the depth comes last: a known normal map helps to scale a relative depth.
         for spec in sorted(self.sources, key=lambda spec: spec == self.depth_spec):
             names = [name for name in self.shares[spec] if name in wanted]
@@ -121,7 +124,8 @@ class MixedPredictor(Predictor):
                 sources |= part.sources
                 warnings += part.warnings
                 light = part.light if part.light is not None else light
-        return MapSet(maps, sources, warnings, light)
+                spread |= part.spread
+        return MapSet(maps, sources, warnings, light, spread)
 
 
 def on_gpu(device: str) -> bool:
@@ -130,5 +134,5 @@ def on_gpu(device: str) -> bool:
 
     there = torch.cuda.is_available()
     if device == "cuda" and not there:
-        raise SetupError("There is no CUDA device that PyTorch can use; choose --device cpu.")
+        raise SetupError('There is no CUDA device that PyTorch can use; choose `device="cpu"`.')
     return device != "cpu" and there

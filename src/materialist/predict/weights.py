@@ -14,7 +14,7 @@ from materialist.io.atomic import whole_file
 if TYPE_CHECKING:
     from torch import Tensor, nn
 
-INSTEAD = "use another predictor (--predictor auto), or read another tool's maps with --predictor maps:DIR"
+INSTEAD = 'use another predictor (`predictor="auto"`), or read another tool\'s maps with `predictor="maps:DIR"`'
 """Advice for a person who lacks the network in question."""
 CHECKSUMS = "SHA256SUMS"
 """List beside every download: one line a file, as `sha256sum` writes and checks them."""
@@ -81,7 +81,11 @@ def read_state(path: Path) -> dict[str, Tensor]:
     try:
         safe = path.suffix == ".safetensors"
         content = load_file(path) if safe else torch.load(path, map_location="cpu", weights_only=True)
+    except MemoryError:
+        raise
     except Exception as error:  # damaged files fail in whatever part of the reader meets them first
+        if out_of_memory(error):
+            raise MemoryError(f"There is not enough memory to read {path}.") from error
         raise WeightsError(
             f"{path} is truncated or damaged, or wants to run code, which is refused ({reason(error)}); "
             f"fetch or copy it again, or {INSTEAD}."
@@ -92,6 +96,12 @@ def read_state(path: Path) -> dict[str, Tensor]:
     if not isinstance(content, Mapping) or not all(isinstance(value, torch.Tensor) for value in content.values()):
         raise WeightsError(f"{path} holds more than named tensors; it is no plain file of weights.")
     return {str(name).removeprefix("module."): tensor for name, tensor in content.items()}
+
+
+def out_of_memory(error: Exception) -> bool:
+    """Whether an error of torch or safetensors means that there is no memory left."""
+    words = ("not enough memory", "can't allocate memory", "Cannot allocate memory", "bad_alloc")
+    return any(word in str(error) for word in words)
 
 
 def load_weights(network: nn.Module, state: Mapping[str, Tensor], path: Path) -> None:

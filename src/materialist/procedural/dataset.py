@@ -8,8 +8,10 @@ import numpy as np
 
 from materialist import __version__
 from materialist.errors import InputError, OutputError
+from materialist.io.atomic import write_whole
 from materialist.io.display import strip, write_sheet
 from materialist.io.samples import SampleFolder, claim, complete, described
+from materialist.procedural.catalog.cache import CREDITS, Listing, listing
 from materialist.procedural.objects import shapes
 from materialist.procedural.options import DataSetOptions
 from materialist.procedural.sample import make_sample
@@ -17,7 +19,7 @@ from materialist.render.variant import setup
 from materialist.types import Progress
 
 FORMAT = 1
-CONTENT = 9
+CONTENT = 11
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")
@@ -40,11 +42,21 @@ def produce(
         setup(options.device)
     for path in options.mesh_files:  # a damaged one must not end a long run
         shapes.load(path)
+    made_of = _listed(options, progress)
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)
+    if made_of:
+        write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
     paths = [sample_path(folder, k) for k in range(count)]
     return complete(paths, partial(make_sample, options=options), "samples", progress, workers)
+
+
+def _listed(options: DataSetOptions, progress: Progress) -> Listing | None:
+    """The models and photographs that the set is made of, read now where that was never done; None without any."""
+    if not options.real_share:
+        return None
+    return listing(options.archives, options.photographs, options.cache, progress)
 
 
 def sample_path(folder: Path, index: int) -> Path:
@@ -54,7 +66,10 @@ def sample_path(folder: Path, index: int) -> Path:
 
 def _description(options: DataSetOptions) -> dict[str, Any]:
     files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}
-    drawn = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
+    drawn: dict[str, Any] = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
+    if options.real_share:
+        real = (*options.archives, *options.photographs)
+        drawn["real"] = {"share": options.real_share, "files": [f"{p.name} {p.stat().st_size}" for p in real]}
     told = {"format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT}
     return told | {"options": drawn | ({"only": options.only} if options.only else {}), "tool_version": __version__}
 

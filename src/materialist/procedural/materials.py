@@ -8,12 +8,21 @@ from typing import TypeVar, cast
 import numpy as np
 
 from materialist.procedural import tiles
+from materialist.procedural.relief import Relief
 from materialist.types import Array
 
 Colour = tuple[float, float, float]
 Range = tuple[float, float]
 Shade = tuple[float, Range, Range, Range]
 """Share, and ranges of hue, saturation and value (sRGB)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ColourPicture:
+    """A photographic texture; two are the same where they are one object."""
+
+    pixels: Array
+    """[h, w, 3] uint8: 255 times the square root of linear albedo, row 0 at the top."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +46,27 @@ class Material:
     """Radiance is emission times albedo, on the front side."""
     offset: tuple[float, float] | None = None
     """Shift in tiles; None for a shift of its own for every surface."""
+    picture: ColourPicture | None = None
+    """Covers what the tile covers; the albedo is its colour times the first of `colours`."""
+    emboss: float = 0.0
+    """Height of the tile's relief, metres."""
+    relief: Relief | None = None
+    """Solid noise that bends the normals."""
 
-    def row(self, shift: tuple[float, float]) -> Array:
-        """[24] float32 as the path tracer reads it; `shift` moves the tile where the material leaves that open."""
+    def row(self, shift: tuple[float, float], start: int = 0) -> Array:
+        """[36] float32 as the path tracer reads it; `shift` moves the tile where the material leaves that open.
+
+        start: place of the picture's first pixel in the buffer of all pictures, in units of 64 pixels.
+        """
         c, s = np.cos(self.turn), np.sin(self.turn)
         (c0, c1, c2), (r0, r1), (m0, m1) = self.colours, self.roughness, self.metallic
         offset = shift if self.offset is None else self.offset
+        height, width = (0, 0) if self.picture is None else self.picture.pixels.shape[:2]
+        solid = [1.0, 1.0, 1.0, 0.0, 0.0] if self.relief is None else self.relief.row()
         return np.array(
             [*c0, r0, *c1, r1, *c2, self.grain, m0, m1, c / self.repeat[0], s / self.repeat[0], -s / self.repeat[1],
-             c / self.repeat[1], offset[0], offset[1], *self.emission, float(self.tile)],
+             c / self.repeat[1], offset[0], offset[1], *self.emission, float(self.tile),
+             start, width, height, self.emboss, *solid, 0, 0, 0],
             np.float32,
         )  # fmt: skip
 

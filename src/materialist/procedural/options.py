@@ -6,9 +6,15 @@ from pathlib import Path
 
 from materialist.errors import InputError
 from materialist.option_kinds import OperationOptions, option
+from materialist.procedural.catalog import packages
 
-KINDS = ("room", "table", "still-life", "outdoor")
-"""Kinds of scenes."""
+TOY_KINDS = ("room", "table", "still-life", "outdoor")
+"""Kinds of scenes of procedural things."""
+REAL_KINDS = ("furnished", "laid", "single", "outside")
+"""Kinds of scenes of real things."""
+KINDS = (*TOY_KINDS, *REAL_KINDS)
+REAL_SHARE = 0.75
+"""Share of the latter where nothing else is said and their packages are installed."""
 SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
 """What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
 HELD_OUT = frozenset((
@@ -47,6 +53,15 @@ class DataSetOptions(OperationOptions):
     split: str = option(
         "train", "heldout uses only the files kept aside for testing.", kind="word", choices=tuple(SPLITS)
     )
+    real: float | None = option(
+        None, f"Share of pictures of real things; default: {REAL_SHARE} where they are installed.", low=0, high=1
+    )
+    furniture: Path | None = option(
+        None, "Folder of .sh3f catalogues; default: that of Debian's sweethome3d-furniture.", kind="file"
+    )
+    cache: Path | None = option(
+        None, "Folder for models and photographs as they are read; default: in the user's cache.", kind="file"
+    )
     only: str = option("", f"Only one kind of scenes: {', '.join(KINDS)}.", kind="name", metavar="KIND")
     seed: int = option(0, "Same seed, same samples.", kind="whole", low=0, flag=None)
     device: str = option("auto", "Where it renders.", kind="word", choices=("auto", "cpu", "cuda"), flag=None)
@@ -58,6 +73,27 @@ class DataSetOptions(OperationOptions):
         if self.only and self.only not in KINDS:
             raise InputError(f"There is no kind '{self.only}' of scene; give one of {', '.join(KINDS)}, or none.")
         _ = self.mesh_files, self.envmap_files  # which raise where a folder cannot be used
+        if (self.real or self.only in REAL_KINDS) and not self.archives:
+            where = f"in {self.furniture}" if self.furniture else "installed"
+            raise InputError(f"No 3D models are {where}; install them with: {packages.INSTALL}, or give --real 0.")
+
+    @cached_property
+    def archives(self) -> tuple[Path, ...]:
+        """The catalogues of models, sorted; none where they are not installed."""
+        return packages.archives(self.furniture)
+
+    @cached_property
+    def photographs(self) -> tuple[Path, ...]:
+        """Photographs of installed packages, sorted."""
+        return packages.photographs() if self.real_share else ()
+
+    @property
+    def real_share(self) -> float:
+        """Share of pictures of real things."""
+        if self.only:
+            return float(self.only in REAL_KINDS)
+        usual = REAL_SHARE if self.archives else 0.0
+        return usual if self.real is None else self.real
 
     @cached_property
     def mesh_files(self) -> tuple[Path, ...]:

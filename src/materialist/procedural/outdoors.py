@@ -59,7 +59,7 @@ def _flat(half: float, material: m.Material, n: int = 1) -> ScenePart:
     return ScenePart(s.sheet((-half, 0, half), (2 * half, 0, 0), (0, 0, -2 * half), n), material)
 
 
-def _houses(rng, start: float, end: float, gap: float) -> list[tuple[float, Parts]]:
+def houses(rng: np.random.Generator, start: float, end: float, gap: float) -> list[tuple[float, Parts]]:
     """(middle, house) of houses in a row between two places, some of them apart."""
     row = []
     while start < end:
@@ -77,7 +77,7 @@ def _street(rng, meshes) -> Parts:
     for side in (-1, 1):
         parts.append(block((wide, 0.14, 140), (side * (half + wide / 2), 0, -55), pave))
         parts.append(block((0.18, 0.145, 140), (side * (half + 0.08), 0, -55), kerb, 0.02))
-        for along, house in _houses(rng, -rng.uniform(0, 6), rng.uniform(20, 70), 5):
+        for along, house in houses(rng, -rng.uniform(0, 6), rng.uniform(20, 70), 5):
             parts += placed(house, (side * (half + wide + 0.1), 0, -along), -side * np.pi / 2)
         for _ in range(int(rng.integers(0, 5))):
             if rng.random() < 0.35:
@@ -100,7 +100,7 @@ def _yard(rng, meshes) -> Parts:
     """A square or garden: a house or wall behind, things, people and plants on the ground."""
     parts, back = [_flat(HORIZON, m.ground(rng), 12)], -rng.uniform(2, 12)
     if rng.random() < 0.7:
-        for x, house in _houses(rng, -rng.uniform(6, 14), 14, 4):
+        for x, house in houses(rng, -rng.uniform(6, 14), 14, 4):
             parts += placed(house, (x, 0, back + rng.normal() * 0.3))
     else:
         parts += placed(street.wall(rng, 40.0), (0, 0, back))

@@ -8,12 +8,15 @@ import numpy as np
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.geometry.boundary import joined_faces
+from materialist.procedural.materials import ColourPicture
 from materialist.procedural.objects.shapes import face_normals
 from materialist.procedural.world import World
 from materialist.types import Array
 
-FACE, MATERIAL, PORTAL = 28, 24, 16
+FACE, MATERIAL, PORTAL = 28, 36, 16
 """Floats a row of each table: multiples of four, for wide gathers."""
+PICTURE_START = 64
+"""Pictures begin at multiples of that many pixels, so that a float32 can hold the place of each."""
 MAX_PORTALS = 4
 LIGHT_TABLE = 2048
 """Entries to draw a luminous face from."""
@@ -35,6 +38,8 @@ class Packed:
     """[F, FACE] float32: three corners of position, normal, uv; material; probability density as a light, 1 / m2."""
     material: Array
     """[M, MATERIAL] float32."""
+    pictures: Array
+    """[P] uint32 pixels of all pictures, red in the lowest byte."""
     lamps: Array
     """[LIGHT_TABLE] uint32 numbers of faces, each as often as it is to be drawn; all 0 without lamps."""
     env: Array
@@ -63,7 +68,9 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     corner = np.concatenate([vertices, np.concatenate(normal), uv], -1)
     faces = joined_faces([p.solid for p in world.parts])[1].astype(np.uint32)
     owner = np.repeat(np.arange(len(world.parts)), [len(p.solid.faces) for p in world.parts])
-    material = np.stack([p.material.row(tuple(rng.random(2))) for p in world.parts]).astype(np.float32)
+    pictures, starts = _pictures(world)
+    rows = [p.material.row(tuple(rng.random(2)), starts.get(p.material.picture, 0)) for p in world.parts]
+    material = np.stack(rows).astype(np.float32)
     lamps, density = _lamps(vertices, faces, owner, material)
     extra = np.zeros((len(faces), 4), np.float32)
     extra[:, 0], extra[:, 1] = owner, density
@@ -72,9 +79,27 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     portals = _portals(world)
     shares = _shares(world, bool(density.any()), sunny)
     return Packed(
-        vertices, faces, face, material, lamps, world.envmap, env_table, env_density, portals, shares,
+        vertices, faces, face, material, pictures, lamps, world.envmap, env_table, env_density, portals, shares,
         rotation.astype(np.float32), float(np.abs(vertices).max()),
     )  # fmt: skip
+
+
+def _pictures(world: World) -> tuple[Array, dict[ColourPicture | None, int]]:
+    """(pixels of all pictures of a world, picture -> its place in units of PICTURE_START)."""
+    pieces = [np.zeros(PICTURE_START, np.uint32)]
+    starts: dict[ColourPicture | None, int] = {}
+    end = 1
+    for part in world.parts:
+        picture = part.material.picture
+        if picture is None or picture in starts:
+            continue
+        red, green, blue = (picture.pixels[..., k].astype(np.uint32).ravel() for k in range(3))
+        pixels = red | green << 8 | blue << 16
+        length = -(-len(pixels) // PICTURE_START)
+        pieces.append(np.pad(pixels, (0, length * PICTURE_START - len(pixels))))
+        starts[picture] = end
+        end += length
+    return np.concatenate(pieces), starts
 
 
 def _lamps(vertices: Array, faces: Array, owner: Array, material: Array) -> tuple[Array, Array]:

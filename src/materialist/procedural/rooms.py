@@ -1,5 +1,7 @@
 """Rooms: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from materialist.procedural import lights, walls, world
@@ -21,7 +23,7 @@ def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.Wo
     standing = Furniture(size)
     standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 3, 9, meshes))
     standing.in_the_middle(rng, _some(rng, f.IN_THE_MIDDLE, 1, 6, meshes))
-    return _world(rng, size, captures, standing.parts, _view(rng, size, standing), "room")
+    return _world(rng, size, captures, standing.parts, view_of(rng, size, standing), "room")
 
 
 def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
@@ -62,14 +64,20 @@ def _world(rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, k
     return world.World(parts, envmap, view, portals, kind)
 
 
-def _sides(size: Size) -> list[tuple[Array, float, float]]:
+def sides(size: Size) -> list[tuple[Array, float, float]]:
     """(lower left corner, turn about Y, length) of the back, right, front and left wall, as seen from inside."""
     w, d, _ = size
     corners = np.array([(-w, 0, -d), (w, 0, -d), (w, 0, d), (-w, 0, d)]) / 2
     return list(zip(corners, (0.0, -np.pi / 2, np.pi, np.pi / 2), (w, d, w, d)))
 
 
-def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
+Hangings = Callable[[np.random.Generator, RoomWall, int], Parts]
+"""(random numbers, wall, how many) -> what hangs on the wall where there is room."""
+
+
+def shell(
+    rng: np.random.Generator, size: Size, captures: Meshes, hangings: Hangings = walls.hangings
+) -> tuple[Parts, list[world.Portal], Array]:
     """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size
     is_open = rng.random() < 0.25
@@ -81,7 +89,7 @@ def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
     lower = m.one_of(rng, m.wall_paint, m.tiled, m.wood) if rng.random() < 0.15 else None
     wood = m.white_paint(rng) if rng.random() < 0.7 else m.wood(rng)
     x, z = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
-    for k, (corner, turn, length) in enumerate(_sides(size)):
+    for k, (corner, turn, length) in enumerate(sides(size)):
         holes = [walls.Opening(0, length, 0, h)]
         if not (is_open and k == 2):
             wall = RoomWall(length, h)
@@ -91,7 +99,7 @@ def shell(rng, size: Size, captures) -> tuple[Parts, list[world.Portal], Array]:
             makers = (m.wall_paint, m.wallpaper, m.brick, m.tiled, m.wood, m.stone)
             own += walls.surface(wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2))
             own.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
-            own += walls.hangings(rng, wall, int(rng.integers(0, 5)))
+            own += hangings(rng, wall, int(rng.integers(0, 5)))
             parts, holes = parts + moved(own, corner, turn), wall.holes
         for hole in holes:
             up = (0, hole.top - hole.bottom, 0)
@@ -129,7 +137,7 @@ class Furniture:
     def along_walls(self, rng: np.random.Generator, pieces: list[Parts]) -> None:
         """Stand pieces with their backs to a wall, most at the back and the sides."""
         for piece in pieces:
-            corner, turn, length = _sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
+            corner, turn, length = sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
             low, high = world.bounds(piece)
             at = rng.uniform(0.04, max(0.05, length - (high - low)[0] - 0.04))
             self.add(moved(placed(piece, (at - low[0], 0, 0.04 - low[2])), corner, turn))
@@ -195,7 +203,7 @@ def _shade(rng, size, power) -> Parts:
     return placed([ScenePart(shade, glow), pole, foot], at)
 
 
-def _view(rng, size: Size, standing: Furniture) -> world.Viewpoint:
+def view_of(rng: np.random.Generator, size: Size, standing: Furniture) -> world.Viewpoint:
     """Somebody in the front half of the room who looks towards its back."""
     w, d, h = size
     for _ in range(30):

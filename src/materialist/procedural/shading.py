@@ -12,8 +12,18 @@ from materialist.bsdf import lobes
 from materialist.bsdf.disney import base_reflectance, specular_probability
 from materialist.bsdf.ggx import alpha_of
 from materialist.buffers import floats, integers, tensor
-from materialist.procedural import tiles
-from materialist.procedural.packing import ENV_ROWS, ENV_TABLE, FACE, LIGHT_TABLE, MATERIAL, MAX_PORTALS, PORTAL, Packed
+from materialist.procedural import relief, tiles
+from materialist.procedural.packing import (
+    ENV_ROWS,
+    ENV_TABLE,
+    FACE,
+    LIGHT_TABLE,
+    MATERIAL,
+    MAX_PORTALS,
+    PICTURE_START,
+    PORTAL,
+    Packed,
+)
 
 _ALBEDO_RANGE = (0.01, 0.95)
 _LEAST_ROUGHNESS = 0.05
@@ -57,6 +67,8 @@ class Shading:
         self.face, self.material = floats(mi, packed.face), floats(mi, packed.material)
         self.env_density, self.portals = floats(mi, packed.env_density), floats(mi, packed.portals)
         self.env_table, self.lamps, self.bank = integers(mi, packed.env_table), integers(mi, packed.lamps), _bank()
+        self.pictures = integers(mi, packed.pictures)
+        self.slopes, self.solid = _slopes(), _solid()
         texture: Any = mi.Texture2f
         self.env = texture(tensor(mi, packed.env), wrap_mode=dr.WrapMode.Repeat)
         self.rows = dr.opaque(mi.Float, float(len(packed.env)))
@@ -65,12 +77,15 @@ class Shading:
         self.turn = [mi.Vector3f(*(dr.opaque(mi.Float, float(x)) for x in row)) for row in packed.to_scene]
         """Three rows of the rotation from camera to scene directions."""
 
-    def hit(self, found, d) -> Hit:
-        """The surface at preliminary intersections `found` of rays with directions d."""
-        return self.at(found.prim_index, found.prim_uv, d, found.t, found.is_valid())
+    def hit(self, found, d, fine=None) -> Hit:
+        """The surface at preliminary intersections `found` of rays with directions d; see `at` for `fine`."""
+        return self.at(found.prim_index, found.prim_uv, d, found.t, found.is_valid(), fine)
 
-    def at(self, index, b, d, t, valid) -> Hit:
-        """The surface at barycentric coordinates b of faces, seen along directions d."""
+    def at(self, index, b, d, t, valid, fine=None) -> Hit:
+        """The surface at barycentric coordinates b of faces, seen along directions d.
+
+        fine: where normals are bent by the relief of the material; nowhere by default.
+        """
         row = [dr.gather(mi.Vector4f, self.face, index * (FACE // 4) + k, valid) for k in range(FACE // 4)]
         corners = [(row[2 * k], row[2 * k + 1]) for k in range(3)]
         place = [mi.Point3f(a.x, a.y, a.z) for a, _ in corners]
@@ -82,6 +97,8 @@ class Shading:
         n = mix(normal)
         n = n * dr.rsqrt(dr.maximum(dr.squared_norm(n), 1e-20))
         front = dr.dot(ng, d) < 0
+        if fine is not None:
+            n = self._bent(n, mi.UInt32(row[6].x), mix(place), mix(uv), place, uv, valid & fine)
         ng = dr.select(front, ng, -ng)
         n = dr.select(dr.dot(n, ng) < 0, -n, n)
         # Bend normals that turn away from the viewer back to the silhouette.
@@ -89,26 +106,74 @@ class Shading:
         n = dr.select(away > 0, dr.normalize(n - d * away * 1.01), n)
         return Hit(valid, mix(place), t, ng, n, mi.Frame3f(n), mix(uv), front, mi.UInt32(row[6].x), row[6].y)
 
+    def _bent(self, n, owner, p, uv, places, corners, active):
+        """Shading normals n on the front side, bent by the relief at points p; `places` and `corners` are those of the
+        faces."""
+        r = [dr.gather(mi.Vector4f, self.material, owner * (MATERIAL // 4) + k, active) for k in range(3, 9)]
+        emboss, solid = r[3].w, active & (r[4].w > 0)
+        # Tiles: how the texture coordinates change along the face, and the height with them.
+        s, t = self._place_on_tile(uv, r[0], r[1])
+        word = dr.gather(mi.UInt32, self.slopes, self._texel(s, t, r[2].w), active & (emboss > 0))
+        along_s = (mi.Float(word & 0xFFFF) - 32768) * relief.FINE_SLOPE
+        along_t = (mi.Float(word >> 16) - 32768) * relief.FINE_SLOPE
+        first, second = places[1] - places[0], places[2] - places[0]
+        du, dv = corners[1] - corners[0], corners[2] - corners[0]
+        flat = dr.cross(first, second)
+        across, up = dr.cross(second, flat), dr.cross(flat, first)
+        scale = dr.rcp(dr.maximum(dr.squared_norm(flat), 1e-20))
+        u, v = (du.x * across + dv.x * up) * scale, (du.y * across + dv.y * up) * scale
+        by_u = along_s * r[0].z + along_t * r[1].x
+        by_v = along_s * r[0].w + along_t * r[1].y
+        slope = dr.select(emboss > 0, emboss * (by_u * u + by_v * v), 0)
+        # Solid noise at the place in the scene.
+        place = mi.Vector3f(*(dr.dot(row, p) for row in self.turn)) * mi.Vector3f(r[4].x, r[4].y, r[4].z)
+        layer = place.z - dr.floor(place.z)
+        layer = (r[5].x * relief.SLAB + 1 + layer * relief.SIDE) / (relief.SLAB * len(relief.SOLID))
+        found = self.solid.eval(mi.Point3f(place.x, place.y, layer), solid)
+        scene = mi.Vector3f(found[0] * r[4].x, found[1] * r[4].y, found[2] * r[4].z) * r[4].w
+        rows = self.turn
+        noise = mi.Vector3f(*(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3)))
+        slope += dr.select(solid, noise, 0)
+        bent = dr.normalize(n - (slope - dr.dot(slope, n) * n))
+        return dr.select(solid | (active & (emboss > 0)), bent, n)
+
+    def _place_on_tile(self, uv, third, fourth):
+        """(s, t) on tiles of texture coordinates, by the fourth and fifth row of four of the material."""
+        return uv.x * third.z + uv.y * third.w + fourth.z, uv.x * fourth.x + uv.y * fourth.y + fourth.w
+
+    def _texel(self, s, t, tile, shift=(0.5, 0.5)):
+        """Number in the bank of the texel at (s, t) of a tile."""
+        side = tiles.SIZE
+        column = mi.UInt32(mi.Int32(dr.floor((s - dr.floor(s)) * side + shift[0] - 0.5)) + side) % side
+        line = mi.UInt32(mi.Int32(dr.floor((t - dr.floor(t)) * side + shift[1] - 0.5)) + side) % side
+        return (mi.UInt32(tile) * side + line) * side + column
+
     def look(self, hit: Hit, texel) -> Look:
         """The material at hits; `texel` in [0, 1)^2 spreads the lookup over neighbouring texels."""
-        r = [
-            dr.gather(mi.Vector4f, self.material, hit.owner * (MATERIAL // 4) + k, hit.valid)
-            for k in range(MATERIAL // 4)
-        ]
-        s = hit.uv.x * r[3].z + hit.uv.y * r[3].w + r[4].z
-        t = hit.uv.x * r[4].x + hit.uv.y * r[4].y + r[4].w
-        side = tiles.SIZE
-        column = mi.UInt32(mi.Int32(dr.floor((s - dr.floor(s)) * side + texel.x - 0.5)) + side) % side
-        line = mi.UInt32(mi.Int32(dr.floor((t - dr.floor(t)) * side + texel.y - 0.5)) + side) % side
-        word = dr.gather(mi.UInt32, self.bank, (mi.UInt32(r[5].w) * side + line) * side + column, hit.valid)
+        r = [dr.gather(mi.Vector4f, self.material, hit.owner * (MATERIAL // 4) + k, hit.valid) for k in range(7)]
+        s, t = self._place_on_tile(hit.uv, r[3], r[4])
+        word = dr.gather(mi.UInt32, self.bank, self._texel(s, t, r[5].w, (texel.x, texel.y)), hit.valid)
         f: list[Any] = [mi.Float((word >> (8 * k)) & 255) / 255 for k in range(4)]
         colours: list[Any] = [mi.Color3f(v.x, v.y, v.z) for v in r[:3]]
         albedo: Any = dr.lerp(dr.lerp(colours[0], colours[1], f[0]), colours[2], f[1])
+        albedo = dr.select(r[6].y > 0, self._printed(r[6], s, t, texel, hit.valid) * colours[0], albedo)
         albedo = dr.clip(albedo * dr.exp(r[2].w * (f[2] - 0.5)), *_ALBEDO_RANGE)
         roughness = dr.clip(dr.lerp(r[0].w, r[1].w, f[3]), _LEAST_ROUGHNESS, 1)
         metallic = dr.lerp(r[3].x, r[3].y, f[0])
         emission = mi.Color3f(r[5].x, r[5].y, r[5].z) * albedo
         return Look(albedo, roughness, metallic, emission)
+
+    def _printed(self, where, s, t, texel, valid):
+        """Linear colour at (s, t) of pictures; `where` holds their places, widths and heights."""
+        width, height = mi.UInt32(where.y), mi.UInt32(where.z)
+        x = mi.Int32(dr.floor((s - dr.floor(s)) * where.y + texel.x - 0.5))
+        y = mi.Int32(dr.floor((t - dr.floor(t)) * where.z + texel.y - 0.5))
+        column = mi.UInt32(dr.clip(x, 0, mi.Int32(width) - 1))
+        line = mi.UInt32(dr.clip(y, 0, mi.Int32(height) - 1))
+        place = mi.UInt32(where.x) * PICTURE_START + line * width + column
+        word = dr.gather(mi.UInt32, self.pictures, place, valid & (where.y > 0))
+        root = mi.Color3f(*(mi.Float((word >> (8 * k)) & 255) / 255 for k in range(3)))
+        return root * root
 
     def sky(self, d):
         """Radiance from direction d (camera frame), bilinear."""
@@ -196,6 +261,19 @@ class Shading:
         scene = mi.Vector3f(r * s, y, -r * c)
         rows = self.turn
         return mi.Vector3f(*(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3)))
+
+
+@cache
+def _slopes():
+    """Slopes of the tiles on the device, once a process."""
+    return integers(mi, relief.tile_bank())
+
+
+@cache
+def _solid():
+    """Slopes of solid noise on the device, once a process."""
+    texture: Any = mi.Texture3f
+    return texture(tensor(mi, relief.solid_bank()), wrap_mode=dr.WrapMode.Repeat)
 
 
 @cache

@@ -85,7 +85,7 @@ class SampleTracer:
         pixel, sample = lane // n, lane % n
         places = (mi.Point2f(mi.Float(sample % PROBE), mi.Float(sample // PROBE)) + 0.5) / PROBE
         ray = self._camera_ray(pixel, places)
-        hit = self._hit(ray, mi.Bool(True))
+        hit = self._hit(ray, mi.Bool(True), mi.Bool(True))
         look = self.shading.look(hit, mi.Point2f(0.5, 0.5))
         depth = dr.select(hit.valid, -hit.p.z, 0)
         owner = dr.select(hit.valid, mi.Int32(hit.owner), -1)
@@ -151,9 +151,9 @@ class SampleTracer:
         y = (h / 2 - mi.Float(pixel // w) - place.y) / self.focal
         return mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1)))
 
-    def _hit(self, ray, active) -> Hit:
+    def _hit(self, ray, active, fine=None) -> Hit:
         found = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        return self.shading.hit(found, ray.d)
+        return self.shading.hit(found, ray.d, fine)
 
     def _paths(self, ray, pixel, sample, rng, seed):
         """Radiance and white diffuse shading along camera rays; each three Floats."""
@@ -163,7 +163,7 @@ class SampleTracer:
         state = (*start, mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Float(-1), mi.Bool(True))
 
         def body(ray, rng, fate, depth, beta, beta_white, total, white, pdf, active):
-            hit = self._hit(ray, active)
+            hit = self._hit(ray, active, active & (depth == 0))
             draws = even.draw(rng, depth)
             look = self.shading.look(hit, draws.texel)
             # What the ray itself found: the sky, or a lamp; weighed against having been aimed at.

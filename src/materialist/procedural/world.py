@@ -47,6 +47,10 @@ class Viewpoint:
     """[3, 3] rotation that turns camera directions into scene directions."""
     fov: float
     """Horizontal field of view, degrees."""
+    aperture: float = 0.0
+    """Diameter of the lens, metres; 0: everything is sharp."""
+    focus: float = 1.0
+    """Distance that is sharp, metres."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,8 @@ class World:
     view: Viewpoint
     portals: list[Portal] = field(default_factory=list)
     kind: str = ""
+    backdrop: Array | None = None
+    """[h, w, 3] linear radiance that the camera sees where there is no surface, at any size; None for the envmap."""
 
 
 def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewpoint:
@@ -74,6 +80,18 @@ def orbit(target: Array, distance: float, azimuth: float, elevation: float, fov:
     radians."""
     back = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
     return Viewpoint(target + distance * back, turn_upright(back), float(fov))
+
+
+def through_lens(rng: np.random.Generator, view: Viewpoint, focus: float, share: float) -> Viewpoint:
+    """The view, with that probability through a lens that blurs what is not about `focus` metres away.
+
+    Its aperture blurs what is far by 1 to 6 % of the picture's width, whatever the scale of the scene.
+    """
+    if rng.random() > share:
+        return view
+    reach = 2 * np.tan(np.radians(view.fov) / 2)  # widths of the picture a metre, at one metre
+    blur = np.exp(rng.uniform(np.log(0.01), np.log(0.06)))
+    return replace(view, aperture=float(blur * reach * focus), focus=float(focus * rng.uniform(0.9, 1.1)))
 
 
 def block(

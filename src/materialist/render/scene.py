@@ -108,7 +108,7 @@ class RenderScene:
 
         _check_options(spp, max_depth)
         if self.mi.variant().startswith("cuda") != (torch_device() == "cuda"):
-            raise SetupError("PyTorch here computes on the CPU alone: choose --device cpu, or install one for CUDA.")
+            raise SetupError('PyTorch here computes on the CPU alone: choose `device="cpu"`, or install one for CUDA.')
         integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
 
         @dr.wrap(source="torch", target="drjit")

@@ -11,6 +11,8 @@ from functools import lru_cache
 from glob import glob
 
 from materialist.errors import InputError, SetupError
+from materialist.forks import check_process
+from materialist.install import install_command
 
 MINIMUM_LLVM = 17
 """Dr.Jit refuses 14; 15 and 16 start, but abort the process in a path-tracing kernel (they cannot select fminimum)."""
@@ -81,7 +83,7 @@ def unloaded(error: BaseException) -> str:
         error = error.__context__
     match = re.search(r"(\S+\.so\S*): cannot open shared object", str(error))
     if match is None:
-        return f"{error}; install it again with: pip install --force-reinstall mitsuba."
+        return f"{error}; install it again with: {install_command('--force-reinstall', 'mitsuba')}"
     return f"the library {match[1]} is missing; install it with: sudo apt-get install -y {package_of(match[1])}"
 
 
@@ -114,10 +116,11 @@ def setup(device: str = "auto"):
     variant runs on the processors this process may use, or on OMP_NUM_THREADS of them, as torch does.
 
     device: `auto` (CUDA where a driver answers), `cpu` or `cuda`. Raises InputError for an unknown one, SetupError
-    where LLVM or CUDA is missing, or another device was chosen before.
+    where LLVM or CUDA is missing, another device was chosen before, or this process is a fork of one that computes.
     """
     if device not in ("auto", "cpu", "cuda"):
         raise InputError(f"Device is '{device}'; choose auto, cpu or cuda.")
+    check_process()
     _point_to_llvm(device)
     try:
         import mitsuba as mi
@@ -131,7 +134,7 @@ def setup(device: str = "auto"):
     wanted = _VARIANTS[device]
     if current != wanted:
         if current in _VARIANTS.values():
-            raise SetupError(f"This process already renders with {current}; start a new one for --device {device}.")
+            raise SetupError(f'This process already renders with {current}; start a new one for `device="{device}"`.')
         _start(mi, device)
     _register_plugins(wanted)
     return mi
@@ -152,7 +155,7 @@ def _start(mi, device: str) -> None:
     import drjit as dr
 
     if device == "cuda" and not usable_gpus():
-        raise SetupError("No CUDA driver with OptiX answers; use --device cpu, or install the NVIDIA driver.")
+        raise SetupError('No CUDA driver with OptiX answers; use `device="cpu"`, or install the NVIDIA driver.')
     if device == "cpu":
         loaded = dr.detail.llvm_version()[0] if dr.has_backend(dr.JitBackend.LLVM) else 0
         if loaded < MINIMUM_LLVM:

@@ -11,12 +11,15 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
+from materialist.io.package import load_scene
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.workspace import with_plain_files
+from materialist.studio.access.quota import Allowance, folder_size
+from materialist.studio.workspace import store, with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
@@ -30,46 +33,77 @@ def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
             made.write(edits.parent / name, name)
 
 
-def unpack(workspace: Path, archive: Path) -> tuple[Step, ...]:
+def unpack(workspace: Path, archive: Path, allowance: Allowance) -> tuple[Step, ...]:
     """The steps of a zip that `pack` wrote, their files in the workspace under names of ours.
 
     Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
     """
-    shown = uploads.shown_name(archive)
-    advice = "give the zip that 'edits.yaml with its masks' makes"
     with tempfile.TemporaryDirectory(dir=workspace, prefix=".load-") as place:
         folder = Path(place)
-        with _members(archive, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (given, members):
-            name = "edits.yaml" if "edits.yaml" in members else "edits.yml"
-            _extract(given, {name: members[name]}, folder, shown)
-            steps = read_recipe(folder / name)
-            wanted = _named(steps)
-            if lacking := sorted(wanted - {*members}):
-                raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")
-            _extract(given, {name: members[name] for name in wanted}, folder, shown)
+        steps, readable = uploads.opened(extract_list, archive, allowance, folder=folder)
 
         def moved(option: str, name: str) -> str:
             file = folder / name
             if (workspace / name).is_file() and filecmp.cmp(workspace / name, file, shallow=False):
                 return name
-            return uploads.stored(workspace, file, option)
+            content = readable[name].read_bytes()
+            allowance.claim(len(content))
+            return store(workspace, option, content, readable[name].suffix.lower())
 
         return tuple(replace(with_plain_files(step, moved), folder=workspace) for step in steps)
 
 
-def unpack_scene(archive: Path, target: Path) -> None:
-    """Unpack a zipped scene package into `target`: known members only.
+def unpack_scene(archive: Path, target: Path, allowance: Allowance) -> None:
+    """Unpack a zipped scene package into `target`: known members only, and only a scene that can be loaded.
 
     Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
     """
-    shown = uploads.shown_name(archive)
-    missing = "no scene package (no scene.json); zip the folder that invert wrote"
     try:
-        with _members(archive, shown, r"scene\.json", missing) as (given, members):
-            _extract(given, {name: one for name, one in members.items() if _MEMBER.fullmatch(name)}, target, shown)
+        uploads.opened(extract_scene, archive, allowance, target=target)
+        allowance.claim(folder_size(target))
     except InputError:
         shutil.rmtree(target, ignore_errors=True)
         raise
+
+
+# --- In the process with limits ---
+
+
+def read_list(report: Any, file: Path) -> list[Step]:
+    """The steps of a list of edits, a YAML file. Raises InputError."""
+    return read_recipe(file)
+
+
+def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dict[str, Path]]:
+    """The steps of a zipped list of edits, whose files it writes to a folder, and the file to read for each name."""
+    shown = uploads.shown_name(file)
+    advice = "give the zip that 'edits.yaml with its masks' makes"
+    with _members(file, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (archive, members):
+        name = "edits.yaml" if "edits.yaml" in members else "edits.yml"
+        _extract(archive, {name: members[name]}, folder, shown)
+        steps = read_recipe(folder / name)
+        options = _named(steps)
+        lacking = sorted(options.keys() - members.keys())
+        if lacking:
+            raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")
+        _extract(archive, {name: members[name] for name in options}, folder, shown)
+    readable = {name: uploads.checked(report, folder / name, option) for name, option in options.items()}
+    return steps, readable
+
+
+def extract_scene(report: Any, file: Path, target: Path) -> None:
+    """Unpack a zipped scene package and load it once. Raises InputError where it is damaged, or too large."""
+    shown = uploads.shown_name(file)
+    missing = "no scene package (no scene.json); zip the folder that invert wrote"
+    with _members(file, shown, r"scene\.json", missing) as (archive, members):
+        known = {name: one for name, one in members.items() if _MEMBER.fullmatch(name)}
+        _extract(archive, known, target, shown)
+    camera = load_scene(target, most=SETTINGS.decoded_bytes).camera
+    if camera.width * camera.height > SETTINGS.scene_pixels:
+        raise InputError(
+            f"{shown} is a scene of {camera.width} x {camera.height} pixels; the studio takes up to "
+            f"{SETTINGS.scene_pixels / 1e6:g} megapixels. Invert its photo again at a smaller --size."
+        )
 
 
 @contextmanager
@@ -80,7 +114,6 @@ def _members(
 
     Raises InputError for what is no zip, and where there is no marker.
     """
-    uploads.check_bytes(archive, shown)
     try:
         with zipfile.ZipFile(archive) as given:
             infos = given.infolist()[:10_000]
@@ -100,14 +133,17 @@ def _extract(given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder
     if total > SETTINGS.unpacked_bytes:
         most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
         raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
+    folder.mkdir(parents=True, exist_ok=True)
+    if shutil.disk_usage(folder).free - total < SETTINGS.disk_left:
+        raise InputError(f"The disk of the studio has no room for {shown}.")
     for name, entry in members.items():
         entry.filename = name
         given.extract(entry, folder)
 
 
-def _named(steps: Iterable[Step]) -> set[str]:
-    """The files that steps name. Raises InputError for a name that is a path."""
-    names: set[str] = set()
+def _named(steps: Iterable[Step]) -> dict[str, str]:
+    """The files that steps name, and the option that names each. Raises InputError for a name that is a path."""
+    options: dict[str, str] = {}
     for step in steps:
-        with_plain_files(step, lambda _, name: names.add(name))
-    return names
+        with_plain_files(step, lambda option, name: options.setdefault(name, option))
+    return options

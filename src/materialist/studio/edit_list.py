@@ -86,9 +86,15 @@ def with_options(step: Step, **options: Any) -> Step:
     return replace(step, options={k: v for k, v in {**step.options, **options}.items() if v is not None})
 
 
+def key_of(steps: tuple[Step, ...]) -> str:
+    """The key of some steps in the store of `kept`."""
+    entries = [[step.kind, step.options, str(step.folder)] for step in steps]
+    return json.dumps(entries, default=str)
+
+
 def kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any], most: int) -> Any:
     """What a store holds for some steps, made where it is missing; it keeps those that were last asked for."""
-    key = json.dumps([[step.kind, step.options, str(step.folder)] for step in steps], default=str)
+    key = key_of(steps)
     found = store.pop(key, None)
     store[key] = found = make() if found is None else found
     for old in list(store)[:-most]:

@@ -26,9 +26,6 @@ def build(studio: Studio) -> Any:
     context = PageContext(studio)
     parts = context.parts
 
-    def closed(request: gr.Request) -> None:
-        studio.leave(request.session_hash)
-
     with gr.Blocks(title="Materialist studio", analytics_enabled=False, fill_width=True) as page:
         gr.HTML(_HEAD, elem_id="head", js_on_load=None)
         with gr.Row(elem_id="body"):
@@ -42,7 +39,6 @@ def build(studio: Studio) -> Any:
         for tab in TABS:
             tab.wire(context)
         tab_open.wire(context, page)
-        page.unload(closed)
     return page
 
 

@@ -3,8 +3,12 @@
 import ctypes
 import gc
 import sys
+import threading
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +17,13 @@ import numpy as np
 
 from materialist.camera import project
 from materialist.color import luminance
+from materialist.edits.core.notes import warned
 from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.errors import InputError
+from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
-from materialist.studio import SETTINGS, glass
-from materialist.studio.edit_list import kept, summary
+from materialist.studio import SETTINGS, glass, tasks
+from materialist.studio.edit_list import kept, key_of, summary
 from materialist.types import Array, Body, Scene
 
 
@@ -39,8 +45,10 @@ _LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 class LivePreview:
     """A fitted scene, its preview (seconds to build, unless `file` has its tables), and the last edited scenes."""
 
-    def __init__(self, scene: Scene, file: Path | None = None):
+    def __init__(self, scene: Scene, file: Path | None = None, package: Path | None = None):
+        """package: where the scene lies; things then fall in a process of their own."""
         self.scene = scene
+        self._package = package
         self._kept: dict[str, Any] = {}
         """What steps make: scenes, and what a sketch needs of glass."""
         self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
@@ -73,15 +81,39 @@ class LivePreview:
     def _after(self, steps: tuple[Step, ...]) -> Scene:
         """The scene after the steps; the last scenes are kept, so moving the last step replays none before it."""
 
-        def make() -> Scene:
-            before, step = self._after(steps[:-1]), steps[-1]
-            try:
-                return apply(self.scene, [step], onto=before)
-            except InputError as error:
-                reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
-                raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+        counts = range(len(steps), 0, -1)
+        known = next((n for n in counts if key_of(steps[:n]) in self._kept), 1)
+        scene = self.scene
+        for n in range(known, len(steps) + 1):
+            make = partial(self._applied, scene, steps[:n])
+            scene = kept(self._kept, steps[:n], make, SETTINGS.scenes_kept)
+        while len(self._kept) > 1 and _bytes_of_bodies(self._kept.values()) > SETTINGS.kept_bytes:
+            del self._kept[next(iter(self._kept))]
+        return scene
 
-        return kept(self._kept, steps, make, SETTINGS.scenes_kept) if steps else self.scene
+    def _applied(self, before: Scene, steps: tuple[Step, ...]) -> Scene:
+        """The scene `before` with the last of the steps. Raises InputError with the step's summary."""
+        step = steps[-1]
+        try:
+            if step.kind == "drop" and not step.skipped and self._package is not None:
+                return self._fallen(before, steps)
+            return apply(self.scene, [step], onto=before)
+        except InputError as error:
+            reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
+            raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+
+    def _fallen(self, before: Scene, steps: tuple[Step, ...]) -> Scene:
+        """The scene `before` after the fall that the last step is; what falls, and for how long, is a stranger's."""
+        limits = Limits(SETTINGS.opening_memory, SETTINGS.fall_seconds)
+        place = str(self._package)
+        added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
+        edits = [*before.provenance.get("edits", []), *added["edits"]]
+        after = replace(
+            before,
+            bodies=(*before.bodies, *added["bodies"]),
+            provenance={**before.provenance, "edits": edits},
+        )
+        return warned(after, *added["warnings"])
 
     def _glass(self, step: Step) -> tuple[Array, Colour]:
         """Region [H, W] bool and tint of a glass step; builds nothing. Raises InputError where it cannot be."""
@@ -131,14 +163,22 @@ def _build(scene: Scene, file: Path | None) -> Any:
     return Preview(scene, file)
 
 
-def free_memory() -> Future[None]:
-    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
-    if "torch" not in sys.modules:  # no scene was open
-        done = Future[None]()
-        done.set_result(None)
-        return done
+class _Freeing:
+    """Gives memory back on the thread of the previews: once for all who ask before it has begun."""
 
-    def free() -> None:
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: Future[None] | None = None
+
+    def submit(self) -> Future[None]:
+        with self._lock:
+            if self._waiting is None:
+                self._waiting = _THREAD.submit(self._free)
+            return self._waiting
+
+    def _free(self) -> None:
+        with self._lock:
+            self._waiting = None
         gc.collect()
         if "drjit" in sys.modules:
             sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
@@ -146,7 +186,26 @@ def free_memory() -> Future[None]:
         with suppress(OSError, AttributeError):  # glibc has it
             ctypes.CDLL(None).malloc_trim(0)
 
-    return _THREAD.submit(free)
+
+_FREEING = _Freeing()
+
+
+def free_memory() -> Future[None]:
+    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
+    if "torch" not in sys.modules:  # no scene was open
+        done = Future[None]()
+        done.set_result(None)
+        return done
+    return _FREEING.submit()
+
+
+def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:
+    """Bytes of the meshes of the bodies in edited scenes, each counted once; other values hold none."""
+    scenes = [value for value in kept_values if isinstance(value, Scene)]
+    bodies = {id(body): body for scene in scenes for body in scene.bodies}
+    return sum(
+        array.nbytes for body in bodies.values() for array in vars(body).values() if isinstance(array, np.ndarray)
+    )
 
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:
@@ -176,7 +235,7 @@ def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
     """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
     colour = np.zeros((*scene.depth.shape, 3), np.float32)
     depth = np.zeros(scene.depth.shape, np.float32)
-    stride = -(-len(body.faces) // SETTINGS.triangles)
+    stride = -(-len(body.faces) * len(scene.bodies) // SETTINGS.triangles)
     corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
     pixels, away = project(corners, scene.camera)
     middle = away.mean(1)

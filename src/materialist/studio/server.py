@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.errors import InputError, SetupError
+from materialist.install import extra_command
 from materialist.io.photo import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
 from materialist.studio import SETTINGS, asset, uploads
@@ -87,33 +87,17 @@ def serve(
     on_ready: Callable[[str], None],
 ) -> None:  # fmt: skip
     """Show the studio until Ctrl-C. `on_ready` gets the address once the page answers."""
-    studio.work.sweep()
-    # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
-    os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache))
-    try:
-        import gradio as gr
-    except ImportError as error:
-        raise SetupError(
-            f"The studio needs one more package: {sys.executable} -m pip install 'gradio==6.31.*'"
-        ) from error
+    gate = application(studio, host=host, port=port, password=password, proxy=proxy)
     import uvicorn
-    from fastapi import FastAPI
 
-    from materialist.studio.gate import Gate
-    from materialist.studio.page import build
-
-    page = build(studio)
-    studio.work.kept = {*studio.work.cache.iterdir()}
-    _fetch_nothing()
-    page.queue(default_concurrency_limit=8, max_size=200)
-    app = gr.mount_gradio_app(
-        FastAPI(openapi_url=None), page, "/", footer_links=[], show_error=True, allowed_paths=[], ssr_mode=False,
-        max_file_size=f"{SETTINGS.upload_megabytes}mb", theme=_theme(gr), css=asset("style.css"), js=asset("page.js"),
-        enable_monitoring=False, pwa=False, mcp_server=False, run_history=False,
-    )  # fmt: skip
-    gate = Gate(app, studio, host=host if studio.single_user else None, proxy=proxy, password=password, port=port)
     config = uvicorn.Config(
-        gate, host, port, log_level="warning", proxy_headers=False, server_header=False, timeout_graceful_shutdown=1
+        gate,
+        host,
+        port,
+        log_level="warning",
+        proxy_headers=False,
+        server_header=False,
+        timeout_graceful_shutdown=1,
     )
     server = uvicorn.Server(config)
     # A thread of its own: signals are for the command.
@@ -135,6 +119,40 @@ def serve(
         shutil.rmtree(studio.work.cache, ignore_errors=True)
 
 
+def application(
+    studio: Studio,
+    *,
+    host: str,
+    port: int,
+    password: str | None = None,
+    proxy: str | None = None,
+) -> Any:
+    """The page behind its gate, an ASGI application. Raises SetupError where Gradio is not installed."""
+    studio.work.sweep()
+    # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
+    os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache))
+    try:
+        import gradio as gr
+    except ImportError as error:
+        raise SetupError(f"The studio needs one more package: {extra_command('studio')}") from error
+    from fastapi import FastAPI
+
+    from materialist.studio.access.gate import Gate
+    from materialist.studio.page import build
+
+    page = build(studio)
+    studio.work.kept |= {*studio.work.cache.iterdir()}
+    _fetch_nothing()
+    page.queue(default_concurrency_limit=8, max_size=200)
+    app = gr.mount_gradio_app(
+        FastAPI(openapi_url=None), page, "/", footer_links=[], show_error=True, allowed_paths=[], ssr_mode=False,
+        max_file_size=f"{SETTINGS.upload_megabytes}mb", theme=_theme(gr), css=asset("style.css"), js=asset("page.js"),
+        enable_monitoring=False, pwa=False, mcp_server=False, run_history=False,
+    )  # fmt: skip
+    single = host if studio.single_user else None
+    return Gate(app, studio, host=single, proxy=proxy, password=password, port=port)
+
+
 def _fetch_nothing() -> None:
     """Let Gradio open no address that a request names in place of a file."""
     from gradio import processing_utils as fetching
@@ -147,7 +165,13 @@ def _fetch_nothing() -> None:
 
 def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
     """A studio on a work folder. Raises OutputError where it cannot be written."""
-    return Studio(WorkFolder(work), JobQueue(workers), single_user, seed=seed, device=device)
+    return Studio(
+        WorkFolder(work),
+        JobQueue(workers, SETTINGS.job_memory, SETTINGS.job_seconds),
+        single_user,
+        seed=seed,
+        device=device,
+    )
 
 
 def _theme(gr: Any) -> Any:

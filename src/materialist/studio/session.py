@@ -11,13 +11,14 @@ import materialist as mt
 from materialist.edits.recipe import REGION, Step, region_of, write_recipe
 from materialist.errors import InputError
 from materialist.jobs.queue import Job, JobQueue
-from materialist.studio import SETTINGS
-from materialist.studio.archives import unpack
+from materialist.studio import SETTINGS, uploads
+from materialist.studio.access.quota import Allowance
+from materialist.studio.archives import read_list, unpack
 from materialist.studio.edit_list import EditList, with_options
 from materialist.studio.glass import GlassClient
 from materialist.studio.preview import LivePreview
 from materialist.studio.selection import ADD, REMOVE, Selection
-from materialist.studio.workspace import Project, read_steps, write_mask
+from materialist.studio.workspace import Project, located, read_steps, write_mask
 from materialist.types import Scene
 
 EDITS = "edits.yaml"
@@ -44,9 +45,16 @@ class FinalPicture:
 class Session:
     """The state of one page. Its methods may be called from any thread."""
 
-    def __init__(self, person: str, without_folders: Callable[[str], str] = str, local: bool = True):
+    def __init__(
+        self,
+        person: str,
+        without_folders: Callable[[str], str] = str,
+        local: bool = True,
+        allowance: Allowance | None = None,
+    ):
         self.person, self.without_folders, self.local = person, without_folders, local
         """`without_folders` is the studio's; `local`: the person has the command line of this machine, too."""
+        self.allowance = allowance or Allowance()
         self.lock = threading.RLock()
         self.project: Project | None = None
         self.live: LivePreview | None = None
@@ -120,7 +128,7 @@ class Session:
         with self.lock:
             self.close()
             self.project, self.glass = project, GlassClient(project.scene)
-            self.live = LivePreview(loaded, project.folder / "preview.npz")
+            self.live = LivePreview(loaded, project.folder / "preview.npz", project.scene)
             self.edits, self._kept = EditList(steps), kept
 
     def close(self) -> None:
@@ -241,14 +249,21 @@ class Session:
         """
         with self.lock:
             _ = self.scene
-            read = unpack if file.suffix.lower() == ".zip" else read_steps
-            self.change("load", EditList(read(self.workspace, file)))
+            if file.suffix.lower() == ".zip":
+                steps = unpack(self.workspace, file, self.allowance)
+            else:
+                steps = located(self.workspace, uploads.opened(read_list, file, self.allowance))
+            self.change("load", EditList(steps))
 
     # Within
 
     def change(self, what: str, after: EditList, *, moving: bool = False) -> None:
         """Set another list of edits, with a way back. Raises InputError, and changes nothing, where it is not valid."""
         assert self.live is not None
+        if len(after.steps) > SETTINGS.edits:
+            raise InputError(
+                f"That would be {len(after.steps)} edits; a photo takes up to {SETTINGS.edits}. Take some away first."
+            )
         self.live.edited(after.active)
         self.remember(what, moving=moving)
         self.edits = after

@@ -134,11 +134,11 @@ def report(scene: Scene) -> str:
     lines = [told] if np.isfinite(value) else []
     camera = scene.camera
     source = {"exif": "from the photo's EXIF data", "default": "assumed", "option": "as chosen"}.get(
-        scene.photo.fov_source, f"from the {scene.photo.fov_source}"
+        scene.photo.fov_source, f"from the {_safe(scene.photo.fov_source)}"
     )
     lines.append(
         f"Worked at {camera.width} × {camera.height} pixels; field of view {camera.fov:.1f}° ({source}); first guess "
-        f"by `{scene.prior.predictor}`."
+        f"by `{_safe(scene.prior.predictor).replace('`', '')}`."
     )
     notes = scene.warnings
     lines += ["", "**What to beware of**", *(f"- {_safe(note)}" for note in notes)] if notes else []

@@ -1,10 +1,14 @@
 """The running studio: its work folder, its queue of jobs, and the pages that are open."""
 
+import json
 import re
 import secrets
 import shutil
 import threading
 import time
+import traceback
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -16,16 +20,19 @@ from materialist.errors import InputError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
+from materialist.studio.access.files import HandedFiles
+from materialist.studio.access.quota import Allowance, Quota, sender_of
 from materialist.studio.preview import free_memory
 from materialist.studio.session import ENDING, Session
-from materialist.studio.workspace import Project, WorkFolder
+from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
 
 LOCAL_PERSON = "me"
 """The person, where the studio serves this machine only."""
 PERSON = "materialist_person"
 """The cookie that tells whose photos a browser may see."""
+PERSON_HEADER = "x-materialist-person"
+"""The header in which the gate tells the page whose request it is; what a browser sends of that name is dropped."""
 _FOLDERS = re.compile(r"(?<![\w/:.<])/(?:[^/\s<>'\"]+/)*(?=[^/\s<>])")
-LOST = "The page has lost its session; reload it."
 
 
 @dataclass
@@ -42,18 +49,22 @@ class Studio:
     device: str = "auto"
     last: dict[str, str] = field(default_factory=dict)
     """Person -> the project last opened or begun; a page that is loaded again goes on with it."""
+    files: HandedFiles = field(default_factory=HandedFiles)
+    """What requests may name: uploads, and results that were handed over."""
+    senders: dict[str, str] = field(default_factory=dict)
+    """Person -> the address of their last request."""
     _sessions: dict[str, Session] = field(default_factory=dict)
-    _uploads: list[tuple[float, str, int]] = field(default_factory=list)
-    """When, by whom, and how many bytes, within the last hour."""
+    _left: list[Session] = field(default_factory=list)
+    """Sessions of closed pages, whose memory is not given back yet."""
+    _closer: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer"))
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
+    def __post_init__(self) -> None:
+        self.quota = Quota(self.work.cache, self.work.root)
+
     def person(self, token: Any) -> str:
-        """The person of a page, from the cookie that its browser keeps. Raises InputError for an invalid one."""
-        if self.single_user:
-            return LOCAL_PERSON
-        if not isinstance(token, str) or not re.fullmatch(r"[a-f0-9]{32}", token):
-            raise InputError(LOST)
-        return token
+        """The name of a page's person, from the cookie that their browser keeps. Raises InputError for none of ours."""
+        return LOCAL_PERSON if self.single_user else person_of(token)
 
     def session(self, page: str | None, person: str, *, beats: bool = False) -> Session:
         """The session of a page, by Gradio's session hash; `beats` where the page holds a request until it is closed.
@@ -64,11 +75,7 @@ class Studio:
         with self._lock:
             last = now - SETTINGS.page_seconds
             gone = [name for name, one in self._sessions.items() if not one.beats and one.seen < last and name != page]
-            known = (
-                self._sessions.setdefault(page, Session(person, self.without_folders, self.single_user))
-                if page
-                else None
-            )
+            known = self._sessions.setdefault(page, self._new_session(person)) if page else None
             if known is not None and known.person == person:
                 known.seen, known.beats = now, known.beats or beats
         for name in gone:
@@ -77,25 +84,31 @@ class Studio:
             raise InputError(LOST)
         return known
 
+    def _new_session(self, person: str) -> Session:
+        allowance = Allowance(self.quota, lambda: self.senders.get(person, person))
+        return Session(person, self.without_folders, self.single_user, allowance)
+
     def without_folders(self, text: str) -> str:
         """A text for a page: names in place of the paths of this machine."""
         for root in (self.work.root, self.work.cache):
             text = text.replace(f"{root}/", "/")
         return _FOLDERS.sub("", text)
 
-    def note_upload(self, person: str, size: str) -> None:
-        """Count an upload by its Content-Length. Raises InputError above the quota, and where the disk is full."""
-        if not size.isdigit():
-            raise InputError("An upload must say how long it is.")
-        now = time.monotonic()
+    def note_sender(self, person: str, address: str) -> None:
+        """Remember where a person's requests come from; those seen longest ago are forgotten."""
         with self._lock:
-            self._uploads = [one for one in self._uploads if now - one[0] < 3600]
-            if sum(bytes_ for _, who, bytes_ in self._uploads if who == person) + int(size) > SETTINGS.upload_quota:
-                raise InputError(f"You have uploaded {SETTINGS.upload_quota / 1e9:g} GB within an hour; go on later.")
-            free = min(shutil.disk_usage(place).free for place in (self.work.cache, self.work.root))
-            if free - int(size) < SETTINGS.disk_left:
-                raise InputError("The disk of the studio is full; it takes no more uploads.")
-            self._uploads.append((now, person, int(size)))
+            self.senders.pop(person, None)
+            self.senders[person] = sender_of(address)
+            while len(self.senders) > SETTINGS.people:
+                del self.senders[next(iter(self.senders))]
+
+    def claim(self, person: str, size: int) -> None:
+        """Count bytes that a person is about to store. Raises InputError above the quota, or where the disk is full."""
+        self.quota.claim(self.senders.get(person, person), size)
+
+    def give_back(self, person: str, size: int) -> None:
+        """Take back a part of what was claimed, and not stored."""
+        self.quota.give_back(self.senders.get(person, person), size)
 
     def projects(self, person: str) -> list[Project]:
         """The projects that a person may open: all on one's own machine, else one's own and `start`."""
@@ -113,9 +126,11 @@ class Studio:
     def open(self, session: Session, name: str) -> None:
         """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
         project = self.project(name, session.person)
+        had_scene = session.live is not None
         session.close()
-        free_memory().result()
-        if psutil.virtual_memory().available < SETTINGS.free_for_scene:
+        if had_scene:
+            free_memory().result()
+        if psutil.virtual_memory().available < _memory_of(project):
             raise InputError("This machine has no memory left for another scene; close one in another tab.")
         session.open(project)
         self.note_last(session.person, name)
@@ -130,31 +145,65 @@ class Studio:
 
         Raises InputError where this person, or all together, have too many there.
         """
-        mine, all_ = len(self.jobs.unfinished(session.person)), len(self.jobs.unfinished())
+        unfinished = self.jobs.unfinished()
+        sender = self.senders.get(session.person, session.person)
+        mine = sum(self.senders.get(job.owner, job.owner) == sender for job in unfinished)
+        all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
             whose = f"You have {mine}" if mine >= SETTINGS.jobs_a_person else f"The studio has {all_}"
             raise InputError(f"{whose} jobs waiting or running; stop one, or wait until one is done.")
+        self.quota.check_disk()
         work = partial(tasks.on_device, self.device, task)
         job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
         session.note_job(job)
         return job
 
     def leave(self, page: str | None) -> None:
-        """Forget a page that was closed, its memory, and its renderings; its work and its inversions go on."""
+        """Forget a page that was closed, and its renderings; its work and its inversions go on.
+
+        Its memory is given back later, in another thread, together with that of other pages.
+        """
         with self._lock:
             session = self._sessions.pop(page or "", None)
+            if session is not None:
+                self._left.append(session)
+                first = len(self._left) == 1
         if session is not None:
             session.stop(self.jobs, *ENDING)
-            session.close()
-            del session
-            free_memory()
+            if first:
+                self._closer.submit(self.close_left)
 
-    def public_copy(self, file: Path, name: str = "") -> str:
-        """A copy of a result in the cache, the only place of served files, in a folder with a random name.
+    def close_left(self) -> None:
+        """Close the sessions of the pages that were closed, and give their memory back, once for all of them."""
+        with self._lock:
+            sessions, self._left = self._left, []
+        had_scene = any(session.live is not None for session in sessions)
+        for session in sessions:
+            try:
+                session.close()
+            except Exception as error:  # the others are closed all the same
+                traceback.print_exception(error)
+        sessions.clear()
+        if had_scene:
+            free_memory().result()
 
-        `name` is another name for the file.
+    def public_copy(self, person: str, file: Path, name: str = "") -> str:
+        """A copy of a result for a person, in the cache, the only place of served files; its path.
+
+        It lies in a folder with a random name, and this person may name it in requests. `name` is another name for
+        the file.
         """
+        self.claim(person, file.stat().st_size)
         folder = self.work.cache / secrets.token_hex(16)
         with writing(file.name):
             folder.mkdir()
-            return str(shutil.copyfile(file, folder / (name or file.name)))
+            copy = Path(shutil.copyfile(file, folder / (name or file.name)))
+        return self.files.hand_out(person, copy, str(copy))
+
+
+def _memory_of(project: Project) -> float:
+    """Bytes of memory that opening a project takes, by the size of its scene."""
+    with suppress(OSError, ValueError, KeyError, TypeError):
+        width, height = json.loads((project.scene / "scene.json").read_text("utf-8"))["size"]
+        return SETTINGS.free_for_scene + SETTINGS.free_a_pixel * int(width) * int(height)
+    return SETTINGS.free_for_scene

@@ -72,7 +72,10 @@ def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: fl
 
 
 def _uploaded(session: Session, file: Path) -> None:
-    uploads.used(session.workspace, file, "envmap", lambda name: session.light(envmap=name, gain="auto"))
+    def use(name: str) -> None:
+        session.light(envmap=name, gain="auto")
+
+    uploads.used(session.workspace, file, "envmap", session.allowance, use)
 
 
 def place_lamp(

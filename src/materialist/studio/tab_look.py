@@ -38,7 +38,7 @@ def wire(context: PageContext) -> None:
     def show_mesh(session: Session) -> Iterator[Updates]:
         file = session.workspace / MESH
         if (yield from context.work(session, tasks.mesh, file)):
-            yield {"mesh": studio.public_copy(file)}
+            yield {"mesh": studio.public_copy(session.person, file)}
             yield {}  # Gradio sends the last updates twice, and of a value sent twice the viewer loads nothing
 
     context.long(parts["look"].select, look)

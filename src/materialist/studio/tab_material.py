@@ -51,4 +51,7 @@ def _coloured(session: Session, value: str) -> None:
 
 
 def _textured(session: Session, file: Path) -> None:
-    uploads.used(session.workspace, file, "texture", lambda name: session.set("edit", albedo=None, texture=name))
+    def use(name: str) -> None:
+        session.set("edit", albedo=None, texture=name)
+
+    uploads.used(session.workspace, file, "texture", session.allowance, use)

@@ -7,7 +7,6 @@ from typing import Any
 
 import gradio as gr
 
-from materialist.edits.insert.meshes import read_model
 from materialist.studio import objects, uploads
 from materialist.studio.controls import file_field, hex_colour, slider
 from materialist.studio.session import Session
@@ -72,10 +71,9 @@ def _choose(session: Session, name: str | None) -> Updates:
 
 def _uploaded(session: Session, file: Path) -> Updates:
     def use(name: str) -> None:
-        read_model(session.workspace / name)
         objects.set_option(session, "mesh", name)
 
-    uploads.used(session.workspace, file, "mesh", use)
+    uploads.used(session.workspace, file, uploads.MESH, session.allowance, use)
     return {"tool": "place", "thing": None}
 
 

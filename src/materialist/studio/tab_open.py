@@ -10,12 +10,11 @@ import cv2
 import gradio as gr
 import numpy as np
 
-import materialist as mt
 from materialist.errors import InputError
 from materialist.io.decode import SUFFIXES
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
-from materialist.studio import SETTINGS, archives, tasks, uploads
+from materialist.studio import archives, tasks, uploads
 from materialist.studio.controls import file_field
 from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
@@ -62,14 +61,14 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield {"facts": box(f"{name} will be opened as a scene.")}
             return
         if file is not None:
-            uploads.checked_picture(Path(file))
+            uploads.opened(uploads.checked, Path(file), session.allowance, option=uploads.PHOTO)
         yield {"facts": box(f"{name} is ready.") if file else ""}
 
     def choose_example(session: Session, data: Any) -> Iterator[Updates]:
         name = [*EXAMPLES][int(data["index"])]
         gr.Info(EXAMPLES[name][1], title="Example photo")
         file = example_path(name)
-        yield {"file": studio.public_copy(file, f"{name}{file.suffix}")}
+        yield {"file": studio.public_copy(session.person, file, f"{name}{file.suffix}")}
 
     def start(session: Session, file: str | None, predictor: str, size: int, fov: str) -> Iterator[Updates]:
         if file is not None and Path(file).suffix.lower() == ".zip":
@@ -86,7 +85,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         if last is not None:
             yield from _resume(context, session, last)
         elif isinstance(studio.start, Path):
-            yield {"file": studio.public_copy(studio.start)}
+            yield {"file": studio.public_copy(session.person, studio.start)}
 
     sent = context.long(parts["file"].change, uploaded, "file")
     sent.failure(lambda: None, None, parts["file"], **LONG)  # what was refused is not there
@@ -114,7 +113,8 @@ def _start_inversion(
     if predictor not in {value for _, value in PREDICTORS}:
         raise InputError("Choose one of the listed ways to make the first guess.")
     source = Path(file)
-    suffix = uploads.checked_picture(source)
+    uploads.opened(uploads.checked, source, session.allowance, option=uploads.PHOTO)
+    suffix = source.suffix.lower()
     project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
     try:
@@ -132,8 +132,7 @@ def _start_inversion(
 def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     project = context.studio.work.new(file.stem, session.person)
     try:
-        archives.unpack_scene(file, project.scene)
-        mt.load_scene(project.scene, most=SETTINGS.decoded_bytes)
+        archives.unpack_scene(file, project.scene, session.allowance)
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise
@@ -153,7 +152,7 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
             if not shown:
                 update["stage"] = waiting_photo(photo)
             shown = len(job.found)
-            pictures = [(studio.public_copy(file), name) for name, file in latest.items()]
+            pictures = [(studio.public_copy(session.person, file), name) for name, file in latest.items()]
             update["found"] = gr.update(value=pictures, visible=bool(pictures))
         yield update
     failed = job.state != "done"

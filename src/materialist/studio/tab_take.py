@@ -62,7 +62,7 @@ def wire(context: PageContext) -> None:
             return
         name = f"{session.opened.stem}-{'edited' if what in ('png', 'exr') else what}{file.suffix}"
         label = f"Download {name} ({file.stat().st_size / 1e6:.1f} MB)"
-        made = gr.update(value=context.studio.public_copy(file, name), label=label, visible=True)
+        made = gr.update(value=context.studio.public_copy(session.person, file, name), label=label, visible=True)
         yield {"download": made, "progress": box("The file is ready."), "stage": stage(session)}
 
     context.long(context.parts["make"].click, make, "what")

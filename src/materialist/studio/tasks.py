@@ -82,6 +82,25 @@ def before_of(output: Path) -> Path:
     return output.with_name(f"{output.name}-before.jpg")
 
 
+def fallen(report: Reporter, scene: str, steps: Steps) -> dict[str, Any]:
+    """What a fall, the last of the steps, adds to a scene: `bodies`, `warnings`, and `edits` of its provenance.
+
+    Steps before it that move no surface are left out: they change nothing of the fall.
+    """
+    from materialist.edits.core.notes import warnings_since
+    from materialist.edits.recipe import apply
+
+    loaded = mt.load_scene(scene)
+    earlier = [step for step in steps[:-1] if step.kind in ("insert", "drop", "remove")]
+    before = apply(loaded, earlier)
+    after = apply(loaded, [steps[-1]], onto=before)
+    return {
+        "bodies": after.bodies[len(before.bodies) :],
+        "warnings": warnings_since(before, after),
+        "edits": after.provenance["edits"][len(before.provenance.get("edits", ())) :],
+    }
+
+
 def mesh(report: Reporter, scene: str, output: str) -> None:
     """A light GLB of the depth surface for the viewer, without the planes that continue it."""
     from materialist.exporters.glb import glb_bytes

@@ -13,6 +13,7 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.edits.core.notes import noise_notes
 from materialist.errors import MaterialistError
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
@@ -21,7 +22,7 @@ from materialist.studio.controls import CONTROLS, control_values, set_option
 from materialist.studio.edit_list import summary
 from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
-from materialist.studio.studio import PERSON, Studio
+from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
 LIVE: dict[str, Any] = {
     "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
@@ -105,7 +106,9 @@ class PageContext:
         sent.failure(lambda: None, None, part, **LIVE)
 
     def session(self, request: Any) -> Session:
-        return self.studio.session(request.session_hash, self.studio.person(dict(request.cookies).get(PERSON)))
+        """The session of a request, whose person the gate has told."""
+        person = LOCAL_PERSON if self.studio.single_user else request.headers.get(PERSON_HEADER, "")
+        return self.studio.session(request.session_hash, person)
 
     def message(self, error: Exception) -> Exception:
         """An exception as Gradio shows it; what was not foreseen goes to the terminal."""
@@ -148,7 +151,9 @@ class PageContext:
         if job.state == FAILED:
             return box(self.studio.without_folders(failure(job)), bad=True)
         if job.over:
-            return box(f"Done in {job.seconds:.0f} s.")
+            pictures = job.kind in ("final", "take")
+            notes = noise_notes() if pictures else []
+            return box(" ".join([f"Done in {job.seconds:.0f} s.", *notes]))
         part = min(1.0, job.done / job.total) if job.total else 0.0
         return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 

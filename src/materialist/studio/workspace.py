@@ -3,6 +3,7 @@
 It survives reloads, restarts and closed browsers.
 """
 
+import fcntl
 import hashlib
 import json
 import os
@@ -12,8 +13,8 @@ import tempfile
 import threading
 import time
 import weakref
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -31,7 +32,13 @@ from materialist.types import Array
 CARD = "project.json"
 """The file that makes a folder a project: title, owner, where the scene is."""
 SCENE = "photo.scene"
+LOST = "The page has lost its session; reload it."
 _NAME = re.compile(r"photo-\d{3,6}")
+_CACHE = "materialist-cache-"
+_CACHE_MARK = "cache-of-a-studio"
+"""A file in each cache: what lacks it is somebody's own."""
+_COOKIE = re.compile(r"[a-f0-9]{32}")
+"""The cookie of a person: a secret."""
 _PERSON = re.compile(r"[a-z0-9]{2,32}")
 
 
@@ -68,17 +75,55 @@ class Project:
         return folder
 
 
+def person_of(cookie: str) -> str:
+    """The name of the person with a cookie, as it is in folders and commands; nobody finds the cookie from it.
+
+    Raises InputError for a cookie that is not one of ours.
+    """
+    if not isinstance(cookie, str) or not _COOKIE.fullmatch(cookie):
+        raise InputError(LOST)
+    return "p" + hashlib.sha256(f"person {cookie}".encode()).hexdigest()[:31]
+
+
 class WorkFolder:
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         self._lock = threading.Lock()
+        self.kept: set[Path] = set()  # what stays in the cache: pictures of the page itself
         with writing(root):
             make_folder(self.root)
             tempfile.TemporaryFile(dir=self.root).close()
-        self.cache = Path(tempfile.mkdtemp(prefix="materialist-studio-"))
-        """Uploads and results that are handed over; they go with this object."""
-        self.kept: set[Path] = set()  # what stays there: pictures of the page itself
-        self._end = weakref.finalize(self, shutil.rmtree, self.cache, ignore_errors=True)
+        self.hide_cookies()
+        with _alone_in(self.root):
+            self._sweep_caches()
+            self.cache = Path(tempfile.mkdtemp(prefix=_CACHE, dir=self.root))
+            """Uploads and results that are handed over; they go with this object."""
+            (self.cache / _CACHE_MARK).touch()
+            lock = _hold(self.cache)
+        self.kept.add(self.cache / _CACHE_MARK)
+        self._end = weakref.finalize(self, _remove, self.cache, lock)
+
+    def _sweep_caches(self) -> None:
+        """Remove the caches of studios that were killed: whoever works holds a lock on theirs."""
+        for cache in self.root.glob(f"{_CACHE}*"):
+            if not (cache / _CACHE_MARK).is_file():
+                continue  # not ours
+            lock = _hold(cache)
+            if lock is not None:
+                _remove(cache, lock)
+
+    def hide_cookies(self) -> None:
+        """Rename folders and owners that are called after a person's cookie, as earlier versions did."""
+        for project in self.projects():
+            for edits in project.folder.glob("edits-*"):
+                cookie = edits.name.removeprefix("edits-")
+                if _COOKIE.fullmatch(cookie):
+                    target = edits.with_name(f"edits-{person_of(cookie)}")
+                    edits.rename(_free_name(target))
+            if _COOKIE.fullmatch(project.owner):
+                card = json.loads((project.folder / CARD).read_text("utf-8"))
+                card["owner"] = person_of(project.owner)
+                write_whole(project.folder / CARD, json.dumps(card, indent=1))
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
@@ -116,6 +161,46 @@ class WorkFolder:
                 shutil.rmtree(project.folder, ignore_errors=True)
 
 
+def _free_name(folder: Path) -> Path:
+    """The folder itself where there is none yet, else one beside it that no person has: `former-1-NAME`."""
+    if not folder.exists():
+        return folder
+    places = (folder.with_name(f"former-{number}-{folder.name}") for number in count(1))
+    return next(place for place in places if not place.exists())
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Within it no other process is within it for the same folder, where the file system has locks."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _hold(cache: Path) -> int | None:
+    """A lock on a cache, which ends with this process, however it ends; None where another process has it."""
+    with suppress(OSError):
+        descriptor = os.open(cache, os.O_RDONLY)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            os.close(descriptor)
+            return None
+        return descriptor
+    return None
+
+
+def _remove(cache: Path, lock: int | None) -> None:
+    """Remove a cache, and give up the lock on it."""
+    shutil.rmtree(cache, ignore_errors=True)
+    if lock is not None:
+        os.close(lock)
+
+
 def _read(folder: Path) -> Project | None:
     """The project in a folder, or None where its card is missing or damaged."""
     try:
@@ -146,13 +231,18 @@ def store(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
 
 def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:
     """The steps of a list of edits. Raises InputError where one names a file that is not in this workspace."""
+    return located(workspace, read_recipe(file))
+
+
+def located(workspace: Path, steps: Iterable[Step]) -> tuple[Step, ...]:
+    """The steps with their files in a workspace. Raises InputError for a file that is not there."""
 
     def here(option: str, name: str) -> str:
         if not (workspace / name).is_file():
             raise InputError(f"The {option} {name} of the list of edits is not here; load the zip that has its files.")
         return name
 
-    return tuple(replace(with_plain_files(step, here), folder=workspace) for step in read_recipe(file))
+    return tuple(replace(with_plain_files(step, here), folder=workspace) for step in steps)
 
 
 def with_plain_files(step: Step, use: Callable[[str, str], Any]) -> Step:

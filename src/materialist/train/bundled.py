@@ -20,7 +20,7 @@ RECIPE = Recipe(
     side=256, batch=8, rate=1e-3, warm_up=300, last_rate=0.02, ema=0.999, bfloat16=True,
     growth=((0.3, 128), (0.75, 192)),
 )  # fmt: skip
-ARCHITECTURE = BundledArchitecture(encoder="lite2", light=16)
+ARCHITECTURE = BundledArchitecture(encoder="lite2", light=16, spread=True)
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,13 @@ class BundledLoss:
     mask: float = 0.2  # cross-entropy of where there is a surface
     light: float = 0.3  # negative log likelihood of the log radiance around the scene
     irradiance: float = 0.3  # relative error of its spherical harmonics
+    spread: float = 0.1  # negative log likelihood of the errors; it moves its own head alone
 
 
 class BundledTask(MapsTask):
     """The network that ships in the package."""
 
+    new_parts = ("spread.",)
     notes: tuple[str, ...] = (
         "Albedo is compared by L1, L2, gradients at four scales, and after one factor a picture; there is no LPIPS: "
         "its backbone is not part of this project.",
@@ -85,9 +87,13 @@ class BundledTask(MapsTask):
         roughness, metallic = batch["roughness"], batch["metallic"]
         level = (out["depth"] - depth).abs().clamp(max=2)
         terms = {}
+        if "spread" in out:
+            true = {**batch, "albedo": albedo, "depth": depth}
+            errors = losses.map_errors(out, true, mask)
+            terms["spread"] = w.spread * losses.laplace(errors, out["spread"], mask)
         if "light" in out:
             likelihood, irradiance = losses.light(out["light"], batch["light"])
-            terms = {"light": w.light * likelihood, "irradiance": w.irradiance * irradiance}
+            terms |= {"light": w.light * likelihood, "irradiance": w.irradiance * irradiance}
         return terms | {
             "albedo": w.albedo_l1 * losses.l1(out["albedo"], albedo, mask)
             + w.albedo_l2 * losses.l2(out["albedo"], albedo, mask),

@@ -54,6 +54,29 @@ def centred_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     return mean((difference - centre.view(-1, 1, 1, 1)).abs().clamp(max=2), mask)
 
 
+def laplace(error: Tensor, log_scale: Tensor, mask: Tensor) -> Tensor:
+    """Negative log likelihood of absolute errors under Laplace distributions, less a constant.
+
+    It is least where the scale is the mean of the error. error, log_scale: [B, C, H, W].
+    """
+    return mean(error * (-log_scale).exp() + log_scale, mask)
+
+
+def map_errors(found: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
+    """[B, 5, H, W] absolute errors of maps, as `Prediction.spread` counts them; without gradients.
+
+    albedo is sRGB-encoded, depth the natural logarithm of relative depth, each up to a constant of the picture.
+    """
+    with torch.no_grad():
+        cosine = F.cosine_similarity(found["normal"], true["normal"], dim=1).unsqueeze(1)
+        difference = found["depth"] - true["depth"]
+        centre = (difference * mask).flatten(1).sum(1) / mask.flatten(1).sum(1).clamp(min=1)
+        depth = (difference - centre.view(-1, 1, 1, 1)).abs().clamp(max=2)
+        albedo = (found["albedo"] - true["albedo"]).abs().mean(1, keepdim=True)
+        flat = [(found[name] - true[name]).abs() for name in ("roughness", "metallic")]
+        return torch.cat([albedo, *flat, cosine.clamp(-1, 1).acos(), depth], 1)
+
+
 def scaled_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     """L1 of linear albedos after one factor a picture (least squares; itself not a path of the gradient)."""
     with torch.no_grad():

@@ -12,6 +12,7 @@ import torch
 from torch.utils.data import DataLoader, default_collate
 
 from materialist.errors import InputError
+from materialist.io.samples import end_with_parent
 from materialist.train.task import Batch, Task
 from materialist.types import Array
 
@@ -81,6 +82,7 @@ def _readable(task: Task, index: int, side: int, rng: np.random.Generator) -> di
 
 def _init_worker(_: int) -> None:
     """One thread a worker: the training has the others. The trainer acts on signals to the group, workers follow."""
+    end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: signal.alarm(GRACE))
     torch.set_num_threads(1)

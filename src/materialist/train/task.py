@@ -70,6 +70,8 @@ class Task(ABC):
     """What checkpoints call its runs: the name of the command."""
     notes: tuple[str, ...] = ()
     """What the log must say at the start."""
+    new_parts: ClassVar[tuple[str, ...]] = ()
+    """Prefixes of the tensors that weights of earlier versions lack."""
 
     def __init__(self, recipe: Recipe, init: Path | None = None):
         """`init`: weights to begin from."""
@@ -106,10 +108,16 @@ class Task(ABC):
         """Figures of a network in evaluation mode on examples that are kept aside; may draw pictures into FOLDER."""
 
     def network(self) -> StoredNetwork:
-        """A network to begin from. Raises WeightsError for weights that are damaged or of another architecture."""
+        """A network to begin from: that of `init`, with new parts where it lacks those of `new_parts`.
+
+        Raises WeightsError for weights that are damaged or of another architecture.
+        """
         network = self.make()
         if self.init is not None:
-            load_weights(network, read_state(self.init) | shared_tensors(network), self.init)
+            untrained = network.state_dict()
+            new = {k: v for k, v in untrained.items() if k.startswith(self.new_parts)}
+            stored = read_state(self.init) | shared_tensors(network)
+            load_weights(network, new | stored, self.init)
         return network
 
     def data(self) -> dict[str, Any]:

@@ -8,11 +8,12 @@ import cv2
 import numpy as np
 import pytest
 from edit_scenes import MASK, flat_scene, rendered_scene
+from PIL import Image
 from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
 from materialist.edits.composite import into_photo as into_photo_module
-from materialist.edits.composite.composite import composite, developed, is_deep, pictures, write_composite
+from materialist.edits.composite.composite import NARROWED, composite, developed, is_deep, pictures, write_composite
 from materialist.edits.composite.into_photo import SETTINGS, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.native_layer import NativeLayer
@@ -22,7 +23,9 @@ from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
+from materialist.io.colour_space import DISPLAY_P3, space, srgb_curve
 from materialist.io.decode import decode
+from materialist.io.out.icc import profile_of
 from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
 
@@ -253,6 +256,30 @@ def test_a_saved_edit_of_a_16_bit_photo_stays_one(tmp_path):
     assert again.photo.source is None and is_deep(again.photo)
     save_scene(developed(FLAT, FLAT, FLAT.photo.original), tmp_path / "c.scene")
     assert not is_deep(load_scene(tmp_path / "c.scene").photo)
+
+
+def test_a_saved_edit_keeps_the_exif_of_the_photo(tmp_path):
+    exif = Image.Exif()
+    exif[0x010F], exif[0x0112] = "Canon", 1
+    exif.get_ifd(0x8769)[0xA405] = 28
+    Image.new("RGB", (48, 36), "grey").save(tmp_path / "a.jpg", exif=exif)
+    scene = replace(FLAT, photo=photo_from(tmp_path / "a.jpg"))
+    once = developed(scene, scene, scene.photo.original)
+    save_scene(once, tmp_path / "b.scene")
+    again = load_scene(tmp_path / "b.scene")
+    assert again.photo.exif == once.photo.exif and again.photo.source is None
+    for saved in (again, developed(again, again, again.photo.original)):
+        write_composite(tmp_path / "o.jpg", saved.photo.original, saved.photo, force=True)
+        found = Image.open(tmp_path / "o.jpg").getexif()
+        assert found[0x010F] == "Canon" and found.get_ifd(0x8769)[0xA405] == 28
+
+
+def test_a_saved_edit_of_a_wide_photo_says_that_it_is_one_no_more(tmp_path):
+    profile = profile_of(space("Display P3", DISPLAY_P3, srgb_curve))
+    for name, settings, notes in (("p3", {"icc_profile": profile}, (NARROWED,)), ("srgb", {}, ())):
+        Image.new("RGB", (48, 36), "grey").save(tmp_path / f"{name}.png", **settings)
+        scene = replace(FLAT, photo=photo_from(tmp_path / f"{name}.png"))
+        assert developed(scene, scene, scene.photo.original).report.warnings == notes
 
 
 def test_a_renderer_goes_with_its_last_user():

@@ -9,8 +9,10 @@ from PIL import Image
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import edge_faults
 from materialist.edits.insert import meshes
+from materialist.edits.insert.formats.limits import MeshLimits
 from materialist.edits.insert.insert import insert
-from materialist.edits.insert.meshes import MeshLimits, creased_normals, files_beside, read_model, repainted
+from materialist.edits.insert.meshes import files_beside, read_model, repainted
+from materialist.edits.insert.normals import creased_normals
 from materialist.errors import InputError
 from materialist.exporters.run import export
 
@@ -41,7 +43,9 @@ def test_edges_of_a_box_stay_and_a_ball_is_smooth(tmp_path):
     (body,) = read_model(box_file(tmp_path / "box.stl")).parts
     assert np.allclose(np.abs(body.normals).max(1), 1, atol=1e-6)
     ball = trimesh.creation.icosphere(3)
-    np.testing.assert_allclose(creased_normals(ball.vertices, ball.faces, 40), ball.vertices[ball.faces], atol=0.02)
+    number, normals = creased_normals(ball.vertices, ball.faces, 40)
+    np.testing.assert_allclose(normals[number], ball.vertices[ball.faces], atol=0.02)
+    assert len(normals) == len(ball.vertices)
 
 
 def test_a_texture_lies_as_the_file_says(tmp_path):
@@ -110,8 +114,9 @@ def test_missing_and_damaged_textures_are_told_and_a_constant_serves(tmp_path, m
     model = read_model(path)
     assert any("cannot be read" in note for note in model.warnings)
     np.testing.assert_allclose(model.parts[0].surface.albedo, 0.5)
-    monkeypatch.setattr("materialist.edits.insert.mesh_material.MAX_PIXELS", 3)
-    assert any("cannot be read" in note for note in read_model(textured_obj(tmp_path)).warnings)
+    monkeypatch.setattr(meshes, "LIMITS", MeshLimits(picture_pixels=3))
+    with pytest.raises(InputError, match="4 pixels in one picture, more than 3"):
+        read_model(textured_obj(tmp_path))
 
 
 def test_what_an_mtl_says_beyond_its_colours(tmp_path):
@@ -151,7 +156,7 @@ def test_bad_meshes_have_a_sentence_each(tmp_path, monkeypatch):
         (write(tmp_path / "f.glb", b"glTF" + b"\0" * 40), "not a readable GLB"),
         (write(tmp_path / "g.fbx", "x"), "ends in"),
         (tmp_path / "missing.obj", "cannot be read"),
-        (write(tmp_path / "h.obj", obj.replace("1 2 3", "-3 -2 -1")), "backwards"),
+        (write(tmp_path / "h.obj", obj.replace("1 2 3", "-3 -2 -4")), "does not exist"),
         (write(tmp_path / "i.stl", b"\0" * 80 + (10**7).to_bytes(4, "little") + b"\0" * 100), "mesh|readable|tri"),
         (gltf_file(tmp_path, "gone.bin"), r"gone\.bin"),
         (write(tmp_path / "k.stl", b"solid \xff\xfe\x80" * 20), "STL mesh .damaged"),

@@ -78,7 +78,7 @@ def test_what_cannot_be_selected(table, options, words):
 
 
 def test_sam2_without_weights_says_what_to_do(table, models):
-    with pytest.raises(MaterialistError, match="leave --with sam2 out"):
+    with pytest.raises(MaterialistError, match=r"leave `method=.sam2.` out"):
         select(table[0], click=(50, 50), method="sam2")
 
 

@@ -1,6 +1,7 @@
 """The bundled network and what happens around it, with random weights."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,6 +28,31 @@ def file(network, tmp_path):
     path = tmp_path / "own.safetensors"
     network.save(path, {"step": 7})
     return path
+
+
+def test_the_spread_is_the_expected_error_and_changes_no_map(network, tmp_path):
+    torch.manual_seed(1)
+    with_spread = BundledNetwork(replace(TINY, spread=True))
+    with_spread.load_state_dict(network.state_dict(), strict=False)
+    with_spread.save(tmp_path / "spread.safetensors", {"step": 7})
+    network.save(tmp_path / "plain.safetensors", {"step": 7})
+    photo = made_photo(45, 61)
+    plain = BundledPredictor(tmp_path / "plain.safetensors").predict(photo)
+    found = BundledPredictor(tmp_path / "spread.safetensors").predict(photo)
+    assert plain.spread == {}
+    assert set(found.spread) == {"albedo", "roughness", "metallic", "normal", "depth"}
+    for values in found.spread.values():
+        assert values.shape == (45, 61)
+        np.testing.assert_allclose(values, 0.1, rtol=0.02)
+    np.testing.assert_array_equal(plain.materials.albedo, found.materials.albedo)
+
+
+def test_the_spread_teaches_its_own_head_alone():
+    network = BundledNetwork(replace(TINY, spread=True))
+    maps = network(torch.rand(1, 3, 32, 32), torch.zeros(1, 2, 32, 32))
+    maps["spread"].sum().backward()
+    moved = {name.partition(".")[0] for name, p in network.named_parameters() if p.grad is not None}
+    assert moved == {"spread"}
 
 
 @pytest.mark.parametrize("size", [(32, 32), (45, 61), (97, 33), (7, 150)])

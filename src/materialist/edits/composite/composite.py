@@ -1,6 +1,5 @@
 """The edit brought back into the photograph: everything that it does not reach stays as it was taken."""
 
-import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -8,23 +7,25 @@ from typing import Any
 
 import cv2
 import numpy as np
-from tifffile import TiffFile
 
 from materialist import metrics
 from materialist.edits.composite.disclosed import compared, without_traces
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
-from materialist.edits.core.notes import PICTURED, is_pictured
+from materialist.edits.core.notes import PICTURED, is_pictured, warned
 from materialist.edits.core.renderer import EditRenderer, denoised, rendered
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
-from materialist.io.decode import RAW_SUFFIXES
-from materialist.io.image import write_image
+from materialist.io.out.colours import photo_colours
+from materialist.io.out.depth import is_deep
+from materialist.io.out.encode import save_image
+from materialist.io.out.exif import copied_exif
 from materialist.options import PATHS
 from materialist.types import Array, Photo, Scene
 
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
+NARROWED = "The photo's file has another colour space than sRGB; the saved scene, and pictures made of it, have sRGB."
 RERENDERED = 64
 """Paths a pixel of the re-rendering of an edited scene that is kept."""
 
@@ -140,7 +141,12 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     same = picture.shape[:2] == size[::-1]
     linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
     photo = replace(
-        scene.photo, linear=linear.astype(np.float32), original=picture, source=None, deep=is_deep(scene.photo)
+        scene.photo,
+        linear=linear.astype(np.float32),
+        original=picture,
+        source=None,
+        deep=is_deep(scene.photo),
+        exif=copied_exif(scene.photo).tobytes(),
     )
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
     figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}
@@ -148,28 +154,10 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     stage = {"name": "edit", "edits": edited.provenance.get("edits", []), "bodies": len(edited.bodies)}
     old = edited.report
     report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})
-    return replace(edited, photo=photo, rerender=again, report=report)
+    saved = replace(edited, photo=photo, rerender=again, report=report)
+    return saved if photo_colours(scene.photo).space is None else warned(saved, NARROWED)
 
 
-def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bool = False) -> None:
-    """Write linear [H, W, 3] to PATH.exr (float32, HDR kept) or PATH.png, with 16 bits if the photo had more than 8.
-
-    A pixel that is the photo's gets the photo's own 8 or 16 bits back, or, as EXR, the value that an HDR file has.
-    Whole or not at all. Raises OutputError or InputError as `write_image`.
-    """
-    if Path(path).suffix.lower() == ".exr" and photo.stops:
-        picture = picture * np.float32(2.0**-photo.stops)
-    write_image(path, picture, deep=is_deep(photo), force=force)
-
-
-def is_deep(photo: Photo) -> bool:
-    """Whether the photo came from a display file of more than 8 bits a channel: 16-bit PNG, TIFF, camera RAW."""
-    if photo.deep:
-        return True
-    head = (photo.source or b"")[:32]
-    if head.startswith(b"\x89PNG"):
-        return len(head) > 24 and head[24] == 16
-    if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
-        return True
-    tiff = head.startswith((b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"))
-    return tiff and TiffFile(io.BytesIO(photo.source or b"")).pages.first.bitspersample > 8
+def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bool = False) -> tuple[str, ...]:
+    """Write linear [H, W, 3] as the photo's own file would be, see `io.out.encode.save_image`; returns its notes."""
+    return save_image(path, picture, photo, force=force)

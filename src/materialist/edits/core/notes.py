@@ -51,6 +51,19 @@ def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
     ]
 
 
+def noise_notes(denoise: bool = True) -> list[str]:
+    """What to say of a picture that was to be denoised, where the denoiser cannot be loaded."""
+    from materialist.render.denoise import denoiser_problem
+
+    problem = denoiser_problem() if denoise else None
+    if problem is None:
+        return []
+    return [
+        f"The picture is not denoised, so it is grainy: pyoidn cannot be loaded ({problem}). "
+        "`materialist doctor` says how to install it; more paths a pixel help, too."
+    ]
+
+
 def is_pictured(scene: Scene) -> bool:
     """Whether the photo of an edited scene shows glass that no rendering of the scene has."""
     return any(step.get("model") == "two-interface" for step in scene.provenance.get("edits", ()))

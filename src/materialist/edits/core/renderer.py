@@ -10,7 +10,7 @@ import numpy as np
 from materialist.color import CLIPPED
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.envmap import environment, paste_visible_sky, texel_directions
-from materialist.errors import SetupError
+from materialist.forks import check_process
 from materialist.geometry.silhouette import window
 from materialist.io.photo import HDR_CLIP
 from materialist.render.bodies import is_glowing, is_transparent
@@ -54,6 +54,7 @@ class EditRenderer:
     """
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
+        check_process()
         self.scene, self.device = scene, device
         self._built: dict[bool, tuple[Scene, Any]] = {}
         """The base's (True) and those of the last edit of other shapes."""
@@ -186,21 +187,26 @@ def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, de
 
     Raises SetupError with `denoise` where the denoiser is not installed.
     """
+    if denoise:
+        from materialist.render.denoise import denoise as clean
+        from materialist.render.denoise import require_denoiser
+
+        require_denoiser()  # before the rendering, which takes long
     renderer = EditRenderer(scene, device=device)
     target = renderer.render_scene(scene)
     picture = target.render(spp=spp, seed=seed, max_depth=path_depth(scene))
     if denoise:
-        from materialist.render.denoise import denoise as clean
-
         picture = clean(picture, *renderer.guides(scene))
     return picture
 
 
 def denoised(picture: Array, albedo: Array, normal: Array) -> Array:
-    """[H, W, 3] without noise, guided by albedo and normal [H, W, 3]; as it is where no denoiser is installed."""
-    from materialist.render.denoise import denoise
+    """[H, W, 3] without noise, guided by albedo and normal [H, W, 3].
 
-    try:
-        return denoise(picture, albedo, normal)
-    except SetupError:
+    As it is where no denoiser can be loaded; `notes.noise_notes` has the sentence that says so.
+    """
+    from materialist.render.denoise import denoise, denoiser_problem
+
+    if denoiser_problem() is not None:
         return picture
+    return denoise(picture, albedo, normal)

@@ -5,7 +5,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from trimesh import Trimesh
 
 from materialist.types import Array, Body, Scene, Surface
 
@@ -67,7 +66,25 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
     Vertices within a millionth of the mesh's size of each other count as one.
     """
     extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
-    mesh = Trimesh(np.round((vertices - vertices.min(0)) / extent * 1e6), faces)  # merges vertices
-    mesh.update_faces((np.diff(np.sort(mesh.faces, 1), axis=1) > 0).all(1))
-    count = np.bincount(mesh.edges_unique_inverse)
+    corners = welded(np.round((vertices - vertices.min(0)) / extent * 1e6))[faces]
+    corners = corners[(np.diff(np.sort(corners, 1), axis=1) > 0).all(1)]
+    _, count = np.unique(edge_keys(corners), return_counts=True)
     return int((count == 1).sum()), int((count > 2).sum())
+
+
+def welded(vertices: Array) -> Array:
+    """[V] int32 number of the place of each vertex [V, n], in float32: equal ones share a number."""
+    places = np.asarray(vertices, np.float32) + np.float32(0)  # no -0
+    order = np.lexsort(places.T)
+    steps = np.zeros(len(places), np.int32)
+    steps[1:] = (places[order[1:]] != places[order[:-1]]).any(1)
+    numbers = np.empty(len(places), np.int32)
+    numbers[order] = np.cumsum(steps, dtype=np.int32)
+    return numbers
+
+
+def edge_keys(faces: Array) -> Array:
+    """[3 F] int64 of faces [F, 3], face by face: a number for each edge, the same both ways."""
+    after = np.roll(faces, -1, 1)
+    low, high = np.minimum(faces, after), np.maximum(faces, after)
+    return (low.astype(np.int64) * (int(faces.max(initial=0)) + 1) + high).ravel()

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -18,7 +18,8 @@ from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
-from materialist.option_kinds import numbers, several
+from materialist.keywords import DropKeywords
+from materialist.option_kinds import documented, numbers, several
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
@@ -43,9 +44,10 @@ Places = tuple[float, float] | Sequence[tuple[float, float]]
 """(x, y) at working size above which all fall, one over the other, or a place for each."""
 
 
+@documented(Drop)
 def drop(
     scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, options: Drop | None = None, *, frames: int = 48,
-    fps: float = 24.0, **values: Any,
+    fps: float = 24.0, **values: Unpack[DropKeywords],
 ) -> list[Scene]:  # fmt: skip
     """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
 
@@ -79,7 +81,10 @@ def drop(
     return film
 
 
-def settle(scene: Scene, meshes: Sequence[Mesh], at: Places, options: Drop | None = None, **values: Any) -> Scene:
+@documented(Drop)
+def settle(
+    scene: Scene, meshes: Sequence[Mesh], at: Places, options: Drop | None = None, **values: Unpack[DropKeywords]
+) -> Scene:
     """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.
 
     Everything is as in `drop`, of which this is the last frame, however long that takes: things are at rest

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from trimesh import Trimesh
 
 from materialist.errors import InputError, SetupError
+from materialist.install import extra_command
 from materialist.types import Array
 
 
@@ -97,7 +98,7 @@ def load(name: str) -> Any:
         return importlib.import_module(name)
     except ImportError as error:
         raise SetupError(
-            "Falling objects need two more packages; install them with: pip install 'materialist[physics]'"
+            f"Falling objects need two more packages; install them with: {extra_command('physics')}"
         ) from error
 
 

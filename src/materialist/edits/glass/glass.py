@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import chain
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from materialist.edits.glass.thickness import object_thickness, objects_in, wall
 from materialist.edits.remove.remove import remove
 from materialist.geometry.membrane import nearest
 from materialist.geometry.slopes import blurred_normals
+from materialist.keywords import GlassKeywords
+from materialist.option_kinds import documented
 from materialist.options import Glass
 from materialist.predict import resample
 from materialist.predict.refraction.thickness import Thickness
@@ -27,9 +29,11 @@ NARROW = "There is no room for an opening within the wall; this glass is hollow,
 NO_ROOM = "There is no room for a wall around air: this glass is solid."
 
 
+@documented(Glass)
 def glass(
-    scene: Scene, mask: Array, options: Glass | None = None, *, fitted: Scene | None = None, **values: Any
-) -> Scene:
+    scene: Scene, mask: Array, options: Glass | None = None, *, fitted: Scene | None = None,
+    **values: Unpack[GlassKeywords],
+) -> Scene:  # fmt: skip
     """The scene with the object under a mask of glass, before what it hid.
 
     The model `closed` path-traces a closed body (`solids.closed`); `two-interface` is the paper's: every camera ray

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,6 +13,8 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.errors import InputError
+from materialist.keywords import InsertionKeywords
+from materialist.option_kinds import documented
 from materialist.options import Insertion
 from materialist.render.bodies import is_transparent
 from materialist.types import Array, Body, Scene
@@ -49,8 +51,13 @@ class Support:
         return float(-self.point[2])
 
 
+@documented(Insertion)
 def insert(
-    scene: Scene, mesh: str | Path | MeshModel, at: tuple[float, float], options: Insertion | None = None, **values: Any
+    scene: Scene,
+    mesh: str | Path | MeshModel,
+    at: tuple[float, float],
+    options: Insertion | None = None,
+    **values: Unpack[InsertionKeywords],
 ) -> Scene:
     """The scene with a mesh standing on the surface under a pixel, one more body for each material of the mesh.
 

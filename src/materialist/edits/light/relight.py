@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import cv2
 import numpy as np
@@ -17,6 +17,8 @@ from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
+from materialist.keywords import RelightKeywords
+from materialist.option_kinds import documented
 from materialist.options import Relight
 from materialist.render.envmap import check_envmap, is_peaked
 from materialist.types import Array, Lamp, Scene
@@ -35,7 +37,10 @@ class AddedLightSettings:
 SETTINGS = AddedLightSettings()
 
 
-def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Any) -> Scene:
+@documented(Relight)
+def relight(
+    scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Unpack[RelightKeywords]
+) -> Scene:
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of `Relight`.
 
     Dimmed lights become surfaces that glow and stay where they are, whatever happens to the light from around. A sun
@@ -45,7 +50,8 @@ def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | Non
     fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
     Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
-    wanted = resolved(scene, Relight.given(options, **values))
+    notes: list[str] = []
+    wanted = resolved(scene, Relight.given(options, **values), notes)
     if isinstance(wanted.rotate, tuple):
         raise InputError(f"The rotation is {'..'.join(map('{:g}'.format, wanted.rotate))}; one picture has one number.")
     if wanted.dim is not None:
@@ -71,14 +77,17 @@ def relight(scene: Scene, options: Relight | None = None, *, fitted: Scene | Non
         "ambient": wanted.ambient if wanted.ambient != 1 else None, "lamps": len(lamps) or None, "dim": wanted.dim,
     }  # fmt: skip
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
-    return noted(warned(new, *_warnings(fitted or scene)), "light", what)
+    return noted(warned(new, *_warnings(fitted or scene), *notes), "light", what)
 
 
-def resolved(scene: Scene, options: Relight) -> Any:
-    """The options with the environment map [h, 2h, 3] itself, its gain, and `types.Lamp` objects. Raises InputError."""
+def resolved(scene: Scene, options: Relight, notes: list[str] | None = None) -> Any:
+    """The options with the environment map [h, 2h, 3] itself, its gain, and `types.Lamp` objects.
+
+    `notes` get what its reader assumed. Raises InputError.
+    """
     envmap, gain = options.envmap, options.gain
     if isinstance(envmap, str | Path):
-        envmap, gain = read_envmap(envmap), "auto" if gain is None else gain
+        envmap, gain = read_envmap(envmap, notes), "auto" if gain is None else gain
     elif envmap is not None:
         envmap, gain = checked_envmap(envmap), 1.0 if gain is None else gain
     lamps = tuple(one if isinstance(one, Lamp) else lamp(scene, *one) for one in options.lamps)
@@ -137,9 +146,15 @@ def checked_envmap(envmap: Array) -> Array:
     return envmap
 
 
-def read_envmap(path: str | Path) -> Array:
-    """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `map_rows` rows. Raises InputError."""
-    envmap = checked_envmap(decode_photo(Path(path)).linear)
+def read_envmap(path: str | Path, notes: list[str] | None = None) -> Array:
+    """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `map_rows` rows.
+
+    `notes` get what its reader assumed. Raises InputError.
+    """
+    decoded = decode_photo(Path(path))
+    if notes is not None:
+        notes += [f"The environment map {Path(path).name}: {note}" for note in decoded.warnings]
+    envmap = checked_envmap(decoded.linear)
     if len(envmap) > (rows := SETTINGS.map_rows):
         envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))
     return envmap
@@ -205,7 +220,7 @@ def _warnings(scene: Scene) -> list[str]:
 
 def moving_light(
     scene: Scene | Sequence[Scene], count: int, options: Relight | None = None, *,
-    suns: tuple[tuple[float, float], ...] = (), **values: Any,
+    suns: tuple[tuple[float, float], ...] = (), **values: Unpack[RelightKeywords],
 ) -> Iterator[Scene]:  # fmt: skip
     """`count` relit scenes: the light turns by `rotate` degrees in all, or from A to B; the sun and one lamp follow
     their stations.
@@ -219,7 +234,8 @@ def moving_light(
     if not 2 <= count <= MAX_FRAMES:
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
     film = [scene] * count if isinstance(scene, Scene) else scene
-    wanted = resolved(film[0], Relight.given(options, **values))
+    notes: list[str] = []
+    wanted = resolved(film[0], Relight.given(options, **values), notes)
     lamps, (first, last) = wanted.lamps, wanted.rotate if isinstance(wanted.rotate, tuple) else (0.0, wanted.rotate)
     if not (first or last) and len(suns) < 2 and len(lamps) < 2:
         last = 360.0
@@ -236,7 +252,7 @@ def moving_light(
         if lamps:
             x, y, z, *power, radius = _between([(*one.position, *one.power, one.radius) for one in lamps], t)
             placed = (Lamp((x, y, z), triple(power), radius),)
-        yield relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=placed)
+        yield warned(relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=placed), *notes)
 
 
 def _between(stations: Sequence[tuple[float, ...]], t: float) -> list[float]:

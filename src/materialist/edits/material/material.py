@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import cv2
 import numpy as np
@@ -14,11 +14,14 @@ from materialist.edits.core.region import checked_region, reshaped
 from materialist.errors import InputError
 from materialist.geometry.planes import axes
 from materialist.io.photo import decode_photo
+from materialist.keywords import MaterialKeywords
+from materialist.option_kinds import documented
 from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
 
 
-def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **values: Any) -> Scene:
+@documented(MaterialEdit)
+def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **values: Unpack[MaterialKeywords]) -> Scene:
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
 
     Saturation and value keep the order of a texture: nothing clips, and grey stays grey. A number for roughness or

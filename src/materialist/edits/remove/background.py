@@ -73,7 +73,7 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     if kind != "sd":
         raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
     gpu = on_gpu(device)
-    with hub.advice("leave --inpaint out"):
+    with hub.advice("leave inpaint out"):
         folder = locate(where, DEFAULT)
         pipeline = hub.pipeline(
             "StableDiffusionInpaintPipeline", folder, gpu, "inpainting pipeline",

@@ -15,6 +15,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import SetupError
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
+from materialist.install import install_command
 from materialist.predict import resample
 from materialist.types import Array
 
@@ -88,5 +89,5 @@ def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) 
     except (ImportError, RuntimeError) as error:
         raise SetupError(
             f"Filling what was hidden needs the package PyPatchMatch ({error}); install it with: {sys.executable} -m "
-            "pip install --force-reinstall --no-deps PyPatchMatch, or give a background."
+            f"{install_command('--force-reinstall', '--no-deps', 'PyPatchMatch')}, or give a background."
         ) from error

@@ -1,7 +1,7 @@
 """The scene without one of its objects (paper, Background Inpainting): what was behind it, in maps, depth and photo."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Unpack
 
 import cv2
 import numpy as np
@@ -15,6 +15,8 @@ from materialist.edits.remove.hole import evidence_notes, make_hole
 from materialist.geometry.build import rebuilt
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import window
+from materialist.keywords import RemovalKeywords
+from materialist.option_kinds import documented
 from materialist.options import Removal
 from materialist.predict import resample
 from materialist.types import Array, Materials, Photo, Scene
@@ -23,9 +25,11 @@ FLOOR = 0.05
 """Radiance up to which an albedo or a re-rendering differs from the photo by a sum, beyond it by a factor (by eye)."""
 
 
+@documented(Removal)
 def remove(
-    scene: Scene, mask: Array, options: Removal | None = None, *, fitted: Scene | None = None, **values: Any
-) -> Scene:
+    scene: Scene, mask: Array, options: Removal | None = None, *, fitted: Scene | None = None,
+    **values: Unpack[RemovalKeywords],
+) -> Scene:  # fmt: skip
     """The scene without the object under a mask: photo, surfaces and materials go on behind it.
 
     In the result `photo` and `rerender` are filled alike: their difference is what the fit misses of the

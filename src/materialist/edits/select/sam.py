@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.install import extra_command
 from materialist.predict import hub
 from materialist.predict.models import hub_model, is_complete, locate
 from materialist.predict.protocol import on_gpu
@@ -25,7 +26,7 @@ def segment(
     """
     import torch
 
-    with hub.advice("leave --with sam2 out"):
+    with hub.advice('leave `method="sam2"` out'):
         model = hub.load(hub.library("transformers").Sam2Model, locate(where, REPO))
     target = torch.device("cuda" if on_gpu(device) else "cpu")
     model = model.to(target).eval()
@@ -53,7 +54,7 @@ def missing() -> str | None:
     from importlib.util import find_spec
 
     if find_spec("transformers") is None:
-        return "Not installed: pip install 'materialist[hub]', then materialist models download sam2."
+        return f"Not installed: {extra_command('hub')}, then materialist models download sam2."
     if not is_complete(hub_model(REPO)):
         return "Its weights are not here: materialist models download sam2."
     return None

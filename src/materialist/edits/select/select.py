@@ -8,6 +8,7 @@ import numpy as np
 from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
 from materialist.edits.select.objects import object_at, object_in
 from materialist.errors import InputError
+from materialist.forks import check_process
 from materialist.io.image import read_mask
 from materialist.option_kinds import numbers, several
 from materialist.predict.clicks.features import Box
@@ -32,6 +33,7 @@ def select(
     Raises InputError for none or several of click, box and mask; a click or box outside the photo or on the sky; an
     empty mask or one of another shape. SetupError, WeightsError: a method without its library or weights.
     """
+    check_process()
     if sum(v is not None for v in (click, box, mask)) != 1:
         raise InputError("Give exactly one of a click, a box or a mask.")
     if method not in METHODS:

@@ -14,7 +14,7 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
 from materialist.predict.bundled.edges import GuidedFilter, grabcut, weighted_median, with_relief
-from materialist.predict.bundled.network import BundledNetwork
+from materialist.predict.bundled.network import SPREADS, BundledNetwork
 from materialist.predict.network import STRIDE
 from materialist.types import Array, Materials, Prediction
 
@@ -50,7 +50,7 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
-    maps, light = _mean_answer(network, linear, rays, device)
+    maps, light, spread = _mean_answer(network, linear, rays, device)
     surface = _without_specks(_surface(maps["mask"], resample.values(linear, maps["mask"].shape)))
     if not surface.any():
         surface[:] = True
@@ -65,7 +65,8 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
     notes: tuple[str, ...] = (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
     if unsure > SETTINGS.unsure_told:
         notes += (f"{unsure:.0%} of the picture, at its top, may be sky and was taken for a far surface.",)
-    return Prediction(materials, normal, depth, warnings=notes, light=light)
+    spread = {name: resample.values(values, size) for name, values in spread.items()}
+    return Prediction(materials, normal, depth, warnings=notes, light=light, spread=spread)
 
 
 def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple[Array, Array]:
@@ -104,9 +105,11 @@ def with_sky(depth: Array, guide: GuidedFilter) -> Array:
 
 def _mean_answer(
     network: BundledNetwork, linear: Array, rays: Array, device: Any
-) -> tuple[dict[str, Array], Array | None]:
-    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes; and
-    of its logarithms of the light, as `Prediction.light`."""
+) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
+    """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes.
+
+    Beside them the light as `Prediction.light` and the spread as `Prediction.spread`, of means of logarithms.
+    """
     sizes = sorted({resample.with_longer_side(linear.shape[:2], side) for side in SETTINGS.sides})
     answers = []
     for size in sizes:
@@ -120,7 +123,13 @@ def _mean_answer(
         answer["depth"] = answer["depth"] - np.median(answer["depth"])
     lights = [answer.pop("light") for answer in answers if "light" in answer]
     light = np.exp(np.mean(lights, axis=0)).astype(np.float32) if lights else None
-    return {n: np.mean([resample.values(a[n], sizes[-1]) for a in answers], axis=0) for n in answers[0]}, light
+    size = sizes[-1]
+    maps = {name: np.mean([resample.values(answer[name], size) for answer in answers], axis=0) for name in answers[0]}
+    expected = np.exp(maps.pop("spread")).astype(np.float32) if "spread" in maps else None
+    spread = {}
+    if expected is not None:
+        spread = {name: np.ascontiguousarray(expected[..., k]) for k, name in enumerate(SPREADS)}
+    return maps, light, spread
 
 
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:

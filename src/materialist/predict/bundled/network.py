@@ -18,6 +18,10 @@ from materialist.predict.network import STRIDE, Architecture, ResidualBlock, Sto
 
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
 """Maps that the network answers with, and their channels."""
+SPREADS = ("albedo", "roughness", "metallic", "normal", "depth")
+"""Maps whose expected error the network answers with, too."""
+FIRST_SPREAD = -2.3
+"""Natural logarithm of the error that an untrained network expects: a tenth."""
 ALBEDO_SLOPE = 4.0
 """With it, sigmoid(slope * (encoded - 0.5)) is about the encoded photo itself."""
 LOG_FLOOR = 2.0**-7
@@ -42,6 +46,8 @@ class BundledArchitecture(Architecture):
     """Variant of EfficientNet-Lite (`predict.efficientnet`) whose features are read beside the photo; "" for none."""
     light: int = 0
     """Rows of the map of the light that it answers with as well; 0 for none."""
+    spread: bool = False
+    """Whether it answers with the expected error of each of SPREADS as well."""
 
 
 class BundledNetwork(StoredNetwork):
@@ -71,6 +77,8 @@ class BundledNetwork(StoredNetwork):
             self.told = zero_convolutions(self.encoder.channels, w)
         if a.light:
             self.light = LightHead(a.light, w[2])
+        if a.spread:
+            self.spread = SpreadHead(a.fine)
         _same_subpixels(self.fine)
         _same_subpixels(self.head)
 
@@ -82,7 +90,7 @@ class BundledNetwork(StoredNetwork):
         albedo [B, 3, H, W] is sRGB-encoded in [0, 1]; roughness and metallic [B, 1, H, W] in [0, 1]; normal
         [B, 3, H, W] unit; depth [B, 1, H, W] the natural logarithm of planar depth, up to a constant; mask
         [B, 1, H, W] the logit of there being a surface; metallic_logit, the metallic before its sigmoid; where the
-        architecture has it, light [B, 4, h, 2h], see `LightHead`.
+        architecture has it, light [B, 4, h, 2h], see `LightHead`, and spread [B, 5, H, W], see `SpreadHead`.
         """
         picture, more = encode(image), self._told(image)
         x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), F.avg_pool2d(rays, 4)], 1))
@@ -99,7 +107,11 @@ class BundledNetwork(StoredNetwork):
         x = F.pixel_shuffle(self.fine(x), 2)
         x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
         maps = _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
-        return maps | ({"light": self.light(told, picture, rays, maps)} if self.architecture.light else {})
+        if self.architecture.light:
+            maps["light"] = self.light(told, picture, rays, maps)
+        if self.architecture.spread:
+            maps["spread"] = self.spread(x)
+        return maps
 
     def _told(self, image: Tensor) -> list[Tensor | float]:
         """What the classifier's features add at each level; nothing where there is no encoder."""
@@ -182,6 +194,30 @@ class _AttentionBlock(nn.Module):
         seen = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2])
         x = x + self.out(seen.transpose(1, 2).reshape(batch, cells, channels))
         return x + self.down(F.gelu(self.up(self.norm2(x))))
+
+
+class SpreadHead(nn.Module):
+    """How far each map is expected to be from the truth, from the features that the maps are made of.
+
+    It learns beside the maps and changes nothing of them: no gradient passes to the features.
+    """
+
+    def __init__(self, features: int):
+        super().__init__()
+        self.hidden = nn.Sequential(_conv(features, features, bias=True), nn.SiLU())
+        self.out = _conv(features, 4 * len(SPREADS), bias=True)
+        nn.init.zeros_(self.out.weight)
+        assert self.out.bias is not None
+        nn.init.constant_(self.out.bias, FIRST_SPREAD)
+
+    def forward(self, features: Tensor) -> Tensor:
+        """[B, 5, H, W] float32, the natural logarithm of the expected absolute error, of features [B, C, H/2, W/2].
+
+        Of the encoded albedo (mean over RGB), roughness, metallic, the normal's angle in radians, and the logarithm
+        of relative depth: the scales of Laplace distributions.
+        """
+        raw = self.out(self.hidden(features.detach()))
+        return F.pixel_shuffle(raw.float(), 2).clamp(-7, 1)
 
 
 class LightHead(nn.Module):

@@ -47,4 +47,6 @@ class BundledPredictor(Predictor):
             maps["normal"] = np.where(found.depth[..., None] > 0, found.normal, 0).astype(np.float32)
             warnings = ()
         light = found.light if "albedo" in wanted else None
-        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, self.name), warnings, light)
+        spread = {name: values for name, values in found.spread.items() if name in wanted}
+        chosen = {name: maps[name] for name in wanted}
+        return MapSet(chosen, dict.fromkeys(wanted, self.name), warnings, light, spread)

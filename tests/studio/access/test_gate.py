@@ -7,13 +7,14 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the studio extra")
 from starlette.applications import Starlette
-from starlette.responses import PlainTextResponse
+from starlette.responses import JSONResponse, PlainTextResponse
 from starlette.routing import Route
 from starlette.testclient import TestClient
 
 from materialist.errors import InputError
-from materialist.studio import StudioSettings, gate, server
-from materialist.studio.gate import Gate
+from materialist.studio import StudioSettings, server
+from materialist.studio.access import gate, quota
+from materialist.studio.access.gate import Gate
 from materialist.studio.server import password_of
 from materialist.studio.studio import PERSON
 
@@ -27,8 +28,16 @@ async def echo(scope, receive, send):
     await answer(scope, receive, send)
 
 
-def client(shared, base="http://studio.example", **options):
-    return TestClient(Gate(echo, shared, **options), base_url=base, follow_redirects=False)
+async def takes_uploads(scope, receive, send):
+    """Answers as Gradio does where it has stored an upload."""
+    while (await receive()).get("more_body"):
+        pass
+    await JSONResponse(["/nowhere/a.png"])(scope, receive, send)
+
+
+def client(shared, base="http://studio.example", app=echo, address="1.2.3.4", **options):
+    gate = Gate(app, shared, **options)
+    return TestClient(gate, base_url=base, follow_redirects=False, client=(address, 1))
 
 
 def headers(**values):
@@ -114,18 +123,22 @@ def test_a_password_closes_every_door(shared, monkeypatch):
     answer = enter("open sesame ü")
     assert answer.status_code == 303 and "SameSite=Lax" in answer.headers["set-cookie"]
     assert "HttpOnly" in answer.headers["set-cookie"] and page.get("/config").status_code == 200
-    other = TestClient(page.app, follow_redirects=False)
+    other, elsewhere = (
+        TestClient(page.app, follow_redirects=False, client=(address, 1)) for address in ("1.2.3.4", "5.6.7.8")
+    )
     assert other.get("/").status_code == 401
     for _ in range(2):
         assert other.post("/login", data={"password": "guess"}).status_code == 401
-    assert other.post("/login", data={"password": "open sesame ü"}).status_code == 429  # not even the right one
+    right = {"password": "open sesame ü"}
+    assert other.post("/login", data=right).status_code == 429  # not even the right one
+    assert elsewhere.post("/login", data=right).status_code == 303  # others are not locked out
     assert page.get("/").status_code == 200
 
 
 def test_a_page_belongs_to_the_browser_that_used_it_first(shared):
     anna, bert = client(shared), client(shared)
     anna.get("/")
-    person = anna.cookies[PERSON]
+    person = shared.person(anna.cookies[PERSON])
     assert anna.get("/gradio_api/queue/data?session_hash=abc").status_code == 200
     assert shared.session("abc", person).person == person
     for place in ("heartbeat/abc", "queue/data?session_hash=abc"):
@@ -135,13 +148,20 @@ def test_a_page_belongs_to_the_browser_that_used_it_first(shared):
 
 
 def test_uploads_have_a_quota(shared, monkeypatch):
-    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(upload_quota=1000))
-    page = client(shared)
-    page.get("/")
-    send = lambda size: page.post("/gradio_api/upload", content=b"x" * size)  # noqa: E731
-    assert send(600).status_code == 200 and send(300).status_code == 200
+    monkeypatch.setattr(quota, "SETTINGS", StudioSettings(storage_quota=1000))
+    page = client(shared, app=takes_uploads)
+
+    def send(size, browser=page):
+        return browser.post("/gradio_api/upload", content=b"x" * size)
+
+    monkeypatch.setattr(quota, "SMALLEST", 1)
+    monkeypatch.setattr(shared, "give_back", lambda person, size: None)  # as if all was stored
+    assert send(600).status_code == 200
+    assert send(300).status_code == 200
     assert send(200).status_code == 403 and "within an hour" in send(200).text
-    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(disk_left=10**18))
+    another_browser = client(shared, app=takes_uploads)
+    assert send(200, another_browser).status_code == 403  # a new cookie is no new sender
+    monkeypatch.setattr(quota, "SETTINGS", StudioSettings(disk_left=10**18))
     assert "full" in send(10).text
 
 
@@ -172,7 +192,8 @@ def test_the_password_need_not_be_an_argument(tmp_path, refused):
 )  # fmt: skip
 def test_only_what_the_page_asks_for_is_answered(shared, method, place, status):
     place = place.replace("CACHE", str(shared.work.cache))
-    assert client(shared).request(method, place).status_code == status
+    body = b'{"data": []}' if method == "POST" else None
+    assert client(shared).request(method, place, content=body).status_code == status
     assert not any(one.beats for one in shared._sessions.values())
 
 
@@ -182,13 +203,24 @@ def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
     async def read(request):
         return PlainTextResponse(str(len(await request.body())))
 
-    reader = Starlette(routes=[Route("/{path:path}", read, methods=["POST"])])
+    async def stored(request):
+        return JSONResponse([str(len(await request.body()))])
+
+    routes = [
+        Route("/gradio_api/upload", stored, methods=["POST"]),
+        Route("/{path:path}", read, methods=["POST"]),
+    ]
+    reader = Starlette(routes=routes)
     page, closed = (TestClient(Gate(reader, shared, password=word)) for word in (None, "open sesame"))
-    chunks = lambda count: iter([b"x" * 100] * count)  # noqa: E731
-    for place, fits in (("queue/join", 10), ("upload", 20)):
-        size = {"content-length": "10"} if place == "upload" else {}
-        assert page.post(f"/gradio_api/{place}", content=chunks(fits), headers=size).status_code == 200
-        assert page.post(f"/gradio_api/{place}", content=chunks(fits + 1), headers=size).status_code == 413
+
+    def chunks(count):
+        return iter([b'{"data": []}'.ljust(100), *[b" " * 100] * (count - 1)])
+
+    assert page.post("/gradio_api/queue/join", content=chunks(10)).status_code == 200
+    assert page.post("/gradio_api/queue/join", content=chunks(11)).status_code == 413
+    assert page.post("/gradio_api/upload", content=b"x" * 2000).status_code == 200
+    assert page.post("/gradio_api/upload", content=b"x" * 2001).status_code == 403
+    assert page.post("/gradio_api/upload", content=chunks(2)).status_code == 403  # without a length
     assert closed.post("/login", content=chunks(50)).status_code == 413
 
 
@@ -202,4 +234,4 @@ def test_gradio_fetches_nothing(shared, monkeypatch):
     asked = lambda: processing.async_ssrf_protected_download("http://127.0.0.1:9/a.png", cache_dir="x")  # noqa: E731
     with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
         thread.submit(lambda: asyncio.run(asked())).result()
-    assert not list(shared.work.cache.iterdir())
+    assert set(shared.work.cache.iterdir()) == shared.work.kept  # nothing was stored

@@ -1,11 +1,14 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
 import hmac
+import json
 import re
 import secrets
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -17,7 +20,9 @@ from starlette.responses import HTMLResponse, PlainTextResponse, RedirectRespons
 
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, asset
-from materialist.studio.studio import PERSON, Studio
+from materialist.studio.access.files import with_known_files
+from materialist.studio.access.quota import sender_of
+from materialist.studio.studio import PERSON, PERSON_HEADER, Studio
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
 LOCAL = ("localhost", "127.0.0.1", "::1")
@@ -25,6 +30,8 @@ _API = "/gradio_api/"
 _BEAT = f"{_API}heartbeat/"
 """A page holds a request to this place, and its name, as long as it is open."""
 _UPLOAD, _FILE = f"{_API}upload", f"{_API}file="
+_EVENTS = (f"{_API}queue/join", f"{_API}run/predict")
+"""Places whose bodies may name files."""
 _READ = re.compile(
     rf"/|/(config|theme\.css|favicon\.ico|robots\.txt)|/(assets|static)/.+|{_FILE}[^\0]+|{_BEAT}\w+"
     rf"|{_API}(queue/data|upload_progress|app_id)"
@@ -32,6 +39,7 @@ _READ = re.compile(
 _PLACES = {"GET": _READ, "HEAD": _READ, "POST": re.compile(rf"{_API}(queue/join|run/predict|upload)")}
 """Method -> what the page asks for. Gradio has more: places that fetch from other machines, record and write."""
 _FORM_BYTES = 4096
+_LENGTHS = (b"content-length", b"transfer-encoding")
 HEADERS = {
     # Gradio makes functions of texts and styles of its own; whatever they do, it stays between page and studio.
     "content-security-policy": (
@@ -67,21 +75,24 @@ class Gate:
         """Host names that may be asked for; None for all."""
         self.proxy, self.password = proxy, password
         self._cookie = f"materialist_login_{port}"
-        self._logins: set[str] = set()
-        self._wrong: deque[float] = deque()
-        """When the last wrong passwords came."""
+        self._logins: dict[str, str] = {}
+        """Login -> the cookie of the person who logged in: no other cookie counts for it."""
+        self._wrong: dict[str, deque[float]] = {}
+        """Address -> when the last wrong passwords came from it."""
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
         if scope["type"] == "lifespan":
             return await self.app(scope, receive, send)
         if scope["type"] != "http":
             return await send({"type": "websocket.close", "code": 1008})
+        address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
-        upload = int(SETTINGS.upload_megabytes * 1e6) if scope["path"] == _UPLOAD else 0
-        most = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes + upload
+        most = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
+        if scope["path"] == _UPLOAD:
+            most = _largest_upload()
         request = Request(scope, _limited(receive, most))
         cookies: dict[str, str] = {}
-        app = await self._answer(request, cookies)
+        app = await self._answer(request, cookies, address)
 
         async def answer(message: Any) -> None:
             if message["type"] == "http.response.start":
@@ -94,6 +105,13 @@ class Gate:
             await send(message)
 
         await app(scope, request.receive, answer)
+
+    def _address(self, scope: Any) -> str:
+        """The IP address that a request comes from: behind a proxy what the proxy says, its last word."""
+        if self.proxy:
+            forwarded = dict(scope["headers"]).get(b"x-forwarded-for", b"").decode("latin-1")
+            return forwarded.rpartition(",")[2].strip() or "proxy"
+        return scope["client"][0] if scope.get("client") else "unknown"
 
     def allows(self, headers: dict[bytes, bytes]) -> bool:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
@@ -112,63 +130,176 @@ class Gate:
         told = dict(headers)
         if self.proxy and b"x-forwarded-host" not in told:
             told[b"x-forwarded-host"] = told.get(b"host", b"")
-        kept = [(k, v) for k, v in headers if not k.startswith(b"x-forwarded") and k != b"forwarded"]
+        dropped = (b"forwarded", PERSON_HEADER.encode())
+        kept = [(k, v) for k, v in headers if not k.startswith(b"x-forwarded") and k not in dropped]
         if self.proxy:
             scheme = b"http" if told.get(b"x-forwarded-proto") == b"http" else b"https"
             kept += [(b"x-forwarded-host", told[b"x-forwarded-host"]), (b"x-forwarded-proto", scheme)]
         return kept
 
-    async def _answer(self, request: Request, cookies: dict[str, str]) -> Any:
+    async def _answer(self, request: Request, cookies: dict[str, str], address: str) -> Any:
         """The application that answers: the page, or a refusal; with cookies to set."""
         if not self.allows(dict(request.scope["headers"])):
             return PlainTextResponse("The studio answers its own pages only.\n", 403)
-        if self.password and request.cookies.get(self._cookie) not in self._logins:
+        login = request.cookies.get(self._cookie, "")
+        if self.password and login not in self._logins:
             if (request.method, request.url.path) == ("POST", "/login"):
-                return await self._log_in(request, cookies)
+                return await self._log_in(request, cookies, address)
             return self._form(401)
-        try:
-            person = self.studio.person(request.cookies.get(PERSON))
-        except InputError:  # its browser is new here
-            cookies[PERSON] = person = secrets.token_hex(16)
+        person = self._person(request, cookies, login)
+        self.studio.note_sender(person, address)
+        request.scope["headers"].append((PERSON_HEADER.encode(), person.encode()))
         path = request.scope["path"]
         if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
             return PlainTextResponse("The studio has no such place.\n", 404)
         if path.startswith(_FILE):
-            file, cache = (Path(one).resolve() for one in (path.removeprefix(_FILE), self.studio.work.cache))
-            if not file.is_relative_to(cache):  # files of ours, and addresses that Gradio would fetch
-                return PlainTextResponse("The studio serves no such file.\n", 403)
+            return self._file(request.scope, path.removeprefix(_FILE), person)
         try:
             if page := request.query_params.get("session_hash"):
                 self.studio.session(page, person)
             if path.startswith(_BEAT) and request.method == "GET":
-                self.studio.session(path.removeprefix(_BEAT), person, beats=True)
+                page = path.removeprefix(_BEAT)
+                self.studio.session(page, person, beats=True)
+                return partial(_held, self.app, self.studio, page)
             if path == _UPLOAD:
-                self.studio.note_upload(person, request.headers.get("content-length", ""))
+                size = _promised(request)
+                self.studio.claim(person, size)
+                return partial(_upload, self.app, self.studio, person, size)
+            if path in _EVENTS:
+                return await self._event(request, person)
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 403)
         return self.app
 
-    async def _log_in(self, request: Request, cookies: dict[str, str]) -> Response:
-        """The page where the password is right, else the form again; after too many wrong ones whatever it is."""
+    def _person(self, request: Request, cookies: dict[str, str], login: str) -> str:
+        """Whose request it is: the person of its login where there are logins, else the person of its cookie."""
+        token = self._logins[login] if self.password else request.cookies.get(PERSON)
+        try:
+            return self.studio.person(token)
+        except InputError:  # its browser is new here
+            cookies[PERSON] = token = secrets.token_hex(16)
+            if self.password:
+                self._logins[login] = token
+            return self.studio.person(token)
+
+    def _file(self, scope: Any, name: str, person: str) -> Any:
+        """The application that serves a file: one of the cache, or an upload of this person by its id."""
+        with suppress(InputError):
+            path = self.studio.files.path(person, name)
+            scope["path"] = f"{_FILE}{path}"
+            scope["raw_path"] = scope["path"].encode()
+            return self.app
+        if not Path(name).resolve().is_relative_to(self.studio.work.cache.resolve()):
+            return PlainTextResponse("The studio serves no such file.\n", 403)
+        return self.app
+
+    async def _event(self, request: Request, person: str) -> Any:
+        """The application that gets an event of the page, with the files that the person may name."""
+        try:
+            given = await request.body()
+        except HTTPException as error:
+            return PlainTextResponse(f"{error.detail}\n", error.status_code)
+        body = with_known_files(given, person, self.studio.files)
+        scope = request.scope
+        scope["headers"] = [one for one in scope["headers"] if one[0] not in _LENGTHS]
+        scope["headers"].append((b"content-length", str(len(body)).encode()))
+
+        async def app(scope: Any, receive: Any, send: Any) -> None:
+            sent = False
+
+            async def receive_body() -> Any:
+                nonlocal sent
+                if sent:
+                    return await receive()
+                sent = True
+                return {"type": "http.request", "body": body, "more_body": False}
+
+            await self.app(scope, receive_body, send)
+
+        return app
+
+    async def _log_in(self, request: Request, cookies: dict[str, str], address: str) -> Response:
+        """The page where the password is right, else the form again.
+
+        After too many wrong ones from an address whatever comes from it.
+        """
         try:
             body = await request.body()
         except HTTPException:
             return self._form(413, "That is too long for a password.")
         now = time.monotonic()
-        while self._wrong and now - self._wrong[0] > 60:
-            self._wrong.popleft()
-        if len(self._wrong) >= SETTINGS.wrong_passwords:
+        wrong = self._wrong_from(sender_of(address), now)
+        if len(wrong) >= SETTINGS.wrong_passwords:
             return self._form(429, "Too many wrong passwords; wait a minute.")
         word = parse_qs(body.decode("utf-8", "replace")).get("password", [""])[0]
         if not hmac.compare_digest(word.encode(), str(self.password).encode()):
-            self._wrong.append(now)
+            wrong.append(now)
             return self._form(401, "That is not the password.")
         cookies[self._cookie] = token = secrets.token_urlsafe(24)
-        self._logins.add(token)
+        self._logins[token] = request.cookies.get(PERSON, "")
         return RedirectResponse("/", 303)
+
+    def _wrong_from(self, sender: str, now: float) -> deque[float]:
+        """When wrong passwords came from a sender within the last minute; old senders are forgotten."""
+        wrong = self._wrong.pop(sender, deque())
+        while wrong and now - wrong[0] > 60:
+            wrong.popleft()
+        self._wrong[sender] = wrong
+        while len(self._wrong) > SETTINGS.addresses:
+            self._wrong.pop(next(iter(self._wrong)))
+        return wrong
 
     def _form(self, status: int, message: str = "") -> Response:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
+
+
+async def _held(app: Application, studio: Studio, page: str, scope: Any, receive: Any, send: Any) -> None:
+    """Let a page hold its request; it is closed when that ends."""
+    try:
+        await app(scope, receive, send)
+    finally:
+        studio.leave(page)
+
+
+def _largest_upload() -> int:
+    """Bytes of the largest body of an upload: a file, and what surrounds it in a form."""
+    return int(SETTINGS.upload_megabytes * 1e6) + SETTINGS.request_bytes
+
+
+def _promised(request: Request) -> int:
+    """The length that an upload gives. Raises InputError for none, another way of saying it, and too much."""
+    size = request.headers.get("content-length", "")
+    if not size.isdigit() or "transfer-encoding" in request.headers:
+        raise InputError("An upload must say how long it is.")
+    if int(size) > _largest_upload():
+        raise InputError(f"An upload may have up to {SETTINGS.upload_megabytes} MB.")
+    return int(size)
+
+
+async def _upload(
+    app: Application, studio: Studio, person: str, size: int, scope: Any, receive: Any, send: Any
+) -> None:
+    """Let Gradio store an upload of a claimed size, and answer with ids of ours in place of its paths."""
+    messages: list[Any] = []
+
+    async def collect(message: Any) -> None:
+        messages.append(message)
+
+    stored = 0
+    try:
+        await app(scope, receive, collect)  # until the files are where it says
+        start = messages[0]
+        body = b"".join(message.get("body", b"") for message in messages[1:])
+        if start["status"] == 200:
+            paths = [Path(path) for path in json.loads(body)]
+            stored = sum(path.stat().st_size for path in paths if path.is_file())
+            body = json.dumps([studio.files.add(person, path) for path in paths]).encode()
+    finally:
+        studio.give_back(person, max(0, size - stored))
+    headers = [one for one in start["headers"] if one[0] not in _LENGTHS]
+    length = (b"content-length", str(len(body)).encode())
+    await send({**start, "headers": [*headers, length]})
+    await send({"type": "http.response.body", "body": body})
 
 
 def _limited(receive: Any, most: int) -> Any:

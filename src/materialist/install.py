@@ -1,0 +1,37 @@
+"""The command that installs a package into this very Python, whether pip, uv or pipx made its environment."""
+
+import re
+import shlex
+import sys
+from importlib import metadata
+from importlib.util import find_spec
+
+DISTRIBUTION = "materialist-photo"
+"""Name of this project among distributions: `materialist` is another one's."""
+
+
+def install_command(*requirements: str) -> str:
+    """A line for a shell that installs requirements, as in `install_command("rawpy>=0.21")`.
+
+    Environments of uv have no pip of their own.
+    """
+    words = shlex.join(requirements)
+    if find_spec("pip") is not None:
+        return f"{sys.executable} -m pip install {words}"
+    return f"uv pip install --python {sys.executable} {words}"
+
+
+def extra_command(extra: str) -> str:
+    """A line for a shell that installs the packages of an extra of ours, such as `usd`."""
+    return install_command(*extra_requirements(extra))
+
+
+def extra_requirements(extra: str) -> list[str]:
+    """The requirements of an extra of ours; our distribution with it where this installation does not know them."""
+    try:
+        every = metadata.requires(DISTRIBUTION) or []
+    except metadata.PackageNotFoundError:
+        every = []
+    marked = re.compile(rf"(.+?)\s*;.*extra == ['\"]{re.escape(extra)}['\"]")
+    found = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
+    return found or [f"{DISTRIBUTION}[{extra}]"]

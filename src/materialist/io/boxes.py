@@ -1,0 +1,69 @@
+"""Boxes of ISO files (HEIC, AVIF, JPEG 2000): the colour information that Pillow does not hand out."""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+_HEAD_BYTES = 4 << 20
+"""How much of a file is searched: boxes of colour stand before the pixels."""
+
+
+def nclx(path: Path) -> tuple[int, int] | None:
+    """Codes of primaries and transfer (ITU-T H.273) of a HEIC's or AVIF's main picture; None where it has none."""
+    meta = dict(boxes(_head(path))).get(b"meta", b"")[4:]
+    top = dict(boxes(meta))
+    properties = list(boxes(dict(boxes(top.get(b"iprp", b""))).get(b"ipco", b"")))
+    for index in _properties_of_primary(top):
+        kind, data = properties[index - 1] if 0 < index <= len(properties) else (b"", b"")
+        if kind == b"colr" and data[:4] == b"nclx" and len(data) >= 8:
+            return struct.unpack_from(">HH", data, 4)  # type: ignore[return-value]
+    return None
+
+
+def jp2_profile(path: Path) -> bytes | None:
+    """The ICC profile of a JPEG 2000 file, or None."""
+    header = dict(boxes(_head(path))).get(b"jp2h", b"")
+    return next((data[3:] for kind, data in boxes(header) if kind == b"colr" and data[:1] in (b"\2", b"\3")), None)
+
+
+def boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and content of each box, one after the other; what is cut off or damaged ends them."""
+    at = 0
+    while at + 8 <= len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        start = at + 8
+        if size == 1 and at + 16 <= len(data):
+            (size,) = struct.unpack_from(">Q", data, start)
+            start += 8
+        end = at + size if size else len(data)
+        if end < start:
+            return
+        yield kind, data[start:end]
+        at = end
+
+
+def _head(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_HEAD_BYTES)
+
+
+def _properties_of_primary(meta: dict[bytes, bytes]) -> list[int]:
+    """Numbers, from 1, of the properties of the main picture (ISO 23008-12, `pitm` and `ipma`)."""
+    primary_box, association = meta.get(b"pitm", b""), dict(boxes(meta.get(b"iprp", b""))).get(b"ipma", b"")
+    try:
+        (primary,) = struct.unpack_from(">I" if primary_box[0] else ">H", primary_box, 4)
+        wide_ids, wide_indices = association[0] > 0, association[3] & 1
+        (entries,) = struct.unpack_from(">I", association, 4)
+        at = 8
+        for _ in range(entries):
+            (item,) = struct.unpack_from(">I" if wide_ids else ">H", association, at)
+            at += 4 if wide_ids else 2
+            count = association[at]
+            form = f">{count}{'H' if wide_indices else 'B'}"
+            indices = struct.unpack_from(form, association, at + 1)
+            if item == primary:
+                return [index & (0x7FFF if wide_indices else 0x7F) for index in indices]
+            at += 1 + struct.calcsize(form)
+    except (IndexError, struct.error):
+        pass
+    return []

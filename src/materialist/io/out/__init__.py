@@ -1,0 +1,1 @@
+"""Pictures out: encodings, colours, EXIF and layers of files that are written."""

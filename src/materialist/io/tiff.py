@@ -1,0 +1,162 @@
+"""TIFF of more than 8 bits a channel, by OpenCV and tifffile, to linear Rec.709."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tifffile import TiffFile
+
+from materialist.color import ROWS
+from materialist.errors import InputError
+from materialist.io.bitmap import (
+    Decoded,
+    deep_space,
+    flattened,
+    frames_note,
+    light_and_alpha,
+    read_bitmap,
+    rgb_levels,
+    upright,
+)
+from materialist.io.colour_space import ColourSpace, lab_to_rec709
+from materialist.io.colour_tags import exif_space
+from materialist.io.exif import file_tags
+from materialist.io.icc import matrix_profile
+from materialist.types import Array
+
+_UNSPECIFIED, _PREMULTIPLIED = 0, 1
+"""What the channel beyond colour may be, of ExtraSamples."""
+_INVERTED, _GREY, _RGB, _CIELAB, _ICCLAB = 0, 1, 2, 8, 9
+"""What values mean, of PhotometricInterpretation."""
+FOURTH = "The file says of its last channel that it is no transparency; it is left out."
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """What the tags of the first page say."""
+
+    bits: int
+    planar: int
+    meaning: int
+    extra: tuple[int, ...]
+    compression: str
+    profile: bytes | None
+    frames: int
+    samples: int
+    """Channels of a pixel."""
+
+    @classmethod
+    def of(cls, page: Any, frames: int) -> "_Layout":
+        tags = page.tags
+        extra = tuple(int(kind) for kind in np.atleast_1d(tags.valueof("ExtraSamples", 2)))
+        return cls(
+            int(np.max(tags.valueof("BitsPerSample", 8))),
+            int(tags.valueof("PlanarConfiguration", 1)),
+            int(tags.valueof("PhotometricInterpretation", _RGB)),
+            extra,
+            page.compression.name,
+            tags.valueof("InterColorProfile"),
+            frames,
+            int(tags.valueof("SamplesPerPixel", 1)),
+        )
+
+
+def read_tiff(path: Path) -> Decoded:
+    """A TIFF: scene-linear where it holds floats. What is deeper than 8 bits OpenCV reads, and turns upright itself.
+
+    Raises InputError for layouts that would be read wrong.
+    """
+    with TiffFile(path) as file:
+        page: Any = file.pages[0]
+        layout = _Layout.of(page, len(file.pages))
+        if layout.bits > 8 and layout.meaning in (_CIELAB, _ICCLAB):
+            return _lab(page, layout, path)
+    if layout.bits <= 8:
+        return _shallow(path, layout)
+    _require_known(layout, path)
+    colour, alpha = rgb_levels(path)
+    tags, warnings = file_tags(path), frames_note(layout.frames)
+    if layout.extra[0] == _UNSPECIFIED:
+        warnings.append(FOURTH)
+        alpha = None
+    elif layout.samples == 2 and alpha is None:  # OpenCV reads the grey channel alone, at 8 bits
+        warnings.append("The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it.")
+    space = _space(layout, tags, warnings, is_float=colour.dtype.kind == "f")
+    premultiplied = _PREMULTIPLIED in layout.extra
+    if colour.dtype.kind == "f":
+        decoded = _light(colour, alpha, space, premultiplied, warnings)
+    elif alpha is not None and premultiplied:
+        raise InputError(f"{path} has premultiplied alpha; save it as plain 16-bit RGB.")
+    else:
+        decoded = flattened(colour, alpha, space, warnings)
+    decoded.tags = tags
+    return decoded
+
+
+def _shallow(path: Path, layout: _Layout) -> Decoded:
+    decoded = read_bitmap(path)
+    if layout.extra[0] == _UNSPECIFIED:
+        decoded.warnings.append(FOURTH)
+    return decoded
+
+
+def _require_known(layout: _Layout, path: Path) -> None:
+    """Refuse what OpenCV would read as something else."""
+    if layout.planar == 2:
+        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
+    if layout.meaning == _INVERTED:
+        raise InputError(f"{path} has inverted values; save it as plain 16-bit RGB.")
+    if layout.meaning not in (_GREY, _RGB):
+        raise InputError(
+            f"{path} is neither grey nor RGB (its PhotometricInterpretation is {layout.meaning}) at {layout.bits} "
+            "bits; save it as RGB."
+        )
+
+
+def _space(layout: _Layout, tags: dict[str, Any], warnings: list[str], *, is_float: bool) -> ColourSpace | None:
+    """What the values mean; None for sRGB, and for floats that are linear Rec.709."""
+    if layout.profile is None:
+        return None if is_float else exif_space(tags, warnings)
+    if not is_float:
+        return deep_space(layout.profile, warnings)
+    space = matrix_profile(layout.profile)
+    if space is None:
+        warnings.append("The colour profile of a float TIFF is used only where it is a matrix: taken as linear.")
+    return space
+
+
+def _light(
+    colour: Array, alpha: Array | None, space: ColourSpace | None, premultiplied: bool, warnings: list[str]
+) -> Decoded:
+    """A float TIFF: light, by its profile or as it is."""
+    light = np.array(colour, np.float32, order="C") if space is None else space.linear(colour)
+    if alpha is not None and not premultiplied:
+        light *= alpha.astype(np.float32)
+    return light_and_alpha(light, alpha, warnings)
+
+
+def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
+    """CIELab of 16 bits: signed a and b (TIFF 6), or with 128 added to them (ICC). Raises InputError."""
+    if layout.compression not in ("NONE", "ADOBE_DEFLATE", "DEFLATE") or layout.bits != 16:
+        raise InputError(
+            f"{path} holds CIELab of {layout.bits} bits, compressed by {layout.compression}; save it uncompressed at "
+            "16 bits, or as RGB."
+        )
+    stored = page.asarray()
+    if stored.ndim != 3 or stored.shape[-1] != 3:
+        raise InputError(f"{path} holds CIELab of another shape than three channels; save it as RGB.")
+    linear: Array = np.empty(stored.shape, np.float32)
+    for start in range(0, len(stored), ROWS):  # bounds the memory
+        rows = slice(start, start + ROWS)
+        linear[rows] = lab_to_rec709(_lab_values(stored[rows], layout.meaning))
+    tags = file_tags(path)
+    return Decoded(upright(linear, tags), False, tags, frames_note(layout.frames))
+
+
+def _lab_values(stored: Array, meaning: int) -> Array:
+    """CIELab of levels of 16 bits: L in [0, 100], a and b around 0."""
+    if meaning == _CIELAB:
+        signed = stored[..., 1:].astype(np.int16)
+        return np.concatenate([stored[..., :1] * (100 / 65535), signed / 256], -1)
+    return stored * np.array([100 / 65280, 1 / 256, 1 / 256]) - np.array([0, 128, 128])

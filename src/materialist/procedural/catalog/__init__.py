@@ -1,0 +1,1 @@
+"""Models of real furniture and things, and photographs, from packages that are installed beside the project."""

@@ -1,0 +1,1 @@
+"""Scenes of real things: rooms, laid tables, single things and sculptures."""

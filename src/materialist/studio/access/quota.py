@@ -1,0 +1,129 @@
+"""What one sender may store, open and have computed at a time. A sender is the address that requests come from."""
+
+import ipaddress
+import shutil
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from materialist.errors import InputError
+from materialist.studio import SETTINGS
+
+HOUR = 3600.0
+"""Seconds."""
+SMALLEST = 65_536
+"""Bytes that a file counts at least: very many small ones would fill a disk, too."""
+
+
+class Quota:
+    """Bytes that each sender stored within the last hour, and files that are being opened.
+
+    Its methods may be called from any thread.
+    """
+
+    def __init__(self, *places: Path) -> None:
+        """places: folders whose disks must not be filled."""
+        self.places = places
+        self._claims: dict[str, deque[tuple[float, int]]] = {}
+        """Sender -> when they stored something, and how many bytes."""
+        self._opening: dict[str, int] = {}
+        """Sender -> how many of their files are being opened."""
+        self._lock = threading.Lock()
+
+    def claim(self, sender: str, size: int) -> None:
+        """Count bytes that a sender is about to store.
+
+        Raises InputError above what one sender may store within an hour, and where the disk is full.
+        """
+        size = max(size, SMALLEST)
+        with self._lock:
+            if self._stored(sender) + size > SETTINGS.storage_quota:
+                limit = f"{SETTINGS.storage_quota / 1e9:g} GB"
+                raise InputError(f"You have stored {limit} here within an hour; go on later.")
+            self.check_disk(size)
+            self._claims.setdefault(sender, deque()).append((time.monotonic(), size))
+
+    def give_back(self, sender: str, size: int) -> None:
+        """Take back a part of what a sender claimed, and did not store."""
+        with self._lock:
+            self._claims.setdefault(sender, deque()).append((time.monotonic(), -size))
+
+    def _stored(self, sender: str) -> int:
+        """Bytes of the last hour; senders who stored nothing in it are forgotten."""
+        hour_ago = time.monotonic() - HOUR
+        for who in list(self._claims):
+            claims = self._claims[who]
+            while claims and claims[0][0] < hour_ago:
+                claims.popleft()
+            if not claims:
+                del self._claims[who]
+        return sum(size for _, size in self._claims.get(sender, ()))
+
+    def check_disk(self, size: int = 0) -> None:
+        """Raise InputError where so many bytes more would fill a disk."""
+        free = min(shutil.disk_usage(place).free for place in self.places)
+        if free - size < SETTINGS.disk_left:
+            raise InputError("The disk of the studio is full; it takes no more files.")
+
+    @contextmanager
+    def opening(self, sender: str) -> Iterator[None]:
+        """A place among the few files that are opened at a time. Raises InputError where there is none."""
+        with self._lock:
+            if self._opening.get(sender):
+                raise InputError("Another file of yours is being opened; wait until it is there.")
+            if len(self._opening) >= SETTINGS.openings:
+                raise InputError("The studio is opening the files of others; try again in a moment.")
+            self._opening[sender] = 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                del self._opening[sender]
+
+
+class Allowance:
+    """The quota of one person, for whoever works for them; of their sender at the time of each call."""
+
+    def __init__(self, quota: Quota | None = None, sender: Callable[[], str] = str) -> None:
+        """sender: gives the person's sender. Without a quota everything is allowed."""
+        self._quota, self._sender = quota, sender
+
+    def claim(self, size: int) -> None:
+        """Count bytes that are about to be stored; raises InputError as `Quota.claim`."""
+        if self._quota is not None:
+            self._quota.claim(self._sender(), size)
+
+    @contextmanager
+    def opening(self) -> Iterator[None]:
+        """As `Quota.opening`."""
+        if self._quota is None:
+            yield
+            return
+        with self._quota.opening(self._sender()):
+            yield
+
+
+def sender_of(address: str) -> str:
+    """The name under which an IP address is counted: itself, and of IPv6 its network of 64 bits, which one has.
+
+    A port behind an IPv4 address does not count.
+    """
+    host, _, port = address.rpartition(":")
+    if port.isdigit() and host.count(".") == 3:
+        address = host
+    try:
+        ip = ipaddress.ip_address(address)
+    except ValueError:
+        return address
+    if ip.version == 4:
+        return str(ip)
+    mapped = ip.ipv4_mapped
+    return str(mapped) if mapped else str(ipaddress.ip_network((ip, 64), strict=False))
+
+
+def folder_size(folder: Path) -> int:
+    """Bytes of the files in a folder."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())

@@ -1,0 +1,26 @@
+"""Messages of the library in the words of the command line."""
+
+import pytest
+
+from materialist.cli.outcome import with_flags
+
+
+@pytest.mark.parametrize(
+    ("python", "flags"),
+    [
+        ("give `force=True` to replace it", "give --force to replace it"),
+        ("render with `denoise=False`.", "render with --no-denoise."),
+        ('choose `device="cpu"`, or', "choose --device cpu, or"),
+        ('with `depth="moge:A B"`, `normal="x"`', "with --depth moge:A B, --normal x"),
+        ('leave `method="sam2"` out', "leave --with sam2 out"),
+        ("give it as `max_triangles=N`.", "give it as --max-triangles N."),
+        ("see: `materialist doctor` and a = b", "see: `materialist doctor` and a = b"),
+    ],
+)
+def test_keywords_become_flags(python, flags):
+    assert with_flags(python) == flags
+
+
+def test_an_error_of_the_library_names_flags(refused, tmp_path):
+    (tmp_path / "a.scene").mkdir()
+    assert "give --force" in refused("invert", "example:coffee", "-o", tmp_path / "a.scene")

@@ -1,0 +1,207 @@
+"""Ways to hurt other people at one studio that once worked."""
+
+import json
+import math
+import threading
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("gradio", reason="needs gradio")
+import io
+import zipfile
+
+from made_meshes import box_file
+from made_tasks import wait
+from starlette.responses import PlainTextResponse
+from starlette.testclient import TestClient
+from studio_scenes import zipped_package
+
+from materialist.errors import InputError
+from materialist.io.decode import image_size
+from materialist.io.exr import read_exr, write_exr
+from materialist.io.image import write_png
+from materialist.io.photo import example_path
+from materialist.studio import SETTINGS, StudioSettings, archives, server, uploads
+from materialist.studio.access import quota
+from materialist.studio.access.gate import Gate
+from materialist.studio.workspace import WorkFolder, person_of
+
+COOKIE = "0123456789abcdef" * 2
+FORM = b'--B\r\nContent-Disposition: form-data; name="files"; filename="a.png"\r\n\r\nSECRET\r\n--B--\r\n'
+
+
+@pytest.fixture
+def page(shared):
+    return server.application(shared, host="0.0.0.0", port=0)
+
+
+def browser(page):
+    client = TestClient(page, base_url="http://studio.example", client=("1.2.3.4", 1))
+    assert client.get("/").status_code == 200
+    return client
+
+
+def test_an_upload_that_says_zero_and_is_chunked_is_refused(page):
+    """Such bytes would not count: h11 reads the chunks, whatever the length says."""
+    kind = {"content-type": "multipart/form-data; boundary=B"}
+    lengths = {"content-length": "0", "transfer-encoding": "chunked"}
+    answer = browser(page).post("/gradio_api/upload", content=FORM, headers=kind | lengths)
+    assert answer.status_code in (400, 403)
+
+
+def test_a_promise_that_is_larger_than_an_upload_takes_nothing_from_the_neighbours(page, shared):
+    """A header alone, without a body, would use up the hour of everybody behind one address."""
+    thief = browser(page)
+    kind = {"content-type": "multipart/form-data; boundary=B"}
+    thief.post("/gradio_api/upload", content=b"", headers=kind | {"content-length": "2999999999"})
+    assert shared.quota._stored("1.2.3.4") == 0
+
+
+def test_what_was_promised_and_never_came_is_given_back(page, shared):
+    """The next one finds the whole hour again."""
+    kind = {"content-type": "multipart/form-data; boundary=B"}
+    browser(page).post("/gradio_api/upload", content=FORM, headers=kind | {"content-length": "50000000"})
+    assert shared.quota._stored("1.2.3.4") <= quota.SMALLEST
+
+
+def test_a_folder_of_the_user_is_never_swept(tmp_path):
+    own = tmp_path / "materialist-cache-of-mine"
+    own.mkdir()
+    (own / "thesis.txt").write_text("years of work")
+    WorkFolder(tmp_path)
+    assert (own / "thesis.txt").is_file()
+
+
+def test_a_work_folder_that_two_versions_used_opens(tmp_path):
+    project = tmp_path / "photo-001"
+    for name in (COOKIE, person_of(COOKIE)):
+        (project / f"edits-{name}").mkdir(parents=True)
+        (project / f"edits-{name}" / "edits.yaml").write_text("- edit: {box: [1, 1, 5, 5], hue: 3}\n")
+    card = {"title": "One", "owner": COOKIE, "scene": "photo.scene"}
+    (project / "project.json").write_text(json.dumps(card))
+    (project,) = WorkFolder(tmp_path).projects(person_of(COOKIE))
+    lists = sorted(file.parent.name for file in project.folder.glob("*/edits.yaml"))
+    assert lists == [f"edits-{person_of(COOKIE)}", f"former-1-edits-{person_of(COOKIE)}"]
+
+
+def test_files_of_a_loaded_zip_count_as_stored(session, tmp_path, opens_here, monkeypatch):
+    """What a zip of edits unpacks to stays in the workspace; its bytes must be claimed, or refused."""
+    claims = []
+    monkeypatch.setattr(quota.Quota, "claim", lambda self, sender, size: claims.append(size))
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("edits.yaml", "- edit: {box: [2, 2, 30, 30], texture: wood.png}\n")
+        archive.write(example_path("example:cat"), "wood.png")
+    (tmp_path / "edits.zip").write_bytes(made.getvalue())
+    monkeypatch.setattr(session, "allowance", quota.Allowance(quota.Quota(), str))
+    session.read_edits(tmp_path / "edits.zip")
+    assert sum(claims) >= example_path("example:cat").stat().st_size
+
+
+def test_copies_that_are_handed_over_are_not_made_on_a_full_disk(shared, monkeypatch, tmp_path):
+    monkeypatch.setattr(quota, "SETTINGS", StudioSettings(disk_left=10**18))
+    file = tmp_path / "result.zip"
+    file.write_bytes(b"x" * 100)
+    with pytest.raises(InputError, match="full"):
+        shared.public_copy("anna", file)
+
+
+def test_ids_of_files_that_were_swept_are_forgotten(shared, tmp_path):
+    file = shared.work.cache / "a.png"
+    file.write_bytes(b"x")
+    shared.files.add("anna", file)
+    file.unlink()
+    for _ in range(600):
+        shared.files.add("bert", shared.work.cache / "b.png")
+    assert not shared.files._files.keys() & {name for name, (who, _) in shared.files._files.items() if who == "anna"}
+
+
+def test_few_uploads_are_opened_at_once_and_one_of_each_sender(monkeypatch, tmp_path):
+    """Each may use 2 GB and one thread of the page: all at once they would freeze it for everybody."""
+    opened_at_once, running, lock = [], [], threading.Lock()
+
+    def slow(task, limits, **given):
+        with lock:
+            running.append(1)
+            opened_at_once.append(len(running))
+        time.sleep(0.2)
+        with lock:
+            running.pop()
+
+    monkeypatch.setattr(uploads, "run_limited", slow)
+    file = tmp_path / "a.png"
+    file.write_bytes(b"x")
+    shared_quota = quota.Quota()
+    refusals = []
+
+    def open_one(sender):
+        allowance = quota.Allowance(shared_quota, lambda: sender)
+        try:
+            uploads.opened(uploads.checked, file, allowance, option="texture")
+        except InputError as error:
+            refusals.append(str(error))
+
+    threads = [threading.Thread(target=open_one, args=(f"1.2.3.{k % 6}",)) for k in range(24)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert max(opened_at_once) <= SETTINGS.openings
+    assert any("Another file of yours" in text for text in refusals)
+    assert any("files of others" in text for text in refusals)
+
+
+def test_jobs_are_counted_by_address(shared, tmp_path):
+    for number in range(SETTINGS.jobs_a_person):
+        person = f"person{number}"
+        shared.note_sender(person, "1.2.3.4")
+        shared.submit(shared.session(f"page{number}", person), wait, tmp_path)
+    shared.note_sender("another", "1.2.3.4")
+    with pytest.raises(InputError, match="6 jobs waiting or running"):
+        shared.submit(shared.session("page", "another"), wait, tmp_path)
+
+
+def test_a_page_ends_with_the_request_that_it_holds(shared):
+    async def held(scope, receive, send):
+        assert "mine" in shared._sessions
+        await PlainTextResponse("beat")(scope, receive, send)
+
+    gate = Gate(held, shared)
+    client = TestClient(gate, base_url="http://studio.example")
+    assert client.get("/gradio_api/heartbeat/mine").status_code == 200
+    assert "mine" not in shared._sessions
+
+
+def test_a_large_texture_is_shrunk_before_the_server_reads_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(edit_pixels=1000))
+    rng = np.random.default_rng(0)
+    write_png(tmp_path / "wood.png", rng.integers(0, 255, (60, 80, 3)).astype(np.uint8))
+    write_exr(tmp_path / "sky.exr", rng.random((40, 80, 3), np.float32) * 9)
+    smaller = uploads.checked(None, tmp_path / "wood.png", "texture")
+    assert smaller.suffix == ".png" and math.prod(image_size(smaller)) <= 1000
+    light = uploads.checked(None, tmp_path / "sky.exr", "envmap")
+    assert light.suffix == ".exr" and math.prod(image_size(light)) <= 1000
+    assert read_exr(light).mean() == pytest.approx(4.5, rel=0.02)
+    with pytest.raises(InputError, match="may have up to"):
+        uploads.checked(None, tmp_path / "wood.png", "mask")
+
+
+def test_a_mesh_of_many_faces_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(mesh_faces=10))
+    box_file(tmp_path / "box.ply")
+    with pytest.raises(InputError, match="12 faces; the studio takes up to 10"):
+        uploads.checked(None, tmp_path / "box.ply", uploads.MESH)
+
+
+def test_a_large_scene_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(scene_pixels=100))
+    with pytest.raises(InputError, match="Invert its photo again"):
+        archives.extract_scene(None, zipped_package(tmp_path), tmp_path / "target")
+
+
+def test_gradio_is_not_asked_to_tell_of_closed_pages(page):
+    """It makes the whole state of a page anew for that, on the loop of all requests: 200 pages stop it for 16 s."""
+    events = browser(page).get("/config").json()["dependencies"]
+    assert not [one["id"] for one in events if any(event == "unload" for _, event in one["targets"])]

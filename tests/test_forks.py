@@ -1,0 +1,55 @@
+"""A fork of a process that has computed is refused with a sentence, where it would hang for ever."""
+
+import subprocess
+import sys
+
+import pytest
+from edit_scenes import flat_scene
+
+from materialist.io.package import save_scene
+
+SCRIPT = """
+import os, sys
+import materialist as mt
+scene = mt.load_scene(sys.argv[1])
+mt.select(scene, mask=scene.depth > 0)
+child = os.fork()
+if child == 0:
+    try:
+        {call}
+        os._exit(1)
+    except mt.SetupError as error:
+        os._exit(42 if "forked" in str(error) and "spawn" in str(error) else 2)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+CALLS = {
+    "invert": "mt.invert('example:coffee')",
+    "select": "mt.select(scene, click=(5, 5))",
+    "render_scene": "mt.render_scene(scene, spp=2)",
+    "composite": "mt.composite(scene, scene)",
+}
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_fork_is_refused(name, tmp_path):
+    save_scene(flat_scene(), tmp_path / "a.scene")
+    script = SCRIPT.format(call=CALLS[name])
+    run = subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.scene")], timeout=120)
+    assert run.returncode == 42
+
+
+def test_a_process_that_forks_before_it_computes_may_compute_in_both(tmp_path):
+    save_scene(flat_scene(), tmp_path / "a.scene")
+    script = """
+import os, sys
+import materialist as mt
+scene = mt.load_scene(sys.argv[1])
+child = os.fork()
+mt.select(scene, mask=scene.depth > 0)
+if child == 0:
+    os._exit(0)
+sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    run = subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.scene")], timeout=120)
+    assert run.returncode == 0

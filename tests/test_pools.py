@@ -1,0 +1,88 @@
+"""Every pool of processes ends with the process that started it, however that ended."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from made_tasks import until
+
+SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
+
+POOLS = {
+    "io/samples.py": """
+import sys, pathlib
+from made_pools import slow_arrays
+from materialist.io.samples import complete
+folder = pathlib.Path(sys.argv[1]) / "samples"
+complete([folder / f"{k}.npz" for k in range(8)], slow_arrays, "samples", lambda *_: None, 2)
+""",
+    "jobs/process.py": """
+import time
+from made_tasks import answer
+from materialist.jobs.pool import LocalPool
+pool = LocalPool([{}, {}])
+for key in "ab":
+    pool.begin(key, answer, {"how": "wait"})
+time.sleep(60)
+""",
+    "train/stream.py": """
+from made_pools import SlowNumbers
+from torch.utils.data import DataLoader
+from materialist.train.stream import _init_worker
+list(DataLoader(SlowNumbers(), num_workers=2, worker_init_fn=_init_worker))
+""",
+}
+"""Module that starts processes -> a program that uses its pool, and stays in it."""
+STARTS_PROCESSES = re.compile(r"ProcessPoolExecutor|multiprocessing\.Pool|Process\(|Popen\(|DataLoader\(")
+OTHERS = {"bench/studio.py", "render/variant.py"}
+"""Modules that start one process and end it themselves."""
+
+
+def test_every_module_that_starts_processes_is_known():
+    starting = {
+        str(file.relative_to(SOURCE))
+        for file in SOURCE.rglob("*.py")
+        if STARTS_PROCESSES.search(file.read_text("utf-8"))
+    }
+    assert starting - OTHERS == {*POOLS}
+
+
+@pytest.mark.parametrize("how_it_ends", [signal.SIGTERM, signal.SIGKILL], ids=["SIGTERM", "SIGKILL"])
+@pytest.mark.parametrize("module", POOLS)
+def test_workers_end_with_their_parent(module, how_it_ends, tmp_path):
+    (tmp_path / "samples").mkdir()
+    program = [sys.executable, "-c", POOLS[module], str(tmp_path)]
+    parent = subprocess.Popen(program, start_new_session=True)
+    try:
+        workers = until(lambda: _workers(parent.pid, at_least=2), 60)
+        os.kill(parent.pid, how_it_ends)
+        parent.wait(10)
+        _, alive = psutil.wait_procs(workers, timeout=20)
+        assert not alive
+    finally:
+        parent.kill()
+        for worker in psutil.process_iter():
+            if worker.pid != os.getpid() and _in_session(worker.pid, parent.pid):
+                worker.kill()
+
+
+def _workers(pid: int, at_least: int) -> list[psutil.Process]:
+    """The children of a process, once so many are there and have had time to begin their work."""
+    children = psutil.Process(pid).children(recursive=True)
+    if len(children) < at_least:
+        return []
+    time.sleep(1.0)
+    return psutil.Process(pid).children(recursive=True)
+
+
+def _in_session(pid: int, session: int) -> bool:
+    try:
+        return os.getsid(pid) == session
+    except ProcessLookupError:
+        return False
