@@ -72,7 +72,7 @@ def optimise(
         value.backward()
         if schedule.keep_best and value.item() < best:
             best, kept = value.item(), [t.detach().clone() for t in tensors]
-        adam.step(schedule.learning_rate * schedule.decay ** (step // schedule.decay_every))
+        adam.step(schedule.rate(step))
         if after_step is not None:
             with torch.no_grad():
                 after_step()
