@@ -187,13 +187,8 @@ class InvertOptions(OperationOptions):
         "transport", "Cached light transport, or the paper's path tracing.", kind="word",
         choices=("transport", "path"))
     preset: str = option(
-        "default", "Our schedule, or the paper's.", kind="word", choices=("default", "paper"))
+        "default", "Our schedule, or the paper's to the letter.", kind="word", choices=("default", "paper"))
     """The path engine always follows the paper."""
-    trust: str = option(
-        "auto", "How far the photo may move albedo, roughness and metallic: sure, hardly; none, as it likes; auto: "
-        "given maps are sure, those of a network unsure.",
-        kind="word", choices=("auto", "sure", "unsure", "none"))
-    """`auto` goes by the source of each map. The paper's preset does not ask."""
     fov: float | str = option(
         "auto", "Horizontal field of view in degrees, or auto: EXIF, else 35.", low=1, high=170, ends="()",
         unit="degrees", choices=("auto",), called="field of view", metavar="TEXT")

@@ -91,7 +91,7 @@ def invert(
     from materialist.fit.invert import FitSetup
     from materialist.fit.settings import preset as named
 
-    settings = wanted.settings or named(preset, hdr=picture.hdr, trust=map_trust(wanted.trust, prior))
+    settings = wanted.settings or named(preset, hdr=picture.hdr)
     fit_setup = FitSetup(
         picture, prior, settings, wanted.completion, wanted.engine,
         envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
@@ -107,7 +107,7 @@ def invert(
             "tool_version": __version__, "predictor": prior.predictor, "sources": prior.sources,
             "engine": wanted.engine, "preset": preset,
             "completion": fit_setup.completion, "completion_asked": wanted.completion,
-            "tau": wanted.tau, "strategy": wanted.strategy, "trust": wanted.trust,
+            "tau": wanted.tau, "strategy": wanted.strategy,
             "mask": _named(mask), "settings": asdict(settings) if wanted.settings else None, "seed": wanted.seed,
             "spp": best.spp, "size": wanted.size, "envmap_size": list(wanted.envmap_size), "fov": picture.camera.fov,
             "fov_source": picture.fov_source,
@@ -145,17 +145,6 @@ def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
         )
         prediction = replace(prediction, warnings=(*prediction.warnings, note))
     return picture, prediction
-
-
-def map_trust(word: str, prior: Prediction) -> tuple[str, str, str]:
-    """How sure the prior's albedo, roughness and metallic are; see `InvertOptions.trust`."""
-    from materialist.predict.registry import is_guess
-
-    if word != "auto":
-        return (word,) * 3
-    sources = (prior.sources.get(name, prior.predictor) for name in ("albedo", "roughness", "metallic"))
-    albedo, roughness, metallic = ("unsure" if is_guess(source) else "sure" for source in sources)
-    return albedo, roughness, metallic
 
 
 def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:

@@ -33,12 +33,12 @@ def test_invert_passes_every_option_on_and_writes_the_scene(done, photo, tmp_pat
     calls = install(monkeypatch)
     place = tmp_path / "a.scene"
     options = "--predictor maps:x --engine path --preset paper --fov 50 --size 24 --envmap-size 64x32 --completion none"
-    more = "--tau 8 --mask mask.png --strategy white-light-first --trust none --seed 7 --device cpu"
+    more = "--tau 8 --mask mask.png --strategy white-light-first --seed 7 --device cpu"
     done("invert", photo, "-o", place, *options.split(), *more.split())
     (call,) = calls
     assert call["options"] == InvertOptions(
         predictor="maps:x", engine="path", preset="paper", fov=50, size=24, envmap_size=(64, 32), completion="none",
-        tau=8, mask=Path("mask.png"), strategy="white-light-first", trust="none", seed=7, device="cpu",
+        tau=8, mask=Path("mask.png"), strategy="white-light-first", seed=7, device="cpu",
     )  # fmt: skip
     given = call["photo"]
     assert given.camera.fov == 50 and given.linear.shape == (16, 24, 3) and callable(call["progress"])

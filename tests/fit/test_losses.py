@@ -8,26 +8,13 @@ import pytest
 import torch
 
 from materialist.color import CLIPPED, linear_to_srgb
-from materialist.fit.losses import (
-    consistency,
-    decode,
-    encode,
-    log_chroma,
-    log_total_variation,
-    rendering_loss,
-    residual,
-)
+from materialist.fit.losses import consistency, encode, log_chroma, log_total_variation, rendering_loss, residual
 from materialist.fit.settings import DEFAULT, PAPER
 
 
 def test_srgb_encoding_is_the_packages():
     x = np.linspace(0, 1, 200, dtype=np.float32)
     np.testing.assert_allclose(encode(torch.from_numpy(x), "srgb").numpy(), linear_to_srgb(x), atol=2e-6)
-
-
-def test_decoding_undoes_encoding():
-    x = torch.linspace(0, 1, 200)
-    torch.testing.assert_close(decode(encode(x, "srgb")), x)
 
 
 def test_clipped_channels_are_wrong_on_one_side_only():
@@ -42,7 +29,7 @@ def test_consistency_is_a_weighted_sum():
     """Delta times the mean L1 distances of albedo, roughness and metallic, as in the paper; or encoded squares."""
     prior = torch.full((4, 5), 0.4)
     maps = prior + torch.tensor([0.3, 0.3, 0.3, 0.5, 0.2])
-    assert float(consistency(maps, prior, replace(PAPER.materials, delta=0.5))) == pytest.approx(0.5 * 1.0)
+    assert float(consistency(maps, prior, PAPER.materials)) == pytest.approx(0.5 * 1.0)
     weighed = replace(PAPER.materials, delta=1.0, weights=(2.0, 0.0, 10.0))
     assert float(consistency(maps, prior, weighed)) == pytest.approx(0.6 + 2.0)
     settings = replace(DEFAULT.materials, delta=1.0, weights=(2.0, 1.0, 10.0))
@@ -54,13 +41,6 @@ def test_losses_of_the_rendering():
     error = torch.tensor([0.05, -0.3])
     assert float(rendering_loss(error, "l1+l2")) == pytest.approx((0.05 + 0.3 + 0.05**2 + 0.3**2) / 2)
     assert float(rendering_loss(error, "l2")) == pytest.approx((0.05**2 + 0.3**2) / 2)
-    # Three times the absolute error's value beside it, by the gradient of the square.
-    assert float(rendering_loss(error, "balanced")) == pytest.approx(4 * (0.05 + 0.3) / 2)
-    error.requires_grad_()
-    rendering_loss(error, "balanced").backward()
-    weight = 3 * 0.175 / ((0.05**2 + 0.3**2) / 2)
-    expected = [(math.copysign(1, e) + weight * 2 * e) / 2 for e in (0.05, -0.3)]
-    torch.testing.assert_close(error.grad, torch.tensor(expected))
 
 
 def test_log_total_variation_equals_a_loop():

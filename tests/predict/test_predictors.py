@@ -14,7 +14,6 @@ from materialist.predict import get_predictor
 from materialist.predict.bundled import predictor
 from materialist.predict.normals import normals_from_depth
 from materialist.predict.protocol import MAPS
-from materialist.predict.registry import is_guess
 from materialist.types import Materials, Prediction
 
 H, W = 20, 32
@@ -156,12 +155,3 @@ def test_bad_names_are_refused(spec, parts, message, tmp_path, monkeypatch):
         write_moge(tmp_path / folder)
     with pytest.raises(InputError, match=message):
         get_predictor(spec, **parts)
-
-
-@pytest.mark.parametrize(
-    ("source", "guess"),
-    [("bundled step 3555 sha256:7f84", True), ("marigold (folder)", True), ("constant", True), ("maps:there", False),
-     ("moge:there", False), ("truth", False), ("unknown", False)],
-)  # fmt: skip
-def test_given_maps_are_told_from_guesses(source, guess):
-    assert is_guess(source) == guess

@@ -19,13 +19,14 @@ from materialist.types import Materials
 class Comparison:
     """One scene, rendered both ways."""
 
-    def __init__(self, camera, geometry, materials, envmap):
+    def __init__(self, camera, geometry, materials, envmap, *, own=False):
         self.camera, self.materials, self.envmap = camera, materials, envmap
         self.path = RenderScene(geometry, camera)
         self.path.set_materials(materials)
         self.path.set_envmap(envmap)
+        roughness = materials.roughness if own else None
         dark = np.zeros((camera.height, camera.width, 3), np.float32)
-        self.engine = TransportEngine(geometry, camera, dark)
+        self.engine = TransportEngine(geometry, camera, dark, roughness=roughness)
         depth = self.engine.cache.image(project(np.array(self.engine.cache.position).T, camera)[1][:, None])[..., 0]
         self.surface, self.away = depth > 0, away_from_edges(depth)
 
@@ -64,18 +65,24 @@ def comparison():
     return Comparison(*furnished_room(96), windowed_sky())
 
 
+@pytest.fixture(scope="module", params=["levels", "own roughness"])
+def either(request, comparison):
+    """Specular tables at all levels, or at the roughness of each pixel."""
+    return comparison if request.param == "levels" else Comparison(*furnished_room(96), windowed_sky(), own=True)
+
+
 @pytest.mark.parametrize(("bounces", "away", "everywhere"), [(1, 38, 32), (3, 34, 30)], ids=["direct", "indirect"])
-def test_cached_shading_equals_path_tracing(comparison, bounces, away, everywhere):
-    assert comparison.surface.mean() > 0.95
-    assert comparison.away.mean() > 0.5
-    measured = comparison.decibels(bounces, spp=100)
+def test_cached_shading_equals_path_tracing(either, bounces, away, everywhere):
+    assert either.surface.mean() > 0.95
+    assert either.away.mean() > 0.5
+    measured = either.decibels(bounces, spp=100)
     assert measured[0] >= away
     assert measured[1] >= everywhere
 
 
-def test_cached_shading_has_no_bias(comparison):
-    reference = comparison.path.render(spp=100, seed=3, max_depth=2)
-    ratio = comparison.cached(1)[comparison.away].mean() / reference[comparison.away].mean()
+def test_cached_shading_has_no_bias(either):
+    reference = either.path.render(spp=100, seed=3, max_depth=2)
+    ratio = either.cached(1)[either.away].mean() / reference[either.away].mean()
     assert ratio == pytest.approx(1, abs=0.01)
 
 

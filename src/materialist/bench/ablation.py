@@ -28,7 +28,6 @@ from materialist.bench.report import Column, Report
 from materialist.buffers import placed
 from materialist.edits.core.renderer import rendered
 from materialist.errors import InputError
-from materialist.fit.fields import ALL, Rows
 from materialist.fit.invert import FitSetup, prepare, replaced
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
@@ -127,10 +126,10 @@ class _Photo:
         problem, photo = engine.material_problem(envmap), placed(self.photo.linear.reshape(-1, 3))[engine.pixels]
         seen: list[float] = []
 
-        def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
-            radiance = problem(maps, rows)
+        def render(maps: torch.Tensor) -> torch.Tensor:
+            radiance = problem(maps)
             with torch.no_grad():
-                error = residual(radiance, photo[rows], settings.encoding, white=settings.white)
+                error = residual(radiance, photo, settings.encoding, white=settings.white)
                 seen.append(float(rendering_loss(error, settings.loss)))
             return radiance
 

@@ -12,8 +12,7 @@ import torch
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.envmap import texels_around
-from materialist.fit.fields import ALL, Rows, resize_envmap
-from materialist.render.scene import MAX_DEPTH
+from materialist.fit.fields import resize_envmap
 from materialist.transport.cache import CacheSettings, Tables, TransportCache
 from materialist.transport.filter import Guide, filter_tables
 from materialist.transport.light import light_matrix
@@ -36,23 +35,23 @@ class LightProblem:
     """render(envmap [height, 2 height, 3]) -> radiance [Q, 3], differentiable."""
 
 
-MaterialProblem = Callable[[torch.Tensor, Rows], torch.Tensor]
-"""Rendering as a function of the materials of surface pixels, light fixed: [P, 5] albedo, roughness and metallic of
-those of the engine's pixels that the second argument names, to radiance [P, 3], differentiable."""
+MaterialProblem = Callable[[torch.Tensor], torch.Tensor]
+"""Rendering as a function of the materials of P surface pixels, light fixed: [P, 5] albedo, roughness and metallic to
+radiance [P, 3], differentiable."""
 
 
 class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
-    radiance: [H, W, 3] what the surfaces send to each other: the photograph, which has all bounces; `settle` takes what
-    the path tracer would find. light_height: rows of the environment map inside the light fit.
+    radiance: [H, W, 3] what the surfaces send to each other: the photograph; None: nothing, as the paper writes L_i.
+    light_height: rows of the environment map inside the light fit. roughness: [H, W], where the fit leaves it alone.
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, radiance: Array | None, *, seed: int = 0, light_height: int = 32,
-        cache: CacheSettings | None = None, progress=None,
+        self, geometry: Geometry, camera: Camera, radiance: Array | None, *, roughness: Array | None = None,
+        seed: int = 0, light_height: int = 32, cache: CacheSettings | None = None, progress=None,
     ):  # fmt: skip
-        self.cache = TransportCache(geometry, camera, cache, seed=seed, progress=progress)
+        self.cache = TransportCache(geometry, camera, cache, roughness=roughness, seed=seed, progress=progress)
         self.camera, self.seed, self.light_height, self.radiance = camera, seed, light_height, radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
@@ -82,22 +81,11 @@ class TransportEngine:
         """Filtered transport tables under `envmap` [h, 2h, 3]."""
         return filter_tables(self.cache, self.cache.gather(envmap, self.radiance), self.guide)
 
-    def settle(self, maps: torch.Tensor, envmap: Array) -> None:
-        """From now on surfaces light each other as these maps [P, 5] do under this light, by as many bounces as the
-        path tracer has, and not as the photo shows."""
-        radiance = None
-        for _ in range(MAX_DEPTH - 2):  # the last surface is the one that is seen, the one before meets the light alone
-            sent = _shaded(self.cache.gather(envmap, radiance), maps)
-            radiance = self.cache.image(sent.cpu())
-        self.radiance = radiance
-
     def material_problem(self, envmap: Array) -> MaterialProblem:
-        tables = self.tables(envmap)
-
-        def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
-            return _shaded(Tables(tables.diffuse[rows], tables.specular[:, rows]), maps)
-
-        return render
+        gathered = self.cache.gather(envmap, self.radiance)
+        self.cache.forget()  # a fit asks once, as a rule
+        tables = filter_tables(self.cache, gathered, self.guide)
+        return lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
 
 
 class PathEngine:
@@ -122,15 +110,11 @@ class PathEngine:
         everything = torch.arange(self.camera.width * self.camera.height)
         return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
 
-    def settle(self, maps: torch.Tensor, envmap: Array) -> None:
-        """Nothing to do: every rendering follows the light from surface to surface."""
-
     def material_problem(self, envmap: Array) -> MaterialProblem:
         light = placed(np.ascontiguousarray(envmap, dtype=np.float32))
         h, w = self.camera.height, self.camera.width
 
-        def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
-            assert rows == ALL, "a path-traced step renders the whole picture"
+        def render(maps: torch.Tensor) -> torch.Tensor:
             full = maps.new_zeros(h * w, 5).index_put((self.pixels,), maps).view(h, w, 5)
             parts = [part.contiguous() for part in (full[..., :3], full[..., 3], full[..., 4])]
             return self._render(*parts, light).reshape(-1, 3)[self.pixels]
@@ -154,11 +138,6 @@ def _subset(rng, size: int, share: float) -> Array:
         return np.zeros(0, np.int64)
     edges = np.linspace(0, size, count + 1)
     return np.minimum((edges[:-1] + rng.random(count) * np.diff(edges)).astype(np.int64), size - 1)
-
-
-def _shaded(tables: Tables, maps: torch.Tensor) -> torch.Tensor:
-    """[P, 3] radiance of maps [P, 5]."""
-    return shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
 
 
 def _guide(cache: TransportCache, camera: Camera) -> Guide:

@@ -12,11 +12,6 @@ from torch import nn
 from torch.nn import functional
 
 from materialist.envmap import sh_basis, texel_directions
-from materialist.fit.losses import decode, encode
-
-Rows = torch.Tensor | slice
-"""Which of the pixels of a field are asked for: their numbers, or a slice."""
-ALL = slice(None)
 
 
 def positional_encoding(x: torch.Tensor, bands: int) -> torch.Tensor:
@@ -107,88 +102,36 @@ def _coverage(count: int, of: int) -> torch.Tensor:
     return overlap.clamp_min(0) * count / of
 
 
-class MaterialField(nn.Module):
-    """Materials of P pixels: calling it gives the maps [P, 5], or those of some rows."""
-
-    def confine(self) -> None:
-        """Bring parameters that have left their range back, after a step; most have none."""
-
-
-class MaterialMLP(MaterialField):
-    """m_p + zeta * tanh(MLP_mat(x, m_p)) with learnable zeta (paper, Material Properties Optimization).
-
-    The network is the published one: sines as activations, its input joined to the first and the third hidden layer
-    once more. It sees where a pixel is, as if the picture's longer side had 512 pixels, beside what its prior is: from
-    the prior alone, equal values would move alike everywhere.
-    """
+class MaterialMLP(nn.Module):
+    """m_p + zeta * tanh(MLP_mat(gamma(m_p))) with learnable zeta (paper, Material Properties Optimization)."""
 
     prior: torch.Tensor
-    code: torch.Tensor
 
-    def __init__(
-        self, prior: torch.Tensor, pixels: torch.Tensor, height: int, width: int, *, bands: int = 2, units: int = 256,
-        zeta: float = 1.3,
-    ):  # fmt: skip
-        """prior: [P, 5] albedo, roughness, metallic of the row-major `pixels` [P] of a picture."""
+    def __init__(self, prior: torch.Tensor, *, bands: int = 6, width: int = 128, layers: int = 3, zeta: float = 0.3):
+        """prior: [P, 5] albedo, roughness, metallic."""
         super().__init__()
-        place = torch.stack([pixels // width, pixels % width], 1).to(prior) * (512 / max(height, width))
-        waves = [wave(2.0**k * place) for k in range(bands) for wave in (torch.sin, torch.cos)]
         self.register_buffer("prior", prior)
-        self.register_buffer("code", torch.cat([place, *waves, prior], 1))
-        inputs = self.code.shape[1]
-        sizes = [(inputs, units - inputs), (units, units), (units, units - inputs), (units, units)]
-        self.hidden = nn.ModuleList(nn.Linear(*size) for size in sizes)
-        self.last = nn.Linear(units, 5)
-        _silence(self.last)
+        self.register_buffer("code", positional_encoding(prior, bands))
+        self.net = mlp(10 * bands, 5, width=width, layers=layers)
+        _silence(self.net[-1])
         self.zeta = nn.Parameter(torch.tensor(zeta))
 
-    def forward(self, rows: Rows = ALL) -> torch.Tensor:
-        code = self.code[rows]
-        x = code
-        for k, layer in enumerate(self.hidden):
-            x = layer(x if k % 2 == 0 else torch.cat([x, code], 1)).sin()
-        return clamped(self.prior[rows] + self.zeta * torch.tanh(self.last(x)))
+    def forward(self) -> torch.Tensor:
+        return (self.prior + self.zeta * torch.tanh(self.net(self.code))).clamp(0, 1)
 
 
-class MaterialMaps(MaterialField):
-    """The maps themselves as parameters ("w/o Network" in the paper), the albedo as sRGB has it: a step is as far in
-    a dark colour as in a light one."""
+class MaterialMaps(nn.Module):
+    """The maps themselves as parameters ("w/o Network" in the paper)."""
 
     def __init__(self, prior: torch.Tensor):
         super().__init__()
-        self.maps = nn.Parameter(torch.cat([encode(prior[:, :3], "srgb"), prior[:, 3:]], 1))
+        self.maps = nn.Parameter(prior.clone())
 
-    def forward(self, rows: Rows = ALL) -> torch.Tensor:
-        maps = clamped(self.maps[rows])
-        return torch.cat([decode(maps[:, :3]), maps[:, 3:]], 1)
-
-    def confine(self) -> None:
-        self.maps.clamp_(0, 1)
+    def forward(self) -> torch.Tensor:
+        return self.maps.clamp(0, 1)
 
 
-class MaterialRegions(MaterialField):
-    """The albedo as a map, as sRGB has it; of roughness and metallic one change for each region of the picture."""
-
-    prior: torch.Tensor
-    region: torch.Tensor
-
-    def __init__(self, prior: torch.Tensor, region: torch.Tensor):
-        """region: [P] int64 numbers from 0."""
-        super().__init__()
-        self.register_buffer("prior", prior)
-        self.register_buffer("region", region)
-        self.albedo = nn.Parameter(encode(prior[:, :3], "srgb"))
-        self.change = nn.Parameter(prior.new_zeros(int(region.max()) + 1, 2))
-
-    def forward(self, rows: Rows = ALL) -> torch.Tensor:
-        surface = self.prior[rows, 3:] + self.change[self.region[rows]]
-        return torch.cat([decode(clamped(self.albedo[rows])), clamped(surface)], 1)
-
-    def confine(self) -> None:
-        self.albedo.clamp_(0, 1)
-
-
-class MaterialUNet(MaterialField):
+class MaterialUNet(nn.Module):
     """Residual by a U-Net with two down- and two upsampling blocks of two 3x3 convolutions (paper's ablation)."""
 
     prior: torch.Tensor
@@ -210,19 +153,14 @@ class MaterialUNet(MaterialField):
         _silence(self.head)
         self.zeta = nn.Parameter(torch.tensor(0.3))
 
-    def forward(self, rows: Rows = ALL) -> torch.Tensor:
+    def forward(self) -> torch.Tensor:
         a = self.down1(self.image)
         b = self.down2(functional.max_pool2d(a, 2))
         m = self.middle(functional.max_pool2d(b, 2))
         u = self.up2(torch.cat([functional.interpolate(m, scale_factor=2.0), b], 1))
         u = self.up1(torch.cat([functional.interpolate(u, scale_factor=2.0), a], 1))
         delta = self.head(u)[0, :, : self.size[0], : self.size[1]].reshape(5, -1).T[self.pixels]
-        return clamped(self.prior + self.zeta * torch.tanh(delta))[rows]
-
-
-def clamped(values: torch.Tensor) -> torch.Tensor:
-    """Values clamped to [0, 1]; a gradient passes as if they were not, so that what has left the range comes back."""
-    return values + (values.clamp(0, 1) - values).detach()
+        return (self.prior + self.zeta * torch.tanh(delta)).clamp(0, 1)
 
 
 def _silence(layer: nn.Module) -> None:
@@ -237,19 +175,16 @@ def _double_conv(inputs: int, outputs: int) -> nn.Sequential:
     )
 
 
-class Unified(MaterialField):
+class Unified(nn.Module):
     """Mask mode: one roughness and one metallic, their means, inside a mask (paper, Material Editing Settings)."""
 
-    def __init__(self, field: MaterialField, inside: torch.Tensor):
+    def __init__(self, field: nn.Module, inside: torch.Tensor):
         """inside: [P] bool."""
         super().__init__()
         self.field, self.inside = field, inside
 
-    def forward(self, rows: Rows = ALL) -> torch.Tensor:
+    def forward(self) -> torch.Tensor:
         maps = self.field()
         mean = maps[self.inside, 3:].mean(0)
         unified = torch.where(self.inside[:, None], mean, maps[:, 3:])
-        return torch.cat([maps[:, :3], unified], 1)[rows]
-
-    def confine(self) -> None:
-        self.field.confine()
+        return torch.cat([maps[:, :3], unified], 1)

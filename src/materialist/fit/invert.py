@@ -11,8 +11,8 @@ import torch
 from materialist.buffers import placed
 from materialist.envmap import paste_visible_sky
 from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
-from materialist.fit.light import LightStart, envmap_field, fit_light, start_light
-from materialist.fit.materials import fit_materials, material_field, remapped
+from materialist.fit.light import envmap_field, fit_light, start_light
+from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
@@ -55,8 +55,6 @@ class FitState:
     envmap: Array
     """[h, 2h, 3]."""
     stages: list[dict] = field(default_factory=list)
-    light: tuple[torch.nn.Module, LightStart] | None = None
-    """The field behind `envmap`, which later fits move on, and what it began with."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +81,9 @@ class Fit:
         if setup.strategy == "white-light-first":
             return self._white_light_first(state)
         settings = setup.settings.materials
+        if setup.mask is not None:  # what the mask makes one value moves, too
+            last = replace(settings.stages[-1], targets=tuple(COLUMNS))
+            settings = replace(settings, stages=(*settings.stages[:-1], last))
         self.fit_light(state, setup.prior.materials)
         self._fit_materials(state, settings)
         return state
@@ -91,12 +92,8 @@ class Fit:
         """Find the state's light, under which these materials look like the photo."""
         start, setup, photo = time.perf_counter(), self.setup, self._photo()
         settings, problem = setup.settings.light, self.engine.light_problem(materials)
-        if state.light is None:
-            begin = start_light(photo, settings, setup.prior.light, problem)
-            light = envmap_field(settings, begin.radiance, seed=setup.seed)
-            state.light = light, begin
-        else:
-            (light, begin), settings = state.light, replace(settings, schedule=settings.again)
+        begin = start_light(photo, settings, setup.prior.light, problem)
+        light = envmap_field(settings, begin.radiance, seed=setup.seed)
         result = fit_light(problem, photo, light, settings, begin, seed=setup.seed, progress=self.progress)
         state.envmap = self.prepared_light(light(max(settings.height, 16)))
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
@@ -114,23 +111,16 @@ class Fit:
 
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
         """From the state's maps, which L_cons holds on to."""
-        setup, engine, pixels = self.setup, self.engine, self.engine.pixels
-        if isinstance(engine, PathEngine):  # a step renders all pixels anyway
-            settings = replace(settings, step_pixels=0)
-        photo = self._photo()[pixels]
+        start, setup = time.perf_counter(), self.setup
+        problem, pixels = self.engine.material_problem(state.envmap), self.engine.pixels
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
         model = material_field(held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed)
-        for stage in settings.stages:
-            start = time.perf_counter()
-            if stage.settled:
-                state.maps = model().detach()
-                engine.settle(state.maps, state.envmap)
-                self.fit_light(state, self.materials(state))
-            problem, one = engine.material_problem(state.envmap), replace(settings, stages=(stage,))
-            (run,) = fit_materials(problem, photo, model, held, one, seed=setup.seed, progress=self.progress)
-            # Its seconds are with those of the tables.
-            state.stages.append({**run.summary(), "seconds": round(time.perf_counter() - start, 3)})
+        results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
+        summaries = [r.summary() for r in results]
+        for first in summaries[:1]:  # the tables are its
+            first["seconds"] += round(time.perf_counter() - start - sum(r.seconds for r in results), 3)
+        state.stages += summaries
         state.maps = model().detach()
 
     def _white_light_first(self, state: FitState) -> FitState:
@@ -216,8 +206,6 @@ def invert(
     if isinstance(fit.engine, TransportEngine):
         timed(stages, "trace", fit.engine.cache.trace)
     state = fit.run()
-    if isinstance(fit.engine, TransportEngine):
-        fit.engine.cache.forget()  # the path tracer needs the memory
     stages += state.stages
     materials = fit.materials(state)
     found("light", state.envmap)
@@ -238,9 +226,14 @@ def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress
     if setup.engine == "path":
         surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
         return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
+    radiance = setup.photo.linear if setup.settings.photo_light else None
+    settings = setup.settings.materials
+    stays = setup.mask is None and setup.strategy == "default" and not settings.remap
+    stays &= all("roughness" not in stage.targets for stage in settings.stages)
     return TransportEngine(
-        geometry, camera, setup.photo.linear, seed=seed, light_height=setup.settings.light_grid, progress=progress
-    )
+        geometry, camera, radiance, roughness=setup.prior.materials.roughness if stays else None, seed=seed,
+        light_height=setup.settings.light_grid, progress=progress,
+    )  # fmt: skip
 
 
 def timed(stages: list[dict], name: str, work: Callable[[], Any]) -> Any:

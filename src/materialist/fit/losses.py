@@ -15,12 +15,6 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def decode(encoded: torch.Tensor) -> torch.Tensor:
-    """Linear values of sRGB ones >= 0."""
-    x = encoded.clamp_min(0.04045)
-    return torch.where(encoded <= 0.04045, encoded / 12.92, ((x + 0.055) / 1.055) ** 2.4)
-
-
 def residual(
     radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, white: float
 ) -> torch.Tensor:  # fmt: skip
@@ -30,15 +24,10 @@ def residual(
 
 
 def rendering_loss(error: torch.Tensor, loss: Loss = "l1+l2") -> torch.Tensor:
-    """Mean loss of encoded errors: `l1+l2` is L_re = L_1 + L_2 (paper, Progressive Differentiable Rendering);
-    `balanced` gives the second term three times the value of the first (published code)."""
-    square = error.square().mean()
+    """Mean loss of encoded errors: `l1+l2` is L_re = L_1 + L_2 (paper, Progressive Differentiable Rendering)."""
     if loss == "l2":
-        return square
-    absolute = error.abs().mean()
-    if loss == "balanced":
-        return absolute + 3 * (absolute / square.clamp_min(1e-12)).detach() * square
-    return absolute + square
+        return error.square().mean()
+    return error.abs().mean() + error.square().mean()
 
 
 def consistency(maps: torch.Tensor, prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:

@@ -72,7 +72,7 @@ def optimise(
         value.backward()
         if schedule.keep_best and value.item() < best:
             best, kept = value.item(), [t.detach().clone() for t in tensors]
-        adam.step(schedule.rate(step))
+        adam.step(schedule.learning_rate * schedule.decay ** (step // schedule.decay_every))
         if after_step is not None:
             with torch.no_grad():
                 after_step()

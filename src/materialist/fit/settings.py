@@ -13,7 +13,7 @@ from materialist.errors import InputError
 from materialist.io.photo import HDR_CLIP
 
 Encoding = Literal["linear", "srgb", "log1p"]
-Loss = Literal["l1+l2", "balanced", "l2"]
+Loss = Literal["l1+l2", "l2"]
 
 
 @dataclass(frozen=True)
@@ -24,14 +24,9 @@ class Schedule:
     max_steps: int = 500  # paper
     decay_every: int = 100  # paper; steps
     decay: float = 0.8  # paper; factor on the learning rate
-    least_rate: float = 0.0  # learning rate that is not lowered any more
     patience: int = 100  # paper; stop when the loss improved too little over this many steps; 0: never
     min_improvement: float = 0.01  # paper; fraction of the loss
     keep_best: bool = False  # end with the parameters of the smallest loss, not with the last
-
-    def rate(self, step: int) -> float:
-        """The learning rate of a step."""
-        return max(self.learning_rate * self.decay ** (step // self.decay_every), self.least_rate)
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,6 @@ class LightSettings:
     white: float = math.inf  # linear value from which a photo's channel is clipped: a brighter rendering is no error
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
-    again: Schedule = dataclasses.field(default_factory=Schedule)  # when the light is fitted once more
     smooth: float = 0.0  # weight of the total variation of log radiance, as it differs from the predicted one
     chroma: float = 0.0  # weight of the colourfulness of the same; larger: whiter; tuned on 12 scenes
     prior: float = 0.0  # weight of the distance from a predicted light, over its scale of error; tuned on 14 scenes
@@ -58,21 +52,17 @@ class MaterialStage:
 
     targets: tuple[str, ...]
     schedule: Schedule
-    settled: bool = False
-    """Before it the light is fitted again, and surfaces light each other as they are rendered; else as the photo
-    shows."""
 
 
 @dataclass(frozen=True)
 class MaterialSettings:
     """Material properties optimisation; a triple is for albedo, roughness and metallic."""
 
-    field: str = "mlp"  # `mlp`, `maps`, `regions` or `unet`
+    field: str = "mlp"  # `mlp`, `maps` or `unet`
     remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
     loss: Loss = "l1+l2"  # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
     white: float = math.inf
-    step_pixels: int = 0  # pixels that a step compares, drawn anew in each; 0: all
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -85,41 +75,30 @@ class FitSettings:
     light: LightSettings
     materials: MaterialSettings
     completion: str = "none"  # what `--completion auto` is; paper
+    photo_light: bool = False  # with cached transport, surfaces light each other as the photo shows them; paper: V L_E
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
     rerender_pixels: int = 2**62  # pixels of a picture from which they are fewer, in proportion; 8 at the least
 
     def at_most(self, steps: int) -> "FitSettings":
         """The same with no more steps in any stage."""
-        cut = lambda one: replace(one, max_steps=min(steps, one.max_steps))  # noqa: E731
-        stages = tuple(replace(stage, schedule=cut(stage.schedule)) for stage in self.materials.stages)
-        light = replace(self.light, schedule=cut(self.light.schedule), again=cut(self.light.again))
-        return replace(self, light=light, materials=replace(self.materials, stages=stages))
+        cut = lambda one: replace(one, schedule=replace(one.schedule, max_steps=min(steps, one.schedule.max_steps)))  # noqa: E731
+        stages = tuple(cut(stage) for stage in self.materials.stages)
+        return replace(self, light=cut(self.light), materials=replace(self.materials, stages=stages))
 
 
-_MATERIAL = Schedule(learning_rate=3e-4, least_rate=1.2e-4, max_steps=2000, patience=200, min_improvement=0.005)
-_RM, _ALL = ("roughness", "metallic"), ("albedo", "roughness", "metallic")
-
-_DIRECT = Schedule(learning_rate=0.025, max_steps=50, decay_every=25, decay=0.5, patience=0)
+_MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
 
 PAPER = FitSettings(
-    light=LightSettings(
-        encoding="srgb", schedule=Schedule(keep_best=True), again=Schedule(learning_rate=1e-4, keep_best=True)
-    ),
+    light=LightSettings(schedule=Schedule(keep_best=True)),
     materials=MaterialSettings(
-        encoding="srgb",
-        loss="balanced",
-        delta=0.1,
-        step_pixels=1024,
         stages=(
-            MaterialStage(_RM, _MATERIAL),
-            MaterialStage(_ALL, _MATERIAL, settled=True),
-            MaterialStage(_ALL, _MATERIAL, settled=True),
-        ),
+            MaterialStage(("roughness", "metallic"), _MATERIAL),
+            MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL),
+        )
     ),
 )
-"""The paper's settings (Implementation Details), and the published code's where those are silent or did not work; which
-is which, and what each is worth, is in docs/paper_map.md. The paper gives no cap on material steps: 2000 a stage."""
+"""The paper's settings to the letter (Implementation Details); it gives no cap on material steps, so 2000 a stage."""
 
 DEFAULT = FitSettings(
     light=LightSettings(
@@ -129,25 +108,26 @@ DEFAULT = FitSettings(
         white=CLIPPED,
         sky=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
-        again=Schedule(learning_rate=0.05, max_steps=80, decay_every=40, decay=0.5, patience=0),
         smooth=0.03,
         chroma=0.05,
         prior=0.01,
     ),
     materials=MaterialSettings(
-        field="regions",
+        field="maps",
         remap=False,
         encoding="srgb",
         loss="l2",
         white=CLIPPED,
         delta=1.0,
-        weights=(0.2, 0.02, 0.1),
+        weights=(0.7, 1.0, 1.0),
         stages=(
-            MaterialStage(_ALL, _DIRECT),
-            MaterialStage(_ALL, replace(_DIRECT, learning_rate=0.01), settled=True),
+            MaterialStage(
+                ("albedo",), Schedule(learning_rate=0.02, max_steps=40, decay_every=20, decay=0.6, patience=0)
+            ),
         ),
     ),
     completion="floors",
+    photo_light=True,
     light_grid=24,
     rerender_spp=32,
     rerender_pixels=2**17,
@@ -157,24 +137,15 @@ DEFAULT = FitSettings(
 PRESETS = {"paper": PAPER, "default": DEFAULT}
 
 
-TRUST = {"sure": 20.0, "unsure": 1.0, "none": 0.1}
-"""What is said of a map's prior -> factor on its weight in L_cons. `none`: it is where the fit starts, no more."""
-
-
-def preset(name: str, *, hdr: bool = False, trust: tuple[str, str, str] = ("unsure",) * 3) -> FitSettings:
+def preset(name: str, *, hdr: bool = False) -> FitSettings:
     """Settings by name.
 
     For HDR photos the paper's loss compares log(1 + x) (paper, Handling HDR Images); ours sees them exposed as a
-    photograph is, and clipped at HDR_CLIP. trust: names of TRUST for albedo, roughness and metallic; the paper's preset
-    does not ask.
+    photograph is, and clipped at HDR_CLIP.
     """
     if name not in PRESETS:
         raise InputError(f"Preset is '{name}'; choose one of {', '.join(PRESETS)}.")
     settings = PRESETS[name]
-    if settings is not PAPER:
-        pairs = zip(settings.materials.weights, trust, strict=True)
-        albedo, roughness, metallic = (weight * TRUST[word] for weight, word in pairs)
-        settings = replace(settings, materials=replace(settings.materials, weights=(albedo, roughness, metallic)))
     if not hdr:
         return settings
     how = {"encoding": "log1p"} if settings is PAPER else {"white": HDR_CLIP}

@@ -55,12 +55,6 @@ def get_predictor(
     return found
 
 
-def is_guess(source: str) -> bool:
-    """Whether the name of a map's source in a Prediction is that of a network, or of `constant`: not of given maps."""
-    word = source.split(":")[0].split(" ")[0]
-    return word in CLASSES and word not in ("maps", "moge")
-
-
 def parsed(spec: str) -> tuple[str, str]:
     """Name of a predictor, and what follows its colon. Raises InputError for an unknown name."""
     name, _, argument = spec.partition(":")

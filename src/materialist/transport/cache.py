@@ -1,8 +1,9 @@
 """The transport cache: rays are traced once, then every light is one gather and every material one shading call.
 
 Per pixel, `diffuse_samples` cosine-weighted directions and `specular_samples` visible-normal directions, at each of
-ROUGHNESS_LEVELS, are traced against the mesh. What is kept of a ray is one integer: MISS, or the radiance slot of the
-face it hit. Directions are regenerated from their index, so that a gather is pure memory traffic.
+ROUGHNESS_LEVELS or at the pixel's own roughness, are traced against the mesh. What is kept of a ray is one integer:
+MISS, or the radiance slot of the face it hit. Directions are regenerated from their index, so that a gather is pure
+memory traffic.
 """
 
 from __future__ import annotations
@@ -53,7 +54,8 @@ class Tables:
     diffuse: torch.Tensor
     """[P, 9]: D0, D1, D2 (RGB each); diffuse radiance is A (1 - M) (D0 + D1 R + D2 R^2)."""
     specular: torch.Tensor
-    """[L, P, 6]: S0, S1 (RGB each) per roughness level; specular radiance is C0 S0(R) + S1(R)."""
+    """[L, P, 6]: S0, S1 (RGB each) per roughness level, or at the pixel's own roughness if L is 1; specular radiance
+    is C0 S0(R) + S1(R)."""
 
 
 def build_scene(mesh: Mesh) -> mi.Scene:
@@ -70,12 +72,14 @@ def build_scene(mesh: Mesh) -> mi.Scene:
 class TransportCache:
     """Traced visibility of one camera and mesh; equal seeds of the point sets give equal caches.
 
-    The faces of the mesh carry the pixel whose radiance a ray that hits them sees.
+    The faces of the mesh carry the pixel whose radiance a ray that hits them sees. roughness: [H, W] perceptual, where
+    it is known and stays: the specular lobe is then tabulated at it alone, which takes a sixth of the rays.
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, settings: CacheSettings | None = None, *, seed: int = 0, progress=None
-    ):
+        self, geometry: Geometry, camera: Camera, settings: CacheSettings | None = None, *,
+        roughness: Array | None = None, seed: int = 0, progress=None,
+    ):  # fmt: skip
         self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
         self.settings = s = settings or CacheSettings()
         self.scene = build_scene(geometry.mesh)
@@ -85,8 +89,13 @@ class TransportCache:
         self.slots = integers(mi, slots)
         """[F] radiance slot of every face: its pixel, or one of its own on a continued plane."""
         self._primary()
-        specular = (max(1, round(share * s.specular_samples)) for share in s.level_share)
-        alphas = (floats(mi, alpha_of(np.array([r], np.float32))) for r in ROUGHNESS_LEVELS)
+        counts, self.roughness = s.level_share, [np.array([r], np.float32) for r in ROUGHNESS_LEVELS]
+        """Of each level of the specular lobe, [1], or [P] of the pixels."""
+        if roughness is not None:
+            own = np.clip(roughness.reshape(-1)[self.pixels], ROUGHNESS_LEVELS[0], 1)
+            counts, self.roughness = (1.0,), [own.astype(np.float32)]
+        specular = (max(1, round(share * s.specular_samples)) for share in counts)
+        alphas = (floats(mi, alpha_of(r)) for r in self.roughness)
         self.lobes = [(s.diffuse_samples, dr.opaque(mi.Float, 1.0)), *zip(specular, alphas, strict=True)]
         """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each level."""
         self._hits: list[mi.UInt32] = []

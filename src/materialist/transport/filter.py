@@ -13,7 +13,7 @@ import torch
 from scipy.sparse import csr_array
 
 from materialist.buffers import placed
-from materialist.transport.cache import ROUGHNESS_LEVELS, Tables, TransportCache
+from materialist.transport.cache import Tables, TransportCache
 from materialist.types import Array
 
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
@@ -73,13 +73,15 @@ def _shifted(image: Array, dy: int, dx: int) -> Array:
 def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:
     """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
     # Sharper levels are nearly noise-free and carry reflected detail.
-    wide = [k for k, roughness in enumerate(ROUGHNESS_LEVELS) if roughness >= _SMOOTHED]
-    stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in wide)], -1)
+    wide = [roughness[:, None] >= _SMOOTHED for roughness in cache.roughness]
+    some = [k for k, pixels in enumerate(wide) if pixels.any()]
+    stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in some)], -1)
     grid = stack.new_zeros(guide.scale.size, stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
     smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
     levels = list(tables.specular)
-    for k, values in zip(wide, smooth[:, 9:].split(6, -1), strict=True):
-        levels[k] = values
+    for n, k in enumerate(some):  # none where every pixel is nearly a mirror
+        first = 9 + 6 * n
+        levels[k] = torch.where(placed(wide[k]), smooth[:, first : first + 6], levels[k])
     return Tables(smooth[:, :9].contiguous(), torch.stack(levels))

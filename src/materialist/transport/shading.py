@@ -18,7 +18,12 @@ def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metalli
 
 
 def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
-    """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P]."""
+    """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P].
+
+    Tables made at the pixels' own roughness (L = 1) are returned unchanged.
+    """
+    if len(tables.specular) == 1:
+        return tables.specular[0]
     levels = torch.tensor(ROUGHNESS_LEVELS).to(roughness)
     r = roughness.clamp(levels[0], levels[-1])
     low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
