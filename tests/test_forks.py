@@ -3,7 +3,6 @@
 import subprocess
 import sys
 
-import pytest
 from edit_scenes import flat_scene
 
 from materialist.io.package import save_scene
@@ -13,30 +12,30 @@ import os, sys
 import materialist as mt
 scene = mt.load_scene(sys.argv[1])
 mt.select(scene, mask=scene.depth > 0)
-child = os.fork()
-if child == 0:
-    try:
-        {call}
-        os._exit(1)
-    except mt.SetupError as error:
-        os._exit(42 if "forked" in str(error) and "spawn" in str(error) else 2)
-sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+calls = {
+    "invert": lambda: mt.invert("example:coffee"),
+    "select": lambda: mt.select(scene, click=(5, 5)),
+    "render_scene": lambda: mt.render_scene(scene, spp=2),
+    "composite": lambda: mt.composite(scene, scene),
+}
+for name, call in calls.items():
+    child = os.fork()
+    if child == 0:
+        try:
+            call()
+            os._exit(1)
+        except mt.SetupError as error:
+            os._exit(0 if "forked" in str(error) and "spawn" in str(error) else 2)
+    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0:
+        sys.exit(name)
 """
 
-CALLS = {
-    "invert": "mt.invert('example:coffee')",
-    "select": "mt.select(scene, click=(5, 5))",
-    "render_scene": "mt.render_scene(scene, spp=2)",
-    "composite": "mt.composite(scene, scene)",
-}
 
-
-@pytest.mark.parametrize("name", CALLS)
-def test_a_fork_is_refused(name, tmp_path):
+def test_a_fork_is_refused(tmp_path):
     save_scene(flat_scene(), tmp_path / "a.scene")
-    script = SCRIPT.format(call=CALLS[name])
-    run = subprocess.run([sys.executable, "-c", script, str(tmp_path / "a.scene")], timeout=120)
-    assert run.returncode == 42
+    command = [sys.executable, "-c", SCRIPT, str(tmp_path / "a.scene")]
+    run = subprocess.run(command, timeout=120, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
 
 
 def test_a_process_that_forks_before_it_computes_may_compute_in_both(tmp_path):

@@ -53,7 +53,11 @@ def test_every_module_that_starts_processes_is_known():
     assert starting - OTHERS == {*POOLS}
 
 
-@pytest.mark.parametrize("how_it_ends", [signal.SIGTERM, signal.SIGKILL], ids=["SIGTERM", "SIGKILL"])
+@pytest.mark.parametrize(
+    "how_it_ends",
+    [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)],
+    ids=["SIGKILL", "SIGTERM"],
+)
 @pytest.mark.parametrize("module", POOLS)
 def test_workers_end_with_their_parent(module, how_it_ends, tmp_path):
     (tmp_path / "samples").mkdir()
