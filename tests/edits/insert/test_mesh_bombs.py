@@ -250,6 +250,7 @@ def stl_grid(path, side=400):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "make", "side"),
     [("a.obj", obj_grid, 320), ("a.glb", glb_grid, 600), ("a.ply", ply_grid, 500), ("a.stl", stl_grid, 400)],
