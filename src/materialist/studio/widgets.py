@@ -150,10 +150,9 @@ class PageContext:
         if self.follows(session, job, follower):
             yield {"progress": self.state(job), "stop": gr.update(visible=False)}
 
-    def follows(self, session: Session, job: Job, follower: object = None) -> bool:
-        """Whether a page is open, and this follower of a job (or any) the last that it has."""
-        known = session.followers.get(id(job))
-        return not session.left and (follower is None or known is follower)
+    def follows(self, session: Session, job: Job, follower: object) -> bool:
+        """Whether a page is open, and this follower of a job the last that it has."""
+        return not session.left and session.followers.get(id(job)) is follower
 
     def state(self, job: Job) -> str:
         """The state of a job as HTML."""
