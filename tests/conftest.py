@@ -42,7 +42,9 @@ def untrained(tmp_path):
     from materialist.predict.refraction.network import RefractionNet
 
     torch.manual_seed(0)
-    RefractionNet(UNetArchitecture((8,) * 5, (1,) * 5)).save(tmp_path / "plain.safetensors", {"step": 0})
+    RefractionNet(UNetArchitecture((8,) * 5, (1,) * 5)).save(
+        tmp_path / "plain.safetensors", {"step": 0}
+    )
     return tmp_path / "plain.safetensors"
 
 
@@ -106,7 +108,9 @@ def refused(run):
     def call(*arguments):
         code, out, err = run(*arguments)
         usage, _, sentence = err.rpartition("Error: ")
-        assert code == 2 and not out and usage[:7] in ("", "Usage: ") and sentence.count("\n") == 1, err
+        assert (
+            code == 2 and not out and usage[:7] in ("", "Usage: ") and sentence.count("\n") == 1
+        ), err
         return err
 
     return call

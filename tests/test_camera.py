@@ -14,7 +14,9 @@ def test_rays_at_another_size_are_those_of_a_camera_of_that_size(width, height):
     y = np.tan(np.radians(25)) * 0.75 * (1 - 2 * (np.arange(height) + 0.5) / height)
     found = rays_at(rays, height, width)
     np.testing.assert_allclose(found[..., 0], np.broadcast_to(x, (height, width)), atol=1e-6)
-    np.testing.assert_allclose(found[..., 1], np.broadcast_to(y[:, None], (height, width)), atol=1e-6)
+    np.testing.assert_allclose(
+        found[..., 1], np.broadcast_to(y[:, None], (height, width)), atol=1e-6
+    )
 
 
 def test_rays_of_a_part_stay_those_of_the_part():

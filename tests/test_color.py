@@ -20,7 +20,9 @@ def test_every_level_comes_back(dtype, monkeypatch):
     top = np.iinfo(dtype).max
     levels = np.arange(top + 1, dtype=dtype).reshape(64, -1)
     decoded = srgb_to_linear(levels)
-    np.testing.assert_array_equal(decoded, srgb_to_linear(levels.astype(np.float32) / np.float32(top)))
+    np.testing.assert_array_equal(
+        decoded, srgb_to_linear(levels.astype(np.float32) / np.float32(top))
+    )
     found = srgb_levels(decoded, dtype)
     assert found.dtype == dtype
     np.testing.assert_array_equal(found, levels)

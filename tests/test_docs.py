@@ -19,7 +19,14 @@ SOURCE = ROOT / "src" / "materialist"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAPER_MAP = ROOT / "docs" / "paper_map.md"
 PROGRAM = get_command(app)
-FOREIGN = {"--factory-startup", "--python", "--python-exit-code", "--render", "--maps", "--no-install-recommends"}
+FOREIGN = {
+    "--factory-startup",
+    "--python",
+    "--python-exit-code",
+    "--render",
+    "--maps",
+    "--no-install-recommends",
+}
 """Options of Blender, the script for it, MoGe and apt-get that the pages name."""
 
 
@@ -63,20 +70,29 @@ def _parsed(words, whole):
         for choice in words[several].split("|"):
             _parsed([*words[:several], choice, *words[several + 1 :]], whole)
         return
-    command, name = PROGRAM, "materialist"
+    command = PROGRAM
+    name = "materialist"
     while hasattr(command, "commands") and words:
         assert words[0] in command.commands, f"there is no command {name} {words[0]}"
-        command, name, words = command.commands[words[0]], f"{name} {words[0]}", words[1:]
+        command = command.commands[words[0]]
+        name = f"{name} {words[0]}"
+        words = words[1:]
     if hasattr(command, "commands"):
         return
     try:
         context = command.make_context(name, list(words))
     except Exception as error:
-        if type(error).__name__ == "Exit" or (not whole and type(error).__name__ == "MissingParameter"):  # --help
+        if type(error).__name__ == "Exit" or (
+            not whole and type(error).__name__ == "MissingParameter"
+        ):  # --help
             return
         raise AssertionError(f"{name} {' '.join(words)}: {error}") from error
     if name == "materialist bench":
-        unknown = set(parse_extra(context.args)) - {*_bench_options(context.params["name"]), "data", "force"}
+        unknown = set(parse_extra(context.args)) - {
+            *_bench_options(context.params["name"]),
+            "data",
+            "force",
+        }
         assert not unknown, f"{name} {context.params['name']} does not take {unknown}"
 
 
@@ -92,10 +108,15 @@ def test_every_command_line_parses(text):
 @cache
 def _options():
     """Every option of every command, and of every benchmark."""
-    found, waiting = {"--help"}, [PROGRAM]
+    found = {"--help"}
+    waiting = [PROGRAM]
     while waiting:
         command = waiting.pop()
-        found.update(name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts))
+        found.update(
+            name
+            for parameter in command.params
+            for name in (*parameter.opts, *parameter.secondary_opts)
+        )
         waiting.extend(getattr(command, "commands", {}).values())
     for name in BENCHMARKS:
         found.update(f"--{option.replace('_', '-')}" for option in _bench_options(name))
@@ -140,7 +161,11 @@ def _place(name):
         path = SOURCE / Path(*parts[:count])
         if path.is_dir() or path.with_suffix(".py").is_file():
             rest = ".".join(parts[count:])
-            return ".".join(parts[:count]) if not rest or rest in _names(".".join(parts[:count])) else None
+            return (
+                ".".join(parts[:count])
+                if not rest or rest in _names(".".join(parts[:count]))
+                else None
+            )
     return None
 
 
@@ -152,13 +177,21 @@ def _rows(text):
 
 
 def test_paper_map_names_functions_that_exist():
-    everything = {name for path in SOURCE.rglob("*.py") for name in _defined(ast.parse(path.read_text("utf-8")))}
+    everything = {
+        name
+        for path in SOURCE.rglob("*.py")
+        for name in _defined(ast.parse(path.read_text("utf-8")))
+    }
     missing = []
     for _, functions, *_ in _rows(PAPER_MAP.read_text("utf-8")):
         here = ""
         for name in re.findall(r"`([A-Za-z_][\w.]*)(?:\([^`]*\))?`", functions):
             # A name without a module is one of the module just named, or of a module beside it.
-            around = [f"{here.rsplit('.', k)[0]}.{name}" if k else f"{here}.{name}" for k in (0, 1)] if here else []
+            around = (
+                [f"{here.rsplit('.', k)[0]}.{name}" if k else f"{here}.{name}" for k in (0, 1)]
+                if here
+                else []
+            )
             found = next((place for place in map(_place, (name, *around)) if place), None)
             here = found or here
             if not found and name not in everything:
@@ -170,7 +203,9 @@ def test_pages_name_functions_that_exist(text):
     ours = {path.stem for path in SOURCE.iterdir()}
     dotted = re.findall(r"`(?:materialist\.)?([a-z_]+(?:\.\w+)+)(?:\([^`]*\))?`", text)
     files = (".py", ".jsonl", ".txt", ".exr", ".yaml")
-    assert not [n for n in dotted if n.split(".")[0] in ours and not n.endswith(files) and not _place(n)]
+    assert not [
+        n for n in dotted if n.split(".")[0] in ours and not n.endswith(files) and not _place(n)
+    ]
 
 
 def test_paper_map_names_tests_that_exist():
@@ -179,8 +214,13 @@ def test_paper_map_names_tests_that_exist():
         folder = Path()
         for name in re.findall(r"`([\w/.:]*test_[\w/.:]*)`", tests):
             file, _, function = name.partition("::")
-            path = next((p for p in (ROOT / "tests" / file, ROOT / "tests" / folder / file) if p.is_file()), None)
-            if path is None or (function and function not in _defined(ast.parse(path.read_text("utf-8")))):
+            path = next(
+                (p for p in (ROOT / "tests" / file, ROOT / "tests" / folder / file) if p.is_file()),
+                None,
+            )
+            if path is None or (
+                function and function not in _defined(ast.parse(path.read_text("utf-8")))
+            ):
                 missing.append(name)
             folder = Path(file).parent if "/" in file else folder
     assert not missing

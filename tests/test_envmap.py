@@ -9,7 +9,9 @@ def test_texels_cover_the_sphere_once():
     for height in (4, 31, 256):
         assert np.isclose(row_solid_angle(height).sum() * 2 * height, 4 * np.pi)
     # Integrals of x^2, y^2, z^2 over the sphere are 4 pi / 3 each.
-    square = (texel_directions(64, 128).astype(float) ** 2 * row_solid_angle(64)[:, None, None]).sum((0, 1))
+    square = (
+        texel_directions(64, 128).astype(float) ** 2 * row_solid_angle(64)[:, None, None]
+    ).sum((0, 1))
     np.testing.assert_allclose(square, 4 * np.pi / 3, rtol=1e-3)
 
 

@@ -21,14 +21,25 @@ FLAT = np.ones((4, 6), bool)
     ("package", "ask", "words"),
     [
         ("rawpy", lambda folder: read_photo(folder / "a.CR2"), "pip install 'rawpy"),
-        ("imageio_ffmpeg", lambda folder: write_frames(folder / "a.mp4", iter([])), "pip install 'imageio-ffmpeg"),
+        (
+            "imageio_ffmpeg",
+            lambda folder: write_frames(folder / "a.mp4", iter([])),
+            "pip install 'imageio-ffmpeg",
+        ),
         ("pyoidn", lambda _: denoise(IMAGE, albedo=IMAGE, normal=IMAGE), "-m pip install pyoidn"),
-        ("patchmatch", lambda _: patched(IMAGE, FLAT, FLAT, FLAT, seed=1),
-         "pip install --force-reinstall --no-deps PyPatchMatch"),
+        (
+            "patchmatch",
+            lambda _: patched(IMAGE, FLAT, FLAT, FLAT, seed=1),
+            "pip install --force-reinstall --no-deps PyPatchMatch",
+        ),
         ("pxr", lambda folder: mt.export(flat_scene(), folder / "a.usdz"), "pip install 'usd-core"),
-        ("diffusers", lambda _: get_predictor("constant", normal="marigold"), "needs diffusers.* install 'diffusers"),
+        (
+            "diffusers",
+            lambda _: get_predictor("constant", normal="marigold"),
+            "needs diffusers.* install 'diffusers",
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_command_is_named(package, ask, words, models, tmp_path, monkeypatch):
     (tmp_path / "a.CR2").write_bytes(b"II*\0" * 20)
     (models / "prs-eth--marigold-normals-v1-1").mkdir(parents=True)

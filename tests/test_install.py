@@ -8,13 +8,17 @@ from materialist import install
 
 
 def test_a_command_is_of_this_very_python(monkeypatch):
-    assert install.install_command("rawpy>=0.21") == f"{sys.executable} -m pip install 'rawpy>=0.21'"
+    assert (
+        install.install_command("rawpy>=0.21") == f"{sys.executable} -m pip install 'rawpy>=0.21'"
+    )
     monkeypatch.setattr(install, "find_spec", lambda name: None)  # as in an environment of uv
     expected = f"uv pip install --python {sys.executable} 'rawpy>=0.21'"
     assert install.install_command("rawpy>=0.21") == expected
 
 
-@pytest.mark.parametrize(("extra", "package"), [("usd", "usd-core"), ("hub", "diffusers"), ("app", "gradio")])
+@pytest.mark.parametrize(
+    ("extra", "package"), [("usd", "usd-core"), ("hub", "diffusers"), ("app", "gradio")]
+)
 def test_an_extra_is_installed_by_its_packages(extra, package):
     command = install.extra_command(extra)
     assert f"'{package}" in command

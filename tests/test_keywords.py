@@ -20,12 +20,25 @@ PAIRS = {
     "InvertKeywords": options.InvertOptions,
     "ExportKeywords": options.ExportOptions,
 }
-FUNCTIONS = (mt.edit, mt.remove, mt.glass, mt.relight, mt.insert, mt.drop, mt.settle, mt.invert, mt.export, mt.batch)
+FUNCTIONS = (
+    mt.edit,
+    mt.remove,
+    mt.glass,
+    mt.relight,
+    mt.insert,
+    mt.drop,
+    mt.settle,
+    mt.invert,
+    mt.export,
+    mt.batch,
+)
 
 
 @pytest.mark.parametrize("name", PAIRS)
 def test_each_has_the_fields_of_its_options(name):
-    assert set(getattr(keywords, name).__annotations__) == {field.name for field in fields(PAIRS[name])}
+    assert set(getattr(keywords, name).__annotations__) == {
+        field.name for field in fields(PAIRS[name])
+    }
 
 
 def test_a_batch_takes_its_own_and_those_of_inversions():
@@ -35,13 +48,17 @@ def test_a_batch_takes_its_own_and_those_of_inversions():
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
 def test_functions_declare_them(function):
-    (loose,) = [p for p in inspect.signature(function).parameters.values() if p.kind is p.VAR_KEYWORD]
+    (loose,) = [
+        p for p in inspect.signature(function).parameters.values() if p.kind is p.VAR_KEYWORD
+    ]
     assert "Keywords" in str(loose.annotation)
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
 def test_docstrings_list_every_option(function):
-    (loose,) = [p for p in inspect.signature(function).parameters.values() if p.kind is p.VAR_KEYWORD]
+    (loose,) = [
+        p for p in inspect.signature(function).parameters.values() if p.kind is p.VAR_KEYWORD
+    ]
     name = next(name for name in (*PAIRS, "BatchKeywords") if name in str(loose.annotation))
     kind = PAIRS.get(name, BatchOptions)
     for field in fields(kind):
@@ -52,13 +69,16 @@ def test_docstrings_list_every_option(function):
 
 def test_a_line_says_what_is_taken_and_the_default():
     assert (
-        "    ior: Index of refraction, 1 to 3: water 1.33, glass 1.5. Takes [1, 3]. Default: 1.5." in mt.Glass.__doc__
+        "    ior: Index of refraction, 1 to 3: water 1.33, glass 1.5. Takes [1, 3]. Default: 1.5."
+        in mt.Glass.__doc__
     )
     assert "Takes 'closed' or 'two-interface'. Default: 'closed'." in mt.glass.__doc__
 
 
 def test_a_misspelt_keyword_is_named_with_the_one_that_is_meant():
-    with pytest.raises(InputError, match=r"edit has no option 'ruoghness'; .* Do you mean 'roughness'\?"):
+    with pytest.raises(
+        InputError, match=r"edit has no option 'ruoghness'; .* Do you mean 'roughness'\?"
+    ):
         options.MaterialEdit.given(ruoghness=1)
     with pytest.raises(InputError, match=r"no option 'qqq'; it takes .*feather\.$"):
         options.MaterialEdit.given(qqq=1)
@@ -68,9 +88,17 @@ def test_a_misspelt_keyword_is_named_with_the_one_that_is_meant():
 def test_a_type_checker_refuses_a_misspelt_keyword(tmp_path):
     from mypy import api
 
-    lines = ("import materialist as mt", "scene = mt.load_scene('a')", "mt.edit(scene, scene.depth, {}=1)")
+    lines = (
+        "import materialist as mt",
+        "scene = mt.load_scene('a')",
+        "mt.edit(scene, scene.depth, {}=1)",
+    )
     for word, expected in (("roughness", 0), ("ruoghness", 1)):
         file = tmp_path / f"{word}.py"
         file.write_text("\n".join(lines).format(word))
-        out, _, code = api.run([str(file), "--ignore-missing-imports", "--cache-dir", str(tmp_path / "cache")])
-        assert code == expected and (expected == 0 or 'Unexpected keyword argument "ruoghness"' in out), out
+        out, _, code = api.run(
+            [str(file), "--ignore-missing-imports", "--cache-dir", str(tmp_path / "cache")]
+        )
+        assert code == expected and (
+            expected == 0 or 'Unexpected keyword argument "ruoghness"' in out
+        ), out

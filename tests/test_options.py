@@ -17,7 +17,9 @@ ALL = (MaterialEdit, Removal, Glass, Relight, Insertion, Drop, InvertOptions, Ex
 @pytest.mark.parametrize("kind", ALL)
 def test_defaults_pass_their_own_checks_and_every_field_is_declared(kind):
     assert kind.given() == kind() and all("option" in field.metadata for field in fields(kind))
-    with pytest.raises(InputError, match=rf"^{kind.operation} has no option 'colour'; it takes \w+, "):
+    with pytest.raises(
+        InputError, match=rf"^{kind.operation} has no option 'colour'; it takes \w+, "
+    ):
         kind.given(colour="red")
 
 
@@ -25,18 +27,30 @@ def test_given_values_replace_those_of_the_options():
     base = Glass(ior=1.3, tint="#ff8000")
     got = Glass.given(base, transmission=0.9)
     assert (got.ior, got.transmission, got.seed) == (1.3, 0.9, 0)
-    assert got.tint == base.tint == pytest.approx(tuple(srgb_to_linear(np.float32([1, 128 / 255, 0]))))
+    assert (
+        got.tint == base.tint == pytest.approx(tuple(srgb_to_linear(np.float32([1, 128 / 255, 0]))))
+    )
 
 
 def test_texts_mean_what_the_values_do(tmp_path):
-    got = Glass.read({"ior": "1.2", "hollow": "yes", "tint": ["1", "0.5", "0"], "background": "b.png"}, folder=tmp_path)
+    got = Glass.read(
+        {"ior": "1.2", "hollow": "yes", "tint": ["1", "0.5", "0"], "background": "b.png"},
+        folder=tmp_path,
+    )
     assert got == Glass(ior=1.2, hollow=True, tint=(1, 0.5, 0), background=tmp_path / "b.png")
     assert Glass.read({"thickness": "symmetry", "shadow": "auto"}) == Glass(thickness="symmetry")
     assert Removal.read({"shadow": "0.5"}, seed=3) == Removal(shadow=0.5, seed=3)
-    assert MaterialEdit.read({"roughness": "+0.25", "metallic": "1"}) == MaterialEdit(roughness="+0.25", metallic=1)
+    assert MaterialEdit.read({"roughness": "+0.25", "metallic": "1"}) == MaterialEdit(
+        roughness="+0.25", metallic=1
+    )
     assert Insertion.read({"material": ["0.1", "0.2", "0.3"]}).material == "0.1,0.2,0.3"
     assert InvertOptions.read({"envmap_size": "64x32", "fov": "auto"}).envmap_size == (64, 32)
-    for lamps in ("1,2,3,4,5", ["1", "2", "3", "4", "5"], [["1", "2", "3", "4", "5"]], ["1,2,3,4,5"]):
+    for lamps in (
+        "1,2,3,4,5",
+        ["1", "2", "3", "4", "5"],
+        [["1", "2", "3", "4", "5"]],
+        ["1,2,3,4,5"],
+    ):
         assert Relight.read({"lamps": lamps}).lamps == ((1, 2, 3, 4, 5),)
     assert len(Relight.read({"lamps": ["1,2,3,4,5", "5,4,3,2,1"]}).lamps) == 2
 
@@ -57,20 +71,44 @@ def test_texts_mean_what_the_values_do(tmp_path):
         (Removal, {"shadow": "yes"}, "The shadow must be a number, or auto, not 'yes'."),
         (Relight, {"rotate": float("nan")}, "The rotation is nan; give a finite number."),
         (Relight, {"rotate": "1..b"}, "The rotation must be a number, or A..B, not 'b'."),
-        (Rendering, {"upscale": "none.py:twice"}, "The upscale is none.py:twice; give FILE.py:FUNCTION"),
+        (
+            Rendering,
+            {"upscale": "none.py:twice"},
+            "The upscale is none.py:twice; give FILE.py:FUNCTION",
+        ),
         (Rendering, {"upscale": f"{__file__}:twice"}, "has no function 'twice'"),
         (Glass, {"back": "same"}, "which only the two-interface model knows"),
         (MaterialEdit, {"hue": 10**400}, "The hue must be a number, not 1000"),
         (Relight, {"sun": (float("nan"), 2)}, "The sun must be 2 numbers"),
         (Relight, {"lamps": [[0, 1e400, 2, 3, 4]]}, "The lamp must be 5 numbers"),
-        (InvertOptions, {"envmap_size": (512.7, 256.9)}, "The envmap size is 512.7; give a whole number."),
-        (InvertOptions, {"envmap_size": (float("inf"), 1)}, "The envmap size is inf; give a finite number."),
+        (
+            InvertOptions,
+            {"envmap_size": (512.7, 256.9)},
+            "The envmap size is 512.7; give a whole number.",
+        ),
+        (
+            InvertOptions,
+            {"envmap_size": (float("inf"), 1)},
+            "The envmap size is inf; give a finite number.",
+        ),
         (Relight, {"sun": (1, 2, 3)}, "The sun must be 2 numbers"),
         (Relight, {"lamps": [[1, 2, 3]]}, "The lamp must be 5 numbers"),
-        (Insertion, {"material": "wood"}, "The material is 'wood'; give as-is, glass, mirror, R,G,B"),
-        (InvertOptions, {"envmap_size": (64, 64)}, "The envmap size is 64x64; it must be twice as wide"),
+        (
+            Insertion,
+            {"material": "wood"},
+            "The material is 'wood'; give as-is, glass, mirror, R,G,B",
+        ),
+        (
+            InvertOptions,
+            {"envmap_size": (64, 64)},
+            "The envmap size is 64x64; it must be twice as wide",
+        ),
         (InvertOptions, {"envmap_size": "512"}, "must look like 512x256, not '512'"),
-        (ExportOptions, {"max_triangles": 99}, "The number of triangles is 99; it must lie in [100, "),
+        (
+            ExportOptions,
+            {"max_triangles": 99},
+            "The number of triangles is 99; it must lie in [100, ",
+        ),
         (InvertOptions, {"tau": 90}, "The tau is 90; it must lie in (0, 90) degrees."),
     ],
 )
@@ -81,7 +119,9 @@ def test_wrong_values_are_named_with_what_may_be_given(kind, values, words):
 
 
 def test_an_option_that_says_nothing_alone():
-    with pytest.raises(InputError, match="gain says nothing without envmap; give that, too, or leave gain out"):
+    with pytest.raises(
+        InputError, match="gain says nothing without envmap; give that, too, or leave gain out"
+    ):
         Relight.read({"gain": "3"})
     with pytest.raises(InputError, match="--texture-scale says nothing without --texture"):
         MaterialEdit.read({"texture_scale": 2.0}, flags=True)

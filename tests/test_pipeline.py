@@ -19,7 +19,8 @@ from materialist.metrics import psnr
 from materialist.pipeline import invert, render_scene
 from materialist.types import Camera, Materials, Prediction
 
-WIDTH, HEIGHT = 24, 18
+WIDTH = 24
+HEIGHT = 18
 pytestmark = pytest.mark.usefixtures("mitsuba", "one_thread")  # Mitsuba before torch, as in a run
 
 
@@ -31,7 +32,8 @@ def folder(tmp_path_factory):
     depth, normal, label = room(camera)
     ball, ball_normal = sphere_depth(camera, (0.85, -0.5, -3.4), 0.5)
     closer = ball < depth
-    depth, normal = np.where(closer, ball, depth), np.where(closer[..., None], ball_normal, normal)
+    depth = np.where(closer, ball, depth)
+    normal = np.where(closer[..., None], ball_normal, normal)
     shade = 0.4 + 0.3 * np.clip(normal @ np.array([-0.4, 0.7, 0.4]), 0, 1)
     albedo = np.array([[0.6, 0.5, 0.4], [0.5, 0.5, 0.6], [0.3, 0.5, 0.3]])[label]
     write_png(folder / "photo.png", (albedo * shade[..., None]).astype(np.float32))
@@ -48,9 +50,16 @@ def options(folder, **changes) -> dict:
 
     settings = PRESETS[changes.pop("settings", "default")].at_most(changes.pop("steps", 10))
     return {
-        "photo": folder / "photo.png", "predictor": f"maps:{folder}", "fov": 45.0, "size": WIDTH,
-        "envmap_size": (32, 16), "spp": 8, "settings": settings, "device": "cpu", **changes,
-    }  # fmt: skip
+        "photo": folder / "photo.png",
+        "predictor": f"maps:{folder}",
+        "fov": 45.0,
+        "size": WIDTH,
+        "envmap_size": (32, 16),
+        "spp": 8,
+        "settings": settings,
+        "device": "cpu",
+        **changes,
+    }
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +74,10 @@ def test_scene_has_every_field(scene):
     for materials in (scene.materials, scene.prior.materials):
         assert materials.albedo.shape == (*size, 3)
         assert materials.roughness.shape == materials.metallic.shape == size
-        assert all(np.isfinite(m).all() for m in (materials.albedo, materials.roughness, materials.metallic))
+        assert all(
+            np.isfinite(m).all()
+            for m in (materials.albedo, materials.roughness, materials.metallic)
+        )
     assert scene.normal.shape == scene.rerender.shape == (*size, 3)
     assert scene.depth.shape == scene.geometry.plane_label.shape == size
     assert scene.envmap.shape == (16, 32, 3)
@@ -87,7 +99,12 @@ def test_report_and_provenance_tell_what_happened(scene):
     assert names[-1] == "rerender"
     assert all(stage["seconds"] >= 0 for stage in scene.report.stages)
     told = scene.provenance
-    assert (told["engine"], told["preset"], told["seed"], told["spp"]) == ("transport", "default", 0, 8)
+    assert (told["engine"], told["preset"], told["seed"], told["spp"]) == (
+        "transport",
+        "default",
+        0,
+        8,
+    )
     assert told["envmap_size"] == [32, 16]
     assert told["predictor"].startswith("maps")
     assert told["completion_asked"] in ("auto", told["completion"]) and told["mask"] is None
@@ -114,7 +131,11 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
 
     monkeypatch.setitem(engine.PathEngine.__init__.__kwdefaults__, "spp", 2)
     told = []
-    scene = invert(**options(folder, engine="path", settings="paper", steps=3, progress=lambda *a: told.append(a[0])))
+    scene = invert(
+        **options(
+            folder, engine="path", settings="paper", steps=3, progress=lambda *a: told.append(a[0])
+        )
+    )
     assert scene.provenance["engine"] == "path"
     assert scene.provenance["preset"] == "paper"
     stages = {stage["name"]: stage for stage in scene.report.stages}
@@ -130,9 +151,14 @@ def test_the_papers_preset_takes_nothing_that_the_paper_does_not(folder, monkeyp
     from materialist.fit import invert as fitting
     from materialist.transport.cache import TransportCache
 
-    sent, slots = [], TransportCache.slot_radiance
-    monkeypatch.setattr(fitting, "paste_visible_sky", lambda *_, **__: pytest.fail("a sky was pasted"))
-    monkeypatch.setattr(TransportCache, "slot_radiance", lambda self, r: sent.append(r) or slots(self, r))
+    sent = []
+    slots = TransportCache.slot_radiance
+    monkeypatch.setattr(
+        fitting, "paste_visible_sky", lambda *_, **__: pytest.fail("a sky was pasted")
+    )
+    monkeypatch.setattr(
+        TransportCache, "slot_radiance", lambda self, r: sent.append(r) or slots(self, r)
+    )
     given = options(folder, preset="paper", settings="paper", steps=2)
     scene = invert(**{name: value for name, value in given.items() if name != "envmap_size"})
     assert scene.envmap.shape == (256, 512, 3) and scene.provenance["completion"] == "none"
@@ -168,7 +194,9 @@ def test_bad_options_are_named(folder, changes, words):
 
 
 def test_a_prior_of_another_size_is_refused(folder, scene):
-    with pytest.raises(InputError, match="prior has 24 x 18 pixels, the photo 12 x 9 at working size"):
+    with pytest.raises(
+        InputError, match="prior has 24 x 18 pixels, the photo 12 x 9 at working size"
+    ):
         invert(**options(folder, prior=scene.prior, size=WIDTH // 2))
 
 
@@ -179,12 +207,18 @@ def test_maps_of_several_predictors_and_the_field_of_view_of_the_depth(folder, t
     (moge / "fov.json").write_text('{"fov_x": 51.0, "fov_y": 39.0}')
     mixed = options(folder, fov="auto", depth=f"moge:{moge}", metallic="constant")
     scene = invert(**mixed)
-    assert scene.camera.fov == scene.provenance["fov"] == 51.0 and scene.photo.fov_source == "predictor"
+    assert (
+        scene.camera.fov == scene.provenance["fov"] == 51.0
+        and scene.photo.fov_source == "predictor"
+    )
     assert np.allclose(scene.depth, read_exr(folder / "depth.exr") * 1.5)
     assert scene.provenance["sources"] == {
-        "albedo": f"maps:{folder}", "roughness": f"maps:{folder}", "metallic": "constant",
-        "normal": f"maps:{folder}", "depth": f"moge:{moge}",
-    }  # fmt: skip
+        "albedo": f"maps:{folder}",
+        "roughness": f"maps:{folder}",
+        "metallic": "constant",
+        "normal": f"maps:{folder}",
+        "depth": f"moge:{moge}",
+    }
     assert invert(**{**mixed, "fov": 45.0}).camera.fov == 45.0
 
 
@@ -198,11 +232,15 @@ def test_misspelt_options_are_refused(call, tmp_path):
 
 def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
     """Nor in an edit of it, which comes back in the unit of the file, its other pixels bit for bit."""
-    linear = read_photo(folder / "photo.png", size=WIDTH).linear * np.float32(1.01)  # not clipped at 1
+    linear = read_photo(folder / "photo.png", size=WIDTH).linear * np.float32(
+        1.01
+    )  # not clipped at 1
     found = {}
     for unit in (1, 2**9):
         write_exr(tmp_path / "photo.exr", np.float32(unit) * linear)
-        save_scene(invert(**options(folder, photo=tmp_path / "photo.exr")), tmp_path / f"{unit}.scene")
+        save_scene(
+            invert(**options(folder, photo=tmp_path / "photo.exr")), tmp_path / f"{unit}.scene"
+        )
         scene = load_scene(tmp_path / f"{unit}.scene")
         mask = np.zeros(scene.depth.shape, bool)
         mask[4:12, 5:15] = True
@@ -225,9 +263,14 @@ def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
 def test_depth_in_large_units_is_warned_about(folder, scene, tmp_path):
     """Of which the scene is only a few thousandths deep."""
     for path in folder.glob("*.exr"):
-        write_exr(tmp_path / path.name, read_exr(path) * np.float32(0.002 if path.stem == "depth" else 1))
+        write_exr(
+            tmp_path / path.name, read_exr(path) * np.float32(0.002 if path.stem == "depth" else 1)
+        )
     other = invert(**options(folder, predictor=f"maps:{tmp_path}"))
-    assert [any("smaller unit" in note for note in made.warnings) for made in (scene, other)] == [False, True]
+    assert [any("smaller unit" in note for note in made.warnings) for made in (scene, other)] == [
+        False,
+        True,
+    ]
 
 
 unit = st.floats(0, 1)
@@ -264,14 +307,20 @@ def test_maps_of_one_value_each_can_be_fitted(folder, albedo, roughness, metalli
 def test_a_photo_and_a_prior_from_memory(folder, scene):
     known = mt.Prior(depth=scene.prior.depth, normal=scene.prior.normal)
     levels = srgb_levels(scene.photo.original)
-    kept = {key: value for key, value in options(folder).items() if key not in ("photo", "predictor")}
+    kept = {
+        key: value for key, value in options(folder).items() if key not in ("photo", "predictor")
+    }
     made = invert(levels, encoded=True, predictor="constant", prior=known, **kept)
-    assert np.array_equal(made.photo.original, scene.photo.original) and np.array_equal(made.depth, scene.depth)
+    assert np.array_equal(made.photo.original, scene.photo.original) and np.array_equal(
+        made.depth, scene.depth
+    )
     assert made.prior.sources["depth"] == "arrays" and made.prior.sources["albedo"] == "constant"
     assert made != scene and made == made
 
 
 @pytest.mark.parametrize("prior", [{"depth": 1}, np.ones((4, 4))])
 def test_a_prior_that_is_none(folder, prior):
-    with pytest.raises(InputError, match=r"The prior is a .*; give a materialist.Prior of arrays, or a Prediction"):
+    with pytest.raises(
+        InputError, match=r"The prior is a .*; give a materialist.Prior of arrays, or a Prediction"
+    ):
         invert(**options(folder, prior=prior))

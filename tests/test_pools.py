@@ -39,7 +39,9 @@ list(DataLoader(SlowNumbers(), num_workers=2, worker_init_fn=_init_worker))
 """,
 }
 """Module that starts processes -> a program that uses its pool, and stays in it."""
-STARTS_PROCESSES = re.compile(r"ProcessPoolExecutor|multiprocessing\.Pool|Process\(|Popen\(|DataLoader\(")
+STARTS_PROCESSES = re.compile(
+    r"ProcessPoolExecutor|multiprocessing\.Pool|Process\(|Popen\(|DataLoader\("
+)
 OTHERS = {"bench/studio.py", "render/variant.py"}
 """Modules that start one process and end it themselves."""
 

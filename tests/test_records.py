@@ -17,10 +17,15 @@ from materialist.types import FitReport, Materials
 
 def test_equal_scenes_are_equal_and_one_number_makes_them_differ():
     assert make_scene() == make_scene() and make_scene() != make_scene(25)
-    scene, other = make_scene(), make_scene()
+    scene = make_scene()
+    other = make_scene()
     other.materials.roughness[3, 4] += 1e-3
     assert scene != other and scene.materials != other.materials and scene.prior == other.prior
-    for changed in ({"lamps": (mt.Lamp((0, 0, -1), (1, 1, 1), 0.1),)}, {"bodies": (make_body(),)}, {"provenance": {}}):
+    for changed in (
+        {"lamps": (mt.Lamp((0, 0, -1), (1, 1, 1), 0.1),)},
+        {"bodies": (make_body(),)},
+        {"provenance": {}},
+    ):
         assert replace(scene, **changed) != scene
     assert scene != "kitchen" and make_body() == make_body()
 
@@ -56,7 +61,9 @@ def test_records_hold_no_hash_because_arrays_have_none():
 
 def test_the_text_of_a_scene_says_what_it_is_in_one_line():
     prior = replace(make_scene().prior, predictor="maps sha256:7f841f20b236bfc9")
-    edited = replace(make_scene(), prior=prior, provenance={"edits": [{}, {}]}, bodies=(make_body(),))
+    edited = replace(
+        make_scene(), prior=prior, provenance={"edits": [{}, {}]}, bodies=(make_body(),)
+    )
     assert repr(edited) == (
         "<Scene kitchen.PNG: 33 x 24 pixels, field of view 41.5 degrees, predictor maps, re-rendering 31.2 dB, "
         "2 edits, 1 body>"
@@ -66,7 +73,10 @@ def test_the_text_of_a_scene_says_what_it_is_in_one_line():
 def test_the_text_of_a_record_names_shapes_and_no_numbers():
     map_ = np.zeros((4, 5), np.float32)
     text = repr(Materials(np.zeros((4, 5, 3), np.float32), map_, map_))
-    assert text == "Materials(albedo=float32[4, 5, 3], roughness=float32[4, 5], metallic=float32[4, 5])"
+    assert (
+        text
+        == "Materials(albedo=float32[4, 5, 3], roughness=float32[4, 5], metallic=float32[4, 5])"
+    )
     assert ", source=" not in repr(make_scene().photo)
     scene = make_scene()
     records = [getattr(scene, one.name) for one in fields(scene)]

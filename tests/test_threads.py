@@ -13,5 +13,7 @@ def test_openmp_threads_sleep_while_they_wait(given, kept):
     if given:
         environment["OMP_WAIT_POLICY"] = given
     code = "import sys, materialist, os; assert 'torch' not in sys.modules; sys.stdout.write(os.environ[sys.argv[1]])"
-    said = subprocess.run([sys.executable, "-c", code, "OMP_WAIT_POLICY"], env=environment, capture_output=True)
+    said = subprocess.run(
+        [sys.executable, "-c", code, "OMP_WAIT_POLICY"], env=environment, capture_output=True
+    )
     assert said.stdout.decode() == kept, said.stderr.decode()

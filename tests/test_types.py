@@ -18,14 +18,34 @@ def test_numbers_of_any_kind_become_pythons():
 @pytest.mark.parametrize(
     ("kind", "values", "words"),
     [
-        *((Camera, values, "whole numbers") for values in
-          ((0, 6, 40), (8.5, 6, 40), (8, None, 40), ([8, 6], 6, 40), (np.inf, 6, 40))),
-        *((Camera, (8, 6, fov), "degrees between 0 and 180") for fov in (0, 180, -3, np.nan, "wide")),
-        *((Lamp, values, "A lamp at") for values in (
-            ((0, 0), (1, 1, 1), 1), (None, (1, 1, 1), 1), ((0, 0, 0), 5, 1), ((0, 0, 0), (1, -1, 1), 1),
-            ((0, 0, 0), (1, 1, 1), 0), ((0, 0, np.nan), (1, 1, 1), 1), ((0, 0, 0), (1, 1, 1), "small"))),
+        *(
+            (Camera, values, "whole numbers")
+            for values in (
+                (0, 6, 40),
+                (8.5, 6, 40),
+                (8, None, 40),
+                ([8, 6], 6, 40),
+                (np.inf, 6, 40),
+            )
+        ),
+        *(
+            (Camera, (8, 6, fov), "degrees between 0 and 180")
+            for fov in (0, 180, -3, np.nan, "wide")
+        ),
+        *(
+            (Lamp, values, "A lamp at")
+            for values in (
+                ((0, 0), (1, 1, 1), 1),
+                (None, (1, 1, 1), 1),
+                ((0, 0, 0), 5, 1),
+                ((0, 0, 0), (1, -1, 1), 1),
+                ((0, 0, 0), (1, 1, 1), 0),
+                ((0, 0, np.nan), (1, 1, 1), 1),
+                ((0, 0, 0), (1, 1, 1), "small"),
+            )
+        ),
     ],
-)  # fmt: skip
+)
 def test_values_that_are_none(kind, values, words):
     with pytest.raises(InputError, match=words):
         kind(*values)

@@ -24,10 +24,13 @@ def rays_at(rays: Array, height: int, width: int) -> Array:
     Rays are linear in the pixel: beyond the first and the last pixel centre they are extrapolated.
     """
     rows, columns = rays.shape[:2]
-    x, y = rays[0, :, 0].astype(np.float64), rays[:, 0, 1].astype(np.float64)
+    x = rays[0, :, 0].astype(np.float64)
+    y = rays[:, 0, 1].astype(np.float64)
     across = ((np.arange(width) + 0.5) * columns / width - 0.5) / max(columns - 1, 1)
     down = ((np.arange(height) + 0.5) * rows / height - 0.5) / max(rows - 1, 1)
-    places = np.broadcast_arrays(x[0] + (x[-1] - x[0]) * across[None], (y[0] + (y[-1] - y[0]) * down)[:, None])
+    places = np.broadcast_arrays(
+        x[0] + (x[-1] - x[0]) * across[None], (y[0] + (y[-1] - y[0]) * down)[:, None]
+    )
     return np.stack(places, -1).astype(np.float32)
 
 

@@ -21,13 +21,17 @@ def srgb_to_linear(srgb: Array) -> Array:
         top = np.iinfo(srgb.dtype).max
         return srgb_to_linear(np.arange(top + 1, dtype=np.float32) / np.float32(top))[srgb]
     srgb = np.asarray(srgb, np.float32)
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return np.where(
+        srgb <= 0.04045, srgb / 12.92, ((np.maximum(srgb, 0) + 0.055) / 1.055) ** 2.4
+    ).astype(np.float32)
 
 
 def linear_to_srgb(linear: Array) -> Array:
     """Encode linear values (any shape, clipped to [0, 1]) as sRGB in [0, 1]; returns float32."""
     linear = np.clip(np.asarray(linear, np.float32), 0, 1)
-    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055).astype(np.float32)
+    return np.where(
+        linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055
+    ).astype(np.float32)
 
 
 def srgb_levels(linear: Array, dtype: type = np.uint8) -> Array:

@@ -109,11 +109,14 @@ def _renderer(llvm: str | None) -> Finding:
 
 def _cuda(needed: bool = False) -> Finding:
     """Whether a driver with OptiX answers; broken where a GPU is `needed` and none does."""
-    tool, said = shutil.which("nvidia-smi"), ""
+    tool = shutil.which("nvidia-smi")
+    said = ""
     if tool is not None:
         query = [tool, "--query-gpu=name,driver_version", "--format=csv,noheader"]
         with suppress(OSError, subprocess.SubprocessError):
-            said = subprocess.run(query, capture_output=True, text=True, timeout=20, check=True).stdout.strip()
+            said = subprocess.run(
+                query, capture_output=True, text=True, timeout=20, check=True
+            ).stdout.strip()
     name = said.partition("\n")[0]
     if usable_gpus():
         return Finding("GPU (CUDA)", "ok", name or "a driver with OptiX")

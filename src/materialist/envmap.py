@@ -17,14 +17,18 @@ def texel_directions(height: int, width: int, kind: type = np.float32) -> Array:
     """[h, w, 3] unit directions of texel centres, of that floating type, in the frame of the map."""
     theta = (np.arange(height) + 0.5)[:, None] / height * np.pi
     phi = ((np.arange(width) + 0.5)[None, :] / width * 2 - 1) * np.pi
-    x, z = np.sin(theta) * np.sin(phi), -np.sin(theta) * np.cos(phi)
+    x = np.sin(theta) * np.sin(phi)
+    z = -np.sin(theta) * np.cos(phi)
     return np.stack(np.broadcast_arrays(x, np.cos(theta), z), -1).astype(kind)
 
 
 def sh_basis(direction: Array, degree: int) -> Array:
     """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
-    x, y, z = direction[..., 2], direction[..., 0], direction[..., 1]
-    theta, phi = np.arccos(np.clip(z, -1, 1)), np.arctan2(y, x)
+    x = direction[..., 2]
+    y = direction[..., 0]
+    z = direction[..., 1]
+    theta = np.arccos(np.clip(z, -1, 1))
+    phi = np.arctan2(y, x)
     columns = []
     for order in range(degree + 1):
         for m in range(-order, order + 1):
@@ -45,9 +49,12 @@ def texels_around(direction: Array, shape: tuple[int, ...]) -> tuple[Array, Arra
     h, w = shape
     x = (np.arctan2(direction[:, 0], -direction[:, 2]) / (2 * np.pi) + 0.5) * w - 0.5
     y = np.clip(np.arccos(np.clip(direction[:, 1], -1, 1)) / np.pi * h - 0.5, 0, h - 1)
-    x0, y0 = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    fx, fy = x - x0, y - y0
-    xs, ys = np.stack([x0 % w, (x0 + 1) % w], -1), np.stack([y0, np.minimum(y0 + 1, h - 1)], -1)
+    x0 = np.floor(x).astype(np.int64)
+    y0 = np.floor(y).astype(np.int64)
+    fx = x - x0
+    fy = y - y0
+    xs = np.stack([x0 % w, (x0 + 1) % w], -1)
+    ys = np.stack([y0, np.minimum(y0 + 1, h - 1)], -1)
     index = ys[:, [0, 0, 1, 1]] * w + xs[:, [0, 1, 0, 1]]
     share = np.stack([(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx], -1)
     return index, share
@@ -58,14 +65,19 @@ def bilinear(picture: Array, place: Array) -> Array:
     height, width = picture.shape[:2]
     x = np.clip(np.nan_to_num(place[:, 0]) - 0.5, 0, width - 1)
     y = np.clip(np.nan_to_num(place[:, 1]) - 0.5, 0, height - 1)
-    x0, y0 = np.minimum(x.astype(int), max(width - 2, 0)), np.minimum(y.astype(int), max(height - 2, 0))
-    x1, y1 = np.minimum(x0 + 1, width - 1), np.minimum(y0 + 1, height - 1)
-    fx, fy = (x - x0)[:, None], (y - y0)[:, None]
+    x0 = np.minimum(x.astype(int), max(width - 2, 0))
+    y0 = np.minimum(y.astype(int), max(height - 2, 0))
+    x1 = np.minimum(x0 + 1, width - 1)
+    y1 = np.minimum(y0 + 1, height - 1)
+    fx = (x - x0)[:, None]
+    fy = (y - y0)[:, None]
     top = picture[y0, x0] * (1 - fx) + picture[y0, x1] * fx
     return top * (1 - fy) + (picture[y1, x0] * (1 - fx) + picture[y1, x1] * fx) * fy
 
 
-def paste_visible_sky(envmap: Array, photo: Array, surface: Array, camera: Camera, *, white: float) -> Array:
+def paste_visible_sky(
+    envmap: Array, photo: Array, surface: Array, camera: Camera, *, white: float
+) -> Array:
     """The map with what the photo itself shows of it: texels seen past every surface take the photo's radiance.
 
     That is the mean of the pixels in a texel, or the pixel at its centre where texels are smaller. Photo pixels from
@@ -85,9 +97,14 @@ def paste_visible_sky(envmap: Array, photo: Array, surface: Array, camera: Camer
     # The pixels of the sky, each in the texel that it looks through.
     rays = unit(pixel_rays(camera)[~surface].astype(np.float64))
     column = ((np.arctan2(rays[:, 0], -rays[:, 2]) / (2 * np.pi) + 0.5) * w).astype(int) % w
-    texel = np.minimum((np.arccos(np.clip(rays[:, 1], -1, 1)) / np.pi * h).astype(int), h - 1) * w + column
+    texel = (
+        np.minimum((np.arccos(np.clip(rays[:, 1], -1, 1)) / np.pi * h).astype(int), h - 1) * w
+        + column
+    )
     count = np.bincount(texel, minlength=h * w).reshape(h, w, 1)
     pixels = raised(photo[~surface], envmap.reshape(-1, 3)[texel])
-    total = np.stack([np.bincount(texel, pixels[:, k], h * w) for k in range(3)], -1).reshape(h, w, 3)
+    total = np.stack([np.bincount(texel, pixels[:, k], h * w) for k in range(3)], -1).reshape(
+        h, w, 3
+    )
     value = np.where(count > 0, total / np.maximum(count, 1), raised(photo[r, c], envmap))
     return np.where(seen, value, envmap).astype(np.float32)

@@ -17,7 +17,8 @@ from materialist.errors import InputError
 
 Colour = tuple[float, float, float]
 """Linear R, G, B in [0, 1]."""
-ON, OFF = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+ON = ("true", "yes", "on", "1")
+OFF = ("false", "no", "off", "0")
 """How a text spells a switch."""
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -113,22 +114,36 @@ class OperationOptions:
             if name not in known:
                 near = difflib.get_close_matches(name, known, 1)
                 meant = f" Do you mean '{near[0]}'?" if near else ""
-                raise InputError(f"{cls.operation} has no option '{name}'; it takes {', '.join(known)}.{meant}")
+                raise InputError(
+                    f"{cls.operation} has no option '{name}'; it takes {', '.join(known)}.{meant}"
+                )
         return replace(options or cls(), **values)
 
     @classmethod
-    def read(cls, texts: Mapping[str, Any], *, folder: Path = Path(), flags: bool = False, **defaults: Any) -> Self:
+    def read(
+        cls,
+        texts: Mapping[str, Any],
+        *,
+        folder: Path = Path(),
+        flags: bool = False,
+        **defaults: Any,
+    ) -> Self:
         """The options that a file in `folder` or a command line (`flags`) names: texts, and lists of texts.
 
         Raises InputError as the class does, and for an option that says nothing without another one.
         """
-        values, known = dict(texts), declarations(cls)
+        values = dict(texts)
+        known = declarations(cls)
         for name, (declared, default) in known.items():
             if name not in values:
                 continue
             if declared.needs and declared.needs not in values and values[name] != default:
-                own, other = (known[n][0].spells(n)[0] if flags else n for n in (name, declared.needs))
-                raise InputError(f"{own} says nothing without {other}; give that, too, or leave {own} out.")
+                own, other = (
+                    known[n][0].spells(n)[0] if flags else n for n in (name, declared.needs)
+                )
+                raise InputError(
+                    f"{own} says nothing without {other}; give that, too, or leave {own} out."
+                )
             if declared.kind == "file" and values[name] not in declared.choices:
                 values[name] = beside(folder, name, values[name])
         return cls.given(cls(**defaults), **values)
@@ -145,7 +160,9 @@ def _listing(kind: type[OperationOptions]) -> str:
     """The options of a class as lines of a docstring; `kind` need not be a dataclass yet."""
     own = {name: value for name, value in vars(kind).items() if isinstance(value, Field)}
     inherited = getattr(kind, "__dataclass_fields__", {})
-    every = {name: one for name, one in (own | {**inherited, **own}).items() if "option" in one.metadata}
+    every = {
+        name: one for name, one in (own | {**inherited, **own}).items() if "option" in one.metadata
+    }
     lines = [one.metadata["option"].meaning(name, one.default) for name, one in every.items()]
     return "\n".join(["Options:", *(f"    {line}" for line in lines)])
 
@@ -174,7 +191,9 @@ def numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
     except (TypeError, ValueError, OverflowError):
         found = ()
     if len(found) != count or not all(map(math.isfinite, found)):
-        raise InputError(f"The {called} must be {count} numbers, with commas between them, not {value!r}.")
+        raise InputError(
+            f"The {called} must be {count} numbers, with commas between them, not {value!r}."
+        )
     return found
 
 
@@ -197,13 +216,17 @@ def parse_colour(colour: Any, name: str = "albedo") -> Colour:
     except (TypeError, ValueError):
         r = g = b = math.nan
     if not all(0 <= c <= 1 for c in (r, g, b)):
-        raise InputError(f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb.")
+        raise InputError(
+            f"The {name} {colour!r} must be R,G,B with three numbers in [0, 1], or #rrggbb."
+        )
     return r, g, b
 
 
 def _number(declared: Option, called: str, value: Any) -> Any:
     """A finite number in the range; a whole one stays whole."""
-    low, high, ends = declared.low, declared.high, declared.ends
+    low = declared.low
+    high = declared.high
+    ends = declared.ends
     try:
         if isinstance(value, bool):
             raise TypeError
@@ -214,7 +237,9 @@ def _number(declared: Option, called: str, value: Any) -> Any:
         raise InputError(f"The {called} must be a number{or_else}, not {value!r}.") from error
     excluded = [end for end, mark in zip((low, high), ends) if mark in "()"]
     if not (math.isfinite(number) and low <= number <= high) or number in excluded:
-        span = f"it must lie in {ends[0]}{_text(low)}, {_text(high)}{ends[1]} {declared.unit}".rstrip()
+        span = (
+            f"it must lie in {ends[0]}{_text(low)}, {_text(high)}{ends[1]} {declared.unit}".rstrip()
+        )
         tail = f"{span} {declared.hint}".rstrip() if math.isfinite(low) else "give a finite number"
         raise InputError(f"The {called} is {_text(number)}; {tail}.")
     return number
@@ -256,7 +281,9 @@ def _paint(declared: Option, called: str, value: Any) -> str:
         parse_colour(text)
     except InputError as error:
         known = ", ".join(declared.choices)
-        raise InputError(f"The {called} is {text!r}; give {known}, R,G,B in [0, 1], or #rrggbb.") from error
+        raise InputError(
+            f"The {called} is {text!r}; give {known}, R,G,B in [0, 1], or #rrggbb."
+        ) from error
     return text
 
 
@@ -283,7 +310,9 @@ def _size(declared: Option, called: str, value: Any) -> tuple[int, int]:
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"The {called} must look like 512x256, not {value!r}.") from error
     if width != 2 * height or not 8 <= height <= 4096:
-        raise InputError(f"The {called} is {width}x{height}; it must be twice as wide as high, from 16x8 to 8192x4096.")
+        raise InputError(
+            f"The {called} is {width}x{height}; it must be twice as wide as high, from 16x8 to 8192x4096."
+        )
     return width, height
 
 
@@ -300,11 +329,15 @@ def _function(declared: Option, called: str, value: Any) -> Any:
 
     path, _, name = str(value).rpartition(":")
     if not Path(path).is_file():
-        raise InputError(f"The {called} is {value}; give FILE.py:FUNCTION, with a file that is there.")
+        raise InputError(
+            f"The {called} is {value}; give FILE.py:FUNCTION, with a file that is there."
+        )
     try:
         found = run_path(path).get(name)
     except Exception as error:  # whatever a user's file raises
-        raise InputError(f"The {called} {path} cannot be run: {type(error).__name__}: {error}.") from error
+        raise InputError(
+            f"The {called} {path} cannot be run: {type(error).__name__}: {error}."
+        ) from error
     if not callable(found):
         raise InputError(f"The {called} {path} has no function '{name}'; write FILE.py:FUNCTION.")
     return found

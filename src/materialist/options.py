@@ -18,17 +18,24 @@ if TYPE_CHECKING:
 
 _SHARE: dict[str, Any] = {"low": 0, "high": 1}
 _SEED: dict[str, Any] = {"kind": "whole", "low": 0, "high": 2**31 - 1, "flag": None}
-_DEVICE: dict[str, Any] = {"kind": "word", "choices": ("auto", "cpu", "cuda"), "flag": None, "written": False}
+_DEVICE: dict[str, Any] = {
+    "kind": "word",
+    "choices": ("auto", "cpu", "cuda"),
+    "flag": None,
+    "written": False,
+}
 _SHIFT: dict[str, Any] = {"kind": "shift", **_SHARE, "metavar": "V|±D"}
 _PAINT: dict[str, Any] = {"kind": "paint", "choices": ("as-is", "glass", "mirror")}
-_UP: dict[str, Any] = {"kind": "word", "choices": ("auto", "y", "z"), "called": "axis that points up"}
+_UP: dict[str, Any] = {
+    "kind": "word",
+    "choices": ("auto", "y", "z"),
+    "called": "axis that points up",
+}
 _SCALE: dict[str, Any] = {"low": 0, "high": 1e3, "ends": "(]"}
 _PREDICTOR: dict[str, Any] = {"kind": "name", "metavar": "PREDICTOR"}
 
 PATHS = 16
 """Paths a pixel of final pictures, denoised; twice as many score the same (`bench photo-alone`)."""
-
-# fmt: off
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,20 +43,32 @@ class MaterialEdit(OperationOptions):
     """Another material inside a region."""
 
     operation = "edit"
-    hue: float = option(0.0, "Turn the albedo's hue, degrees.", low=-3600, high=3600, unit="degrees")
+    hue: float = option(
+        0.0, "Turn the albedo's hue, degrees.", low=-3600, high=3600, unit="degrees"
+    )
     saturation: float = option(0.0, "-1 (grey) to 1.", low=-1, high=1)
     value: float = option(0.0, "-1 (black) to 1 (white).", low=-1, high=1)
-    albedo: Colour | str | None = option(None, "One linear colour, or #rrggbb in sRGB.", kind="colour", metavar="R,G,B")
-    texture: Array | str | Path | None = option(None, "A picture laid on the surface.", kind="file", metavar="PNG")
+    albedo: Colour | str | None = option(
+        None, "One linear colour, or #rrggbb in sRGB.", kind="colour", metavar="R,G,B"
+    )
+    texture: Array | str | Path | None = option(
+        None, "A picture laid on the surface.", kind="file", metavar="PNG"
+    )
     """[h, w, 3] linear, or a file."""
     texture_scale: float = option(
-        1.0, "Its size; 1 covers the region once.", low=0, high=100, ends="(]", needs="texture")
+        1.0, "Its size; 1 covers the region once.", low=0, high=100, ends="(]", needs="texture"
+    )
     roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **_SHIFT)
     metallic: float | str | None = option(None, "The same for metallic.", **_SHIFT)
     grow: float = option(
-        0.0, "Grow the region, or shrink it (below 0), by this share of the picture's longer side.", low=-0.2, high=0.2)
+        0.0,
+        "Grow the region, or shrink it (below 0), by this share of the picture's longer side.",
+        low=-0.2,
+        high=0.2,
+    )
     feather: float = option(
-        0.0, "Width of its soft border, share of the longer side.", low=0, high=0.2)
+        0.0, "Width of its soft border, share of the longer side.", low=0, high=0.2
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,19 +77,33 @@ class Removal(OperationOptions):
 
     operation = "remove"
     background: Array | str | Path | None = option(
-        None, "The same view without the object, in place of inpainting.", kind="file", metavar="PNG")
+        None,
+        "The same view without the object, in place of inpainting.",
+        kind="file",
+        metavar="PNG",
+    )
     """[h, w, 3] linear at working or native size and the exposure of the photo, or a file of the photo's aspect."""
     inpaint: str | Callable[[Array, Array], Array] | None = option(
-        None, "A diffusion model: a folder, or owner/name.", kind="name", metavar="sd:MODEL")
+        None, "A diffusion model: a folder, or owner/name.", kind="name", metavar="sd:MODEL"
+    )
     """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None copies patches."""
     shadow: float | None = option(
         None,
         "How far its shadow and reflection on the ground are filled, too, share of its size; auto: 0.15.",
-        low=0, high=2, choices=("auto",), metavar="auto|S")
+        low=0,
+        high=2,
+        choices=("auto",),
+        metavar="auto|S",
+    )
     """None and `auto` are 0.15."""
     grow: float = option(
-        0.01, "Rim of the object that is filled as well, share of the picture's longer side.", low=0, high=0.2,
-        called="rim", flag=None)
+        0.01,
+        "Rim of the object that is filled as well, share of the picture's longer side.",
+        low=0,
+        high=0.2,
+        called="rim",
+        flag=None,
+    )
     seed: int = option(0, "Of the patch search.", **_SEED)
     device: str = option("auto", "Where a diffusion model runs.", **_DEVICE)
 
@@ -86,29 +119,50 @@ class Glass(Removal):
 
     operation = "glass"
     ior: float = option(
-        1.5, "Index of refraction, 1 to 3: water 1.33, glass 1.5.", low=1, high=3, called="index of refraction",
-        hint="(water 1.33, glass 1.5, diamond 2.4)")
-    transmission: float = option(1.0, "Share of light that enters; the rest is the old surface.", **_SHARE)
-    tint: Colour = option((1.0, 1.0, 1.0), "Its colour, linear, or #rrggbb.", kind="colour", metavar="R,G,B")
+        1.5,
+        "Index of refraction, 1 to 3: water 1.33, glass 1.5.",
+        low=1,
+        high=3,
+        called="index of refraction",
+        hint="(water 1.33, glass 1.5, diamond 2.4)",
+    )
+    transmission: float = option(
+        1.0, "Share of light that enters; the rest is the old surface.", **_SHARE
+    )
+    tint: Colour = option(
+        (1.0, 1.0, 1.0), "Its colour, linear, or #rrggbb.", kind="colour", metavar="R,G,B"
+    )
     """Of white light after a way in and a way out."""
     roughness: float = option(0.0, "0 is clear, 0.3 frosted.", **_SHARE)
     hollow: bool | str = option(False, "A wall around air.", kind="switch", choices=("open",))
     """`open`: and without a lid, for what is a surface of revolution."""
     model: str = option(
-        "closed", "closed: path-traced; two-interface: as in the paper.", kind="word",
-        choices=("closed", "two-interface"))
+        "closed",
+        "closed: path-traced; two-interface: as in the paper.",
+        kind="word",
+        choices=("closed", "two-interface"),
+    )
     back: str = option(
-        "found", "two-interface: the normals of the back that was found, or the same as the front's, as in the paper.",
-        kind="word", choices=("found", "same"))
+        "found",
+        "two-interface: the normals of the back that was found, or the same as the front's, as in the paper.",
+        kind="word",
+        choices=("found", "same"),
+    )
     thickness: Array | str | Path = option(
-        "auto", "How thick it is; a file has scene units.", kind="file",
-        choices=("auto", "network", "symmetry"), metavar="auto|network|symmetry|FILE")
+        "auto",
+        "How thick it is; a file has scene units.",
+        kind="file",
+        choices=("auto", "network", "symmetry"),
+        metavar="auto|network|symmetry|FILE",
+    )
     """One of the methods, or [H, W] along the camera rays, or a file of that."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.back == "same" and self.model == "closed":
-            raise InputError("The back is 'same', which only the two-interface model knows; take that model, too.")
+            raise InputError(
+                "The back is 'same', which only the two-interface model knows; take that model, too."
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,27 +171,60 @@ class Relight(OperationOptions):
 
     operation = "relight"
     dim: float | None = option(
-        None, "Factor on windows and lamps that the photo shows; they stay put.", low=0, high=10, called="dimming",
-        hint="(1 for as it is, 0 for off)")
-    lights: Array | None = option(None, "The lights that `dim` means.", kind="any", flag=None, written=False)
+        None,
+        "Factor on windows and lamps that the photo shows; they stay put.",
+        low=0,
+        high=10,
+        called="dimming",
+        hint="(1 for as it is, 0 for off)",
+    )
+    lights: Array | None = option(
+        None, "The lights that `dim` means.", kind="any", flag=None, written=False
+    )
     """[H, W] bool at working size; None takes those that are found."""
-    envmap: Array | str | Path | None = option(None, "Another light: EXR or HDR, 2:1.", kind="file", metavar="FILE")
+    envmap: Array | str | Path | None = option(
+        None, "Another light: EXR or HDR, 2:1.", kind="file", metavar="FILE"
+    )
     """[h, 2h, 3] linear radiance >= 0 in the project's convention, or a file."""
     gain: float | str | None = option(
-        None, "Factor on it; auto keeps the photo's mean light.", low=0, high=1e6, ends="(]", choices=("auto",),
-        needs="envmap", metavar="auto|G")
+        None,
+        "Factor on it; auto keeps the photo's mean light.",
+        low=0,
+        high=1e6,
+        ends="(]",
+        choices=("auto",),
+        needs="envmap",
+        metavar="auto|G",
+    )
     """None: `auto` for a file, whose exposure is not known, and 1 for an array."""
     rotate: float | tuple[float, float] = option(
-        0.0, "Turn the light to the right; a film's from A to B.", kind="span", called="rotation", unit="degrees",
-        metavar="DEG|A..B")
+        0.0,
+        "Turn the light to the right; a film's from A to B.",
+        kind="span",
+        called="rotation",
+        unit="degrees",
+        metavar="DEG|A..B",
+    )
     sun: tuple[float, float] | None = option(
-        None, "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, metavar="AZ,EL")
+        None,
+        "A sun: degrees right of ahead, and above the horizon.",
+        kind="numbers",
+        count=2,
+        metavar="AZ,EL",
+    )
     sun_power: float = option(
-        1.0, "Its light, relative to the mean light of the photo.", low=0, high=1e4, needs="sun")
+        1.0, "Its light, relative to the mean light of the photo.", low=0, high=1e4, needs="sun"
+    )
     ambient: float = option(1.0, "Factor on the light that was there.", low=0, high=1e4)
     lamps: tuple[Lamp | tuple[float, float, float, float, float], ...] = option(
-        (), "A lamp at a pixel and depth.", kind="lamp", many=True, called="lamp", flag="--lamp",
-        metavar="X,Y,DEPTH,KELVIN,POWER")
+        (),
+        "A lamp at a pixel and depth.",
+        kind="lamp",
+        many=True,
+        called="lamp",
+        flag="--lamp",
+        metavar="X,Y,DEPTH,KELVIN,POWER",
+    )
     """What `materialist.lamp` makes, or its arguments."""
 
 
@@ -146,11 +233,14 @@ class Insertion(OperationOptions):
     """How a mesh is put into the photo."""
 
     operation = "insert"
-    scale: float = option(1.0, "Factor on its size; 1 is a sixth of the picture's width there.", **_SCALE)
+    scale: float = option(
+        1.0, "Factor on its size; 1 is a sixth of the picture's width there.", **_SCALE
+    )
     turn: float = option(0.0, "Turn about its up axis.", unit="degrees", metavar="DEG")
     material: str = option("as-is", "as-is, glass, mirror, R,G,B (linear) or #rrggbb.", **_PAINT)
     size: float | None = option(
-        None, "Its longest side in scene units, in place of the sixth.", low=0, high=1e9, ends="(]")
+        None, "Its longest side in scene units, in place of the sixth.", low=0, high=1e9, ends="(]"
+    )
     up: str = option("auto", "Axis of the file that points up: y, z; auto: z for STL.", **_UP)
 
 
@@ -160,12 +250,23 @@ class Drop(OperationOptions):
 
     operation = "drop"
     height: float = option(1.5, "Over the ground, in longest sides.", low=0, high=100)
-    spin: float = option(0.3, "Turns per second about an axis that the seed chooses.", low=-20, high=20)
-    scale: float = option(1.0, "Factor on the size; 1 is a sixth of the picture's width there.", **_SCALE)
+    spin: float = option(
+        0.3, "Turns per second about an axis that the seed chooses.", low=-20, high=20
+    )
+    scale: float = option(
+        1.0, "Factor on the size; 1 is a sixth of the picture's width there.", **_SCALE
+    )
     material: str = option("as-is", "as-is, glass, mirror, R,G,B (linear) or #rrggbb.", **_PAINT)
     gravity: tuple[float, float, float] | None = option(
-        None, "Its direction in the camera frame: X right, Y up, Z back.", kind="numbers", count=3, metavar="X,Y,Z")
-    metres: float = option(0.2, "What the longest side is taken for; small things fall fast.", low=1e-3, high=100)
+        None,
+        "Its direction in the camera frame: X right, Y up, Z back.",
+        kind="numbers",
+        count=3,
+        metavar="X,Y,Z",
+    )
+    metres: float = option(
+        0.2, "What the longest side is taken for; small things fall fast.", low=1e-3, high=100
+    )
     seed: int = option(0, "Of the axes that things spin about.", **_SEED)
     up: str = option("auto", "Axis of the files that points up: y, z; auto: z for STL.", **_UP)
 
@@ -176,51 +277,103 @@ class InvertOptions(OperationOptions):
 
     operation = "invert"
     predictor: str = option(
-        "auto", "auto, bundled[:FILE], matnet[:FILE], marigold, maps:DIR or constant; for every map not named below.",
-        kind="name", flag="--predictor --rest")
+        "auto",
+        "auto, bundled[:FILE], matnet[:FILE], marigold, maps:DIR or constant; for every map not named below.",
+        kind="name",
+        flag="--predictor --rest",
+    )
     albedo: str | None = option(None, "Where the albedo comes from.", **_PREDICTOR)
     roughness: str | None = option(None, "Where the roughness comes from.", **_PREDICTOR)
     metallic: str | None = option(None, "Where the metallic comes from.", **_PREDICTOR)
     normal: str | None = option(None, "Where the normals come from (also moge:DIR).", **_PREDICTOR)
-    depth: str | None = option(None, "Where the depth comes from (also depth-anything, moge:DIR).", **_PREDICTOR)
+    depth: str | None = option(
+        None, "Where the depth comes from (also depth-anything, moge:DIR).", **_PREDICTOR
+    )
     engine: str = option(
-        "transport", "Cached light transport, or the paper's path tracing.", kind="word",
-        choices=("transport", "path"))
+        "transport",
+        "Cached light transport, or the paper's path tracing.",
+        kind="word",
+        choices=("transport", "path"),
+    )
     preset: str = option(
-        "default", "Our schedule, or the paper's to the letter.", kind="word", choices=("default", "paper"))
+        "default",
+        "Our schedule, or the paper's to the letter.",
+        kind="word",
+        choices=("default", "paper"),
+    )
     """The path engine always follows the paper."""
     fov: float | str = option(
-        "auto", "Horizontal field of view in degrees, or auto: EXIF, else 35.", low=1, high=170, ends="()",
-        unit="degrees", choices=("auto",), called="field of view", metavar="TEXT")
+        "auto",
+        "Horizontal field of view in degrees, or auto: EXIF, else 35.",
+        low=1,
+        high=170,
+        ends="()",
+        unit="degrees",
+        choices=("auto",),
+        called="field of view",
+        metavar="TEXT",
+    )
     """`auto`: from the predictor of the depth where it knows one (MoGe), else from EXIF, else 35."""
     size: int = option(
-        512, "Working size: longer side, pixels.", kind="whole", low=8, high=8192, called="working size", unit="pixels")
+        512,
+        "Working size: longer side, pixels.",
+        kind="whole",
+        low=8,
+        high=8192,
+        called="working size",
+        unit="pixels",
+    )
     """Of the working picture; a Photo keeps the size that it was read at."""
     layer: str | None = option(
-        None, "Which layer or part of an EXR is the photo; else chosen by their names.", kind="name", metavar="NAME")
+        None,
+        "Which layer or part of an EXR is the photo; else chosen by their names.",
+        kind="name",
+        metavar="NAME",
+    )
     """A Photo keeps the layer that it was read with."""
-    envmap_size: tuple[int, int] = option((512, 256), "Size of the environment map.", kind="size", metavar="WxH")
+    envmap_size: tuple[int, int] = option(
+        (512, 256), "Size of the environment map.", kind="size", metavar="WxH"
+    )
     """(width, height), with width = 2 * height."""
     completion: str = option(
-        "auto", "Continue planes beyond what is seen: floors, walls as well (planes), or none; auto: floors, with "
+        "auto",
+        "Continue planes beyond what is seen: floors, walls as well (planes), or none; auto: floors, with "
         "the paper's preset none.",
-        kind="word", choices=("auto", "planes", "floors", "none"))
+        kind="word",
+        choices=("auto", "planes", "floors", "none"),
+    )
     """`floors` continues planes behind what the photo shows, and floors and table tops beyond the frame; `planes` walls
     and ceilings as well, `none` adds nothing."""
     tau: float = option(
-        6.0, "Grazing angle below which the surface is cut, degrees.", low=0, high=90, ends="()", unit="degrees")
+        6.0,
+        "Grazing angle below which the surface is cut, degrees.",
+        low=0,
+        high=90,
+        ends="()",
+        unit="degrees",
+    )
     mask: Array | str | Path | None = option(
-        None, "Region with one roughness and metallic.", kind="file", metavar="PNG")
+        None, "Region with one roughness and metallic.", kind="file", metavar="PNG"
+    )
     """[H, W] bool at working size, or a file."""
     strategy: str = option(
-        "default", "The paper's per-image strategies.", kind="word", choices=("default", "white-light-first"))
+        "default",
+        "The paper's per-image strategies.",
+        kind="word",
+        choices=("default", "white-light-first"),
+    )
     seed: int = option(0, "Equal seeds give equal scenes on one machine.", **_SEED)
     device: str = option("auto", "Where to compute.", **_DEVICE)
     settings: Any = option(None, "FitSettings in place of the preset.", kind="any", flag=None)
     prior: Prediction | Prior | None = option(
-        None, "Maps that are known: a Prior of some, the predictor gives the others; or a whole Prediction.",
-        kind="any", flag=None)
-    spp: int | None = option(None, "Paths a pixel of the final re-rendering.", kind="whole", low=1, flag=None)
+        None,
+        "Maps that are known: a Prior of some, the predictor gives the others; or a whole Prediction.",
+        kind="any",
+        flag=None,
+    )
+    spp: int | None = option(
+        None, "Paths a pixel of the final re-rendering.", kind="whole", low=1, flag=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,15 +382,29 @@ class ExportOptions(OperationOptions):
 
     operation = "export"
     to: str | None = option(
-        None, "Format; else that of the suffix.", kind="word", choices=("glb", "blend", "usd", "mitsuba", "html"),
-        called="format")
+        None,
+        "Format; else that of the suffix.",
+        kind="word",
+        choices=("glb", "blend", "usd", "mitsuba", "html"),
+        called="format",
+    )
     max_triangles: int | None = option(
-        None, "Coarser mesh of at most N triangles; html: 60000 unless given.", kind="whole", low=100,
-        called="number of triangles", metavar="N")
+        None,
+        "Coarser mesh of at most N triangles; html: 60000 unless given.",
+        kind="whole",
+        low=100,
+        called="number of triangles",
+        metavar="N",
+    )
     blender: str | None = option(
-        None, "blend: the blender program, or a Python that has bpy; else it is looked for.", kind="name",
-        metavar="PROGRAM")
+        None,
+        "blend: the blender program, or a Python that has bpy; else it is looked for.",
+        kind="name",
+        metavar="PROGRAM",
+    )
     shadow_catcher: bool = option(
-        False, "blend: show the photo, with the scene to catch shadows on it.", kind="switch")
+        False, "blend: show the photo, with the scene to catch shadows on it.", kind="switch"
+    )
     fitted_material: bool = option(
-        False, "blend: the material model of the fit, not Blender's Principled.", kind="switch")
+        False, "blend: the material model of the fit, not Blender's Principled.", kind="switch"
+    )

@@ -36,10 +36,14 @@ SMALL = 0.05
 
 @documented(InvertOptions)
 def invert(
-    photo: PhotoInput, options: InvertOptions | None = None, *, encoded: bool | None = None,
-    progress: Callable[[str, int, int], Any] | None = None, on_stage: Callable[[str, Any], Any] | None = None,
+    photo: PhotoInput,
+    options: InvertOptions | None = None,
+    *,
+    encoded: bool | None = None,
+    progress: Callable[[str, int, int], Any] | None = None,
+    on_stage: Callable[[str, Any], Any] | None = None,
     **values: Unpack[InvertKeywords],
-) -> Scene:  # fmt: skip
+) -> Scene:
     """Decompose a photograph into geometry, materials and light.
 
     Args:
@@ -67,14 +71,21 @@ def invert(
 
     wanted = InvertOptions.given(options, **values)
     preset = "paper" if wanted.engine == "path" else wanted.preset
-    tick, tell = progress or (lambda *_: None), on_stage or (lambda *_: None)
+    tick = progress or (lambda *_: None)
+    tell = on_stage or (lambda *_: None)
     tick("read", 0, 1)
     if isinstance(photo, Photo):
         picture = exposed(photo)
     else:
-        picture = photo_of(photo, encoded=encoded, size=wanted.size, fov=wanted.fov, layer=wanted.layer)
+        picture = photo_of(
+            photo, encoded=encoded, size=wanted.size, fov=wanted.fov, layer=wanted.layer
+        )
     if isinstance(photo, Photo) and wanted.fov != "auto":
-        picture = replace(picture, camera=replace(picture.camera, fov=cast(float, wanted.fov)), fov_source="option")
+        picture = replace(
+            picture,
+            camera=replace(picture.camera, fov=cast(float, wanted.fov)),
+            fov_source="option",
+        )
     mask = _mask(wanted.mask, picture)
     lap("read")
     tick("predict", 0, 1)
@@ -93,33 +104,62 @@ def invert(
 
     settings = wanted.settings or named(preset, hdr=picture.hdr)
     fit_setup = FitSetup(
-        picture, prior, settings, wanted.completion, wanted.engine,
-        envmap_height=wanted.envmap_size[1], tau=wanted.tau, mask=mask, strategy=wanted.strategy, seed=wanted.seed,
-        device=wanted.device, spp=wanted.spp,
-    )  # fmt: skip
+        picture,
+        prior,
+        settings,
+        wanted.completion,
+        wanted.engine,
+        envmap_height=wanted.envmap_size[1],
+        tau=wanted.tau,
+        mask=mask,
+        strategy=wanted.strategy,
+        seed=wanted.seed,
+        device=wanted.device,
+        spp=wanted.spp,
+    )
     lap("setup")
     best = fitting.invert(fit_setup, progress=progress, found=tell)
     report = _report(picture, prior, best, (*stages, *best.stages), start)
     return Scene(
-        camera=picture.camera, photo=picture, prior=prior, materials=best.materials, normal=prior.normal,
-        depth=prior.depth, geometry=best.geometry, envmap=best.envmap, rerender=best.rerender, report=report,
+        camera=picture.camera,
+        photo=picture,
+        prior=prior,
+        materials=best.materials,
+        normal=prior.normal,
+        depth=prior.depth,
+        geometry=best.geometry,
+        envmap=best.envmap,
+        rerender=best.rerender,
+        report=report,
         provenance={
-            "tool_version": __version__, "predictor": prior.predictor, "sources": prior.sources,
-            "engine": wanted.engine, "preset": preset,
-            "completion": fit_setup.completion, "completion_asked": wanted.completion,
-            "tau": wanted.tau, "strategy": wanted.strategy,
-            "mask": _named(mask), "settings": asdict(settings) if wanted.settings else None, "seed": wanted.seed,
-            "spp": best.spp, "size": wanted.size, "envmap_size": list(wanted.envmap_size), "fov": picture.camera.fov,
+            "tool_version": __version__,
+            "predictor": prior.predictor,
+            "sources": prior.sources,
+            "engine": wanted.engine,
+            "preset": preset,
+            "completion": fit_setup.completion,
+            "completion_asked": wanted.completion,
+            "tau": wanted.tau,
+            "strategy": wanted.strategy,
+            "mask": _named(mask),
+            "settings": asdict(settings) if wanted.settings else None,
+            "seed": wanted.seed,
+            "spp": best.spp,
+            "size": wanted.size,
+            "envmap_size": list(wanted.envmap_size),
+            "fov": picture.camera.fov,
             "fov_source": picture.fov_source,
         },
-    )  # fmt: skip
+    )
 
 
 def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     """The photo as the predictor sees it, and the prior."""
     known = wanted.prior
     if known is not None and not isinstance(known, Prediction | Prior):
-        raise InputError(f"The prior is a {type(known).__name__}; give a materialist.Prior of arrays, or a Prediction.")
+        raise InputError(
+            f"The prior is a {type(known).__name__}; give a materialist.Prior of arrays, or a Prediction."
+        )
     if isinstance(known, Prediction):
         given, (height, width) = known, picture.linear.shape[:2]
         for values in (*vars(given.materials).values(), given.normal, given.depth):
@@ -131,12 +171,17 @@ def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
         return picture, given
     from materialist.predict import get_predictor
 
-    parts = {name: getattr(wanted, name) for name in ("albedo", "roughness", "metallic", "normal", "depth")}
+    parts = {
+        name: getattr(wanted, name)
+        for name in ("albedo", "roughness", "metallic", "normal", "depth")
+    }
     source = get_predictor(wanted.predictor, device=wanted.device, prior=known, **parts)
     picture = _seen_by(source, picture)
     prediction = source.predict(picture, seed=wanted.seed)
     if not (prediction.depth > 0).any():
-        raise InputError('The predictor found no surface in the photo; give a depth map, as in `depth="maps:DIR"`.')
+        raise InputError(
+            'The predictor found no surface in the photo; give a depth map, as in `depth="maps:DIR"`.'
+        )
     middle = float(np.median(prediction.depth[prediction.depth > 0]))
     if middle < SMALL:
         note = (
@@ -147,7 +192,9 @@ def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
     return picture, prediction
 
 
-def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto") -> Array:
+def render_scene(
+    scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto"
+) -> Array:
     """Path-trace a scene, with its bodies and lamps, from the photo's camera: [H, W, 3] float32 linear.
 
     `spp` counts camera rays a pixel. Denoising is for pictures only.
@@ -159,12 +206,17 @@ def render_scene(scene: Scene, *, spp: int = 64, denoise: bool = False, seed: in
     return rendered(scene, spp=spp, seed=seed, denoise=denoise, device=device)
 
 
-def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[dict, ...], start: float) -> FitReport:
-    materials, halves = found.materials, [np.nan_to_num(half, posinf=0) for half in found.halves]
+def _report(
+    picture: Photo, prior: Prediction, found: FitResult, stages: tuple[dict, ...], start: float
+) -> FitReport:
+    materials = found.materials
+    halves = [np.nan_to_num(half, posinf=0) for half in found.halves]
     rerender = (halves[0] + halves[1]) / 2
     surface = prior.depth > 0
     distance = {
-        f"prior_l1_{name}": float(np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean())
+        f"prior_l1_{name}": float(
+            np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean()
+        )
         for name in ("albedo", "roughness", "metallic")
     }
     residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
@@ -176,7 +228,9 @@ def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[d
             f"{lost} pixels of the re-rendering are no numbers; look for wild values in the depth and normals."
         )
     if clipped > 0.01:
-        notes.append(f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds.")
+        notes.append(
+            f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds."
+        )
     if is_peaked(found.envmap):
         notes.append("The photo has hard light: its shadows may be baked into the albedo.")
     poor = float((residual > 0.1).mean())
@@ -200,7 +254,9 @@ def _report(picture: Photo, prior: Prediction, found: FitResult, stages: tuple[d
 
 def peak_rss_mb() -> float:
     """The most memory that this process has held, MB; macOS counts in bytes, Linux in kB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (
+        2**20 if sys.platform == "darwin" else 2**10
+    )
 
 
 def _named(mask: Array | None) -> dict[str, Any] | None:
@@ -216,10 +272,16 @@ def _seen_by(source, picture: Photo) -> Photo:
     angle = getattr(source, "field_of_view", None)
     if angle is None or picture.fov_source == "option":
         return picture
-    known, notes = picture.camera.fov, picture.warnings
+    known = picture.camera.fov
+    notes = picture.warnings
     if picture.fov_source == "exif" and abs(known - angle) > 0.1 * angle:
-        notes = (*notes, f"EXIF says a field of view of {known:.1f} degrees, the depth was made with {angle:.1f}.")
-    return replace(picture, camera=replace(picture.camera, fov=angle), fov_source="predictor", warnings=notes)
+        notes = (
+            *notes,
+            f"EXIF says a field of view of {known:.1f} degrees, the depth was made with {angle:.1f}.",
+        )
+    return replace(
+        picture, camera=replace(picture.camera, fov=angle), fov_source="predictor", warnings=notes
+    )
 
 
 def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
@@ -230,7 +292,9 @@ def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
     if isinstance(given, str | Path):
         given = read_mask(given, shape, picture.original.shape[:2])
     if given.shape != shape:
-        raise InputError(f"Mask is {given.shape}, the photo at working size is {shape} (rows, columns).")
+        raise InputError(
+            f"Mask is {given.shape}, the photo at working size is {shape} (rows, columns)."
+        )
     if given.dtype != bool:
         raise InputError(f"Mask holds {given.dtype}; give truth values, for example mask > 0.5.")
     if not given.any():

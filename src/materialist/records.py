@@ -15,7 +15,10 @@ class Record:
         return same(self, other) if type(other) is type(self) else NotImplemented
 
     def __repr__(self) -> str:
-        shown = (f"{one.name}={_short(getattr(self, one.name))}" for one in fields(self) if one.repr)  # type: ignore[arg-type]
+        shown = []
+        for one in fields(self):  # type: ignore[arg-type]
+            if one.repr:
+                shown.append(f"{one.name}={_short(getattr(self, one.name))}")
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
@@ -27,9 +30,13 @@ def same(one: Any, other: Any) -> bool:
         return _same_arrays(np.asarray(one), np.asarray(other))
     if isinstance(one, Record):
         names = [field.name for field in fields(one)]  # type: ignore[arg-type]
-        return type(one) is type(other) and all(same(getattr(one, n), getattr(other, n)) for n in names)
+        return type(one) is type(other) and all(
+            same(getattr(one, n), getattr(other, n)) for n in names
+        )
     if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(same(value, other[key]) for key, value in one.items())
+        return one.keys() == other.keys() and all(
+            same(value, other[key]) for key, value in one.items()
+        )
     if isinstance(one, list | tuple) and isinstance(other, list | tuple):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, float) and isinstance(other, float) and one != one:

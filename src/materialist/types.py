@@ -42,11 +42,22 @@ class Camera:
 
     def __post_init__(self) -> None:
         """NumPy's numbers become Python's, as files and other programs need them. Raises InputError for others."""
-        width, height, fov = (_numbers(getattr(self, name), 1) for name in ("width", "height", "fov"))
-        if not (width and height and min(*width, *height) >= 1 and all(n % 1 == 0 for n in (*width, *height))):
-            raise InputError(f"A camera of {self.width} x {self.height} pixels: give whole numbers from 1 on.")
+        width, height, fov = (
+            _numbers(getattr(self, name), 1) for name in ("width", "height", "fov")
+        )
+        if not (
+            width
+            and height
+            and min(*width, *height) >= 1
+            and all(n % 1 == 0 for n in (*width, *height))
+        ):
+            raise InputError(
+                f"A camera of {self.width} x {self.height} pixels: give whole numbers from 1 on."
+            )
         if not (fov and 0 < fov[0] < 180):
-            raise InputError(f"A camera with a field of view of {self.fov}: give degrees between 0 and 180.")
+            raise InputError(
+                f"A camera with a field of view of {self.fov}: give degrees between 0 and 180."
+            )
         for name, value in (("width", int(width[0])), ("height", int(height[0])), ("fov", fov[0])):
             object.__setattr__(self, name, value)
 
@@ -197,7 +208,9 @@ class Lamp:
 
     def __post_init__(self) -> None:
         """NumPy's numbers become Python's, as files and other programs need them. Raises InputError for others."""
-        position, power, radius = _numbers(self.position, 3), _numbers(self.power, 3), _numbers(self.radius, 1)
+        position = _numbers(self.position, 3)
+        power = _numbers(self.power, 3)
+        radius = _numbers(self.radius, 1)
         if not position or not power or min(power) < 0 or not radius or radius[0] <= 0:
             raise InputError(
                 f"A lamp at {self.position} of power {self.power} and radius {self.radius}: give three coordinates, "
@@ -232,7 +245,9 @@ class Surface(Materials):
     @property
     def interface_roughness(self) -> float:
         """That of the dielectric interface, in [0, 1]."""
-        return float(self.roughness.mean()) if self.glass_roughness is None else self.glass_roughness
+        return (
+            float(self.roughness.mean()) if self.glass_roughness is None else self.glass_roughness
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -246,7 +261,8 @@ class Body(Triangles):
     def mesh(self) -> Mesh:
         """The triangles; no face of them carries a pixel of the photo."""
         count = len(self.faces)
-        pixel, plane = np.zeros(count, np.int32), np.full(count, -1, np.int16)
+        pixel = np.zeros(count, np.int32)
+        plane = np.full(count, -1, np.int16)
         return Mesh(self.vertices, self.faces, self.normals, self.uv, pixel, plane)
 
 
@@ -289,11 +305,18 @@ class Scene(Record):
     @property
     def warnings(self) -> list[str]:
         """Those of the photo, the prior, the fit and the edits, each once."""
-        return list(dict.fromkeys((*self.photo.warnings, *self.prior.warnings, *self.report.warnings)))
+        return list(
+            dict.fromkeys((*self.photo.warnings, *self.prior.warnings, *self.report.warnings))
+        )
 
     def __repr__(self) -> str:
-        camera, edits = self.camera, self.provenance.get("edits", ())
-        counts = (("edit", "edits", edits), ("lamp", "lamps", self.lamps), ("body", "bodies", self.bodies))
+        camera = self.camera
+        edits = self.provenance.get("edits", ())
+        counts = (
+            ("edit", "edits", edits),
+            ("lamp", "lamps", self.lamps),
+            ("body", "bodies", self.bodies),
+        )
         facts = [
             f"{camera.width} x {camera.height} pixels",
             f"field of view {camera.fov:.4g} degrees",
@@ -301,7 +324,11 @@ class Scene(Record):
         ]
         quality = self.report.metrics.get("rerender_psnr_path")
         facts += [] if quality is None else [f"re-rendering {quality:.1f} dB"]
-        facts += [f"{len(items)} {many if len(items) > 1 else one}" for one, many, items in counts if items]
+        facts += [
+            f"{len(items)} {many if len(items) > 1 else one}"
+            for one, many, items in counts
+            if items
+        ]
         return f"<Scene {self.photo.name}: {', '.join(facts)}>"
 
     def _repr_png_(self) -> bytes:

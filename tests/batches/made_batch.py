@@ -20,7 +20,9 @@ def made_up(photo: Photo, **options) -> Scene:
     """A scene that depends on the photo, the seed and nothing else."""
     options["progress"]("read", 0, 1)
     scene = scene_of(photo)
-    albedo = np.clip(photo.linear * np.float32(0.5 + 0.1 * options["seed"]), 0, 1).astype(np.float32)
+    albedo = np.clip(photo.linear * np.float32(0.5 + 0.1 * options["seed"]), 0, 1).astype(
+        np.float32
+    )
     options["progress"]("light", 1, 1)
     return replace(scene, materials=replace(scene.materials, albedo=albedo))
 
@@ -28,9 +30,12 @@ def made_up(photo: Photo, **options) -> Scene:
 def even(photo: Photo, **options) -> Scene:
     """The same before a flat wall that faces the camera, on which things can come to rest."""
     scene = made_up(photo, **options)
-    depth, normal = np.full_like(scene.depth, 3), np.zeros_like(scene.normal)
+    depth = np.full_like(scene.depth, 3)
+    normal = np.zeros_like(scene.normal)
     normal[..., 2] = 1
-    geometry = Geometry(make_mesh(depth, normal, scene.camera), np.full_like(scene.geometry.plane_label, -1))
+    geometry = Geometry(
+        make_mesh(depth, normal, scene.camera), np.full_like(scene.geometry.plane_label, -1)
+    )
     return replace(scene, depth=depth, normal=normal, geometry=geometry)
 
 
@@ -57,7 +62,9 @@ def run(source: Path, runs: Path, **options) -> Outcome:
     """A batch with `moody` for the inversion."""
     from materialist.batches.run import batch  # not at the top: workers load this file, too
 
-    return batch(source, runs, **{"function": "made_batch:moody", "workers": 2, "device": "cpu", **options})
+    return batch(
+        source, runs, **{"function": "made_batch:moody", "workers": 2, "device": "cpu", **options}
+    )
 
 
 def _again(name: str) -> bool:

@@ -21,7 +21,11 @@ def recipe(tmp_path):
 
 def test_the_key_changes_with_a_mesh_and_with_nothing_else(recipe):
     key = edits_key(recipe, "a", 8)
-    assert edits_key(recipe, "a", 8) == key and edits_key(recipe, "b", 8) != key and edits_key(recipe, "a", 9) != key
+    assert (
+        edits_key(recipe, "a", 8) == key
+        and edits_key(recipe, "b", 8) != key
+        and edits_key(recipe, "a", 9) != key
+    )
     (recipe.parent / "b.ply").write_text("of another photo")
     assert edits_key(recipe, "a", 8) == key
     (recipe.parent / "ball.ply").write_text("another ball")
@@ -46,8 +50,16 @@ def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
 
 def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     recipe.write_text("- edit: {mask: 'm/{name}.png', hue: 20}\n")
-    source, runs, said = photos(recipe.parent / "photos", "one", "two"), recipe.parent / "runs", []
-    options = {"apply": recipe, "function": "made_batch:made_up", "workers": 1, "device": "cpu", "spp": 2}
+    source = photos(recipe.parent / "photos", "one", "two")
+    runs = recipe.parent / "runs"
+    said = []
+    options = {
+        "apply": recipe,
+        "function": "made_batch:made_up",
+        "workers": 1,
+        "device": "cpu",
+        "spp": 2,
+    }
     with pytest.raises(InputError, match=r"no .*/m/one.png for one.png.*resume=True"):
         batch(source, runs, **options)
     assert not list(runs.glob("*.scene"))
@@ -55,12 +67,19 @@ def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     (recipe.parent / "m/one.png").write_bytes(b"no picture")
     outcome = batch(source, runs, resume=True, progress=said.append, **options)
     assert said[0].news.startswith("1 of 2 photos lack a file") and not said[0].running
-    assert "m/two.png for two.png" in said[0].news and outcome.count("failed") == 2 and (runs / "two.scene").is_dir()
+    assert (
+        "m/two.png for two.png" in said[0].news
+        and outcome.count("failed") == 2
+        and (runs / "two.scene").is_dir()
+    )
 
 
 def test_a_list_is_parsed_once_for_all_photos_and_anew_when_it_was_changed(recipe, monkeypatch):
-    parsed, real = [], read_recipe
-    monkeypatch.setattr("materialist.edits.recipe.read_recipe", lambda path: parsed.append(path) or real(path))
+    parsed = []
+    real = read_recipe
+    monkeypatch.setattr(
+        "materialist.edits.recipe.read_recipe", lambda path: parsed.append(path) or real(path)
+    )
     one, other = (edits_for(recipe, name)[0].options["mesh"] for name in "ab")
     assert len(parsed) == 1 and one == ["a.ply", "ball.ply"] and other == ["b.ply", "ball.ply"]
     recipe.write_text(TEXT.replace("20", "30"))

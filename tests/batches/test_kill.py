@@ -33,20 +33,30 @@ def done(runs):
 
 
 def workers_of(process):
-    return [c for c in psutil.Process(process.pid).children() if "materialist.jobs.worker" in c.cmdline()]
+    return [
+        c
+        for c in psutil.Process(process.pid).children()
+        if "materialist.jobs.worker" in c.cmdline()
+    ]
 
 
 def command(source, runs):
     arguments = ["batch", source, "-o", runs, "--workers", 2, "--device", "cpu", "--json"]
     return subprocess.Popen(
-        [sys.executable, "-c", COMMAND.format(arguments=[str(a) for a in arguments])], stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, start_new_session=True, text=True,
-    )  # fmt: skip
+        [sys.executable, "-c", COMMAND.format(arguments=[str(a) for a in arguments])],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        text=True,
+    )
 
 
 @pytest.mark.slow
-def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_result(tmp_path, monkeypatch):
-    source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
+def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_result(
+    tmp_path, monkeypatch
+):
+    source = photos(tmp_path / "in", *NAMES)
+    runs = tmp_path / "runs"
     monkeypatch.setenv("MADE_SLOW", "30")  # the second batch of photos is at work when it is killed
     process = command(source, runs)
     until(lambda: len(done(runs)) >= 1, 60)
@@ -67,21 +77,29 @@ def test_a_killed_driver_takes_its_workers_with_it_and_resume_gives_the_same_res
 @pytest.mark.slow
 def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
     monkeypatch.setenv("MADE_SLOW", "1")
-    source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
+    source = photos(tmp_path / "in", *NAMES)
+    runs = tmp_path / "runs"
     process = command(source, runs)
     until(lambda: len(done(runs)) >= 1, 60)
     until(lambda: workers_of(process), 60)[0].kill()
     assert process.wait(60) == 0, process.stderr.read()
     attempts = [entry["attempts"] for entry in done(runs)]
-    assert sorted(attempts) in ([1, 1, 1, 1, 2], [1] * 5)  # killed between two photos, it costs nothing
+    assert sorted(attempts) in (
+        [1, 1, 1, 1, 2],
+        [1] * 5,
+    )  # killed between two photos, it costs nothing
     monkeypatch.setenv("MADE_SLOW", "0")
-    assert json.loads((runs / "summary.json").read_text())["hash"] == run(source, tmp_path / "fresh").hash
+    assert (
+        json.loads((runs / "summary.json").read_text())["hash"]
+        == run(source, tmp_path / "fresh").hash
+    )
 
 
 @pytest.mark.parametrize("whole_group", [True, False])
 def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(tmp_path, monkeypatch, whole_group):
     monkeypatch.setenv("MADE_SLOW", "30")
-    source, runs = photos(tmp_path / "in", *NAMES), tmp_path / "runs"
+    source = photos(tmp_path / "in", *NAMES)
+    runs = tmp_path / "runs"
     process = command(source, runs)
     until(lambda: len(done(runs)) >= 1, 60)
     workers = until(lambda: workers_of(process), 60)

@@ -41,13 +41,19 @@ def test_a_folder_that_holds_something_is_refused_or_gone_on_with_or_begun_anew(
 
 def test_other_options_are_refused_by_name(tmp_path):
     write(tmp_path, ("done", "a.png"))
-    with pytest.raises(InputError, match="size 64, not 96"), open_ledger(tmp_path, {"size": 96}, resume=True):
+    with (
+        pytest.raises(InputError, match="size 64, not 96"),
+        open_ledger(tmp_path, {"size": 96}, resume=True),
+    ):
         pass
     with open_ledger(tmp_path, {"size": 96}, resume=True, force=True) as ledger:
         assert ledger.last["a.png"]["key"] != ledger.key
 
 
 def test_two_batches_do_not_share_a_folder(tmp_path):
-    with open_ledger(tmp_path, OPTIONS), pytest.raises(OutputError, match="Another batch is at work"):
+    with (
+        open_ledger(tmp_path, OPTIONS),
+        pytest.raises(OutputError, match="Another batch is at work"),
+    ):
         write(tmp_path, resume=True)
     write(tmp_path, resume=True)

@@ -18,7 +18,9 @@ def ids(source, runs="elsewhere"):
 
 
 def test_a_folder_is_searched_with_its_subfolders_and_nothing_of_ours_is_a_photo(tmp_path):
-    photos(tmp_path, "b", "a.JPG", "sub/c", ".hidden", ".cache/d", "k.scene/photo", "old/e", "runs/a")
+    photos(
+        tmp_path, "b", "a.JPG", "sub/c", ".hidden", ".cache/d", "k.scene/photo", "old/e", "runs/a"
+    )
     (tmp_path / "k.scene/scene.json").touch()
     (tmp_path / "old/batch.jsonl").touch()
     (tmp_path / "notes.txt").touch()
@@ -32,7 +34,9 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
         "# mine\n b.png\n\na.png\nb.png\nexample:cat\nhttps://me:secret@host/x.jpg?signature=1\nnone.png\n"
     )
     found = {photo.id: photo.location for photo in list_photos(listing, runs="r")}
-    assert found["a.png"] == str(tmp_path / "a.png") and found["none.png"] == str(tmp_path / "none.png")
+    assert found["a.png"] == str(tmp_path / "a.png") and found["none.png"] == str(
+        tmp_path / "none.png"
+    )
     assert found["example:cat"] == "example:cat" and len(found) == 5
     assert found["https://host/x.jpg"] == "https://me:secret@host/x.jpg?signature=1"
     assert without_secrets("ftp://user:p@ss@host/x.jpg") == "ftp://host/x.jpg"
@@ -53,14 +57,21 @@ def test_what_is_passed_over_is_named(tmp_path):
 
 
 def test_reported_names_are_photos(real_data):
-    folder, notes = real_data("data/reported/batch_names"), []
-    assert [photo.id for photo in list_photos(folder, runs="r", notes=notes)] == ["one.jfif", "two.hif"]
+    folder = real_data("data/reported/batch_names")
+    notes = []
+    assert [photo.id for photo in list_photos(folder, runs="r", notes=notes)] == [
+        "one.jfif",
+        "two.hif",
+    ]
     assert notes == ["Passed over, as their names are no photo's: README."]
-    assert [photo.id for photo in list_photos(folder / "one.jfif", runs="r")] == [str(folder / "one.jfif")]
+    assert [photo.id for photo in list_photos(folder / "one.jfif", runs="r")] == [
+        str(folder / "one.jfif")
+    ]
 
 
 @pytest.mark.parametrize(
-    ("make", "said"), [("nothing", "There is no folder"), ("empty", "holds no photo"), ("bytes", "no list")]
+    ("make", "said"),
+    [("nothing", "There is no folder"), ("empty", "holds no photo"), ("bytes", "no list")],
 )
 def test_what_holds_no_photo_is_refused(tmp_path, make, said):
     (tmp_path / "empty").mkdir()
@@ -96,23 +107,39 @@ def test_urls_are_listed_versioned_and_fetched(tmp_path):
 
 
 def test_names_are_stems_as_long_as_those_are_unique():
-    names = unique_names(["a/k.png", "b/k.jpg", "c.png", "d.png", "d.jpg", "x y/é.png", "http://h/p/z.jpg"])
+    names = unique_names(
+        ["a/k.png", "b/k.jpg", "c.png", "d.png", "d.jpg", "x y/é.png", "http://h/p/z.jpg"]
+    )
     assert names == {
-        "a/k.png": "a_k.png", "b/k.jpg": "b_k.jpg", "c.png": "c", "d.png": "d.png", "d.jpg": "d.jpg", "x y/é.png": "é",
+        "a/k.png": "a_k.png",
+        "b/k.jpg": "b_k.jpg",
+        "c.png": "c",
+        "d.png": "d.png",
+        "d.jpg": "d.jpg",
+        "x y/é.png": "é",
         "http://h/p/z.jpg": "z",
-    }  # fmt: skip
+    }
 
 
 @settings(deadline=None)
 @given(
-    st.lists(st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=150), min_size=1, unique=True),
+    st.lists(
+        st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=150),
+        min_size=1,
+        unique=True,
+    ),
     st.randoms(),
 )
 def test_names_are_legal_distinct_and_the_same_in_any_order(texts, random):
     names = unique_names(texts)
     assert len({name.casefold() for name in names.values()}) == len(texts)
     for name in names.values():
-        assert name and not set(name) & set('/\\\0:*?"<>|{}') and name[0] not in "._" and len(name.encode()) <= LONGEST
+        assert (
+            name
+            and not set(name) & set('/\\\0:*?"<>|{}')
+            and name[0] not in "._"
+            and len(name.encode()) <= LONGEST
+        )
     shuffled = list(texts)
     random.shuffle(shuffled)
     assert unique_names(shuffled) == names
@@ -127,5 +154,7 @@ def test_a_batch_behind_a_url_resumes_with_what_has_changed(tmp_path):
     (tmp_path / "c.png").rename(tmp_path / "in/b.png")
     again = batch(f"file://{tmp_path}/in", tmp_path / "runs", resume=True, **options)
     assert again.kept == 1 and again.count("done") == 2
-    hashes = [{row["name"]: row["photo_hash"] for row in outcome.rows} for outcome in (first, again)]
+    hashes = [
+        {row["name"]: row["photo_hash"] for row in outcome.rows} for outcome in (first, again)
+    ]
     assert hashes[0]["a"] == hashes[1]["a"] and hashes[0]["b"] != hashes[1]["b"]

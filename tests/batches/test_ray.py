@@ -15,9 +15,12 @@ def test_a_cluster_gives_what_worker_processes_give(tmp_path):
     cluster = run(source, tmp_path / "cluster", ray="local")
     state = {row["name"]: (row["status"], row["attempts"]) for row in cluster.rows}
     assert state == {
-        "a": ("done", 1), "b": ("done", 1), "deadly-once": ("done", 2), "impossible": ("failed", 1),
+        "a": ("done", 1),
+        "b": ("done", 1),
+        "deadly-once": ("done", 2),
+        "impossible": ("failed", 1),
         "deadly": ("failed", 3),
-    }  # fmt: skip
+    }
     (source / "deadly.png").unlink()
     assert cluster.hash == run(photos(source, "a"), tmp_path / "local").hash
 

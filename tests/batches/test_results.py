@@ -16,7 +16,10 @@ def test_the_hash_is_of_the_arrays_and_the_camera_and_not_of_the_time(tmp_path):
     scene = make_scene()
     rougher = np.nextafter(scene.materials.roughness, np.float32(2))
     others = {
-        "same": {"report": FitReport((), {"total_seconds": 9.0}), "photo": replace(scene.photo, path="other.png")},
+        "same": {
+            "report": FitReport((), {"total_seconds": 9.0}),
+            "photo": replace(scene.photo, path="other.png"),
+        },
         "roughness": {"materials": replace(scene.materials, roughness=rougher)},
         "depth": {"depth": scene.depth + np.float32(1)},
         "fov": {"camera": replace(scene.camera, fov=40.0)},
@@ -24,7 +27,9 @@ def test_the_hash_is_of_the_arrays_and_the_camera_and_not_of_the_time(tmp_path):
     save_scene(scene, tmp_path / "a")
     for name, changes in others.items():
         save_scene(replace(scene, **changes), tmp_path / name)
-        assert (package_hash(tmp_path / name) == package_hash(tmp_path / "a")) == (name == "same"), name
+        assert (package_hash(tmp_path / name) == package_hash(tmp_path / "a")) == (
+            name == "same"
+        ), name
 
 
 def test_a_package_that_is_not_whole_has_no_hash(tmp_path):

@@ -20,7 +20,9 @@ def reasons(outcome):
 
 
 def test_every_photo_ends_as_done_or_with_a_reason(tmp_path):
-    source = photos(tmp_path / "in", "a", "sub/b", "sub/a.jpg", "bug", "impossible", "deadly", "deadly-once")
+    source = photos(
+        tmp_path / "in", "a", "sub/b", "sub/a.jpg", "bug", "impossible", "deadly", "deadly-once"
+    )
     (source / "cut.png").write_bytes((source / "a.png").read_bytes()[:60])
     seen = []
     outcome = run(source, tmp_path / "runs", progress=seen.append)
@@ -54,7 +56,9 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     first = run(source, tmp_path / "runs")
     written = (tmp_path / "runs/a.scene/scene.json").stat().st_mtime_ns
     (tmp_path / "runs/b.scene/maps/albedo.exr").unlink()
-    Image.fromarray(np.random.default_rng(9).integers(0, 256, (16, 24, 3)).astype(np.uint8)).save(source / "c.png")
+    Image.fromarray(np.random.default_rng(9).integers(0, 256, (16, 24, 3)).astype(np.uint8)).save(
+        source / "c.png"
+    )
     (source / "d.png").unlink()
     photos(source, "x", "new")  # the first is only there to make the second another picture
     (source / "x.png").unlink()
@@ -67,7 +71,8 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
 
 
 def test_what_lies_there_of_somebody_else_is_not_replaced(tmp_path):
-    source, runs = photos(tmp_path / "in", "b"), tmp_path / "runs"
+    source = photos(tmp_path / "in", "b")
+    runs = tmp_path / "runs"
     run(source, runs)
     photos(source, "a")
     (runs / "a.scene").mkdir()
@@ -76,7 +81,9 @@ def test_what_lies_there_of_somebody_else_is_not_replaced(tmp_path):
     for _ in range(2):
         outcome = run(source, runs, resume=True, apply=masks(tmp_path, "a", "b"), spp=2)
         assert reasons(outcome).keys() == {"a", "b"}
-        assert all("exists and is not of this batch" in reason for reason in reasons(outcome).values())
+        assert all(
+            "exists and is not of this batch" in reason for reason in reasons(outcome).values()
+        )
         assert (runs / "a.scene" / "mine.txt").read_text() == (runs / "b.png").read_text() == "mine"
     (runs / "b.png").unlink()
     outcome = run(source, runs, resume=True, apply=masks(tmp_path, "a", "b"), spp=2)
@@ -94,12 +101,16 @@ def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"size": 4}, "working size"), ({"fov": "wide"}, "field of view"), ({"seed": -1}, "seed is -1"),
-        ({"predictor": "oracle"}, "no predictor 'oracle'"), ({"workers": 0}, "workers is 0; it must lie"),
+        ({"size": 4}, "working size"),
+        ({"fov": "wide"}, "field of view"),
+        ({"seed": -1}, "seed is -1"),
+        ({"predictor": "oracle"}, "no predictor 'oracle'"),
+        ({"workers": 0}, "workers is 0; it must lie"),
         ({"quality": 80}, "png has none"),
-        ({"apply": "none.yaml"}, "cannot be read"), ({"settings": object()}, "texts and numbers"),
+        ({"apply": "none.yaml"}, "cannot be read"),
+        ({"settings": object()}, "texts and numbers"),
     ],
-)  # fmt: skip
+)
 def test_options_that_fit_no_photo_are_refused_before_anything_is_written(tmp_path, options, said):
     source = photos(tmp_path / "in", "a")
     with pytest.raises(InputError, match=said):
@@ -110,7 +121,9 @@ def test_options_that_fit_no_photo_are_refused_before_anything_is_written(tmp_pa
 def masks(folder, *names):
     (folder / "masks").mkdir(exist_ok=True)
     for name in names:
-        Image.fromarray(np.pad(np.full((8, 8), 255, np.uint8), ((4, 4), (8, 8)))).save(folder / f"masks/{name}.png")
+        Image.fromarray(np.pad(np.full((8, 8), 255, np.uint8), ((4, 4), (8, 8)))).save(
+            folder / f"masks/{name}.png"
+        )
     (folder / "edits.yaml").write_text(RECIPE)
     return folder / "edits.yaml"
 
@@ -118,10 +131,13 @@ def masks(folder, *names):
 def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(tmp_path):
     pytest.importorskip("mitsuba")
     source = photos(tmp_path / "in", "a", "b")
-    recipe, runs = masks(tmp_path, "a"), tmp_path / "runs"
+    recipe = masks(tmp_path, "a")
+    runs = tmp_path / "runs"
     options = {"apply": recipe, "spp": 2, "workers": 1}
     first = run(source, runs, **options)
-    assert "masks/b.png" in reasons(first)["b"] and reasons(first)["b"].startswith("The scene is there")
+    assert "masks/b.png" in reasons(first)["b"] and reasons(first)["b"].startswith(
+        "The scene is there"
+    )
     assert (runs / "b.scene").is_dir() and not (runs / "b.png").exists() and first.exit_code == 2
     assert Image.open(runs / "a.png").size == Image.open(source / "a.png").size
     written = (runs / "b.scene/scene.json").stat().st_mtime_ns
@@ -132,12 +148,18 @@ def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(t
     assert run(source, runs, resume=True, **options).kept == 2
     recipe.write_text(RECIPE.replace("90", "200"))
     other = run(source, runs, resume=True, **options)
-    assert other.kept == 0 and other.exit_code == 0 and other.rows[0]["edits"] != again.rows[0]["edits"]
+    assert (
+        other.kept == 0
+        and other.exit_code == 0
+        and other.rows[0]["edits"] != again.rows[0]["edits"]
+    )
     small = run(source, runs, resume=True, **options, format="jpg", quality=60)
     assert small.kept == 0 and Image.open(runs / "a.jpg").format == "JPEG"
     assert run(source, runs, resume=True, **options, format="jpg", quality=60).kept == 2
     assert run(source, runs, resume=True, **options, format="jpg", quality=90).kept == 0
-    assert 'href="a.jpg"' in (runs / "index.html").read_text() and small.rows[0]["picture"] == "a.jpg"
+    assert (
+        'href="a.jpg"' in (runs / "index.html").read_text() and small.rows[0]["picture"] == "a.jpg"
+    )
     assert (runs / "b.scene/scene.json").stat().st_mtime_ns == written
 
 
@@ -149,4 +171,7 @@ def test_a_file_name_that_is_no_utf8_is_a_photo_like_any_other(tmp_path):
         pytest.skip("this file system takes only UTF-8")
     outcome = run(source, tmp_path / "runs", workers=1)
     assert outcome.exit_code == 0, reasons(outcome)
-    assert outcome.rows[0]["id"] == "caf\\udce9.png" and "caf" in (tmp_path / "runs/index.html").read_text()
+    assert (
+        outcome.rows[0]["id"] == "caf\\udce9.png"
+        and "caf" in (tmp_path / "runs/index.html").read_text()
+    )

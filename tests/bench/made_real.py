@@ -34,7 +34,9 @@ def floor(size=SIZE, focal=32.0):
 def write_object(folder):
     """A ball of two paints under three lamps: its photos are exactly albedo times cosine."""
     height, width = SIZE
-    y, x = np.meshgrid((height - 1) / 2 - np.arange(height), np.arange(width) - (width - 1) / 2, indexing="ij")
+    y, x = np.meshgrid(
+        (height - 1) / 2 - np.arange(height), np.arange(width) - (width - 1) / 2, indexing="ij"
+    )
     square = (x**2 + y**2) / 11**2
     mask = square < 0.9
     normal = np.stack([x / 11, y / 11, np.sqrt(np.maximum(1 - square, 0))], -1) * mask[..., None]
@@ -99,9 +101,19 @@ def write_interiorverse(folder):
     scene = folder / "dataset_85" / "L3D1"
     scene.mkdir(parents=True)
     (scene.parent / "test.txt").write_text("L3D1\n")
-    values = {"im": photo() / 255, "albedo": 0.25, "material": 0.3, "normal": [0, 0, 1], "depth": 2000, "mask": 1}
+    values = {
+        "im": photo() / 255,
+        "albedo": 0.25,
+        "material": 0.3,
+        "normal": [0, 0, 1],
+        "depth": 2000,
+        "mask": 1,
+    }
     for name, value in values.items():
-        write_exr(scene / f"000_{name}.exr", np.broadcast_to(np.float32(value), (*SIZE, 3)).astype(np.float32))
+        write_exr(
+            scene / f"000_{name}.exr",
+            np.broadcast_to(np.float32(value), (*SIZE, 3)).astype(np.float32),
+        )
 
 
 def write_wildrelight(folder):
@@ -111,7 +123,10 @@ def write_wildrelight(folder):
         for name in ("photo", "envmap"):
             (folder / "park" / name).mkdir(parents=True, exist_ok=True)
         write_exr(folder / "park" / "envmap" / f"time{k}_envmap.exr", envmap)
-        write_exr(folder / "park" / "photo" / f"time{k}_hdr.exr", (photo() * np.float32(3 * k + 1)).astype(np.float32))
+        write_exr(
+            folder / "park" / "photo" / f"time{k}_hdr.exr",
+            (photo() * np.float32(3 * k + 1)).astype(np.float32),
+        )
 
 
 def write_multi_illumination(folder):

@@ -13,13 +13,24 @@ from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.io.photo import read_photo
 
-STAGES = {"geometry": 1.0, "engine": 0.75, "trace": 1.25, "light": 2.5, "albedo": 3.0,
-          "roughness+metallic": 0.25, "rerender": 4.0}  # fmt: skip
+STAGES = {
+    "geometry": 1.0,
+    "engine": 0.75,
+    "trace": 1.25,
+    "light": 2.5,
+    "albedo": 3.0,
+    "roughness+metallic": 0.25,
+    "rerender": 4.0,
+}
 REPORT = {
-    "rerender_psnr_path": 33.0, "rerender_ssim_path": 0.95, "prior_l1_albedo": 0.1, "prior_l1_roughness": 0.2,
-    "prior_l1_metallic": 0.3, "peak_rss_mb": 700.0,
+    "rerender_psnr_path": 33.0,
+    "rerender_ssim_path": 0.95,
+    "prior_l1_albedo": 0.1,
+    "prior_l1_roughness": 0.2,
+    "prior_l1_metallic": 0.3,
+    "peak_rss_mb": 700.0,
     "stages": [{"name": name, "seconds": seconds} for name, seconds in STAGES.items()],
-}  # fmt: skip
+}
 """What an inversion reports."""
 
 
@@ -36,11 +47,15 @@ def data(tmp_path):
     return folder
 
 
-def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data, monkeypatch, measured):
+def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(
+    data, monkeypatch, measured
+):
     seen = []
 
     def inverted(*command, **_):
-        value = lambda name: command[command.index(name) + 1]  # noqa: E731
+        def value(name):
+            return command[command.index(name) + 1]
+
         photo = read_photo(command[1], size=int(value("--size")))
         seen.append((command, photo.camera))
         scene = Path(value("-o"))
@@ -56,7 +71,11 @@ def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data,
     assert commands[0][1] == str(data / "photo.png") and commands[1][1] != commands[0][1]
     for command in commands:
         options = " ".join(command)
-        assert f"--predictor maps:{data / 'maps'}" in options and "--seed 3" in options and "--device cpu" in options
+        assert (
+            f"--predictor maps:{data / 'maps'}" in options
+            and "--seed 3" in options
+            and "--device cpu" in options
+        )
     rows = report.rows
     assert [row["method"] for row in rows] == ["24 × 16", "96 × 64"]
     assert rows[1]["peak_mb"] == 700 and rows[1]["psnr"] == 33
@@ -65,7 +84,9 @@ def test_every_size_is_inverted_as_asked_and_larger_ones_enlarge_the_photo(data,
 
 
 def test_a_failed_command_is_told_in_its_own_words(tmp_path):
-    with pytest.raises(MaterialistError, match=r"materialist invert .* ended with code 2: .*nothing.jpg"):
+    with pytest.raises(
+        MaterialistError, match=r"materialist invert .* ended with code 2: .*nothing.jpg"
+    ):
         materialist("invert", str(tmp_path / "nothing.jpg"), "-o", str(tmp_path / "a.scene"))
 
 

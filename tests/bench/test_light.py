@@ -25,8 +25,13 @@ def test_maps_are_given_as_the_method_says(sample):
     true, neutral, predicted, shape = (
         light.given_maps(sample, light.METHODS[name], seed=0, device="cpu") for name in names
     )
-    assert true.depth is neutral.depth is sample.truth.depth and true.materials is sample.truth.materials
-    assert not np.array_equal(predicted.depth, true.depth) and np.array_equal(shape.depth, predicted.depth)
+    assert (
+        true.depth is neutral.depth is sample.truth.depth
+        and true.materials is sample.truth.materials
+    )
+    assert not np.array_equal(predicted.depth, true.depth) and np.array_equal(
+        shape.depth, predicted.depth
+    )
     for given in (neutral.materials, shape.materials):
         assert given.albedo.shape == true.materials.albedo.shape and (given.albedo == 0.5).all()
         assert (given.roughness == 0.5).all() and np.allclose(given.metallic, 0.1)
@@ -45,13 +50,22 @@ def test_mirrors_are_photographed_under_the_same_light(sample):
     polished = light.mirrored(sample)
     changed = np.abs(polished.photo.linear - sample.photo.linear).max(-1) > 0.05
     things = np.isin(sample.scene.seen, list(sample.scene.things))
-    assert (polished.truth.materials.metallic == things).all() and np.array_equal(polished.envmap, sample.envmap)
+    assert (polished.truth.materials.metallic == things).all() and np.array_equal(
+        polished.envmap, sample.envmap
+    )
     assert changed[things].mean() > 0.5 > changed[~things].mean()
 
 
 @pytest.mark.slow
 def test_a_run_writes_a_row_for_every_method(measured):
-    options = {"scenes": 1, "lights": 1, "size": 24, "spp": 16, "methods": "default", "relight": False}
+    options = {
+        "scenes": 1,
+        "lights": 1,
+        "size": 24,
+        "spp": 16,
+        "methods": "default",
+        "relight": False,
+    }
     report = measured("light", device="cpu", **options)
     rows = report.rows
     assert [r["method"] for r in rows] == ["default"]
@@ -62,7 +76,9 @@ def test_a_run_writes_a_row_for_every_method(measured):
 
 @pytest.mark.slow
 def test_relit_inversions_and_the_paper_s_engine(measured):
-    report = measured("light", scenes=1, lights=1, size=48, spp=64, methods="paper path", device="cpu")
+    report = measured(
+        "light", scenes=1, lights=1, size=48, spp=64, methods="paper path", device="cpu"
+    )
     rows = {row["method"]: row for row in report.rows}
     each = [name + end for end in light.COMPLETIONS.values() for name in ("ceiling", "inversion")]
     assert list(rows) == [*each, "paper path"]

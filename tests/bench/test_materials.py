@@ -18,7 +18,9 @@ def folder(tmp_path):
     """A photo with true maps: a slanted plane, two paints."""
     place = tmp_path / "data" / "plane"
     (place / "maps").mkdir(parents=True)
-    albedo = np.where(np.arange(48)[None, :, None] < 24, [0.6, 0.3, 0.2], [0.2, 0.4, 0.5]).astype(np.float32)
+    albedo = np.where(np.arange(48)[None, :, None] < 24, [0.6, 0.3, 0.2], [0.2, 0.4, 0.5]).astype(
+        np.float32
+    )
     albedo = np.repeat(albedo, 40, 0)
     depth = np.linspace(3, 2, 40)[:, None] + np.linspace(0.4, 0, 48)[None]
     depth = depth.astype(np.float32)
@@ -35,9 +37,12 @@ def folder(tmp_path):
 def test_a_perfect_predictor_scores_perfectly(folder, measured):
     maps = folder / "plane" / "maps"
     report = measured("materials", data=folder, predictor=f"maps:{maps},constant")
-    best, guess = report.means[f"maps:{maps}"], report.means["constant"]
+    best = report.means[f"maps:{maps}"]
+    guess = report.means["constant"]
     assert best["albedo_psnr"] == best["roughness_psnr_pooled"] == 100
-    assert best["depth_si_log_rmse"] == 0 and best["depth_order"] == 1 and best["normal_angle"] < 0.1
+    assert (
+        best["depth_si_log_rmse"] == 0 and best["depth_order"] == 1 and best["normal_angle"] < 0.1
+    )
     assert guess["albedo_psnr"] < 60 and guess["roughness_psnr"] == pytest.approx(20, abs=0.1)
     assert (report.folder / "sheet.png").is_file()
 
@@ -63,4 +68,6 @@ def test_samples_are_seen_by_their_own_camera(tmp_path):
 
 def test_the_benchmark_of_time(measured):
     rows = measured("predictor", predictor="constant", size=48, warmups=1, runs=2).rows
-    assert [row["method"] for row in rows] == ["constant predict"] and rows[0]["mean_ms"] >= rows[0]["fastest_ms"] > 0
+    assert [row["method"] for row in rows] == ["constant predict"] and rows[0]["mean_ms"] >= rows[
+        0
+    ]["fastest_ms"] > 0

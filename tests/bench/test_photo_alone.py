@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from materialist.bench.edits import true_scene
-from materialist.bench.photo_alone import SCENE_SEED, PhotoAloneBench, light_error, unseen_sample, with_truth
+from materialist.bench.photo_alone import (
+    SCENE_SEED,
+    PhotoAloneBench,
+    light_error,
+    unseen_sample,
+    with_truth,
+)
 from materialist.errors import InputError
 from materialist.fit.settings import PAPER
 from materialist.procedural import arrangements, lights
@@ -18,8 +24,9 @@ def test_captures_are_those_that_no_training_set_may_use(monkeypatch, tmp_path):
     """By name: of all files, only the held-out ones are asked for."""
     asked = []
     for folder, ending, names in (
-        ("meshes", ".ply", ("train", "spot_cow", "bunny")), ("envmaps", ".exr", ("museum", "forest")),
-    ):  # fmt: skip
+        ("meshes", ".ply", ("train", "spot_cow", "bunny")),
+        ("envmaps", ".exr", ("museum", "forest")),
+    ):
         (tmp_path / folder).mkdir()
         for name in names:
             (tmp_path / folder / f"{name}{ending}").touch()
@@ -51,7 +58,11 @@ def test_arrangements_are_those_of_no_other_seed(mitsuba):
 
 def test_a_part_of_the_truth_replaces_that_part_alone(mitsuba):
     truth = make_sample(0, 0, 0, size=24, spp=16).truth
-    prior = replace(truth, depth=truth.depth * 2, materials=replace(truth.materials, albedo=truth.materials.albedo / 2))
+    prior = replace(
+        truth,
+        depth=truth.depth * 2,
+        materials=replace(truth.materials, albedo=truth.materials.albedo / 2),
+    )
     albedo, geometry = (with_truth(prior, truth, given) for given in ("albedo", "geometry"))
     assert albedo.depth is prior.depth and albedo.materials.albedo is truth.materials.albedo
     assert geometry.depth is truth.depth and geometry.materials is prior.materials
@@ -68,7 +79,9 @@ def test_a_run_has_maps_and_edits(measured, monkeypatch):
     from materialist import pipeline
 
     sample, _ = unseen_sample(0, None, 32)
-    monkeypatch.setattr(pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo))
+    monkeypatch.setattr(
+        pipeline, "invert", lambda photo, **_: replace(true_scene(sample), photo=photo)
+    )
     small = {"scenes": 1, "size": 32, "spp": 4, "truth_spp": 16}
     report = measured("photo-alone", kinds="relight,insert", **small)
     rows = {row["method"]: row for row in report.rows}
@@ -76,7 +89,9 @@ def test_a_run_has_maps_and_edits(measured, monkeypatch):
     assert rows["maps: fitted"]["albedo"] == 100 and rows["maps: fitted"]["light"] < 1e-6
     assert rows["relight: fitted"]["inside"] > rows["relight: untouched"]["inside"] + 3
     inverted = []
-    monkeypatch.setattr(pipeline, "invert", lambda *_, **how: inverted.append(how) or true_scene(sample))
+    monkeypatch.setattr(
+        pipeline, "invert", lambda *_, **how: inverted.append(how) or true_scene(sample)
+    )
     measured("photo-alone", kinds="relight", paper=3, **small)
     assert inverted[1]["engine"] == "path" and inverted[1]["settings"] == PAPER.at_most(3)
     assert (report.folder / "sheet.png").exists() and PhotoAloneBench().scenes >= 24

@@ -40,10 +40,17 @@ def test_the_table_marks_the_best_figure_of_each_column():
 
 def test_methods_compete_within_their_part():
     rows = [
-        {"method": m, "sample": "a", "psnr": v} for m, v in (("hue: a", 1), ("hue: b", 2), ("cup: a", 8), ("cup: b", 9))
+        {"method": m, "sample": "a", "psnr": v}
+        for m, v in (("hue: a", 1), ("hue: b", 2), ("cup: a", 8), ("cup: b", 9))
     ]
-    text = markdown(replace(REPORT, rows=[*rows, {"method": "cup: ceiling", "sample": "a", "psnr": 99}]))
-    assert "| hue: b | 1 | **2.0** |" in text and "| cup: b | 1 | **9.0** |" in text and text.count("**") == 4
+    text = markdown(
+        replace(REPORT, rows=[*rows, {"method": "cup: ceiling", "sample": "a", "psnr": 99}])
+    )
+    assert (
+        "| hue: b | 1 | **2.0** |" in text
+        and "| cup: b | 1 | **9.0** |" in text
+        and text.count("**") == 4
+    )
 
 
 def test_a_report_is_three_files_of_valid_content(tmp_path):
@@ -82,7 +89,11 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path):
     [
         ("nonsense", {}, "no benchmark 'nonsense'"),
         ("light", {"colour": 3}, "no option 'colour'.*scenes"),
-        ("light", {"methods": "default,magic"}, "'magic' is unknown; choose from default.*paper path"),
+        (
+            "light",
+            {"methods": "default,magic"},
+            "'magic' is unknown; choose from default.*paper path",
+        ),
         ("light", {"scenes": 0}, "scenes is 0"),
         ("select", {"scenes": "abc"}, "scenes must be a number"),
         ("select", {"seed": -1}, "seed is -1"),
@@ -114,7 +125,9 @@ def test_a_folder_with_something_in_it_is_kept(tmp_path):
         ("whdr", {"data": "."}, "no picture with judgements"),
     ],
 )
-def test_what_cannot_be_is_told_before_anything_is_written(tmp_path, monkeypatch, name, options, words):
+def test_what_cannot_be_is_told_before_anything_is_written(
+    tmp_path, monkeypatch, name, options, words
+):
     (tmp_path / "empty").mkdir()
     monkeypatch.chdir(tmp_path / "empty")
     with pytest.raises(InputError, match=words):
@@ -138,4 +151,7 @@ def test_a_run_that_is_stopped_leaves_the_rows_that_were_measured(tmp_path, monk
     with pytest.raises(KeyboardInterrupt):
         bench.run("select", output=tmp_path)
     content = json.loads((tmp_path / "report.json").read_text())
-    assert content["title"].startswith("`bench select`") and content["means"]["one"] == {"samples": 1, "iou": 0.5}
+    assert content["title"].startswith("`bench select`") and content["means"]["one"] == {
+        "samples": 1,
+        "iou": 0.5,
+    }

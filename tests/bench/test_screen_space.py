@@ -22,7 +22,9 @@ def test_a_shadow_lies_where_the_line_through_the_body_and_the_light_meets_the_f
     buffer = np.zeros((64, 64))
     (x, y), z = project(body, camera)
     buffer[int(y) - 1 : int(y) + 2, int(x) - 1 : int(x) + 2] = z
-    scene = SimpleNamespace(camera=camera, depth=depth, envmap=envmap, normal=np.tile([0.0, 1.0, 0.0], (64, 64, 1)))
+    scene = SimpleNamespace(
+        camera=camera, depth=depth, envmap=envmap, normal=np.tile([0.0, 1.0, 0.0], (64, 64, 1))
+    )
     shadow = shadowed(scene, buffer, 0.3)[..., 0]
     rows, columns = np.nonzero(shadow < 0.5)
     assert 0 < len(rows) < 40

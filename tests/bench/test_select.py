@@ -21,7 +21,10 @@ def test_both_maps_are_scored(measured):
 
 
 def test_outlined_objects_are_drawn_where_they_are():
-    whole = {"outline": [[100, 50], [300, 50], [300, 200], [100, 200]], "holes": [[[120, 60], [140, 60], [130, 90]]]}
+    whole = {
+        "outline": [[100, 50], [300, 50], [300, 200], [100, 200]],
+        "holes": [[[120, 60], [140, 60], [130, 90]]],
+    }
     part = {"outline": [[200, 100], [250, 100], [250, 150], [200, 150]], "part": True}
     (mask, place), (inner, _) = clickable([whole, part], (128, 256))
     assert abs(int(mask.sum()) - (100 * 75 - 75)) < 20 and int(inner.sum()) == 25 * 25

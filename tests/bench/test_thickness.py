@@ -12,7 +12,8 @@ def test_shapes_and_meshes_have_rows(tmp_path, untrained, measured):
     report = measured("thickness", data=tmp_path / "data", **options)
     assert len(report.rows) == 2 * (2 * 2 + 1)
     ball = {row["method"]: row for row in report.rows if row["sample"].startswith("ball")}
-    prior, network = ball["symmetric meshes: symmetry"], ball["symmetric meshes: RefractionNet"]
+    prior = ball["symmetric meshes: symmetry"]
+    network = ball["symmetric meshes: RefractionNet"]
     assert prior["solid"] < 0.12 and "hollow" not in prior
     # Seen from near, rays to a ball's sides are not parallel, and its back is not quite its front in a mirror.
     assert network["back"] == pytest.approx(prior["back"], abs=0.01) and prior["back"] < 35

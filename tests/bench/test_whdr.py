@@ -34,7 +34,10 @@ POINTS = _points((0.1, 0.5), (0.5, 0.5), (0.9, 0.5))
         ([_says(1, 2, "1")], 1.0),
         ([_says(0, 1, "E")], 1.0),
         ([_says(0, 1, "1", 3.0), _says(0, 2, "2", 1.0)], 0.25),  # weighted
-        ([_says(0, 1, "1"), _says(0, 1, "2", 0.0), _says(0, 1, "2", None), _says(0, 1, "?")], 0.0),  # do not count
+        (
+            [_says(0, 1, "1"), _says(0, 1, "2", 0.0), _says(0, 1, "2", None), _says(0, 1, "?")],
+            0.0,
+        ),  # do not count
     ],
 )
 def test_known_answers(comparisons, expected):
@@ -45,7 +48,9 @@ def test_known_answers(comparisons, expected):
     error, count = whdr(ALBEDO, {**judged, "intrinsic_points": transparent})
     assert np.isnan(error) and count == 0
     apart = {**judged, "intrinsic_comparisons": [_says(1, 2, "1")]}
-    assert [whdr(ALBEDO, apart, delta=delta)[0] for delta in (0.04, 0.06)] == [0, 1], "a relative threshold"
+    assert [whdr(ALBEDO, apart, delta=delta)[0] for delta in (0.04, 0.06)] == [0, 1], (
+        "a relative threshold"
+    )
 
 
 def test_the_benchmark_from_a_folder(tmp_path, measured):
@@ -66,10 +71,14 @@ def test_the_benchmark_from_a_folder(tmp_path, measured):
 
 @pytest.mark.parametrize(
     "text",
-    ["[]", "no JSON", '{"intrinsic_points": [], "intrinsic_comparisons": [{"point1": 1}]}',
-     '{"intrinsic_points": [{"id": 1}], "intrinsic_comparisons": '
-     '[{"point1": 1, "point2": 7, "darker": "1", "darker_score": 1}]}'],
-)  # fmt: skip
+    [
+        "[]",
+        "no JSON",
+        '{"intrinsic_points": [], "intrinsic_comparisons": [{"point1": 1}]}',
+        '{"intrinsic_points": [{"id": 1}], "intrinsic_comparisons": '
+        '[{"point1": 1, "point2": 7, "darker": "1", "darker_score": 1}]}',
+    ],
+)
 def test_what_is_no_judgement_is_told(tmp_path, text):
     cv2.imwrite(str(tmp_path / "1.png"), np.arange(4800).reshape(40, 40, 3).astype(np.uint8))
     (tmp_path / "1.json").write_text(text)

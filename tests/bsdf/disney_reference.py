@@ -20,7 +20,9 @@ MIN_ALPHA = 1e-3
 """Lower clamp of alpha = roughness**2."""
 
 
-def evaluate(albedo: Array, roughness: Array, metallic: Array, n: Array, wi: Array, wo: Array) -> Array:
+def evaluate(
+    albedo: Array, roughness: Array, metallic: Array, n: Array, wi: Array, wo: Array
+) -> Array:
     """[..., 3] float64 f_r = f_s + (1 - M) f_d in 1 / sr; 0 where wi and wo lie on different sides of the surface.
 
     albedo: [..., 3]. roughness, metallic: [...]. n, wi, wo: [..., 3] unit, directions away from the surface.
@@ -31,7 +33,9 @@ def evaluate(albedo: Array, roughness: Array, metallic: Array, n: Array, wi: Arr
     s0, s1 = specular_split(roughness, n, wi, wo)
     base = base_reflectance(albedo, metallic)
     above = (_dot(n, wi) * _dot(n, wo) > 0)[..., None]
-    return np.where(above, base * s0[..., None] + s1[..., None] + (1 - metallic)[..., None] * diffuse, 0)
+    return np.where(
+        above, base * s0[..., None] + s1[..., None] + (1 - metallic)[..., None] * diffuse, 0
+    )
 
 
 def base_reflectance(albedo: Array, metallic: Array) -> Array:
@@ -46,9 +50,14 @@ def diffuse_coefficients(n: Array, wi: Array, wo: Array) -> Array:
     F_d(w) = 1 + (F_D90 - 1)(1 - n.w)^5 is linear in F_D90 = 0.5 + 2 R (h.w)^2, hence in R.
     """
     cos_i, cos_o, _, cos_d = _cosines(n, wi, wo)
-    fi, fo, slope = _schlick(cos_i), _schlick(cos_o), 2 * cos_d**2
-    at_zero_i, at_zero_o = 1 - 0.5 * fi, 1 - 0.5 * fo
-    return np.stack([at_zero_i * at_zero_o, slope * (at_zero_i * fo + at_zero_o * fi), slope**2 * fi * fo], -1)
+    fi = _schlick(cos_i)
+    fo = _schlick(cos_o)
+    slope = 2 * cos_d**2
+    at_zero_i = 1 - 0.5 * fi
+    at_zero_o = 1 - 0.5 * fo
+    return np.stack(
+        [at_zero_i * at_zero_o, slope * (at_zero_i * fo + at_zero_o * fi), slope**2 * fi * fo], -1
+    )
 
 
 def specular_split(roughness: Array, n: Array, wi: Array, wo: Array) -> tuple[Array, Array]:
@@ -65,7 +74,9 @@ def specular_split(roughness: Array, n: Array, wi: Array, wo: Array) -> tuple[Ar
 
 def hemisphere(count: int) -> Array:
     """[count, count, 3] directions about +Z, each of the solid angle 2 pi / count^2."""
-    z, phi = np.meshgrid((np.arange(count) + 0.5) / count, (np.arange(count) + 0.5) / count * 2 * np.pi)
+    z, phi = np.meshgrid(
+        (np.arange(count) + 0.5) / count, (np.arange(count) + 0.5) / count * 2 * np.pi
+    )
     sine = np.sqrt(1 - z**2)
     return np.stack([sine * np.cos(phi), sine * np.sin(phi), z], -1)
 

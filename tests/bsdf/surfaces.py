@@ -45,7 +45,8 @@ def vector(directions):
 def directions(count, seed, *, lowest=0.02):
     """[N, 3] float32 unit directions of the upper hemisphere, cosine above `lowest`."""
     rng = np.random.default_rng(seed)
-    z, phi = rng.uniform(lowest, 1, count), rng.uniform(0, 2 * np.pi, count)
+    z = rng.uniform(lowest, 1, count)
+    phi = rng.uniform(0, 2 * np.pi, count)
     s = np.sqrt(1 - z**2)
     return np.stack([s * np.cos(phi), s * np.sin(phi), z], -1).astype(np.float32)
 
@@ -53,13 +54,16 @@ def directions(count, seed, *, lowest=0.02):
 def draws(count, seed):
     """The two arguments of `sample` that are random, [N] and [N, 2]."""
     rng = np.random.default_rng(seed)
-    return mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(rng.random((2, count)).astype(np.float32))
+    return mi.Float(rng.random(count).astype(np.float32)), mi.Point2f(
+        rng.random((2, count)).astype(np.float32)
+    )
 
 
 def pairs(count, seed, roughness):
     """wi, wo [N, 3]: half anywhere, half near the mirror direction, where the specular lobe is."""
     rng = np.random.default_rng(seed + 1)
-    wi, wo = directions(count, seed), directions(count, seed + 2)
+    wi = directions(count, seed)
+    wo = directions(count, seed + 2)
     half = count // 2
     near = wi[:half] * [-1, -1, 1] + rng.normal(size=(half, 3)) * 2 * roughness**2
     near /= np.linalg.norm(near, axis=-1, keepdims=True)

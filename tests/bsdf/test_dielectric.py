@@ -16,7 +16,8 @@ def unit(shape):
 
 def pairs(count=500):
     """Directions and normals that point against them."""
-    d, n = unit((count,)), unit((count,))
+    d = unit((count,))
+    n = unit((count,))
     return d, np.where(np.sum(d * n, -1, keepdims=True) > 0, -n, n)
 
 
@@ -29,7 +30,9 @@ def test_snells_law(ior):
     np.testing.assert_allclose(sine_in, ior * sine_out, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(t, axis=-1), 1, atol=1e-12)
     assert (np.sum(t * n, -1) <= 1e-12).all()
-    np.testing.assert_allclose(np.sum(np.cross(d, n) * t, -1), 0, atol=1e-12)  # stays in the plane of incidence
+    np.testing.assert_allclose(
+        np.sum(np.cross(d, n) * t, -1), 0, atol=1e-12
+    )  # stays in the plane of incidence
 
 
 def test_refraction_is_reversible():
@@ -63,12 +66,15 @@ def test_fresnel_at_known_angles():
 def test_fresnel_is_the_same_from_both_sides():
     cosine = np.linspace(0.05, 1, 30)
     inner = np.sqrt(1 - (1 - cosine**2) / 1.7**2)
-    np.testing.assert_allclose(fresnel_dielectric(cosine, 1.7), fresnel_dielectric(inner, 1 / 1.7), atol=1e-12)
+    np.testing.assert_allclose(
+        fresnel_dielectric(cosine, 1.7), fresnel_dielectric(inner, 1 / 1.7), atol=1e-12
+    )
 
 
 def test_facets_are_distributed_as_visible_normals():
     # The mean over visible facets of any f is the integral of f D G1 max(v.h, 0) / (v.n): try f = h.n.
-    alpha, cosine = 0.4, 0.6
+    alpha = 0.4
+    cosine = 0.6
     v = np.array([np.sqrt(1 - cosine**2), 0, cosine])
     h = hemisphere(400)
     ggx = alpha**2 / (np.pi * (h[..., 2] ** 2 * (alpha**2 - 1) + 1) ** 2)
@@ -77,7 +83,9 @@ def test_facets_are_distributed_as_visible_normals():
     assert (density * area).sum() == pytest.approx(1, abs=2e-3)
     expected = (density * area * h[..., 2]).sum()
     drawn = [
-        visible_facet(-v, np.array([0, 0, 1.0]), alpha, (k * 0.7548776662) % 1, (k * 0.5698402910) % 1)[2]
+        visible_facet(
+            -v, np.array([0, 0, 1.0]), alpha, (k * 0.7548776662) % 1, (k * 0.5698402910) % 1
+        )[2]
         for k in range(4000)
     ]
     assert np.mean(drawn) == pytest.approx(expected, abs=3e-3)

@@ -3,7 +3,19 @@
 import disney_reference as brdf
 import numpy as np
 import pytest
-from surfaces import ALBEDO, NORMAL, directions, draws, evaluate, interaction, make, mi, pairs, tilted, vector
+from surfaces import (
+    ALBEDO,
+    NORMAL,
+    directions,
+    draws,
+    evaluate,
+    interaction,
+    make,
+    mi,
+    pairs,
+    tilted,
+    vector,
+)
 
 GRID = [(0.04, 0.0), (0.1, 1.0), (0.2, 0.4), (0.5, 0.0), (0.5, 1.0), (1.0, 0.4)]
 
@@ -20,9 +32,12 @@ def test_eval_is_the_papers_formula(roughness, metallic):
     assert (through == 0).all()
 
 
-@pytest.mark.parametrize(("roughness", "metallic"), [(0.02, 0.5), (0.2, 0.4), (0.5, 1.0), (1.0, 0.0)])
+@pytest.mark.parametrize(
+    ("roughness", "metallic"), [(0.02, 0.5), (0.2, 0.4), (0.5, 1.0), (1.0, 0.0)]
+)
 def test_sample_and_eval_pdf_agree(roughness, metallic):
-    surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
+    surface = make(roughness=roughness, metallic=metallic)
+    ctx = mi.BSDFContext()
     wi = directions(4000, 5)
     wi[::2, 2] *= -1
     si = interaction(wi)
@@ -51,12 +66,18 @@ def _leaning(wi, count=1, leans=True):
 
 
 @pytest.mark.parametrize(
-    ("roughness", "metallic", "degrees", "side"), [(0.4, 0.5, 30, 1), (1, 0, 60, -1), (0.6, 1, 70, 1)]
+    ("roughness", "metallic", "degrees", "side"),
+    [(0.4, 0.5, 30, 1), (1, 0, 60, -1), (0.6, 1, 70, 1)],
 )
-def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness, metallic, degrees, side):
-    surface, ctx = make(roughness=roughness, metallic=metallic), mi.BSDFContext()
-    wi, count = tilted(degrees, side), 1 << 17
-    numbers, total = draws(count, 1), []
+def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(
+    roughness, metallic, degrees, side
+):
+    surface = make(roughness=roughness, metallic=metallic)
+    ctx = mi.BSDFContext()
+    wi = tilted(degrees, side)
+    count = 1 << 17
+    numbers = draws(count, 1)
+    total = []
     for si in (interaction(np.tile(wi, (count, 1))), _leaning(wi, count)):
         sample, weight = surface.sample(ctx, si, *numbers)
         drawn = np.array(sample.pdf) > 0
@@ -64,15 +85,27 @@ def test_nothing_passes_through_a_face_that_leans_and_nothing_is_lost(roughness,
         assert ((np.array(sample.wo).T @ face)[drawn] * (wi @ face) > -1e-5).all()
         total.append(np.array(weight).mean(1))
     np.testing.assert_allclose(total[1], total[0], rtol=0.02)
-    without = np.array(surface.sample(ctx, interaction(np.tile(wi, (count, 1))), *numbers)[0].wo).T @ face
+    without = (
+        np.array(surface.sample(ctx, interaction(np.tile(wi, (count, 1))), *numbers)[0].wo).T @ face
+    )
     assert (without * (wi @ face) < 0).mean() > 0.01  # which would pass
 
 
 @pytest.mark.parametrize(
     ("roughness", "metallic", "degrees", "side", "leans"),
     [
-        *((0.3, 0, 5, 1, False), (0.3, 1, 40, -1, False), (0.45, 0.5, 60, 1, False), (0.6, 0, 80, -1, False)),
-        *((0.6, 1, 80, 1, False), (1, 0.5, 40, -1, False), (0.5, 0.5, 30, 1, True), (1, 0.2, 60, -1, True)),
+        *(
+            (0.3, 0, 5, 1, False),
+            (0.3, 1, 40, -1, False),
+            (0.45, 0.5, 60, 1, False),
+            (0.6, 0, 80, -1, False),
+        ),
+        *(
+            (0.6, 1, 80, 1, False),
+            (1, 0.5, 40, -1, False),
+            (0.5, 0.5, 30, 1, True),
+            (1, 0.2, 60, -1, True),
+        ),
     ],
 )
 def test_chi_squared(roughness, metallic, degrees, side, leans, capsys, tmp_path, monkeypatch):
@@ -80,21 +113,32 @@ def test_chi_squared(roughness, metallic, degrees, side, leans, capsys, tmp_path
     from mitsuba.chi2 import ChiSquareTest, SphericalDomain
 
     monkeypatch.chdir(tmp_path)  # the test leaves its histogram in the current folder when it fails
-    surface, ctx, wi = make(roughness=roughness, metallic=metallic), mi.BSDFContext(), tilted(degrees, side)
-    at = lambda directions: _leaning(wi, len(np.array(directions)), leans)  # noqa: E731
+    surface = make(roughness=roughness, metallic=metallic)
+    ctx = mi.BSDFContext()
+    wi = tilted(degrees, side)
+
+    def at(directions):
+        return _leaning(wi, len(np.array(directions)), leans)
 
     def draw(u):
         sample, _ = surface.sample(ctx, at(u[0]), u[0], mi.Point2f(u[1], u[2]))
         return sample.wo, mi.Float(np.array(sample.pdf) > 0)
 
     test = ChiSquareTest(
-        SphericalDomain(), draw, lambda wo: surface.pdf(ctx, at(wo[0]), wo), sample_dim=3, sample_count=100_000,
-        res=101, ires=16,
-    )  # fmt: skip
+        SphericalDomain(),
+        draw,
+        lambda wo: surface.pdf(ctx, at(wo[0]), wo),
+        sample_dim=3,
+        sample_count=100_000,
+        res=101,
+        ires=16,
+    )
     assert test.run(significance_level=0.001), capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("name", "step"), [("base_color", 0.02), ("roughness", 0.004), ("metallic", 0.02)])
+@pytest.mark.parametrize(
+    ("name", "step"), [("base_color", 0.02), ("roughness", 0.004), ("metallic", 0.02)]
+)
 @pytest.mark.parametrize(("roughness", "metallic"), [(0.3, 0.35), (0.7, 0.8)])
 def test_gradients_are_finite_differences_of_the_formula(name, step, roughness, metallic):
     """Forward derivative of eval against central differences of the float64 reference, in every parameter."""
@@ -113,9 +157,14 @@ def test_gradients_are_finite_differences_of_the_formula(name, step, roughness, 
     def reference(shift):
         at = {"base_color": np.array(ALBEDO), "roughness": roughness, "metallic": metallic}
         at[name] = at[name] + shift
-        return brdf.evaluate(at["base_color"], at["roughness"], at["metallic"], NORMAL, wi, wo) * wo[:, 2:]
+        return (
+            brdf.evaluate(at["base_color"], at["roughness"], at["metallic"], NORMAL, wi, wo)
+            * wo[:, 2:]
+        )
 
-    expected = (8 * (reference(step) - reference(-step)) - (reference(2 * step) - reference(-2 * step))) / (12 * step)
+    expected = (
+        8 * (reference(step) - reference(-step)) - (reference(2 * step) - reference(-2 * step))
+    ) / (12 * step)
     scale = np.abs(expected).max()
     assert scale > 0
     assert np.abs(gradient - expected).max() < 2e-3 * scale

@@ -8,7 +8,13 @@ from materialist.render.variant import setup
 
 
 def described(ior, alpha):
-    return {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha, "int_ior": ior, "ext_ior": 1.0}
+    return {
+        "type": "roughdielectric",
+        "distribution": "ggx",
+        "alpha": alpha,
+        "int_ior": ior,
+        "ext_ior": 1.0,
+    }
 
 
 @pytest.mark.parametrize("ior, alpha", [(1.5, 0.04), (1.5, 0.49), (2.0, 1.0)])
@@ -18,7 +24,8 @@ def test_the_albedo_is_what_mitsubas_sampler_leaves(ior, alpha):
     import mitsuba as mi
 
     bsdf = mi.load_dict(described(ior, alpha))
-    table, count = directional_albedo(ior, alpha), 1 << 15
+    table = directional_albedo(ior, alpha)
+    count = 1 << 15
     for side in (0, 1):
         for k in (0, COSINES // 3, COSINES - 1):
             cosine = (k + 0.5) / COSINES
@@ -26,7 +33,9 @@ def test_the_albedo_is_what_mitsubas_sampler_leaves(ior, alpha):
             si.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, cosine * (1 - 2 * side))
             sampler = mi.load_dict({"type": "independent"})
             sampler.seed(1, count)
-            context = mi.BSDFContext(mi.TransportMode.Importance)  # energy: no factor for the density of radiance
+            context = mi.BSDFContext(
+                mi.TransportMode.Importance
+            )  # energy: no factor for the density of radiance
             _, weight = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), True)
             assert table[side, k] == pytest.approx(float(np.mean(weight.x)), abs=0.01)
 
@@ -39,4 +48,6 @@ def test_new_values_change_the_gain():
     params = mi.traverse(bsdf)
     params["interface.alpha.value"], params["interface.eta"] = 0.5, 1.3
     params.update()
-    np.testing.assert_allclose(np.array(bsdf.table).reshape(2, -1), directional_albedo(1.3, 0.5), atol=1e-5)
+    np.testing.assert_allclose(
+        np.array(bsdf.table).reshape(2, -1), directional_albedo(1.3, 0.5), atol=1e-5
+    )

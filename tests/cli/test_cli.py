@@ -37,30 +37,59 @@ def test_invert_passes_every_option_on_and_writes_the_scene(done, photo, tmp_pat
     done("invert", photo, "-o", place, *options.split(), *more.split())
     (call,) = calls
     assert call["options"] == InvertOptions(
-        predictor="maps:x", engine="path", preset="paper", fov=50, size=24, envmap_size=(64, 32), completion="none",
-        tau=8, mask=Path("mask.png"), strategy="white-light-first", seed=7, device="cpu",
-    )  # fmt: skip
+        predictor="maps:x",
+        engine="path",
+        preset="paper",
+        fov=50,
+        size=24,
+        envmap_size=(64, 32),
+        completion="none",
+        tau=8,
+        mask=Path("mask.png"),
+        strategy="white-light-first",
+        seed=7,
+        device="cpu",
+    )
     given = call["photo"]
-    assert given.camera.fov == 50 and given.linear.shape == (16, 24, 3) and callable(call["progress"])
+    assert (
+        given.camera.fov == 50 and given.linear.shape == (16, 24, 3) and callable(call["progress"])
+    )
     assert load_scene(place).camera == given.camera
 
 
-def test_defaults_are_those_of_python_and_json_is_the_last_line(run, done, photo, tmp_path, monkeypatch):
+def test_defaults_are_those_of_python_and_json_is_the_last_line(
+    run, done, photo, tmp_path, monkeypatch
+):
     calls = install(monkeypatch)
     facts = done("invert", photo, "-o", tmp_path / "a.scene")
     assert calls[0]["options"] == InvertOptions()
     assert facts["ok"] is True and facts["scene"] == str(tmp_path / "a.scene")
-    assert str(tmp_path / "b.scene/overview.png") in run("invert", photo, "-o", tmp_path / "b.scene")[1]
+    assert (
+        str(tmp_path / "b.scene/overview.png")
+        in run("invert", photo, "-o", tmp_path / "b.scene")[1]
+    )
     assert facts["rerender_psnr_path"] == 31.25 and facts["warnings"] == ["no normals", "dim"]
 
 
 def test_render_writes_what_the_pipeline_gives(run, photo, tmp_path, monkeypatch):
     calls = install(monkeypatch)
     run("invert", photo, "-o", tmp_path / "a.scene")
-    code, out, err = run("render", tmp_path / "a.scene", "-o", tmp_path / "o.exr", "--spp", 4, "--denoise", "--seed", 3)
+    code, out, err = run(
+        "render",
+        tmp_path / "a.scene",
+        "-o",
+        tmp_path / "o.exr",
+        "--spp",
+        4,
+        "--denoise",
+        "--seed",
+        3,
+    )
     assert code == 0, err
     assert calls[1].items() >= {"spp": 4, "denoise": True, "seed": 3, "device": "auto"}.items()
-    np.testing.assert_array_equal(read_exr(tmp_path / "o.exr"), load_scene(tmp_path / "a.scene").rerender)
+    np.testing.assert_array_equal(
+        read_exr(tmp_path / "o.exr"), load_scene(tmp_path / "a.scene").rerender
+    )
     assert "o.exr" in out
 
 
@@ -105,9 +134,13 @@ def test_exit_codes(run, photo, tmp_path, monkeypatch, failure, code):
         (["bench", "light", "-o", "OUT", "ten"], "ten"),
     ],
 )
-def test_bad_input_is_exit_2_before_any_work(refused, photo, tmp_path, monkeypatch, arguments, words):
+def test_bad_input_is_exit_2_before_any_work(
+    refused, photo, tmp_path, monkeypatch, arguments, words
+):
     calls = install(monkeypatch)
-    filled = [a.replace("PHOTO", str(photo)).replace("OUT", str(tmp_path / "out")) for a in arguments]
+    filled = [
+        a.replace("PHOTO", str(photo)).replace("OUT", str(tmp_path / "out")) for a in arguments
+    ]
     assert words in refused(*filled)
     assert not calls and os.listdir(tmp_path) == ["photo.png"]
 
@@ -116,24 +149,42 @@ def test_bench_dispatches_with_extra_options(done, tmp_path, monkeypatch):
     from materialist import bench
 
     seen = {}
-    monkeypatch.setattr(bench, "run", lambda name, **options: seen.update(options, name=name), raising=False)
+    monkeypatch.setattr(
+        bench, "run", lambda name, **options: seen.update(options, name=name), raising=False
+    )
     done("bench", "light", "--scenes", 10, "--quick", "size=64", "--rate=0.5", "-o", tmp_path / "r")
     assert seen.pop("output") == tmp_path / "r"
     assert seen == {
-        "name": "light", "data": None, "seed": 0, "device": "auto", "force": False, "scenes": "10", "quick": True,
-        "size": "64", "rate": "0.5",
-    }  # fmt: skip
+        "name": "light",
+        "data": None,
+        "seed": 0,
+        "device": "auto",
+        "force": False,
+        "scenes": "10",
+        "quick": True,
+        "size": "64",
+        "rate": "0.5",
+    }
 
 
 @pytest.mark.parametrize(
     ("command", "kind"),
-    [("invert", InvertOptions), ("glass", Glass), ("relight", Relight), ("drop", Drop), ("export", ExportOptions)],
+    [
+        ("invert", InvertOptions),
+        ("glass", Glass),
+        ("relight", Relight),
+        ("drop", Drop),
+        ("export", ExportOptions),
+    ],
 )
 def test_help_names_a_flag_for_every_option(run, command, kind):
     code, out, _ = run(command, "--help")
     assert code == 0 and "Usage: materialist" in out and run("--version")[1].strip() == __version__
     flags = {
-        flag for name, (told, _) in declarations(kind).items() if told.flag is not None for flag in told.spells(name)
+        flag
+        for name, (told, _) in declarations(kind).items()
+        if told.flag is not None
+        for flag in told.spells(name)
     }
     assert all(flag in out for flag in flags | {"--seed", "--device", "--json", "--force"})
 
@@ -144,7 +195,9 @@ def test_starting_loads_nothing_heavy():
         "heavy = 'torch mitsuba drjit cv2 matplotlib OpenEXR scipy skimage PIL rawpy pillow_heif numpy'.split()\n"
         "sys.exit(','.join(name for name in heavy if name in sys.modules) or 0)"
     )
-    child = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    child = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
     assert child.returncode == 0, f"importing the command line loads {child.stderr.strip()}"
 
 

@@ -23,7 +23,12 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("pictures")
     save_scene(rendered_scene(block=3.0), folder / "a.scene")
     save_scene(floor_scene(), folder / "floor.scene")
-    for name, mask in (("block", MASK), ("empty", MASK & False), ("all", MASK | True), ("square", np.ones((36, 36)))):
+    for name, mask in (
+        ("block", MASK),
+        ("empty", MASK & False),
+        ("all", MASK | True),
+        ("square", np.ones((36, 36))),
+    ):
         Image.fromarray((mask * 255).astype(np.uint8)).save(folder / f"{name}.png")
     write_exr(folder / "square.exr", np.ones((32, 32, 3), np.float32))
     write_exr(folder / "sky.exr", np.full((16, 32, 3), 0.5, np.float32))
@@ -46,13 +51,23 @@ def folder(tmp_path_factory):
 
 
 def test_edit_writes_the_photo_with_only_the_block_changed(done, folder, tmp_path):
-    scene, out = folder / "a.scene", tmp_path / "out.exr"
+    scene = folder / "a.scene"
+    out = tmp_path / "out.exr"
     options = "--value -0.5 --roughness +0.2 --spp 4 --seed 2"
     told = done(
-        "edit", scene, "--mask", folder / "block.png", *options.split(), "-o", out, "--save", tmp_path / "b.scene"
+        "edit",
+        scene,
+        "--mask",
+        folder / "block.png",
+        *options.split(),
+        "-o",
+        out,
+        "--save",
+        tmp_path / "b.scene",
     )
     assert told["image"] == str(out) and told["edits"][0]["roughness"] == "+0.2"
-    picture, photo = read_exr(out), load_scene(scene).photo.original
+    picture = read_exr(out)
+    photo = load_scene(scene).photo.original
     np.testing.assert_array_equal(picture[:8], photo[:8])
     assert (picture[MASK] < photo[MASK]).all()
     saved = load_scene(tmp_path / "b.scene")
@@ -61,9 +76,20 @@ def test_edit_writes_the_photo_with_only_the_block_changed(done, folder, tmp_pat
 
 
 def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(done, folder, tmp_path):
-    common = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--roughness", "+0", "--spp", 4]
+    common = [
+        "edit",
+        folder / "a.scene",
+        "--mask",
+        folder / "block.png",
+        "--roughness",
+        "+0",
+        "--spp",
+        4,
+    ]
     done(*common, "-o", tmp_path / "o.png")
-    photo = np.round(linear_to_srgb(load_scene(folder / "a.scene").photo.original) * 255).astype(np.uint8)
+    photo = np.round(linear_to_srgb(load_scene(folder / "a.scene").photo.original) * 255).astype(
+        np.uint8
+    )
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "o.png")), photo)
     done(*common, "--full-render", "--no-denoise", "-o", tmp_path / "b.png")
     full = np.asarray(Image.open(tmp_path / "b.png"))
@@ -71,7 +97,9 @@ def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(done, 
     (tmp_path / "f.py").write_text("def twice(p):\n    return p.repeat(2, 0).repeat(2, 1)\n")
     large = ["--full-render", "--no-denoise", "--upscale", f"{tmp_path / 'f.py'}:twice"]
     done(*common, *large, "-o", tmp_path / "l.png")
-    np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "l.png")), full.repeat(2, 0).repeat(2, 1))
+    np.testing.assert_array_equal(
+        np.asarray(Image.open(tmp_path / "l.png")), full.repeat(2, 0).repeat(2, 1)
+    )
 
 
 def test_a_picture_without_the_denoiser_says_so(run, done, folder, tmp_path, monkeypatch):
@@ -88,7 +116,9 @@ def test_a_picture_without_the_denoiser_says_so(run, done, folder, tmp_path, mon
 
 
 @pytest.mark.parametrize("command", ["edit", "render"])
-def test_an_explicit_wish_for_the_denoiser_fails_before_the_work(command, refused, folder, tmp_path, monkeypatch):
+def test_an_explicit_wish_for_the_denoiser_fails_before_the_work(
+    command, refused, folder, tmp_path, monkeypatch
+):
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     monkeypatch.setattr(package, "load_scene", lambda path: pytest.fail("the work was begun"))
     region = ["--mask", folder / "block.png", "--value", "-0.5"] if command == "edit" else []
@@ -98,7 +128,15 @@ def test_an_explicit_wish_for_the_denoiser_fails_before_the_work(command, refuse
 
 
 def test_apply_replays_the_list(run, done, folder, tmp_path):
-    command = ["apply", folder / "a.scene", folder / "edits.yaml", "--spp", 4, "-o", tmp_path / "o.png"]
+    command = [
+        "apply",
+        folder / "a.scene",
+        folder / "edits.yaml",
+        "--spp",
+        4,
+        "-o",
+        tmp_path / "o.png",
+    ]
     assert [e["kind"] for e in done(*command)["edits"]] == ["material", "light", "insert"]
     assert "3 edits applied, 1 skipped." in run(*command, "--force")[1]
 
@@ -119,60 +157,116 @@ def test_relight_dims_the_lights_that_are_meant(done, folder, tmp_path):
 def test_relight_by_map_lamp_and_frames(done, folder, tmp_path):
     relight = ["relight", folder / "a.scene", "--spp", 4]
     done(*relight, "--envmap", folder / "sky.exr", "--gain", 1, "-o", tmp_path / "o.exr")
-    assert read_exr(tmp_path / "o.exr").mean() < 0.6 * load_scene(folder / "a.scene").photo.original.mean()
+    assert (
+        read_exr(tmp_path / "o.exr").mean()
+        < 0.6 * load_scene(folder / "a.scene").photo.original.mean()
+    )
     done(*relight, "--lamp", "10,10,2.5,3000,1", "--ambient", 0.5, "-o", tmp_path / "l.png")
     done(*relight, "--rotate", 90, "--frames", 3, "--no-denoise", "-o", tmp_path / "turn")
-    assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == [f"{k:04d}.png" for k in range(3)]
+    assert sorted(p.name for p in (tmp_path / "turn").iterdir()) == [
+        f"{k:04d}.png" for k in range(3)
+    ]
 
 
 @pytest.mark.parametrize("factor, notes", [(0.5, 0), (1, 1)])
-def test_a_film_is_judged_by_the_frame_that_changes_most(done, folder, tmp_path, monkeypatch, factor, notes):
+def test_a_film_is_judged_by_the_frame_that_changes_most(
+    done, folder, tmp_path, monkeypatch, factor, notes
+):
     photo = load_scene(folder / "a.scene").photo.original
-    made = lambda scene, film, **_: (photo * np.float32(one) for _, one in zip(film, (1, factor, 1)))  # noqa: E731
+
+    def made(scene, film, **_):
+        return (photo * np.float32(one) for _, one in zip(film, (1, factor, 1)))
+
     monkeypatch.setattr("materialist.edits.composite.composite.pictures", made)
-    told = done("relight", folder / "a.scene", "--rotate", 360, "--frames", 3, "-o", tmp_path / "turn")
+    told = done(
+        "relight", folder / "a.scene", "--rotate", 360, "--frames", 3, "-o", tmp_path / "turn"
+    )
     assert str(told["warnings"]).count("of 255 levels") == notes
 
 
 def test_select_writes_a_mask_that_edit_reads(done, folder, tmp_path):
     select = ["select", folder / "a.scene"]
-    assert done(*select, "--mask", folder / "block.png", "-o", tmp_path / "m.png")["pixels"] == MASK.sum()
+    assert (
+        done(*select, "--mask", folder / "block.png", "-o", tmp_path / "m.png")["pixels"]
+        == MASK.sum()
+    )
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "m.png"))[..., 0] == 255, MASK)
     done(*select, "--click", "17,17", "--native", "-o", tmp_path / "n.png")
 
 
 def test_glass_is_written_saved_and_loaded_again(done, folder, tmp_path):
-    out, saved = tmp_path / "g.exr", tmp_path / "g.scene"
+    out = tmp_path / "g.exr"
+    saved = tmp_path / "g.scene"
     made = done(
-        "glass", folder / "a.scene", "--mask", folder / "block.png", "--ior", 1.4, "--tint", "#80ff80", "--thickness",
-        folder / "thick.exr", "--spp", 4, "-o", out, "--save", saved,
-    )["edits"][-1]  # fmt: skip
+        "glass",
+        folder / "a.scene",
+        "--mask",
+        folder / "block.png",
+        "--ior",
+        1.4,
+        "--tint",
+        "#80ff80",
+        "--thickness",
+        folder / "thick.exr",
+        "--spp",
+        4,
+        "-o",
+        out,
+        "--save",
+        saved,
+    )["edits"][-1]
     assert made["kind"] == "glass" and made["ior"] == 1.4 and made["thickness"] == "given"
-    picture, scene = read_exr(out), load_scene(saved)
+    picture = read_exr(out)
+    scene = load_scene(saved)
     assert (picture[MASK] != load_scene(folder / "a.scene").photo.original[MASK]).any()
     np.testing.assert_array_equal(scene.photo.original, picture)
     (body,) = scene.bodies
     assert body.surface.ior == pytest.approx(1.4) and body.surface.tint[1] == pytest.approx(1)
-    told = done("apply", folder / "a.scene", folder / "glass.yaml", "--spp", 4, "-o", tmp_path / "1.exr")
+    told = done(
+        "apply", folder / "a.scene", folder / "glass.yaml", "--spp", 4, "-o", tmp_path / "1.exr"
+    )
     assert told["edits"][-1]["hollow"] is True
 
 
 def test_remove_with_a_background_shows_it(done, folder, tmp_path):
     done(
-        "remove", folder / "a.scene", "--mask", folder / "block.png", "--background", folder / "wall.exr", "--spp", 16,
-        "-o", tmp_path / "r.exr",
-    )  # fmt: skip
+        "remove",
+        folder / "a.scene",
+        "--mask",
+        folder / "block.png",
+        "--background",
+        folder / "wall.exr",
+        "--spp",
+        16,
+        "-o",
+        tmp_path / "r.exr",
+    )
     assert abs(read_exr(tmp_path / "r.exr")[MASK].mean() - 0.25) < 0.03
 
 
 def test_insert_writes_picture_and_scene(done, folder, tmp_path):
-    scene, out = folder / "floor.scene", tmp_path / "out.exr"
+    scene = folder / "floor.scene"
+    out = tmp_path / "out.exr"
     told = done(
-        "insert", scene, folder / "box.ply", "--at", "12,28", "--at", "36,28", "--material", "0.1,0.2,0.7", "--spp", 4,
-        "-o", out, "--save", tmp_path / "b.scene",
-    )  # fmt: skip
+        "insert",
+        scene,
+        folder / "box.ply",
+        "--at",
+        "12,28",
+        "--at",
+        "36,28",
+        "--material",
+        "0.1,0.2,0.7",
+        "--spp",
+        4,
+        "-o",
+        out,
+        "--save",
+        tmp_path / "b.scene",
+    )
     assert [edit["at"] for edit in told["edits"]] == [[12, 28], [36, 28]]
-    picture, photo = read_exr(out), load_scene(scene).photo.original
+    picture = read_exr(out)
+    photo = load_scene(scene).photo.original
     assert np.abs(picture - photo).max(-1).sum() > 10
     np.testing.assert_array_equal(picture[:4], photo[:4])
     assert len(load_scene(tmp_path / "b.scene").bodies) == 2
@@ -182,25 +276,56 @@ def test_insert_writes_picture_and_scene(done, folder, tmp_path):
 def test_drop_films_into_a_folder(done, folder, tmp_path):
     pytest.importorskip("mujoco")
     told = done(
-        "drop", folder / "floor.scene", folder / "box.ply", "--at", "24,28", "--frames", 3, "--fps", 3, "--spp", 4,
-        "--height", 0.3, "--material", "#aa3311", "-o", tmp_path / "film", "--save", tmp_path / "end.scene",
-    )  # fmt: skip
+        "drop",
+        folder / "floor.scene",
+        folder / "box.ply",
+        "--at",
+        "24,28",
+        "--frames",
+        3,
+        "--fps",
+        3,
+        "--spp",
+        4,
+        "--height",
+        0.3,
+        "--material",
+        "#aa3311",
+        "-o",
+        tmp_path / "film",
+        "--save",
+        tmp_path / "end.scene",
+    )
     frames = sorted((tmp_path / "film").glob("*.png"))
     assert len(frames) == told["frames"] == 3
     first, last = (np.asarray(Image.open(f)).astype(float) for f in (frames[0], frames[-1]))
     assert np.abs(first - last).max() > 20
     assert len(load_scene(tmp_path / "end.scene").bodies) == 1
     told = done(
-        "drop", folder / "floor.scene", folder / "box.ply", "--at", "24,28", "--frames", 2, "--spp", 4, "--rotate",
-        "-90..90", "-o", tmp_path / "turned",
-    )  # fmt: skip
+        "drop",
+        folder / "floor.scene",
+        folder / "box.ply",
+        "--at",
+        "24,28",
+        "--frames",
+        2,
+        "--spp",
+        4,
+        "--rotate",
+        "-90..90",
+        "-o",
+        tmp_path / "turned",
+    )
     assert [edit.get("rotate") for edit in told["edits"]] == [None, 90]
 
 
-EDIT, RELIGHT, GLASS = ("edit", "a.scene"), ("relight", "a.scene"), ("glass", "a.scene", "--mask", "block.png")
+EDIT = ("edit", "a.scene")
+RELIGHT = ("relight", "a.scene")
+GLASS = ("glass", "a.scene", "--mask", "block.png")
 HUE = (*EDIT, "--mask", "block.png", "--hue", "9")
 TURN = (*RELIGHT, "--rotate", "9")
-INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
+INSERT = ("insert", "floor.scene")
+DROP = ("drop", "floor.scene")
 
 
 @pytest.mark.parametrize(
@@ -209,13 +334,21 @@ INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
         ((*EDIT, "--mask", "square.png", "--hue", "9"), "out.png", "36 x 36"),
         ((*EDIT, "--hue", "9"), "out.png", "exactly one"),
         ((*EDIT, "--mask", "block.png"), "out.png", "Nothing to change"),
-        ((*HUE, "--texture-scale", "2"), "out.png", "--texture-scale says nothing without --texture"),
+        (
+            (*HUE, "--texture-scale", "2"),
+            "out.png",
+            "--texture-scale says nothing without --texture",
+        ),
         (HUE, "out.gif", ".png"),
         (("edit", "nothing.scene", *HUE[2:]), "out.png", "nothing.scene"),
         ((*HUE, "--save", "a.scene"), "out.png", "--force"),
         ((*HUE, "--save", "out.scene"), "out.scene/a.png", "beside"),
         ((*HUE, "--full-render", "--save", "out.scene"), "out.png", "leave one of them out"),
-        ((*HUE, "--upscale", "box.ply:f"), "out.png", "--upscale says nothing without --full-render"),
+        (
+            (*HUE, "--upscale", "box.ply:f"),
+            "out.png",
+            "--upscale says nothing without --full-render",
+        ),
         (RELIGHT, "out.png", "No light"),
         ((*RELIGHT, "--sun", "10,100"), "out.png", "elevation is 100"),
         ((*TURN, "--frames", "4"), "out.png", ".mp4"),
@@ -233,24 +366,46 @@ INSERT, DROP = ("insert", "floor.scene"), ("drop", "floor.scene")
         ((*GLASS, "--back", "same"), "out.png", "only the two-interface model"),
         (("glass", "a.scene", "--mask", "all.png"), "out.png", "mark one object only"),
         ((*INSERT, "in/quad.obj", "--at", "12,28"), "out.png", "never followed"),
-        ((*DROP, "box.ply", "--at", "12,28", "--gravity", "0,1"), "film", "gravity must be 3 numbers"),
-        ((*DROP, "box.ply", "--at", "24,28", "--save", "out.scene"), "out.scene/film", "put it beside"),
+        (
+            (*DROP, "box.ply", "--at", "12,28", "--gravity", "0,1"),
+            "film",
+            "gravity must be 3 numbers",
+        ),
+        (
+            (*DROP, "box.ply", "--at", "24,28", "--save", "out.scene"),
+            "out.scene/film",
+            "put it beside",
+        ),
     ],
 )
-def test_bad_input_is_one_sentence_with_exit_2_and_nothing_is_written(refused, folder, tmp_path, arguments, out, words):
-    named = lambda word: "." in word and not word.replace(".", "").replace(",", "").isdigit()  # noqa: E731
-    place = lambda word: (tmp_path if word.startswith("out") else folder) / word  # noqa: E731
+def test_bad_input_is_one_sentence_with_exit_2_and_nothing_is_written(
+    refused, folder, tmp_path, arguments, out, words
+):
+    def named(word):
+        return "." in word and not word.replace(".", "").replace(",", "").isdigit()
+
+    def place(word):
+        return (tmp_path if word.startswith("out") else folder) / word
+
     before = sorted(folder.rglob("*"))
-    err = refused(*(place(word) if named(word) else word for word in arguments), "-o", tmp_path / out)
+    err = refused(
+        *(place(word) if named(word) else word for word in arguments), "-o", tmp_path / out
+    )
     assert err.startswith("Error: ") and words in err
     assert sorted(folder.rglob("*")) == before and not list(tmp_path.iterdir())
 
 
 def test_the_device_is_chosen_before_anything_renders(done, folder, tmp_path, monkeypatch):
     """A GPU machine must not begin on its GPU and then be told of the CPU."""
-    save_scene(insert(load_scene(folder / "a.scene"), folder / "box.ply", (6, 30), scale=0.3), tmp_path / "c.scene")
-    asked, setup = [], variant.setup
-    monkeypatch.setattr(variant, "setup", lambda device="auto": asked.append(device) or setup(device))
+    save_scene(
+        insert(load_scene(folder / "a.scene"), folder / "box.ply", (6, 30), scale=0.3),
+        tmp_path / "c.scene",
+    )
+    asked = []
+    setup = variant.setup
+    monkeypatch.setattr(
+        variant, "setup", lambda device="auto": asked.append(device) or setup(device)
+    )
     options = ["--spp", "4", "--device", "cpu", "-o", tmp_path / "out.png"]
     done("edit", tmp_path / "c.scene", "--mask", folder / "block.png", "--value", "0.1", *options)
     assert asked[:1] == ["cpu"]
@@ -258,7 +413,16 @@ def test_the_device_is_chosen_before_anything_renders(done, folder, tmp_path, mo
 
 @pytest.mark.parametrize("kind", ["jpg", "tif", "webp", "avif"])
 def test_pictures_of_every_kind(kind, done, folder, tmp_path):
-    command = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5", "--spp", 4]
+    command = [
+        "edit",
+        folder / "a.scene",
+        "--mask",
+        folder / "block.png",
+        "--value",
+        "-0.5",
+        "--spp",
+        4,
+    ]
     quality = [] if kind == "tif" else ["--quality", 100]
     done(*command, *quality, "-o", tmp_path / f"o.{kind}")
     shown = np.asarray(Image.open(tmp_path / f"o.{kind}"), np.int16)
@@ -268,7 +432,17 @@ def test_pictures_of_every_kind(kind, done, folder, tmp_path):
 
 
 def test_layers_of_an_edit_a_rendering_and_the_photo(done, refused, folder, tmp_path):
-    edit = ["edit", folder / "a.scene", "--mask", folder / "block.png", "--value", "-0.5", "--spp", 4, "--exr-layers"]
+    edit = [
+        "edit",
+        folder / "a.scene",
+        "--mask",
+        folder / "block.png",
+        "--value",
+        "-0.5",
+        "--spp",
+        4,
+        "--exr-layers",
+    ]
     done(*edit, "-o", tmp_path / "edit.exr")
     render = ["render", folder / "a.scene", "--spp", 4, "--exr-layers"]
     done(*render, "-o", tmp_path / "render.exr")
@@ -278,7 +452,9 @@ def test_layers_of_an_edit_a_rendering_and_the_photo(done, refused, folder, tmp_
     assert all("beauty" in read.layer for read in beauty.values())
     assert np.allclose(beauty["photo"].original * 2.0 ** -beauty["photo"].stops, photo)
     assert "--exr-layers writes an .exr" in refused(*edit, "-o", tmp_path / "o.png")
-    assert "--photo says nothing without" in refused(*render[:-1], "--photo", "-o", tmp_path / "o.exr")
+    assert "--photo says nothing without" in refused(
+        *render[:-1], "--photo", "-o", tmp_path / "o.exr"
+    )
 
 
 @pytest.mark.parametrize(
@@ -289,11 +465,22 @@ def test_layers_of_an_edit_a_rendering_and_the_photo(done, refused, folder, tmp_
         (("--exr-layers",), "--exr-layers writes an .exr"),
     ],
 )
-def test_encodings_are_refused_before_the_work(flags, words, refused, folder, tmp_path, monkeypatch):
+def test_encodings_are_refused_before_the_work(
+    flags, words, refused, folder, tmp_path, monkeypatch
+):
     monkeypatch.setattr(package, "load_scene", lambda path: pytest.fail("the work was begun"))
     assert words in refused("render", folder / "a.scene", *flags, "-o", tmp_path / "o.png")
 
 
 def test_a_film_has_no_quality(refused, folder, tmp_path):
-    command = ["relight", folder / "a.scene", "--frames", 2, "-o", tmp_path / "film", "--quality", 80]
+    command = [
+        "relight",
+        folder / "a.scene",
+        "--frames",
+        2,
+        "-o",
+        tmp_path / "film",
+        "--quality",
+        80,
+    ]
     assert "are of pictures" in refused(*command)

@@ -25,11 +25,15 @@ def nothing_there(models, monkeypatch):
     ("code", "said", "detail", "remedy"),
     [
         (-6, "Cannot select", "exit -6: Cannot select", "sudo apt-get install -y libllvm19"),
-        (1, "ImportError: libatomic.so.1: cannot open shared object file: No such file or directory\n\nNameError: name",
-         "libatomic.so.1 is missing", "sudo apt-get install -y libatomic1"),
+        (
+            1,
+            "ImportError: libatomic.so.1: cannot open shared object file: No such file or directory\n\nNameError: name",
+            "libatomic.so.1 is missing",
+            "sudo apt-get install -y libatomic1",
+        ),
         (None, "", "the probe did not finish", "materialist doctor"),
     ],
-)  # fmt: skip
+)
 def test_a_renderer_that_fails_in_its_child_is_survived(monkeypatch, code, said, detail, remedy):
     def probe(command, **_):
         if code is None:
@@ -38,11 +42,15 @@ def test_a_renderer_that_fails_in_its_child_is_survived(monkeypatch, code, said,
 
     monkeypatch.setattr(doctor.subprocess, "run", probe)
     finding = doctor._renderer("/wrong/libLLVM.so")
-    assert finding.state == "broken" and finding.detail.startswith(detail) and finding.remedy == remedy
+    assert (
+        finding.state == "broken" and finding.detail.startswith(detail) and finding.remedy == remedy
+    )
 
 
 def test_a_missing_extra_names_the_one_that_brings_it(monkeypatch):
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"][
+        "optional-dependencies"
+    ]
     packages = {
         re.match(r"[\w-]+", entry)[0]: extra
         for extra, entries in extras.items()
@@ -95,7 +103,9 @@ def put(tmp_path, content=b"weights"):
     folder = tmp_path / "models" / "Lez--MatNet"
     folder.mkdir(parents=True)
     (folder / "matnet_weights.pth").write_bytes(content)
-    (folder / "SHA256SUMS").write_text(f"{hashlib.sha256(b'weights').hexdigest()}  matnet_weights.pth\n")
+    (folder / "SHA256SUMS").write_text(
+        f"{hashlib.sha256(b'weights').hexdigest()}  matnet_weights.pth\n"
+    )
 
 
 def test_list_says_what_is_here(run, done, tmp_path):
@@ -120,18 +130,30 @@ def test_verify(run, done, refused, tmp_path):
     ):
         spoil()
         code, out, err = run("models", "verify", "matnet", "--json")
-        assert code == 2 and words in err and json.loads(out.splitlines()[-1])["error"] == "WeightsError"
+        assert (
+            code == 2
+            and words in err
+            and json.loads(out.splitlines()[-1])["error"] == "WeightsError"
+        )
 
 
 def test_files_that_were_fetched_elsewhere_are_taken(run, done, refused, tmp_path):
     source = tmp_path / "fetched"
     source.mkdir()
     assert "lacks config.json" in refused("models", "download", "depth-anything", "--from", source)
-    for name, content in (("config.json", b"{}"), ("model.safetensors", b"weights"), ("notes.md", b"no")):
+    for name, content in (
+        ("config.json", b"{}"),
+        ("model.safetensors", b"weights"),
+        ("notes.md", b"no"),
+    ):
         (source / name).write_bytes(content)
     done("models", "download", "depth-anything", "--from", source)
     folder = tmp_path / "models" / "depth-anything--Depth-Anything-V2-Small-hf"
-    assert sorted(p.name for p in folder.iterdir()) == ["SHA256SUMS", "config.json", "model.safetensors"]
+    assert sorted(p.name for p in folder.iterdir()) == [
+        "SHA256SUMS",
+        "config.json",
+        "model.safetensors",
+    ]
     out = run("models", "list")[1]
     assert next(line for line in out.splitlines() if "depth-anything" in line).startswith("here")
 
@@ -150,7 +172,9 @@ def test_train_on_without_a_folder_says_what_it_needs():
 def test_quickstart_takes_paths_of_the_caller_and_forces_its_own_place_only(tmp_path):
     for name in ("scripts/quickstart", "scripts/setup", ".venv/bin/materialist"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        text = (ROOT / name).read_text() if name == "scripts/quickstart" else '#!/bin/sh\necho "$@"\n'
+        text = (
+            (ROOT / name).read_text() if name == "scripts/quickstart" else '#!/bin/sh\necho "$@"\n'
+        )
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
     here = tmp_path / "else where"
@@ -160,5 +184,7 @@ def test_quickstart_takes_paths_of_the_caller_and_forces_its_own_place_only(tmp_
         (["a.png"], f"invert {here}/a.png -o out/a.scene --force"),
         (["/b/a.png", "yes"], f"invert /b/a.png -o {here}/yes"),
     ):
-        told = subprocess.run(["../scripts/quickstart", *given], cwd=here, capture_output=True, text=True, check=True)
+        told = subprocess.run(
+            ["../scripts/quickstart", *given], cwd=here, capture_output=True, text=True, check=True
+        )
         assert told.stdout.splitlines()[-1] == said

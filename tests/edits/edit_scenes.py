@@ -24,12 +24,23 @@ INNER = np.pad(np.ones((6, 6), bool), ((15, 15), (15, 27)))
 
 
 def scene_of(
-    camera: Camera, depth, normal, albedo, *, roughness=0.5, photo=None, original=None, envmap=None, completion="planes"
+    camera: Camera,
+    depth,
+    normal,
+    albedo,
+    *,
+    roughness=0.5,
+    photo=None,
+    original=None,
+    envmap=None,
+    completion="planes",
 ) -> Scene:
     """A scene of maps [H, W(, 3)]; the photo is the albedo and the light is even, unless they are given."""
     depth, normal, albedo = (np.asarray(a, np.float32) for a in (depth, normal, albedo))
     linear = albedo if photo is None else photo
-    materials = Materials(albedo, np.full(depth.shape, roughness, np.float32), np.zeros(depth.shape, np.float32))
+    materials = Materials(
+        albedo, np.full(depth.shape, roughness, np.float32), np.zeros(depth.shape, np.float32)
+    )
     seen = Photo(linear, camera, linear if original is None else original, fov_source="option")
     geometry = build_geometry(depth, normal, camera, completion=completion)
     light = np.ones((8, 16, 3), np.float32) if envmap is None else envmap
@@ -37,7 +48,9 @@ def scene_of(
     return Scene(camera, seen, prior, materials, normal, depth, geometry, light, linear)
 
 
-def flat_scene(height: int = 36, width: int = 48, *, native: int = 1, sky: int = 0, block: float = 2.0) -> Scene:
+def flat_scene(
+    height: int = 36, width: int = 48, *, native: int = 1, sky: int = 0, block: float = 2.0
+) -> Scene:
     """The scene with a made-up photo; `native` times as large an original; `sky` rows without a surface.
 
     The wall is 3 away and the block `block`.
@@ -55,7 +68,16 @@ def flat_scene(height: int = 36, width: int = 48, *, native: int = 1, sky: int =
     envmap = np.ones((8, 16, 3), np.float32)
     envmap[:4] *= 1.5
     camera = Camera(width, height, 40.0)
-    return scene_of(camera, depth, normal, albedo, photo=photo, original=original, envmap=envmap, completion="none")
+    return scene_of(
+        camera,
+        depth,
+        normal,
+        albedo,
+        photo=photo,
+        original=original,
+        envmap=envmap,
+        completion="none",
+    )
 
 
 @lru_cache(maxsize=4)
@@ -64,12 +86,16 @@ def rendered_scene(native: int = 1, block: float = 2.0) -> Scene:
     scene = flat_scene(native=native, block=block)
     picture = np.clip(render_scene(scene, spp=64, seed=11), 0, 1)
     original = np.kron(picture, np.ones((native, native, 1), np.float32))
-    return replace(scene, photo=replace(scene.photo, linear=picture, original=original), rerender=picture)
+    return replace(
+        scene, photo=replace(scene.photo, linear=picture, original=original), rerender=picture
+    )
 
 
 def tetrahedron() -> Body:
     """A red one, right of the block, half a unit before the wall."""
-    corners = np.float32([[0.2, -0.3, -2.4], [0.7, -0.3, -2.4], [0.45, -0.3, -2.0], [0.45, 0.3, -2.3]])
+    corners = np.float32(
+        [[0.2, -0.3, -2.4], [0.7, -0.3, -2.4], [0.45, -0.3, -2.0], [0.45, 0.3, -2.3]]
+    )
     faces = np.int32([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
     middle = corners.mean(0)
     normals = (corners - middle) / np.linalg.norm(corners - middle, axis=-1, keepdims=True)

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-COMPONENTS = {"int8": 5120, "uint8": 5121, "int16": 5122, "uint16": 5123, "uint32": 5125, "float32": 5126}
+COMPONENTS = {
+    "int8": 5120,
+    "uint8": 5121,
+    "int16": 5122,
+    "uint16": 5123,
+    "uint32": 5125,
+    "float32": 5126,
+}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32)
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.uint16)
@@ -53,9 +60,12 @@ class GltfBuilder:
         self.tree["accessors"].append(entry | fields)
         return len(self.tree["accessors"]) - 1
 
-    def sparse(self, count: int, columns: int, rows: Any, values: Any, base: int | None = None) -> int:
+    def sparse(
+        self, count: int, columns: int, rows: Any, values: Any, base: int | None = None
+    ) -> int:
         """Number of a new accessor of zeros, or of what is at `base`, with some rows replaced."""
-        rows, values = np.asarray(rows, np.uint16), np.asarray(values, np.float32)
+        rows = np.asarray(rows, np.uint16)
+        values = np.asarray(values, np.float32)
         entry: dict[str, Any] = {"componentType": 5126, "count": count, "type": KINDS[columns]}
         if base is not None:
             entry["bufferView"] = self.tree["accessors"][base]["bufferView"]
@@ -90,7 +100,9 @@ class GltfBuilder:
             self.tree.setdefault("samplers", []).append(sampler)
             textures[-1]["sampler"] = len(self.tree["samplers"]) - 1
         texture = {"index": len(textures) - 1} | info
-        self.tree.setdefault("materials", []).append({"pbrMetallicRoughness": {"baseColorTexture": texture}})
+        self.tree.setdefault("materials", []).append(
+            {"pbrMetallicRoughness": {"baseColorTexture": texture}}
+        )
         return len(self.tree["materials"]) - 1
 
     def write(self, path: Path) -> Path:

@@ -25,6 +25,7 @@ def colours(model: MeshModel) -> list[list[float]]:
     for part in model.parts:
         h, w = part.surface.albedo.shape[:2]
         u, v = part.uv[part.faces].mean(1).T
-        column, row = np.floor(u * w).astype(int) % w, np.floor(v * h).astype(int) % h
+        column = np.floor(u * w).astype(int) % w
+        row = np.floor(v * h).astype(int) % h
         seen.append(part.surface.albedo[row, column])
     return np.unique(np.concatenate(seen).round(3), axis=0).tolist()

@@ -45,16 +45,27 @@ def written(scene, tmp_path_factory):
 def test_parts_have_the_names_and_spaces_that_compositors_know(scene, written):
     found = parts_of(written)
     assert tuple(found) == PLAIN
-    assert {header["colorInteropID"] for header, _ in found.values()} == {"lin_rec709_scene", "data"}
-    assert [name for name, (header, _) in found.items() if header["colorInteropID"] == "data"] == ["N", "Z", "position"]
+    assert {header["colorInteropID"] for header, _ in found.values()} == {
+        "lin_rec709_scene",
+        "data",
+    }
+    assert [name for name, (header, _) in found.items() if header["colorInteropID"] == "data"] == [
+        "N",
+        "Z",
+        "position",
+    ]
     assert np.array_equal(colour(found["beauty"][1], ""), scene.photo.original)
     assert list(found["Z"][1]) == ["Z"] and set(found["N"][1]) == {"N.X", "N.Y", "N.Z"}
-    assert {c.shape for _, channels in found.values() for c in channels.values()} == {scene.photo.original.shape[:2]}
+    assert {c.shape for _, channels in found.values() for c in channels.values()} == {
+        scene.photo.original.shape[:2]
+    }
 
 
 def test_light_by_lobe_and_the_residual_make_the_picture(scene, written):
     found = {
-        name: colour(channels, f"{name}.") for name, (_, channels) in parts_of(written).items() if name in PLAIN[1:5]
+        name: colour(channels, f"{name}.")
+        for name, (_, channels) in parts_of(written).items()
+        if name in PLAIN[1:5]
     }
     total = found["diffuse"] + found["specular"] + found["residual"]
     assert np.abs(total - scene.photo.original).max() < 2e-3
@@ -68,9 +79,13 @@ def test_light_by_lobe_and_the_residual_make_the_picture(scene, written):
 def test_geometry_is_that_of_the_scene_at_native_size(scene, written):
     found = parts_of(written)
     depth = found["Z"][1]["Z"]
-    assert np.array_equal(depth[::2, ::2], scene.depth) and np.array_equal(depth[1::2, 1::2], scene.depth)
+    assert np.array_equal(depth[::2, ::2], scene.depth) and np.array_equal(
+        depth[1::2, 1::2], scene.depth
+    )
     camera = Camera(2 * scene.camera.width, 2 * scene.camera.height, scene.camera.fov)
-    assert np.allclose(colour(found["position"][1], "position.", "XYZ"), unproject(depth, camera), atol=1e-5)
+    assert np.allclose(
+        colour(found["position"][1], "position.", "XYZ"), unproject(depth, camera), atol=1e-5
+    )
     assert np.allclose(colour(found["N"][1], "N.", "XYZ")[30, 40], scene.normal[15, 20], atol=1e-3)
 
 
@@ -84,11 +99,15 @@ def test_a_picture_of_working_size_and_the_unit_of_an_hdr_photo(scene, tmp_path)
     assert mt.save_layers(tmp_path / "a.exr", hdr, scene.rerender) == ()
     found = parts_of(tmp_path / "a.exr")
     assert np.array_equal(colour(found["beauty"][1], ""), 4 * scene.rerender)
-    assert found["Z"][1]["Z"].shape == scene.depth.shape and np.array_equal(found["Z"][1]["Z"], scene.depth)
+    assert found["Z"][1]["Z"].shape == scene.depth.shape and np.array_equal(
+        found["Z"][1]["Z"], scene.depth
+    )
 
 
 def test_bodies_are_things_of_a_cryptomatte(scene, tmp_path):
-    corners = np.float32([[-0.4, -0.4, -1.5], [0.4, -0.4, -1.5], [0.4, 0.4, -1.5], [-0.4, 0.4, -1.5]])
+    corners = np.float32(
+        [[-0.4, -0.4, -1.5], [0.4, -0.4, -1.5], [0.4, 0.4, -1.5], [-0.4, 0.4, -1.5]]
+    )
     faces = np.int32([[0, 1, 2], [0, 2, 3]])
     normals = np.tile(np.float32([[0, 0, 1]]), (4, 1))
     red = Surface(np.full((1, 1, 3), (0.9, 0, 0), np.float32), *np.full((2, 1, 1), 0.5, np.float32))
@@ -98,7 +117,9 @@ def test_bodies_are_things_of_a_cryptomatte(scene, tmp_path):
     found = parts_of(tmp_path / "a.exr")
     header, channels = found["CryptoObject00"]
     manifest = next(value for key, value in header.items() if key.endswith("/manifest"))
-    assert json.loads(manifest) == {"sign": f"{np.float32(cryptomatte_id('sign')).view(np.uint32):08x}"}
+    assert json.loads(manifest) == {
+        "sign": f"{np.float32(cryptomatte_id('sign')).view(np.uint32):08x}"
+    }
     middle = (36, 48)
     assert channels["CryptoObject00.R"][middle] == np.float32(cryptomatte_id("sign"))
     assert channels["CryptoObject00.G"][middle] == 1 and channels["CryptoObject00.G"][0, 0] == 0
@@ -108,13 +129,20 @@ def test_bodies_are_things_of_a_cryptomatte(scene, tmp_path):
 
 def test_pixels_of_several_things_have_them_by_coverage(tmp_path):
     picture = np.zeros((2, 2, 3), np.float32)
-    shares = {"a": np.full((2, 2), 0.2), "b": np.full((2, 2), 0.5), "c": np.float32([[0.3, 0], [0, 0]])}
+    shares = {
+        "a": np.full((2, 2), 0.2),
+        "b": np.full((2, 2), 0.5),
+        "c": np.float32([[0.3, 0], [0, 0]]),
+    }
     write_layers(tmp_path / "a.exr", {"beauty": picture}, shares)
     found = parts_of(tmp_path / "a.exr")
-    first, second = found["CryptoObject00"][1], found["CryptoObject01"][1]
+    first = found["CryptoObject00"][1]
+    second = found["CryptoObject01"][1]
     ids = {name: np.float32(cryptomatte_id(name)) for name in shares}
     assert first["CryptoObject00.R"][0, 0] == ids["b"] and first["CryptoObject00.G"][0, 0] == 0.5
-    assert first["CryptoObject00.B"][0, 0] == ids["c"] and first["CryptoObject00.B"][1, 1] == ids["a"]
+    assert (
+        first["CryptoObject00.B"][0, 0] == ids["c"] and first["CryptoObject00.B"][1, 1] == ids["a"]
+    )
     assert second["CryptoObject01.R"][0, 0] == ids["a"] and second["CryptoObject01.R"][1, 1] == 0
 
 

@@ -38,7 +38,8 @@ def test_material_change_agrees_with_the_path_tracer(preview):
 
 def test_the_first_picture_is_coarse_and_near(preview):
     edited = edit(preview.scene, MASK, roughness=0.2, albedo=(0.1, 0.4, 0.2), metallic=0.5)
-    first, fine = Preview(preview.scene).render(edited), preview.render(edited)
+    first = Preview(preview.scene).render(edited)
+    fine = preview.render(edited)
     assert psnr(first, fine) > 30 and (first != fine).any()
 
 
@@ -52,7 +53,9 @@ def test_light_change_agrees_with_the_path_tracer(preview):
 
 
 def test_a_coarse_light_is_near_and_leaves_nothing_behind(preview):
-    one, other = (relight(preview.scene, sun=(azimuth, 40.0), ambient=0.5) for azimuth in (60.0, -60.0))
+    one, other = (
+        relight(preview.scene, sun=(azimuth, 40.0), ambient=0.5) for azimuth in (60.0, -60.0)
+    )
     full = preview.render(one)
     preview.render(other)
     rough = [preview.render(one, coarse=True) for _ in range(2)][-1]
@@ -73,17 +76,28 @@ def test_new_metal_hides_the_photos_texture(preview):
     edited = edit(preview.scene, MASK, metallic=1.0)
     seen = preview.scene.photo
     textured = copy(preview)
-    rough = np.where(MASK[..., None], np.random.default_rng(0).uniform(0.8, 1.2, seen.linear.shape), 1)
-    textured.scene = replace(preview.scene, photo=replace(seen, linear=(seen.linear * rough).astype(np.float32)))
-    np.testing.assert_allclose(textured.picture(edited)[MASK], preview.picture(edited)[MASK], atol=1e-3)
+    rough = np.where(
+        MASK[..., None], np.random.default_rng(0).uniform(0.8, 1.2, seen.linear.shape), 1
+    )
+    textured.scene = replace(
+        preview.scene, photo=replace(seen, linear=(seen.linear * rough).astype(np.float32))
+    )
+    np.testing.assert_allclose(
+        textured.picture(edited)[MASK], preview.picture(edited)[MASK], atol=1e-3
+    )
 
 
 def test_kept_tables_are_taken_and_damaged_ones_made_again(preview, tmp_path):
-    scene, file = preview.scene, tmp_path / "preview.npz"
+    scene = preview.scene
+    file = tmp_path / "preview.npz"
     edited = edit(scene, MASK, hue=120)
     made = prepared(scene, file)
-    whole, picture = file.read_bytes(), made.picture(edited)
-    traced = lambda one: "_engine" in vars(one)  # noqa: E731
+    whole = file.read_bytes()
+    picture = made.picture(edited)
+
+    def traced(one):
+        return "_engine" in vars(one)
+
     again = Preview(scene, file)
     np.testing.assert_array_equal(again.picture(edited), picture)
     assert traced(made) and not traced(again)

@@ -37,9 +37,13 @@ def test_steps_are_the_functions_in_order(folder):
     )
     expected = edit(edit(SCENE, MASK, hue=120, roughness="+0.25"), MASK, metallic=0.5)
     lamps = [lamp(SCENE, 5, 6, 2, 3000, 1), lamp(SCENE, 9, 9, 2, 4000, 2)]
-    expected = relight(expected, envmap=np.full((16, 32, 3), 2.0), gain=0.5, rotate=45, ambient=0.5, lamps=lamps)
+    expected = relight(
+        expected, envmap=np.full((16, 32, 3), 2.0), gain=0.5, rotate=45, ambient=0.5, lamps=lamps
+    )
     for name in ("albedo", "roughness", "metallic"):
-        np.testing.assert_array_equal(getattr(got.materials, name), getattr(expected.materials, name))
+        np.testing.assert_array_equal(
+            getattr(got.materials, name), getattr(expected.materials, name)
+        )
     np.testing.assert_array_equal(got.envmap, expected.envmap)
     assert got.lamps == expected.lamps and len(got.provenance["edits"]) == 3
 
@@ -63,7 +67,10 @@ def test_an_insert_may_have_several_places(folder):
         ("- relight: now", "no options"),
         ("- edit: {mask: block.png, hue: 3, hue: 90}", "'hue' is given twice"),
         ("edits: [{edit: {mask: block.png, hue: 3}}]\nlights: 3", "says 'lights' beside its edits"),
-        ("- edit: {mask: block.png, hue: 3, skip: ture}", "The skip must be true or false, not 'ture'"),
+        (
+            "- edit: {mask: block.png, hue: 3, skip: ture}",
+            "The skip must be true or false, not 'ture'",
+        ),
         ("- relight: {}", "changes nothing"),
         ("- edit: &a {hue: 3}\n- edit: *a", "an alias (*)"),
         ("[" * 3000, "nested too deeply"),
@@ -76,8 +83,14 @@ def test_what_is_wrong_is_named(folder, text, words):
     assert words in str(error.value)
 
 
-@pytest.mark.parametrize("second", ["edit: {mask: block.png, hue: 90}", "remove: {mask: block.png}",
-                                    "glass: {mask: block.png, model: two-interface}"])  # fmt: skip
+@pytest.mark.parametrize(
+    "second",
+    [
+        "edit: {mask: block.png, hue: 90}",
+        "remove: {mask: block.png}",
+        "glass: {mask: block.png, model: two-interface}",
+    ],
+)
 def test_what_was_taken_away_is_in_no_later_region(folder, second):
     with pytest.raises(InputError, match=r"Step 2 .*took away what is there"):
         replay(folder, f"- remove: {{mask: block.png}}\n- {second}\n")
@@ -86,7 +99,9 @@ def test_what_was_taken_away_is_in_no_later_region(folder, second):
     wide[rows.min() :, :] = True
     Image.fromarray((wide * 255).astype(np.uint8)).save(folder / "wide.png")
     removed = replay(folder, "- remove: {mask: block.png}\n")
-    got = replay(folder, "- remove: {mask: block.png}\n- edit: {mask: wide.png, albedo: [0, 0, 1]}\n")
+    got = replay(
+        folder, "- remove: {mask: block.png}\n- edit: {mask: wide.png, albedo: [0, 0, 1]}\n"
+    )
     gone = removed.depth != SCENE.depth
     assert gone.any() and np.array_equal(got.materials.albedo[gone], removed.materials.albedo[gone])
     assert np.allclose(got.materials.albedo[wide & ~gone], [0, 0, 1])
@@ -95,5 +110,7 @@ def test_what_was_taken_away_is_in_no_later_region(folder, second):
 def test_a_region_is_chosen_on_the_steps_device(monkeypatch):
     seen = []
     monkeypatch.setattr(recipe, "select", lambda scene, device, **_: seen.append(device) or MASK)
-    apply(SCENE, [recipe.Step("edit", {"click": [16, 18], "with": "sam2", "hue": 10})], device="cpu")
+    apply(
+        SCENE, [recipe.Step("edit", {"click": [16, 18], "with": "sam2", "hue": 10})], device="cpu"
+    )
     assert seen == ["cpu"]

@@ -14,7 +14,8 @@ from materialist.types import Camera
 
 CAMERA = Camera(48, 40, 40)
 SHAPE = (40, 48)
-RADIUS, CENTRE = 0.6, (0, 0, -3)
+RADIUS = 0.6
+CENTRE = (0, 0, -3)
 *MAPS, THICK = ball(CAMERA, CENTRE, RADIUS)
 
 
@@ -36,7 +37,8 @@ def shown(maps, thickness, away, picture, sky=0.0, back=None, camera=CAMERA, **o
 
 def gradient(camera):
     """A background that tells where it was looked up: x and y in the picture, in [0, 1]."""
-    h, w = camera.height, camera.width
+    h = camera.height
+    w = camera.width
     x, y = np.meshgrid((np.arange(w) + 0.5) / w, (np.arange(h) + 0.5) / h)
     return np.stack([x, y, 0 * x + 0.5], -1).astype(np.float32)
 
@@ -73,10 +75,14 @@ def test_a_ball_bends_rays_twice_by_the_difference_of_angles():
     cr = np.sqrt(1 - (1 - ci**2) / 1.5**2)
     crossing = ti.cross(front, thick[mask], ior=1.5)
     # The exit lies on the ball, and the deviation is 2 (i - r), as for every ball lens.
-    np.testing.assert_allclose(np.linalg.norm(crossing.exit - np.array([0, 0, -3.0]), axis=-1), 0.6, atol=0.01)
+    np.testing.assert_allclose(
+        np.linalg.norm(crossing.exit - np.array([0, 0, -3.0]), axis=-1), 0.6, atol=0.01
+    )
     deviation = np.arccos(np.clip(np.sum(crossing.direction * front.direction, -1), -1, 1))
     core = ci > 0.5  # at the rim a pixel sees many normals
-    np.testing.assert_allclose(deviation[core], 2 * (np.arccos(ci) - np.arccos(cr))[core], atol=0.03)
+    np.testing.assert_allclose(
+        deviation[core], 2 * (np.arccos(ci) - np.arccos(cr))[core], atol=0.03
+    )
 
 
 def test_a_back_of_its_own_bends_rays_as_that_back_does():
@@ -94,8 +100,11 @@ def test_a_back_of_its_own_bends_rays_as_that_back_does():
 
 
 def test_without_refraction_the_background_is_seen_unchanged():
-    out, picture = shown(MAPS, THICK, 6.0, gradient(CAMERA), 1.0, ior=1.0), gradient(CAMERA)
-    inner = MAPS[2] & (THICK > 0.36)  # next to the silhouette some rays of a pixel pass beside the ball
+    out = shown(MAPS, THICK, 6.0, gradient(CAMERA), 1.0, ior=1.0)
+    picture = gradient(CAMERA)
+    inner = MAPS[2] & (
+        THICK > 0.36
+    )  # next to the silhouette some rays of a pixel pass beside the ball
     np.testing.assert_allclose(out[inner], picture[inner], atol=1e-3)
     assert (out[~MAPS[2]] == 0).all()
 
@@ -131,20 +140,35 @@ def test_no_light_is_made_or_lost(roughness):
 @pytest.mark.parametrize(("roughness", "tilt"), [(0.3, 75.0), (0.6, 45.0), (1.0, 0.0)])
 def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
     """F D G / (4 cos_i cos_o) over the upper hemisphere, by quadrature: nothing is reflected below the surface."""
-    alpha, angle = roughness**2, np.deg2rad(tilt)
-    view, up = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([0, 0, 1.0])
-    cosine, azimuth = np.meshgrid((np.arange(800) + 0.5) / 800, (np.arange(200) + 0.5) / 200 * 2 * np.pi)
+    alpha = roughness**2
+    angle = np.deg2rad(tilt)
+    view = np.array([np.sin(angle), 0, np.cos(angle)])
+    up = np.array([0, 0, 1.0])
+    cosine, azimuth = np.meshgrid(
+        (np.arange(800) + 0.5) / 800, (np.arange(200) + 0.5) / 200 * 2 * np.pi
+    )
     sine = np.sqrt(1 - cosine**2)
     out = np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine], -1)
     half = (view + out) / np.linalg.norm(view + out, axis=-1, keepdims=True)
     normals = alpha**2 / (np.pi * (half[..., 2] ** 2 * (alpha**2 - 1) + 1) ** 2)
-    value = fresnel_dielectric(half @ view, 1.5) * normals * masking(out, up, alpha) * masking(view, up, alpha)
+    value = (
+        fresnel_dielectric(half @ view, 1.5)
+        * normals
+        * masking(out, up, alpha)
+        * masking(view, up, alpha)
+    )
     expected = 2 * np.pi * (value / (4 * view[2])).mean()
     count = 3000
     front = SimpleNamespace(
-        point=np.zeros((1, 3)), direction=-view[None], normal=up[None], way=lambda _, d: d, back_at=lambda *_: -up[None]
+        point=np.zeros((1, 3)),
+        direction=-view[None],
+        normal=up[None],
+        way=lambda _, d: d,
+        back_at=lambda *_: -up[None],
     )
-    found = [ti.cross(front, np.ones(1), ior=1.5, alpha=alpha, sample=(k, count)) for k in range(count)]
+    found = [
+        ti.cross(front, np.ones(1), ior=1.5, alpha=alpha, sample=(k, count)) for k in range(count)
+    ]
     assert np.mean([c.reflectance for c in found]) == pytest.approx(expected, rel=0.02)
     assert all(c.reflected[0, 2] > 0 for c in found if c.reflectance[0] > 0)
 
@@ -152,7 +176,8 @@ def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
 def test_rays_that_meet_nothing_see_the_environment():
     sky = np.zeros((16, 32, 3))
     sky[:8] = 1.0  # the upper half
-    origin, direction = np.array([[0.0, 0, -2]] * 3), np.array([[0.0, 0.9, 0.436], [0, -0.9, 0.436], [0, 0, -1.0]])
+    origin = np.array([[0.0, 0, -2]] * 3)
+    direction = np.array([[0.0, 0.9, 0.436], [0, -0.9, 0.436], [0, 0, -1.0]])
     behind = ti.Backdrop(np.full((*SHAPE, 3), 0.25), np.full(SHAPE, 5.0), sky)
     found = ti.look(origin, direction, behind, CAMERA)
     assert found[:, 0].tolist() == pytest.approx([1, 0, 0.25])

@@ -23,7 +23,8 @@ def room(width: int = 64, height: int = 40, fov: float = 50.0, completion: str =
     """Floor, back wall, a box to the left, sky in the upper right corner; light from the right."""
     camera = Camera(width, height, fov)
     rays = pixel_rays(camera)
-    x, y = rays[..., 0], rays[..., 1]
+    x = rays[..., 0]
+    y = rays[..., 1]
     floor = np.where(y < -0.02, 1.0 / np.maximum(-y, 1e-3), 1e6)  # [H, W] the plane y = -1
     depth = np.minimum(floor, 6.0).astype(np.float32)
     normal = np.where((floor < 6)[..., None], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]).astype(np.float32)
@@ -36,7 +37,9 @@ def room(width: int = 64, height: int = 40, fov: float = 50.0, completion: str =
     albedo = (albedo * (0.7 + 0.3 * checks[..., None])).astype(np.float32)
     roughness = np.linspace(0.3, 0.9, width, dtype=np.float32)[None].repeat(height, 0)
     metallic = np.where(label == 2, 0.8, 0.1).astype(np.float32)
-    scene = scene_of(camera, depth, normal, albedo, photo=albedo * 0.8, envmap=sky(), completion=completion)
+    scene = scene_of(
+        camera, depth, normal, albedo, photo=albedo * 0.8, envmap=sky(), completion=completion
+    )
     photo = replace(scene.photo, path='dir/<b>ro"om.png', fov_source="default")
     materials = Materials(albedo, roughness, metallic)
     report = FitReport(
@@ -44,17 +47,22 @@ def room(width: int = 64, height: int = 40, fov: float = 50.0, completion: str =
         {"rerender_psnr_path": 31.25, "poor_fraction": float("nan")},
         ("too </script> dark",),
     )
-    made = replace(scene, photo=photo, materials=materials, rerender=photo.linear * 0.9, report=report)
+    made = replace(
+        scene, photo=photo, materials=materials, rerender=photo.linear * 0.9, report=report
+    )
     return replace(made, provenance={"tau": 6.0, "seed": 0})
 
 
 def sky(height: int = 16) -> np.ndarray:
     """[h, 2h, 3] light, bright and reddish to the right and above, bluish behind."""
     rows, columns = np.indices((height, 2 * height))
-    up, around = np.cos(np.pi * (rows + 0.5) / height), np.pi * ((columns + 0.5) / height - 1)
-    right, ahead = np.sin(around), np.cos(around)
+    up = np.cos(np.pi * (rows + 0.5) / height)
+    around = np.pi * ((columns + 0.5) / height - 1)
+    right = np.sin(around)
+    ahead = np.cos(around)
     red = 0.6 + 1.5 * np.clip(right, 0, 1) * (1 + up)
-    green, blue = 0.5 + 0.5 * np.clip(up, 0, 1), 0.7 + np.clip(-ahead, 0, 1)
+    green = 0.5 + 0.5 * np.clip(up, 0, 1)
+    blue = 0.7 + np.clip(-ahead, 0, 1)
     return np.stack([red, green, blue], -1).astype(np.float32)
 
 
@@ -71,17 +79,29 @@ def with_bodies(*surfaces: Surface) -> Scene:
     made = []
     for k, surface in enumerate(surfaces):
         x = -0.9 + 0.9 * k
-        corners = np.array([[x, -0.4, -2], [x + 0.8, -0.4, -2], [x + 0.8, 0.4, -2], [x, 0.4, -2]], np.float32)
+        corners = np.array(
+            [[x, -0.4, -2], [x + 0.8, -0.4, -2], [x + 0.8, 0.4, -2], [x, 0.4, -2]], np.float32
+        )
         uv = np.array([[0, 1], [1, 1], [1, 0], [0, 0]], np.float32)
         normals = np.tile(np.float32([0, 0, 1]), (4, 1))
-        made.append(Body(corners, np.array([[0, 1, 2], [0, 2, 3]], np.int32), normals, uv, surface, f"plate{k}"))
+        made.append(
+            Body(
+                corners,
+                np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+                normals,
+                uv,
+                surface,
+                f"plate{k}",
+            )
+        )
     return replace(room(), bodies=tuple(made))
 
 
 CHECKS = Surface(
-    np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32), np.full((1, 1), 0.4, np.float32),
+    np.array([[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [1, 1, 1]]], np.float32),
+    np.full((1, 1), 0.4, np.float32),
     np.zeros((1, 1), np.float32),
-)  # fmt: skip
+)
 GLASS = uniform_surface(1.0, 0.2, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4))
 GLOW = uniform_surface(0.1, 0.5, 0.0, emission=(3.0, 1.5, 0.75))
 LAMP = Lamp((0.9, 0.3, -2.6), (6.0, 4.5, 3.0), 0.12)

@@ -40,7 +40,9 @@ def test_the_folder_holds_what_the_script_reads(tmp_path):
     ast.parse(script)
     facts = json.loads((folder / "scene.json").read_text())
     assert (facts["width"], facts["height"], facts["fov"]) == (64, 40, 50.0)
-    assert list(facts["parts"]) == ["surface", "plane0", "plane1"] and facts["parts"]["surface"] == {
+    assert list(facts["parts"]) == ["surface", "plane0", "plane1"] and facts["parts"][
+        "surface"
+    ] == {
         "maps": "",
         "repeat": False,
     }
@@ -48,7 +50,9 @@ def test_the_folder_holds_what_the_script_reads(tmp_path):
         assert arrays["surface_uv"].shape[1] == 2 and arrays["plane1_faces"].shape[1] == 3
     np.testing.assert_array_equal(read_exr(folder / "albedo.exr"), room().materials.albedo)
     np.testing.assert_array_equal(read_exr(folder / "envmap.exr"), room().envmap)
-    assert str(folder / "build.py") in done.notes[0] and done.notes[0].startswith("Make the .blend with: blender ")
+    assert str(folder / "build.py") in done.notes[0] and done.notes[0].startswith(
+        "Make the .blend with: blender "
+    )
 
 
 def test_without_blender_the_script_stays(tmp_path, monkeypatch):
@@ -62,7 +66,9 @@ def test_without_blender_the_script_stays(tmp_path, monkeypatch):
 
 
 def test_a_blender_that_works(tmp_path):
-    program = fake(tmp_path, "open(sys.argv[sys.argv.index('-o') + 1], 'w').write(' '.join(sys.argv))")
+    program = fake(
+        tmp_path, "open(sys.argv[sys.argv.index('-o') + 1], 'w').write(' '.join(sys.argv))"
+    )
     done = mt.export(room(), tmp_path / "room.blend", blender=program, fitted_material=True)
     assert done.path.read_text().endswith("--fitted-material") and done.notes == ()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["python-with-bpy", "room.blend"]
@@ -89,7 +95,8 @@ def by_cycles(scene, tmp_path, *options):
 
 @pytest.mark.slow
 def test_cycles_sees_what_we_see(tmp_path):
-    ours, theirs = renderer(room()).render(spp=256), by_cycles(room(), tmp_path)
+    ours = renderer(room()).render(spp=256)
+    theirs = by_cycles(room(), tmp_path)
     assert psnr(ours, theirs) > 32
     assert max(psnr(ours, theirs[:, ::-1]), psnr(ours, theirs[::-1])) < 22
     assert max(psnr(ours, np.roll(theirs, 1, axis)) for axis in (0, 1)) < 30
@@ -99,19 +106,23 @@ def test_cycles_sees_what_we_see(tmp_path):
 @pytest.mark.parametrize("kind", ["texture", "glass", "rough glass", "coat"])
 def test_cycles_has_our_bodies(tmp_path, kind):
     surface = {
-        "texture": CHECKS, "glass": uniform_surface(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
+        "texture": CHECKS,
+        "glass": uniform_surface(1.0, 0.0, 0.0, transmission=1.0, ior=1.4, tint=(0.9, 0.5, 0.4)),
         "rough glass": uniform_surface(1.0, 0.4, 0.0, transmission=1.0, ior=1.3),
         "coat": uniform_surface(0.3, 0.3, 0.0, transmission=0.6, ior=1.3),
-    }[kind]  # fmt: skip
+    }[kind]
     ball = trimesh.creation.icosphere(4, 0.5)
     ways = np.asarray(ball.vertices / 0.5, np.float32)
     uv = np.stack([ways[:, 0] * 0.7 + 1.3, 0.4 - ways[:, 1] * 0.7], 1).astype(np.float32)
     vertices = (ways * 0.5 + [0.1, 0, -2.2]).astype(np.float32)
     body = Body(vertices, np.asarray(ball.faces, np.int32), ways, uv, surface, "ball")
     scene = replace(room(), bodies=(body,))
-    ours, theirs = rendered(scene, spp=512, seed=0), by_cycles(scene, tmp_path, "--samples", "512")
+    ours = rendered(scene, spp=512, seed=0)
+    theirs = by_cycles(scene, tmp_path, "--samples", "512")
     y, x = np.indices(ours.shape[:2])
     inside = (x - 34.9) ** 2 + (y - 19.5) ** 2 < 14**2
     np.testing.assert_allclose(theirs[inside].mean(0), ours[inside].mean(0), rtol=0.04)
-    blurred = [np.stack([x[k : 40 - 5 + k : 5] for k in range(5)]).mean(0) for x in (ours, theirs)]  # rows, five each
+    blurred = [
+        np.stack([x[k : 40 - 5 + k : 5] for k in range(5)]).mean(0) for x in (ours, theirs)
+    ]  # rows, five each
     assert np.corrcoef(blurred[0].ravel(), blurred[1].ravel())[0, 1] > 0.97

@@ -50,15 +50,20 @@ def test_the_surface_looks_up_its_own_pixel(loaded):
     texel = uv[surface.faces].mean(1) * (64, 40)
     seen = 2 * int((scene.depth > 0).sum())
     assert (np.floor(np.stack([column, row], 1)) == np.floor(texel))[:seen].mean() > 0.99
-    np.testing.assert_allclose(np.stack([column, row], 1), project(middle, scene.camera)[0], atol=1e-3)
+    np.testing.assert_allclose(
+        np.stack([column, row], 1), project(middle, scene.camera)[0], atol=1e-3
+    )
 
 
 def test_textures_those_of_planes_of_one_pixel(loaded):
     scene, meshes = loaded
     parts = {part.name: part.materials for part in scene_parts(scene)}
     for name, size in (("surface", (40, 64, 3)), ("plane1", (1, 1, 3))):
-        materials, found = parts[name], meshes[name].visual.material
-        color, packed = (np.asarray(t)[..., :3] for t in (found.baseColorTexture, found.metallicRoughnessTexture))
+        materials = parts[name]
+        found = meshes[name].visual.material
+        color, packed = (
+            np.asarray(t)[..., :3] for t in (found.baseColorTexture, found.metallicRoughnessTexture)
+        )
         assert color.shape == packed.shape == size
         assert np.abs(color / 255 - linear_to_srgb(materials.albedo)).max() <= 0.5 / 255 + 1e-6
         assert np.abs(packed[..., 1] / 255 - materials.roughness).max() <= 0.5 / 255 + 1e-6
@@ -76,15 +81,27 @@ def test_official_validator(tmp_path):
     """Needs node and the npm package gltf-validator, installed globally or where NODE_PATH says."""
     if shutil.which("node") is None:
         pytest.skip("needs node")
-    roots = subprocess.run(["npm", "root", "-g"], capture_output=True, text=True) if shutil.which("npm") else None
+    roots = (
+        subprocess.run(["npm", "root", "-g"], capture_output=True, text=True)
+        if shutil.which("npm")
+        else None
+    )
     paths = [os.environ.get("NODE_PATH", ""), roots.stdout.strip() if roots else ""]
-    if not any((Path(p) / "gltf-validator").is_dir() for path in paths for p in path.split(os.pathsep) if p):
+    if not any(
+        (Path(p) / "gltf-validator").is_dir() for path in paths for p in path.split(os.pathsep) if p
+    ):
         pytest.skip("needs the npm package gltf-validator (npm install -g gltf-validator)")
     file = tmp_path / "room.glb"
     environment = os.environ | {"NODE_PATH": os.pathsep.join(path for path in paths if path)}
     glass = repainted(read_model(box_file(tmp_path / "box.ply")), "glass")
-    for scene in (room(completion="planes"), room(completion="none"), replace(room(), bodies=glass.parts)):
+    for scene in (
+        room(completion="planes"),
+        room(completion="none"),
+        replace(room(), bodies=glass.parts),
+    ):
         file.write_bytes(glb_bytes(scene, [*scene_parts(scene), *body_parts(scene)]))
-        done = subprocess.run(["node", "-e", VALIDATE, str(file)], capture_output=True, text=True, env=environment)
+        done = subprocess.run(
+            ["node", "-e", VALIDATE, str(file)], capture_output=True, text=True, env=environment
+        )
         issues = json.loads(done.stdout)
         assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]

@@ -27,7 +27,11 @@ def test_it_renders_as_ours_does(tmp_path, capfd):
     noise = np.sqrt(np.mean((ours[0] - ours[1]) ** 2))
     assert np.sqrt(np.mean((ours[0] - theirs[1]) ** 2)) < 1.15 * noise
     assert np.mean(theirs) == pytest.approx(np.mean(ours), rel=0.01)
-    light = next(value for name, value in mi.traverse(loaded) if name.endswith(".data") and "bsdf" not in name)
+    light = next(
+        value
+        for name, value in mi.traverse(loaded)
+        if name.endswith(".data") and "bsdf" not in name
+    )
     np.testing.assert_array_equal(np.array(light), np.array(target.params["light.data"]))
     assert "WARN" not in capfd.readouterr().out
 
@@ -42,7 +46,8 @@ def test_normals_that_lean_away_from_the_eye_are_ours(tmp_path):
     write_mitsuba(tmp_path, scene, scene_parts(scene))
     target = renderer(scene)
     loaded = target.mi.load_file(str(tmp_path / OWN), parallel=False, spp=256, max_depth=3)
-    ours, theirs = target.render(spp=256, seed=1, max_depth=3), np.array(target.mi.render(loaded, seed=2))
+    ours = target.render(spp=256, seed=1, max_depth=3)
+    theirs = np.array(target.mi.render(loaded, seed=2))
     blocks = [image.reshape(5, 8, 8, 8, 3).mean((1, 3)) for image in (ours, theirs)]
     np.testing.assert_allclose(blocks[1], blocks[0], rtol=0.05)  # inside `twosided`: 0.19
 
@@ -52,6 +57,7 @@ def test_lamps_light_it_as_they_light_ours(tmp_path):
     write_mitsuba(tmp_path, scene, scene_parts(scene))
     mi = setup("auto")
     loaded = mi.load_file(str(tmp_path / OWN), parallel=False, spp=64)
-    theirs, ours = np.array(mi.render(loaded, seed=1)), render_scene(scene, spp=64)
+    theirs = np.array(mi.render(loaded, seed=1))
+    ours = render_scene(scene, spp=64)
     np.testing.assert_allclose(theirs.mean((0, 1)), ours.mean((0, 1)), rtol=0.03)
     assert ours.mean() > 1.3 * render_scene(replace(scene, lamps=()), spp=16).mean()

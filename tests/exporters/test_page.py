@@ -36,7 +36,8 @@ def test_in_a_browser(browser, tmp_path):
     scene = room()
     (tmp_path / "room.html").write_text(page(scene, scene_parts(scene)), "utf-8")
     tab = browser.new_page(viewport={"width": 700, "height": 800})
-    asked, faults = [], []
+    asked = []
+    faults = []
     tab.on("request", lambda request: asked.append(request.url.split(":")[0]))
     tab.on("pageerror", lambda fault: faults.append(str(fault)))
     tab.goto(f"file://{tmp_path}/room.html")
@@ -52,9 +53,14 @@ def test_in_a_browser(browser, tmp_path):
     # From the photo's view the mesh shows the photo, texel by texel; the sky stays empty.
     shown = _canvas(tab)
     rows, columns = ((np.arange(n) + 0.5) / n for n in (40, 64))
-    pick = shown[np.ix_((rows * shown.shape[0]).astype(int), (columns * shown.shape[1]).astype(int))]
+    pick = shown[
+        np.ix_((rows * shown.shape[0]).astype(int), (columns * shown.shape[1]).astype(int))
+    ]
     difference = np.abs(pick - 255 * linear_to_srgb(scene.photo.linear)).max(-1)
-    assert np.median(difference[scene.depth > 0]) < 8 and np.percentile(difference[scene.depth > 0], 90) < 40
+    assert (
+        np.median(difference[scene.depth > 0]) < 8
+        and np.percentile(difference[scene.depth > 0], 90) < 40
+    )
     assert (np.abs(pick[scene.depth == 0] - (29, 31, 34)).max(-1) < 3).mean() > 0.95
     tab.locator("#view").focus()
     for _ in range(5):
@@ -69,4 +75,6 @@ def test_in_a_browser(browser, tmp_path):
 def _canvas(tab) -> np.ndarray:
     """[h, w, 3] what the canvas shows."""
     address = tab.evaluate("document.getElementById('view').toDataURL()")
-    return np.asarray(Image.open(io.BytesIO(base64.b64decode(address.split(",")[1]))).convert("RGB")).astype(float)
+    return np.asarray(
+        Image.open(io.BytesIO(base64.b64decode(address.split(",")[1]))).convert("RGB")
+    ).astype(float)

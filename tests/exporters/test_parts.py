@@ -18,10 +18,14 @@ def test_parts_are_the_whole_mesh():
         members = scene.geometry.plane_label == int(part.name.removeprefix("plane"))
         assert part.constant
         np.testing.assert_allclose(
-            part.materials.albedo[0, 0], scene.materials.albedo[members].mean(0, dtype=float), rtol=1e-5
+            part.materials.albedo[0, 0],
+            scene.materials.albedo[members].mean(0, dtype=float),
+            rtol=1e-5,
         )
         np.testing.assert_allclose(
-            part.materials.roughness[0, 0], scene.materials.roughness[members].mean(dtype=float), rtol=1e-5
+            part.materials.roughness[0, 0],
+            scene.materials.roughness[members].mean(dtype=float),
+            rtol=1e-5,
         )
 
 

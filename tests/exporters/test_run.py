@@ -39,7 +39,9 @@ def test_only_an_earlier_export_is_replaced(tmp_path):
         mt.export(room(), target, to="usd")
     (target / "work").mkdir()
     (target / "work" / "comp.nk").touch()
-    with pytest.raises(mt.OutputError, match=r"holds work/comp\.nk, which does not belong to an export"):
+    with pytest.raises(
+        mt.OutputError, match=r"holds work/comp\.nk, which does not belong to an export"
+    ):
         mt.export(room(), target, to="blend", force=True)
     (target / "work" / "comp.nk").unlink()
     (target / ".DS_Store").touch()

@@ -17,7 +17,9 @@ from materialist.exporters.parts import scene_parts
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("usd")
-    return folder, [mt.export(room(), folder / name, to="usd").path for name in ("room.usdz", "room")]
+    return folder, [
+        mt.export(room(), folder / name, to="usd").path for name in ("room.usdz", "room")
+    ]
 
 
 def test_official_validators(written):
@@ -52,7 +54,9 @@ def test_the_stage_says_what_the_scene_says(written):
 def test_the_centre_of_the_light_lies_ahead(written):
     """OpenEXR's latlong, which a dome light uses, has +Z in its centre and +X at a quarter of its width."""
     stage = Usd.Stage.Open(str(written[1][1]))
-    turn = np.array(UsdGeom.Xformable(stage.GetPrimAtPath("/Scene/Light")).ComputeLocalToWorldTransform(0))[:3, :3]
+    turn = np.array(
+        UsdGeom.Xformable(stage.GetPrimAtPath("/Scene/Light")).ComputeLocalToWorldTransform(0)
+    )[:3, :3]
     np.testing.assert_allclose(np.array([0, 0, 1]) @ turn, [0, 0, -1], atol=1e-12)
     # Ours turns to +X to the right of the centre: three quarters of the width, OpenEXR's -X.
     np.testing.assert_allclose(np.array([-1, 0, 0]) @ turn, [1, 0, 0], atol=1e-12)
@@ -67,12 +71,18 @@ def test_bodies_have_textures_and_it_is_said_that_nothing_refracts(tmp_path):
     stage = Usd.Stage.Open(str(done.path))
     texture = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/base_color"))
     assert (
-        texture.GetInput("file").Get().path == "./body0_base_color.png" and texture.GetInput("wrapS").Get() == "repeat"
+        texture.GetInput("file").Get().path == "./body0_base_color.png"
+        and texture.GetInput("wrapS").Get() == "repeat"
     )
     own = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/surface/base_color"))
-    assert own.GetInput("file").Get().path == "./base_color.png" and own.GetInput("wrapS").Get() == "clamp"
+    assert (
+        own.GetInput("file").Get().path == "./base_color.png"
+        and own.GetInput("wrapS").Get() == "clamp"
+    )
     glass = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body1/surface"))
-    assert glass.GetInput("opacity").Get() == 0 and glass.GetInput("ior").Get() == pytest.approx(1.4)
+    assert glass.GetInput("opacity").Get() == 0 and glass.GetInput("ior").Get() == pytest.approx(
+        1.4
+    )
 
 
 def test_lamps_and_what_glows(tmp_path):
@@ -83,5 +93,9 @@ def test_lamps_and_what_glows(tmp_path):
     np.testing.assert_allclose(radiance, LAMP.radiance, rtol=1e-5)
     place = UsdGeom.Xformable(sphere).ComputeLocalToWorldTransform(0).ExtractTranslation()
     np.testing.assert_allclose(place, LAMP.position)
-    glow = UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/surface")).GetInput("emissiveColor").Get()
+    glow = (
+        UsdShade.Shader(stage.GetPrimAtPath("/Scene/Materials/body0/surface"))
+        .GetInput("emissiveColor")
+        .Get()
+    )
     np.testing.assert_allclose(glow, [3, 1.5, 0.75])

@@ -23,7 +23,9 @@ class Far(torch.Tensor):
 
     @staticmethod
     def __new__(cls, near):
-        return torch.Tensor._make_wrapper_subclass(cls, near.shape, near.stride(), dtype=near.dtype, device="meta")
+        return torch.Tensor._make_wrapper_subclass(
+            cls, near.shape, near.stride(), dtype=near.dtype, device="meta"
+        )
 
     def __init__(self, near):
         self.near = near
@@ -31,17 +33,31 @@ class Far(torch.Tensor):
 
 class OtherDevice(TorchDispatchMode):
     def __torch_dispatch__(self, function, types, args=(), kwargs=None):
-        name, kwargs = function._schema.name.removeprefix("aten::"), dict(kwargs or {})
+        name = function._schema.name.removeprefix("aten::")
+        kwargs = dict(kwargs or {})
         # Numbers, and places in a tensor, may come from the processor.
         indexing = name in ("index", "index_put", "index_put_", "_index_put_impl_")
-        counts = lambda t: isinstance(t, Far) or (t.is_floating_point() if indexing else t.dim())  # noqa: E731
-        far = {isinstance(t, Far) for t in tree_leaves((args, kwargs)) if isinstance(t, torch.Tensor) and counts(t)}
+
+        def counts(t):
+            return isinstance(t, Far) or (t.is_floating_point() if indexing else t.dim())
+
+        far = {
+            isinstance(t, Far)
+            for t in tree_leaves((args, kwargs))
+            if isinstance(t, torch.Tensor) and counts(t)
+        }
         assert len(far) < 2 or name in ("_to_copy", "copy_"), f"{name} mixes devices"
         device = kwargs.pop("device", None)
         there = True in far if device is None else torch.device(device).type == "meta"
         near_args, near_kwargs = tree_map_only(Far, lambda t: t.near, (args, kwargs))
         found = function(*near_args, **near_kwargs)
-        return args[0] if name.endswith("_") else tree_map_only(torch.Tensor, Far, found) if there else found
+        return (
+            args[0]
+            if name.endswith("_")
+            else tree_map_only(torch.Tensor, Far, found)
+            if there
+            else found
+        )
 
 
 @pytest.fixture
@@ -61,11 +77,17 @@ def elsewhere(monkeypatch):
 
 @pytest.mark.parametrize(
     "engine, preset",
-    [("transport", DEFAULT), ("transport", PAPER), pytest.param("path", PAPER, marks=pytest.mark.slow)],
+    [
+        ("transport", DEFAULT),
+        ("transport", PAPER),
+        pytest.param("path", PAPER, marks=pytest.mark.slow),
+    ],
 )
 def test_a_fit_elsewhere_finds_what_it_finds_here(engine, preset, request):
     room = Room(16)
-    setup = room.setup(preset.at_most(2), spp=2, engine=engine, completion="none", mask=np.eye(16) > 0)
+    setup = room.setup(
+        preset.at_most(2), spp=2, engine=engine, completion="none", mask=np.eye(16) > 0
+    )
     prior = replace(setup.prior, light=np.full((8, 16, 4), 0.5, np.float32))
     here = invert(setup := replace(setup, prior=prior))
     request.getfixturevalue("elsewhere")
@@ -73,6 +95,13 @@ def test_a_fit_elsewhere_finds_what_it_finds_here(engine, preset, request):
     np.testing.assert_allclose(there.envmap, here.envmap, rtol=1e-4)
     np.testing.assert_allclose(there.materials.albedo, here.materials.albedo, atol=1e-5)
     if engine == "transport":  # and the quick look
-        seen = there.materials, prior.normal, prior.depth, there.geometry, there.envmap, there.rerender
+        seen = (
+            there.materials,
+            prior.normal,
+            prior.depth,
+            there.geometry,
+            there.envmap,
+            there.rerender,
+        )
         scene = Scene(room.camera, room.photo, prior, *seen)
         assert Preview(scene).render(replace(scene, envmap=2 * scene.envmap)).mean() > 0

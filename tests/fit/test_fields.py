@@ -38,10 +38,12 @@ def seam(envmap) -> float:
 
 def test_direction_field_is_continuous_where_the_map_is_sewn():
     torch.manual_seed(3)
-    sphere, sheet = EnvmapMLP(), EnvmapMLP(coordinates="uv")
+    sphere = EnvmapMLP()
+    sheet = EnvmapMLP(coordinates="uv")
     assert sphere.net[0].in_features == 2 * 4 * 3 and sheet.net[0].in_features == 2 * 4 * 2
     with torch.no_grad():
-        envmap, flat = sphere(48), sheet(48)
+        envmap = sphere(48)
+        flat = sheet(48)
     assert envmap.shape == (48, 96, 3)
     assert float(envmap.min()) >= 0
     assert seam(envmap) < 1.2
@@ -55,7 +57,8 @@ def test_spherical_harmonics_are_orthonormal_and_the_known_ones():
     weight = np.broadcast_to(row_solid_angle(128)[:, None], d.shape[:2])
     gram = np.einsum("ijk,ijl,ij->kl", basis, basis, weight)
     np.testing.assert_allclose(gram, np.eye(16), atol=2e-3)
-    c1, c2 = math.sqrt(3 / (4 * math.pi)), math.sqrt(5 / (16 * math.pi))
+    c1 = math.sqrt(3 / (4 * math.pi))
+    c2 = math.sqrt(5 / (16 * math.pi))
     np.testing.assert_allclose(basis[..., 0], math.sqrt(1 / (4 * math.pi)), rtol=1e-5)
     np.testing.assert_allclose(basis[..., 2], c1 * d[..., 1], atol=1e-5)
     for column, axis in ((1, 0), (3, 2)):  # the sign is a convention
@@ -70,7 +73,9 @@ def test_resizing_keeps_the_mean_and_shrinking_the_light_of_every_texel(height):
     resized = resize_envmap(envmap, height)
     assert resized.shape == (height, 2 * height, 3)
     torch.testing.assert_close(resized.mean((0, 1)), envmap.mean((0, 1)), rtol=0.01, atol=0.01)
-    assert float(resized.min()) >= float(envmap.min()) and float(resized.max()) <= float(envmap.max())
+    assert float(resized.min()) >= float(envmap.min()) and float(resized.max()) <= float(
+        envmap.max()
+    )
     for row, column in ((7, 3), (8, 16), (6, 31)) if height < 16 else ():
         envmap = torch.zeros(16, 32, 3)
         envmap[row, column] = 100

@@ -44,12 +44,20 @@ class Room:
 
     def fit(self, settings: FitSettings, **options) -> Fit:
         engine = TransportEngine(
-            self.geometry, self.camera, self.photo.linear, light_height=settings.light_grid, cache=CacheSettings(32, 8)
-        )  # fmt: skip
+            self.geometry,
+            self.camera,
+            self.photo.linear,
+            light_height=settings.light_grid,
+            cache=CacheSettings(32, 8),
+        )
         return Fit(self.setup(settings, **options), self.geometry, self.path, engine)
 
     def setup(self, settings: FitSettings, prior: Materials | None = None, **options) -> FitSetup:
-        maps = Prediction(prior or self.prior, np.zeros_like(self.photo.linear), np.ones(self.photo.linear.shape[:2]))
+        maps = Prediction(
+            prior or self.prior,
+            np.zeros_like(self.photo.linear),
+            np.ones(self.photo.linear.shape[:2]),
+        )
         return FitSetup(self.photo, maps, settings, envmap_height=ENVMAP_HEIGHT, **options)
 
 
@@ -70,14 +78,18 @@ def test_light_is_recovered(room, fitted):
     assert float(envmap.min()) >= 0
     assert metrics.sh_error_relative(envmap, room.light) < 0.75 * room.start_error
     turned = np.roll(envmap, envmap.shape[1] // 2, axis=1)
-    assert metrics.sh_error_relative(envmap, room.light) < metrics.sh_error_relative(turned, room.light)
+    assert metrics.sh_error_relative(envmap, room.light) < metrics.sh_error_relative(
+        turned, room.light
+    )
 
 
 def test_rerendering_comes_close_to_the_photo(room, fitted):
     fit, state = fitted
     before = room.render(room.prior, np.full_like(room.light, 0.6), 64)
     after = room.render(fit.materials(state), state.envmap, 64)
-    assert metrics.psnr(after, room.photo.linear) > max(28, metrics.psnr(before, room.photo.linear) + 8)
+    assert metrics.psnr(after, room.photo.linear) > max(
+        28, metrics.psnr(before, room.photo.linear) + 8
+    )
 
 
 def test_true_materials_and_light_stay(room):
@@ -123,7 +135,9 @@ def test_papers_first_stage_leaves_albedo_alone(room):
 
 @pytest.mark.parametrize("field", ["mlp-uv", "sh"])
 def test_every_light_field_learns(room, field):
-    light = replace(DEFAULT.light, field=field, height=16, schedule=Schedule(learning_rate=5e-3, max_steps=25))
+    light = replace(
+        DEFAULT.light, field=field, height=16, schedule=Schedule(learning_rate=5e-3, max_steps=25)
+    )
     fit = room.fit(replace(DEFAULT, light=light).at_most(25))
     stage = next(s for s in fit.run().stages if s["name"] == "light")
     assert stage["loss_last"] < 0.97 * stage["loss_first"]
@@ -141,13 +155,17 @@ def test_visible_sky_is_pasted_where_it_is_seen():
     d = texel_directions(64, 128)
     ahead = (d[..., 2] < -0.95) & (d[..., 1] > 0.03)
     np.testing.assert_allclose(pasted[ahead & (d[..., 0] < -0.03)], 0.4)
-    np.testing.assert_allclose(pasted[ahead & (d[..., 0] > 0.03)], 3.0)  # clipped: at least 1, and 3 is more
+    np.testing.assert_allclose(
+        pasted[ahead & (d[..., 0] > 0.03)], 3.0
+    )  # clipped: at least 1, and 3 is more
     np.testing.assert_allclose(pasted[(d[..., 1] < -0.03) | (d[..., 2] > 0)], 3.0)
     assert paste_visible_sky(envmap, photo, np.ones_like(surface), camera, white=CLIPPED) is envmap
     # What a texel shows is the mean of its pixels, not one of them.
     fine = Camera(320, 320, 60.0)
     noisy = np.random.default_rng(0).uniform(0.2, 0.6, (320, 320, 3)).astype(np.float32)
-    mean = paste_visible_sky(envmap, noisy, np.kron(surface, np.ones((10, 10))) > 0, fine, white=CLIPPED)
+    mean = paste_visible_sky(
+        envmap, noisy, np.kron(surface, np.ones((10, 10))) > 0, fine, white=CLIPPED
+    )
     assert np.abs(mean[ahead] - 0.4).max() < 0.08
     # An HDR photo measures up to its own white.
     measured = paste_visible_sky(envmap, 1.5 * photo, surface, camera, white=10.0)
@@ -156,7 +174,9 @@ def test_visible_sky_is_pasted_where_it_is_seen():
 
 def test_a_result_has_two_independent_halves(room):
     told = {}
-    setup = replace(room.setup(PAPER.at_most(3), room.truth), completion="none", spp=4, device="cpu")
+    setup = replace(
+        room.setup(PAPER.at_most(3), room.truth), completion="none", spp=4, device="cpu"
+    )
     result = invert(setup, found=told.__setitem__)
     assert result.spp == 4 and not np.array_equal(*result.halves)
     np.testing.assert_allclose(result.rerender, np.mean(result.halves, 0), rtol=1e-6)

@@ -24,12 +24,17 @@ def test_a_map_of_few_texels_is_what_is_fitted(rows, asked):
             heights.add((height, jitter is not None))
             return super().forward(height, jitter)
 
-    heights, taken = set(), []
+    heights = set()
+    taken = []
     problem = LightProblem(
-        torch.arange(2), HEIGHT, lambda envmap: (taken.append(envmap), envmap[:1, :2].flatten(0, 1))[1]
+        torch.arange(2),
+        HEIGHT,
+        lambda envmap: (taken.append(envmap), envmap[:1, :2].flatten(0, 1))[1],
     )
     settings = LightSettings(field="mlp", height=rows, schedule=Schedule(max_steps=2))
-    fit_light(problem, torch.ones(2, 3), Recorded(), settings, LightStart(torch.ones(8, 16, 3), None))
+    fit_light(
+        problem, torch.ones(2, 3), Recorded(), settings, LightStart(torch.ones(8, 16, 3), None)
+    )
     assert heights == {asked} and all(envmap.shape == (HEIGHT, 2 * HEIGHT, 3) for envmap in taken)
 
 
@@ -37,15 +42,21 @@ def _floor(rows=16):
     """A light problem of diffuse patches of albedo 0.5 whose light comes from the upper half alone."""
     d = torch.from_numpy(texel_directions(rows, 2 * rows)).reshape(-1, 3)
     angle = torch.from_numpy(row_solid_angle(rows)).float().repeat_interleave(2 * rows)
-    normals = torch.nn.functional.normalize(torch.tensor([[0, 1.0, 0], [0.4, 1, 0], [-0.4, 1, 0], [0, 1, 0.4]]), dim=-1)
+    normals = torch.nn.functional.normalize(
+        torch.tensor([[0, 1.0, 0], [0.4, 1, 0], [-0.4, 1, 0], [0, 1, 0.4]]), dim=-1
+    )
     seen = (normals @ d.T).clamp(min=0) * (d[:, 1] > 0) * angle * 0.5 / torch.pi
-    return LightProblem(torch.arange(len(normals)), rows, lambda envmap: seen @ envmap.reshape(-1, 3))
+    return LightProblem(
+        torch.arange(len(normals)), rows, lambda envmap: seen @ envmap.reshape(-1, 3)
+    )
 
 
 def test_a_predicted_light_gets_the_exposure_of_the_photo():
     problem = _floor()
     rng = np.random.default_rng(0)
-    predicted = np.concatenate([rng.uniform(0.2, 1, (8, 16, 3)), np.ones((8, 16, 1))], -1).astype(np.float32)
+    predicted = np.concatenate([rng.uniform(0.2, 1, (8, 16, 3)), np.ones((8, 16, 1))], -1).astype(
+        np.float32
+    )
     settings = replace(DEFAULT.light, height=16)
     rendered = problem.render(resize_envmap(torch.from_numpy(predicted[..., :3].copy()), 16))
     start = start_light(0.4 * rendered, settings, predicted, problem)
@@ -56,7 +67,8 @@ def test_a_predicted_light_gets_the_exposure_of_the_photo():
 
 def test_what_the_photo_tells_nothing_about_stays_as_predicted():
     """The lower half reaches nothing: it keeps its prediction; the upper half explains a photo twice as bright."""
-    problem, settings = _floor(), replace(DEFAULT.light, height=16, schedule=Schedule(0.1, 200, patience=0))
+    problem = _floor()
+    settings = replace(DEFAULT.light, height=16, schedule=Schedule(0.1, 200, patience=0))
     predicted = np.ones((16, 32, 4), np.float32)
     predicted[8:, :, :3] = [0.7, 0.5, 0.3]
     target = 2 * problem.render(torch.from_numpy(predicted[..., :3].copy())) / 10
@@ -66,7 +78,9 @@ def test_what_the_photo_tells_nothing_about_stays_as_predicted():
     found = field(16).detach()
     torch.testing.assert_close(problem.render(found), target, rtol=0.05, atol=0.0)
     colour = found[12:].mean((0, 1))
-    torch.testing.assert_close(colour / colour[0], torch.tensor([1, 5 / 7, 3 / 7]), rtol=0.05, atol=0.0)
+    torch.testing.assert_close(
+        colour / colour[0], torch.tensor([1, 5 / 7, 3 / 7]), rtol=0.05, atol=0.0
+    )
 
 
 def test_a_lamp_counts_by_what_it_lights():

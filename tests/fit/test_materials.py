@@ -20,7 +20,10 @@ def fitted(light, photo, prior, white=math.inf):
     """[P, 5] maps where a pixel's radiance is light [P, 3] times albedo."""
     schedule = Schedule(learning_rate=0.02, max_steps=400, decay_every=100, decay=0.3, patience=0)
     settings = replace(
-        DEFAULT.materials, weights=(WEIGHT, 1.0, 1.0), white=white, stages=(MaterialStage(("albedo",), schedule),)
+        DEFAULT.materials,
+        weights=(WEIGHT, 1.0, 1.0),
+        white=white,
+        stages=(MaterialStage(("albedo",), schedule),),
     )
     field = MaterialMaps(prior)
     fit_materials(lambda maps: maps[:, :3] * light, photo, field, prior, settings)
@@ -30,20 +33,26 @@ def fitted(light, photo, prior, white=math.inf):
 def test_albedo_lies_between_the_prior_and_what_the_photo_asks_for():
     """argmin (s(render A) - s(photo))^2 + w (s(A) - s(A0))^2, s the sRGB curve, for every channel by itself."""
     rng = np.random.default_rng(0)
-    light, photo = rng.uniform(0.5, 2, (6, 3)), rng.uniform(0.05, 0.9, (6, 3))
+    light = rng.uniform(0.5, 2, (6, 3))
+    photo = rng.uniform(0.05, 0.9, (6, 3))
     prior = np.concatenate([rng.uniform(0.1, 0.9, (6, 3)), np.full((6, 2), 0.5)], 1)
     found = fitted(*(torch.from_numpy(x.astype(np.float32)) for x in (light, photo, prior)))
-    s = lambda x: encode(torch.tensor(x), "srgb").item()  # noqa: E731
+
+    def s(x):
+        return encode(torch.tensor(x), "srgb").item()
+
     for place in np.ndindex(6, 3):
-        cost = lambda a, k=place: (  # noqa: E731
-            (s(a * light[k]) - s(photo[k])) ** 2 + WEIGHT * (s(a) - s(prior[k])) ** 2
-        )
+
+        def cost(a, k=place):
+            return (s(a * light[k]) - s(photo[k])) ** 2 + WEIGHT * (s(a) - s(prior[k])) ** 2
+
         best = minimize_scalar(cost, bounds=(0, 1), method="bounded").x
         assert abs(found[place].item() - best) < 0.01
     torch.testing.assert_close(found[:, 3:], torch.full((6, 2), 0.5))
 
 
 def test_a_clipped_photo_asks_for_nothing_darker():
-    light, prior = torch.full((1, 3), 2.0), torch.full((1, 5), 0.6)
+    light = torch.full((1, 3), 2.0)
+    prior = torch.full((1, 5), 0.6)
     torch.testing.assert_close(fitted(light, torch.ones(1, 3), prior, white=CLIPPED), prior)
     assert (fitted(light, torch.ones(1, 3), prior)[:, :3] < 0.57).all()

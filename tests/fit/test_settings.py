@@ -58,9 +58,15 @@ def test_unknown_names_are_told():
         envmap_field(replace(DEFAULT.light, field="cube"), torch.ones(4, 8, 3))
 
 
-@pytest.mark.parametrize(("name", "encodings"), [("paper", ("log1p", "log1p")), ("default", ("srgb", "srgb"))])
+@pytest.mark.parametrize(
+    ("name", "encodings"), [("paper", ("log1p", "log1p")), ("default", ("srgb", "srgb"))]
+)
 def test_hdr_photos_are_compared_as_log_in_the_paper_and_as_ours_compares_all(name, encodings):
     settings = preset(name, hdr=True)
     assert (settings.light.encoding, settings.materials.encoding) == encodings
-    assert settings.light.white == settings.materials.white == (math.inf if name == "paper" else HDR_CLIP)
+    assert (
+        settings.light.white
+        == settings.materials.white
+        == (math.inf if name == "paper" else HDR_CLIP)
+    )
     assert preset(name) == {"paper": PAPER, "default": DEFAULT}[name]

@@ -16,8 +16,10 @@ def plane_depth(camera: Camera, normal, offset: float):
 
 def sphere_depth(camera: Camera, centre, radius: float):
     """Depth [H, W] of a sphere's front, inf where rays miss it, and its unit normals [H, W, 3]."""
-    rays, centre = pixel_rays(camera).astype(float), np.asarray(centre, float)
-    a, b = (rays**2).sum(-1), rays @ centre
+    rays = pixel_rays(camera).astype(float)
+    centre = np.asarray(centre, float)
+    a = (rays**2).sum(-1)
+    b = rays @ centre
     root = b**2 - a * (centre @ centre - radius**2)
     depth = np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
     points = rays * np.where(np.isfinite(depth), depth, 1)[..., None]
@@ -38,8 +40,10 @@ def box_depth(camera: Camera, low, high):
     """Depth [H, W] of an axis-aligned box (corners low, high), inf where missed, and its face normals [H, W, 3]."""
     rays = pixel_rays(camera).astype(float)
     with np.errstate(divide="ignore", invalid="ignore"):
-        first, second = np.asarray(low) / rays, np.asarray(high) / rays
-    near, far = np.minimum(first, second), np.maximum(first, second)
+        first = np.asarray(low) / rays
+        second = np.asarray(high) / rays
+    near = np.minimum(first, second)
+    far = np.maximum(first, second)
     axis = near.argmax(-1)
     hit = (near.max(-1) < far.min(-1)) & (near.max(-1) > 0)
     normal = -np.sign(rays) * np.eye(3)[axis]
@@ -48,18 +52,22 @@ def box_depth(camera: Camera, low, high):
 
 def room(camera: Camera):
     """Floor y = -1 (label 0), wall z = -6 (1), a box on the floor (2): depth [H, W], normal [H, W, 3], label [H, W]."""
-    floor, wall = plane_depth(camera, (0, 1, 0), -1.0), plane_depth(camera, (0, 0, 1), -6.0)
+    floor = plane_depth(camera, (0, 1, 0), -1.0)
+    wall = plane_depth(camera, (0, 0, 1), -6.0)
     box, box_normal = box_depth(camera, (-0.9, -1.0, -4.0), (0.1, -0.2, -3.0))
     depths = np.stack([floor, wall, box])
     label = depths.argmin(0)
-    normal = np.where((label == 2)[..., None], box_normal, np.array([[0.0, 1, 0], [0, 0, 1], [0, 0, 0]])[label])
+    normal = np.where(
+        (label == 2)[..., None], box_normal, np.array([[0.0, 1, 0], [0, 0, 1], [0, 0, 0]])[label]
+    )
     return depths.min(0), normal.astype(np.float32), label
 
 
 def screen_rays(camera: Camera, screen):
     """Directions [N, 3] with z = -1 through screen positions [N, 2] (pixels, x right, y down)."""
     screen = np.asarray(screen, float)
-    x, y = screen[:, 0] - camera.width / 2, camera.height / 2 - screen[:, 1]
+    x = screen[:, 0] - camera.width / 2
+    y = camera.height / 2 - screen[:, 1]
     return np.stack([x / camera.focal, y / camera.focal, -np.ones(len(x))], -1)
 
 
@@ -81,7 +89,8 @@ def trace(mesh, origin, directions, slack: float = 1e-7):
     sides = [np.cross(u, v) for u, v in ((b, c), (c, a), (a, b))]
     normal = np.cross(b - a, c - a)
     height = (normal * a).sum(-1)
-    distance, face = np.full(len(directions), np.inf), np.full(len(directions), -1)
+    distance = np.full(len(directions), np.inf)
+    face = np.full(len(directions), -1)
     for start in range(0, len(directions), 256):
         rays = directions[start : start + 256]
         volumes = np.stack([rays @ side.T for side in sides])  # [3, n, F]

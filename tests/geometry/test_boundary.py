@@ -25,9 +25,12 @@ def mesh_of(depth, fov=40.0, tau=6.0):
 @st.composite
 def depth_maps(draw):
     """Random small depth maps: noise, steps, and holes; at least one pixel has a surface."""
-    height, width = draw(st.integers(1, 9)), draw(st.integers(1, 9))
+    height = draw(st.integers(1, 9))
+    width = draw(st.integers(1, 9))
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    depth = 2 + rng.integers(0, draw(st.integers(1, 4)), (height, width)) * draw(st.sampled_from([0.01, 0.5, 30.0]))
+    depth = 2 + rng.integers(0, draw(st.integers(1, 4)), (height, width)) * draw(
+        st.sampled_from([0.01, 0.5, 30.0])
+    )
     depth = depth * rng.uniform(1, 1 + draw(st.sampled_from([1e-6, 0.05, 1.0])), depth.shape)
     depth[rng.random(depth.shape) < draw(st.sampled_from([0, 0.2, 0.6]))] = 0
     depth[rng.integers(height), rng.integers(width)] = 1.5
@@ -42,7 +45,11 @@ def corners_by_loop(depth, cuts):
 
     def linked(p, q):
         (i, j), (k, m) = min(p, q), max(p, q)
-        return bool(cuts.link_x[i, j] if i == k else cuts.link_y[i, j]) if abs(i - k) + abs(j - m) == 1 else False
+        return (
+            bool(cuts.link_x[i, j] if i == k else cuts.link_y[i, j])
+            if abs(i - k) + abs(j - m) == 1
+            else False
+        )
 
     def gradient(i, j, axis):
         steps = []
@@ -59,7 +66,9 @@ def corners_by_loop(depth, cuts):
     for row in range(height + 1):
         for column in range(width + 1):
             around = [(row - 1, column - 1), (row - 1, column), (row, column - 1), (row, column)]
-            around = [(i, j) for i, j in around if 0 <= i < height and 0 <= j < width and depth[i, j] > 0]
+            around = [
+                (i, j) for i, j in around if 0 <= i < height and 0 <= j < width and depth[i, j] > 0
+            ]
             while around:
                 group = [around.pop(0)]
                 for member in group:
@@ -70,7 +79,11 @@ def corners_by_loop(depth, cuts):
                     slot = 2 * (row - i) + column - j
                     vertex[i, j, slot] = count
                     own = 1 / depth[i, j]
-                    value = own + (column - j - 0.5) * gradient(i, j, 0) + (row - i - 0.5) * gradient(i, j, 1)
+                    value = (
+                        own
+                        + (column - j - 0.5) * gradient(i, j, 0)
+                        + (row - i - 0.5) * gradient(i, j, 1)
+                    )
                     inverse[i, j, slot] = min(max(value, own / 2), own * 2)
                 count += 1
     return vertex, inverse
@@ -100,16 +113,25 @@ def test_the_mesh_is_sound_for_any_depth_map(depth, tau):
         assert np.isfinite(array).all()
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=-1), 1, atol=1e-5)
     corners = mesh.vertices[mesh.faces].astype(float)
-    facing = -(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * corners[:, 0]).sum(-1)
+    facing = -(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * corners[:, 0]
+    ).sum(-1)
     assert (facing > 0).all()  # counter-clockwise seen from the camera, tucks too
     assert ((mesh.normals * -mesh.vertices).sum(-1) > 0).all()
     points = mesh.vertices[np.unique(mesh.faces[:front])].astype(float)
-    screen = points[:, :2] / -points[:, 2:] * [camera.focal, -camera.focal] + [camera.width / 2, camera.height / 2]
-    np.testing.assert_allclose(mesh.uv[: len(screen)] * [camera.width, camera.height], screen, atol=1e-3)
+    screen = points[:, :2] / -points[:, 2:] * [camera.focal, -camera.focal] + [
+        camera.width / 2,
+        camera.height / 2,
+    ]
+    np.testing.assert_allclose(
+        mesh.uv[: len(screen)] * [camera.width, camera.height], screen, atol=1e-3
+    )
     # Wherever a ray hits a face, a nearest-texel lookup at its uv gives the face's pixel.
     weights = np.random.default_rng(0).dirichlet(np.ones(3), len(mesh.faces)) * 0.98 + 0.02 / 3
     uv = (weights[..., None] * mesh.uv[mesh.faces]).sum(1)
-    texel = np.floor(uv[:, 1] * camera.height).astype(int) * camera.width + np.floor(uv[:, 0] * camera.width)
+    texel = np.floor(uv[:, 1] * camera.height).astype(int) * camera.width + np.floor(
+        uv[:, 0] * camera.width
+    )
     np.testing.assert_array_equal(texel, mesh.face_pixel)
 
 
@@ -117,7 +139,9 @@ def test_the_mesh_is_sound_for_any_depth_map(depth, tau):
 @settings(max_examples=30, deadline=None)
 def test_rays_see_every_surface_and_only_its_own_pixel(depth, tau, seed):
     mesh, camera = mesh_of(depth, tau=tau)
-    inside = 0.01 + 0.98 * np.random.default_rng(seed).beta(0.2, 0.2, (depth.size, 2))  # mostly near a pixel's edge
+    inside = 0.01 + 0.98 * np.random.default_rng(seed).beta(
+        0.2, 0.2, (depth.size, 2)
+    )  # mostly near a pixel's edge
     distance, face = look(mesh, camera, inside)
     surface = depth.ravel() > 0
     np.testing.assert_array_equal(face >= 0, surface)  # no white border, and the sky is open
@@ -125,7 +149,9 @@ def test_rays_see_every_surface_and_only_its_own_pixel(depth, tau, seed):
     assert (face < 2 * surface.sum()).all()  # the tucks stay hidden
     # A corner's inverse depth is a mean of values within a factor of two of its pixels' own.
     most = ndimage.maximum_filter(depth, 3, mode="nearest").ravel()[surface]
-    least = ndimage.minimum_filter(np.where(depth > 0, depth, np.inf), 3, mode="nearest").ravel()[surface]
+    least = ndimage.minimum_filter(np.where(depth > 0, depth, np.inf), 3, mode="nearest").ravel()[
+        surface
+    ]
     assert (distance[surface] < 2.001 * most).all() and (distance[surface] > 0.499 * least).all()
 
 
@@ -135,7 +161,9 @@ def test_rays_exactly_on_edges_and_corners_never_pass_between(depth, tau, seed):
     depth = np.where(depth > 0, depth, 7.0)
     mesh, camera = mesh_of(depth, tau=tau)
     rng = np.random.default_rng(seed)
-    rows, columns = np.mgrid[0 : camera.height + 1, 0 : camera.width + 1].reshape(2, -1).astype(float)
+    rows, columns = (
+        np.mgrid[0 : camera.height + 1, 0 : camera.width + 1].reshape(2, -1).astype(float)
+    )
     on_corner = np.stack([columns, rows], -1)
     on_column = np.stack([columns, rng.uniform(0, camera.height, len(rows))], -1)
     on_row = np.stack([rng.uniform(0, camera.width, len(rows)), rows], -1)
@@ -163,7 +191,13 @@ def test_thin_bars_stand_free_of_the_background(width, tau):
     assert between[0] == -1
 
 
-@given(st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(0.5, 20), st.integers(3, 30), st.integers(3, 20))
+@given(
+    st.floats(-1.2, 1.2),
+    st.floats(-1.2, 1.2),
+    st.floats(0.5, 20),
+    st.integers(3, 30),
+    st.integers(3, 20),
+)
 @settings(max_examples=25, deadline=None)
 def test_planes_are_reproduced_exactly(x, y, distance, width, height):
     normal = np.array([x, y, 1.0]) / np.linalg.norm([x, y, 1.0])
@@ -171,7 +205,9 @@ def test_planes_are_reproduced_exactly(x, y, distance, width, height):
     depth = plane_depth(camera, normal, -distance)
     assume(np.isfinite(depth).all())
     inverse = np.pad(1 / depth, 1, mode="reflect", reflect_type="odd")  # linear on a plane
-    assume((2 * inverse[:-2] > inverse[1:-1]).all() and inverse.min() > 0)  # the horizon is not in the picture
+    assume(
+        (2 * inverse[:-2] > inverse[1:-1]).all() and inverse.min() > 0
+    )  # the horizon is not in the picture
     mesh = depth_to_mesh(depth, np.broadcast_to(normal, (*depth.shape, 3)), camera)
     assert len(mesh.vertices) == (width + 1) * (height + 1)  # one sheet
     np.testing.assert_allclose(mesh.vertices @ normal, -distance, rtol=2e-5)
@@ -180,7 +216,8 @@ def test_planes_are_reproduced_exactly(x, y, distance, width, height):
 def test_beside_a_smeared_outline_the_surface_has_no_lip():
     """A receding side whose outline the depth smears over some pixels: nothing there comes back to the camera."""
     side = np.concatenate([np.linspace(2.6, 2.75, 16), [3.11, 4.13, 4.7], np.full(13, 4.86)])
-    depth, camera = np.tile(side, (8, 1)), Camera(32, 8, 35.0)
+    depth = np.tile(side, (8, 1))
+    camera = Camera(32, 8, 35.0)
     normal = np.tile(np.array([0, 0, 1], np.float32), (8, 32, 1))
     mesh = depth_to_mesh(depth, normal, camera)
     front = mesh.faces[: 2 * depth.size].reshape(8, 32, 6)

@@ -34,7 +34,9 @@ def test_rays_down_beside_below_and_behind_the_camera_find_the_floor(furnished):
         distance, plane, face = hit(geometry.mesh, (x, 0.3, z), (0, -1, 0))
         assert plane == floor and distance == pytest.approx(1.3, abs=0.03)
         assert geometry.plane_label.ravel()[geometry.mesh.face_pixel[face]] == floor
-        np.testing.assert_allclose(geometry.mesh.normals[geometry.mesh.faces[face]], [[0, 1, 0]] * 3, atol=0.02)
+        np.testing.assert_allclose(
+            geometry.mesh.normals[geometry.mesh.faces[face]], [[0, 1, 0]] * 3, atol=0.02
+        )
 
 
 def test_the_floor_and_the_wall_go_on_behind_the_box(furnished):
@@ -45,7 +47,8 @@ def test_the_floor_and_the_wall_go_on_behind_the_box(furnished):
     distance, plane, _ = hit(geometry.mesh, (-0.5, -0.9, -5.5), (0, 0, -1))
     assert plane == wall and distance == pytest.approx(0.5, abs=0.05)
     # Above the frame it goes on, but not without end.
-    right, top = 6 * CAMERA.width / (2 * CAMERA.focal), 6 * CAMERA.height / (2 * CAMERA.focal)
+    right = 6 * CAMERA.width / (2 * CAMERA.focal)
+    top = 6 * CAMERA.height / (2 * CAMERA.focal)
     distance, plane, _ = hit(geometry.mesh, (0.0, 1.2 * top, -3.0), (0, 0, -1))
     assert plane == wall and distance == pytest.approx(3, abs=0.05)
     assert hit(geometry.mesh, (0.0, 2 * top, -3.0), (0, 0, -1))[1] is None
@@ -66,7 +69,9 @@ def test_planes_stop_at_each_other_and_leave_light_from_above_and_behind(furnish
 def test_the_camera_sees_none_of_it(furnished):
     geometry, depth, _, _, _ = furnished
     assert (geometry.mesh.face_plane >= 0).sum() > 500
-    _, face = look(geometry.mesh, CAMERA, np.random.default_rng(0).uniform(0.01, 0.99, (depth.size, 2)))
+    _, face = look(
+        geometry.mesh, CAMERA, np.random.default_rng(0).uniform(0.01, 0.99, (depth.size, 2))
+    )
     np.testing.assert_array_equal(geometry.mesh.face_pixel[face], np.arange(depth.size))
     assert (geometry.mesh.face_plane[face] == -1).all()
 
@@ -92,7 +97,9 @@ def test_completion_can_be_switched_off_without_a_change_to_the_rest(furnished):
     assert (bare.plane_label == -1).all() and (bare.mesh.face_plane == -1).all()
     assert bare.plane_label.dtype == np.int8 and bare.mesh.face_plane.dtype == np.int16
     count = len(bare.mesh.faces)
-    np.testing.assert_array_equal(*(g.mesh.vertices[g.mesh.faces[:count]] for g in (geometry, bare)))
+    np.testing.assert_array_equal(
+        *(g.mesh.vertices[g.mesh.faces[:count]] for g in (geometry, bare))
+    )
     np.testing.assert_array_equal(geometry.mesh.face_pixel[:count], bare.mesh.face_pixel)
     with pytest.raises(InputError, match="'walls'"):
         build_geometry(depth, normal, CAMERA, completion="walls")
@@ -113,7 +120,8 @@ def test_walls_can_end_at_the_frame(furnished):
 
 def test_the_last_row_of_a_wall_has_the_walls_normal():
     """Normals are not shared across creases, points are."""
-    floor, wall = plane_depth(CAMERA, (0, 1, 0), -1.0), plane_depth(CAMERA, (0, 0, 1), -4.0)
+    floor = plane_depth(CAMERA, (0, 1, 0), -1.0)
+    wall = plane_depth(CAMERA, (0, 0, 1), -4.0)
     is_wall = wall < np.where(floor > 0, floor, np.inf)
     depth = np.where(is_wall, wall, floor)
     normal = np.where(is_wall[..., None], [0.0, 0, 1], [0.0, 1, 0]).astype(np.float32)
@@ -121,6 +129,8 @@ def test_the_last_row_of_a_wall_has_the_walls_normal():
     blended = np.abs(mesh.normals).max(-1) < 0.9
     assert blended.sum() > 40  # the mean of wall and floor
     split = split_creases(mesh, depth, normal)
-    np.testing.assert_array_equal(build_geometry(depth, normal, CAMERA, completion="none").mesh.normals, split.normals)
+    np.testing.assert_array_equal(
+        build_geometry(depth, normal, CAMERA, completion="none").mesh.normals, split.normals
+    )
     own = normal.reshape(-1, 3)[split.face_pixel]  # [F, 3]
     np.testing.assert_allclose(split.normals[split.faces], np.repeat(own[:, None], 3, 1), atol=1e-6)

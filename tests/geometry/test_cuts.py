@@ -25,7 +25,8 @@ def test_a_floor_seen_down_to_the_horizon_is_whole(tau):
 @pytest.mark.parametrize("turn", [0.0, 30.0, 90.0])
 def test_a_plane_at_grazing_angle_is_whole(degrees, turn):
     camera = Camera(64, 48, 3.0)  # a narrow view, so that the angle is nearly the same everywhere
-    tilt, spin = np.radians(90 - degrees), np.radians(turn)
+    tilt = np.radians(90 - degrees)
+    spin = np.radians(turn)
     normal = np.array([np.sin(tilt) * np.cos(spin), np.sin(tilt) * np.sin(spin), np.cos(tilt)])
     depth = plane_depth(camera, normal, normal @ [0, 0, -10])
     depth = np.where((depth > 2) & (depth < 100), depth, 0)
@@ -43,7 +44,8 @@ def test_a_sphere_is_cut_off_all_round_but_not_cracked(pixels, shift):
     depth = np.minimum(sphere, 40.0)
     ball = np.isfinite(sphere)
     cuts = find_cuts(depth, camera, 6.0)
-    rim_x, rim_y = ball[:, :-1] != ball[:, 1:], ball[:-1] != ball[1:]
+    rim_x = ball[:, :-1] != ball[:, 1:]
+    rim_y = ball[:-1] != ball[1:]
     np.testing.assert_array_equal(cuts.cut_x, rim_x)
     np.testing.assert_array_equal(cuts.cut_y, rim_y)
 
@@ -71,7 +73,8 @@ def test_smeared_edges_part_when_the_normals_say_that_nothing_is_slanted(width, 
     camera = Camera(256, 16, 18.0)
     inverse = np.full((16, 256), 1 / 4)
     inverse[:, 120 : 120 + width] = 1 / 2
-    facing, sideways = np.zeros((16, 256, 3)), np.zeros((16, 256, 3))
+    facing = np.zeros((16, 256, 3))
+    sideways = np.zeros((16, 256, 3))
     facing[..., 2], sideways[..., 0] = 1, 1
     for smear in (1, 3, 7):
         smeared = ndimage.uniform_filter1d(inverse, smear, axis=1)

@@ -18,9 +18,15 @@ def degrees_between(a, b):
 def test_floor_and_wall_of_a_room(seed):
     depth, normal, label = room(CAMERA)
     planes, again = (find_planes(depth, normal, CAMERA, seed=seed) for _ in range(2))
-    assert all((a.normal == b.normal).all() and (a.mask == b.mask).all() for a, b in zip(planes, again, strict=True))
+    assert all(
+        (a.normal == b.normal).all() and (a.mask == b.mask).all()
+        for a, b in zip(planes, again, strict=True)
+    )
     for k, (true, offset) in enumerate((((0, 1, 0), -1.0), ((0, 0, 1), -6.0))):
-        best = min(planes, key=lambda plane: degrees_between(plane.normal, true) + abs(plane.offset - offset))
+        best = min(
+            planes,
+            key=lambda plane: degrees_between(plane.normal, true) + abs(plane.offset - offset),
+        )
         assert degrees_between(best.normal, true) < 1
         assert best.offset == pytest.approx(offset, rel=0.02)
         overlap = (best.mask & (label == k)).sum() / (best.mask | (label == k)).sum()
@@ -43,4 +49,7 @@ def test_noise_in_depth_and_normals_is_survived():
 def test_a_sphere_is_no_plane(radius):
     sphere, outward = sphere_depth(CAMERA, (0, 0, -4), radius)
     depth = np.where(np.isfinite(sphere), sphere, 0)
-    assert find_planes(depth, np.where(depth[..., None] > 0, outward, 0).astype(np.float32), CAMERA) == []
+    assert (
+        find_planes(depth, np.where(depth[..., None] > 0, outward, 0).astype(np.float32), CAMERA)
+        == []
+    )

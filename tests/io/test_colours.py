@@ -24,7 +24,15 @@ from PIL import Image, ImageCms
 from pillow_heif import from_bytes
 
 from materialist.errors import InputError
-from materialist.io.colour_space import ADOBE_RGB, CIE_XYZ, DISPLAY_P3, REC709, REC2020, rgb_to_xyz, to_rec709
+from materialist.io.colour_space import (
+    ADOBE_RGB,
+    CIE_XYZ,
+    DISPLAY_P3,
+    REC709,
+    REC2020,
+    rgb_to_xyz,
+    to_rec709,
+)
 from materialist.io.photo import read_photo
 
 REPORTED = "data/reported"
@@ -33,7 +41,9 @@ REPORTED = "data/reported"
 def png(path, pixels, *chunks):
     """A PNG of 8 or 16 bits with chunks before its pixels."""
     data = cv2.imencode(".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels)[1].tobytes()
-    path.write_bytes(data[:33] + b"".join(chunk(kind, content) for kind, content in chunks) + data[33:])
+    path.write_bytes(
+        data[:33] + b"".join(chunk(kind, content) for kind, content in chunks) + data[33:]
+    )
     return path
 
 
@@ -42,7 +52,8 @@ def gama(gamma):
 
 
 def chrm(primaries):
-    red_to_blue, white = primaries[:6], primaries[6:]
+    red_to_blue = primaries[:6]
+    white = primaries[6:]
     return b"cHRM", struct.pack(">8I", *(round(value * 1e5) for value in (*white, *red_to_blue)))
 
 
@@ -61,7 +72,10 @@ def test_matrices_are_the_published_ones():
     ("encode", "chunks"),
     [
         (lambda: srgb(quadrants(TO_P3)), [(b"cICP", bytes([12, 13, 0, 1]))]),
-        (lambda: srgb(quadrants(TO_2020)), [(b"cICP", bytes([9, 13, 0, 1])), gama(1 / 2.2), chrm(ADOBE_RGB)]),
+        (
+            lambda: srgb(quadrants(TO_2020)),
+            [(b"cICP", bytes([9, 13, 0, 1])), gama(1 / 2.2), chrm(ADOBE_RGB)],
+        ),
         (lambda: (16 + 219 * srgb(quadrants(TO_P3))) / 255, [(b"cICP", bytes([12, 13, 0, 0]))]),
         (lambda: quadrants() ** (1 / 1.8), [gama(1 / 1.8)]),
         (lambda: quadrants(), [gama(1)]),
@@ -70,7 +84,17 @@ def test_matrices_are_the_published_ones():
         (lambda: srgb(quadrants()), [(b"sRGB", b"\0"), gama(1), chrm(ADOBE_RGB)]),
         (lambda: srgb(quadrants()), [gama(1 / 2.2), chrm(REC709)]),
     ],
-    ids=["cicp-p3", "cicp-first", "cicp-narrow", "gamma-1.8", "linear", "adobe", "chrm", "srgb-first", "srgb-twice"],
+    ids=[
+        "cicp-p3",
+        "cicp-first",
+        "cicp-narrow",
+        "gamma-1.8",
+        "linear",
+        "adobe",
+        "chrm",
+        "srgb-first",
+        "srgb-twice",
+    ],
 )
 def test_chunks_of_png(tmp_path, encode, chunks, dtype):
     photo = read_photo(png(tmp_path / "a.png", levels(encode(), dtype), *chunks))
@@ -82,7 +106,9 @@ def test_chunks_of_png(tmp_path, encode, chunks, dtype):
 def test_hdr_png_is_light_and_says_so(tmp_path, code, curve, name):
     bright = quadrants(TO_2020)
     bright[:4] = 3.0  # above white
-    photo = read_photo(png(tmp_path / "a.png", levels(curve(bright), np.uint16), (b"cICP", bytes([9, code, 0, 1]))))
+    photo = read_photo(
+        png(tmp_path / "a.png", levels(curve(bright), np.uint16), (b"cICP", bytes([9, code, 0, 1])))
+    )
     assert_right(photo)
     assert photo.hdr and any(name in warning for warning in photo.warnings)
     np.testing.assert_allclose(photo.original[0] * 2.0**-photo.stops, 3, rtol=0.01)
@@ -119,18 +145,23 @@ def test_nclx_of_heic(tmp_path, name, encode, codes, is_hdr, bits):
     image.save(tmp_path / name, quality=-1, chroma=444, **dict(zip(keys, codes)))
     photo = read_photo(tmp_path / name)
     assert_right(photo, 0.02)
-    assert photo.hdr == is_hdr and any("is read as" in warning for warning in photo.warnings) == is_hdr
+    assert (
+        photo.hdr == is_hdr and any("is read as" in warning for warning in photo.warnings) == is_hdr
+    )
 
 
 @pytest.mark.parametrize("codes", [(1, 1), (6, 6), (5, 6)])
 def test_the_codes_of_video_are_srgb_in_a_still(tmp_path, codes):
-    photo = read_photo(png(tmp_path / "a.png", levels(srgb(quadrants())), (b"cICP", bytes([*codes, 0, 1]))))
+    photo = read_photo(
+        png(tmp_path / "a.png", levels(srgb(quadrants())), (b"cICP", bytes([*codes, 0, 1])))
+    )
     assert_right(photo)
     assert any("taken as sRGB" in warning for warning in photo.warnings)
 
 
 @pytest.mark.parametrize(
-    ("codes", "encode"), [((12, 13), lambda: srgb(quadrants(TO_P3))), ((9, 16), lambda: pq(quadrants(TO_2020)))]
+    ("codes", "encode"),
+    [((12, 13), lambda: srgb(quadrants(TO_P3))), ((9, 16), lambda: pq(quadrants(TO_2020)))],
 )
 def test_nclx_of_avif(tmp_path, codes, encode):
     """Pillow writes Rec.709 and sRGB; the two codes are put in their place."""
@@ -161,7 +192,9 @@ def test_exif_that_names_no_space_gives_a_note_and_srgb_gives_none(tmp_path):
     for colour_space, notes in ((65535, 1), (1, 0)):
         exif = Image.Exif()
         exif.get_ifd(34665)[40961] = colour_space
-        Image.fromarray(levels(srgb(quadrants()))).save(tmp_path / "a.jpg", quality=100, subsampling=0, exif=exif)
+        Image.fromarray(levels(srgb(quadrants()))).save(
+            tmp_path / "a.jpg", quality=100, subsampling=0, exif=exif
+        )
         photo = read_photo(tmp_path / "a.jpg")
         assert_right(photo, 0.02)
         assert len(photo.warnings) == notes
@@ -176,13 +209,23 @@ def test_primaries_of_exif(tmp_path):
 
 def icc(primaries, curve):
     """A matrix profile as darktable writes it: D50 colorants and one curve."""
-    to_d50 = np.linalg.inv(np.array([[0.4360747, 0.3850649, 0.1430804], [0.2225045, 0.7168786, 0.0606169],
-                                     [0.0139322, 0.0971045, 0.7141733]]))  # fmt: skip
+    to_d50 = np.linalg.inv(
+        np.array(
+            [
+                [0.4360747, 0.3850649, 0.1430804],
+                [0.2225045, 0.7168786, 0.0606169],
+                [0.0139322, 0.0971045, 0.7141733],
+            ]
+        )
+    )
     colorants = np.linalg.inv(to_d50) @ to_rec709(primaries)
-    tags = {name: b"XYZ \0\0\0\0" + struct.pack(">3i", *np.round(colorants[:, k] * 65536).astype(int))
-            for k, name in enumerate((b"rXYZ", b"gXYZ", b"bXYZ"))}  # fmt: skip
+    tags = {
+        name: b"XYZ \0\0\0\0" + struct.pack(">3i", *np.round(colorants[:, k] * 65536).astype(int))
+        for k, name in enumerate((b"rXYZ", b"gXYZ", b"bXYZ"))
+    }
     tags |= dict.fromkeys((b"rTRC", b"gTRC", b"bTRC"), curve)
-    table, body = b"", b""
+    table = b""
+    body = b""
     for name, data in tags.items():
         table += name + struct.pack(">II", 132 + 12 * len(tags) + len(body), len(data))
         body += data + b"\0" * (-len(data) % 4)
@@ -193,7 +236,9 @@ def icc(primaries, curve):
 
 LINEAR = b"curv\0\0\0\0" + struct.pack(">I", 0)
 SRGB_PARAMETERS = (2.4, 1 / 1.055, 0.055 / 1.055, 1 / 12.92, 0.04045)
-SRGB = b"para\0\0\0\0" + struct.pack(">HH5i", 3, 0, *(round(value * 65536) for value in SRGB_PARAMETERS))
+SRGB = b"para\0\0\0\0" + struct.pack(
+    ">HH5i", 3, 0, *(round(value * 65536) for value in SRGB_PARAMETERS)
+)
 
 
 @pytest.mark.parametrize(
@@ -228,7 +273,9 @@ def test_grey_profiles_of_any_depth(tmp_path):
     head = bytes(profile[:128]) + struct.pack(">I4sII", 1, b"kTRC", 144, len(curve)) + curve
     ramp = np.tile(np.linspace(0.1, 0.9, 40), (25, 1))
     for dtype in (np.uint8, np.uint16):
-        tifffile.imwrite(tmp_path / "a.tif", levels(ramp, dtype), photometric="minisblack", iccprofile=head)
+        tifffile.imwrite(
+            tmp_path / "a.tif", levels(ramp, dtype), photometric="minisblack", iccprofile=head
+        )
         photo = read_photo(tmp_path / "a.tif")
         np.testing.assert_allclose(photo.linear[..., 1], ramp**1.8, atol=0.004)
         assert photo.warnings == ()
@@ -242,7 +289,9 @@ def test_cielab_of_16_bits(tmp_path, kind, compression):
     lab = rgb2lab(srgb(quadrants()), illuminant="D65")  # about what Bradford makes of it under D50
     if kind == "cielab":
         lightness = np.round(lab[..., :1] / 100 * 65535).astype(np.uint16)
-        stored = np.concatenate([lightness, np.round(lab[..., 1:] * 256).astype(np.int16).view(np.uint16)], -1)
+        stored = np.concatenate(
+            [lightness, np.round(lab[..., 1:] * 256).astype(np.int16).view(np.uint16)], -1
+        )
     else:
         stored = np.round(lab * [652.8, 256, 256] + [0, 32768, 32768]).astype(np.uint16)
     tifffile.imwrite(tmp_path / "a.tif", stored, photometric=kind, compression=compression)
@@ -256,7 +305,9 @@ def test_deep_tiffs_that_are_neither_grey_nor_rgb_are_refused(tmp_path, meaning)
     code = {"separated": 5, "cfa": 32803, "ycbcr": 6}[meaning]
     channels = 4 if meaning == "separated" else 3
     pixels = np.random.default_rng(0).integers(0, 65536, (20, 30, channels)).astype(np.uint16)
-    tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="rgb", extrasamples=["unspecified"] * (channels - 3))
+    tifffile.imwrite(
+        tmp_path / "a.tif", pixels, photometric="rgb", extrasamples=["unspecified"] * (channels - 3)
+    )
     with tifffile.TiffFile(tmp_path / "a.tif", mode="r+b") as file:
         file.pages[0].tags["PhotometricInterpretation"].overwrite(code)
     with pytest.raises(InputError, match="neither grey nor RGB"):
@@ -278,7 +329,13 @@ def test_a_fourth_channel_that_is_no_alpha_is_left_out(tmp_path, dtype):
 def test_a_second_channel_of_a_deep_grey_tiff_is_told_of(tmp_path, kind):
     grey = levels(srgb(quadrants()), np.uint16)[..., :1]
     pixels = np.concatenate([grey, grey * 0 + 9], -1)
-    tifffile.imwrite(tmp_path / "a.tif", pixels, photometric="minisblack", extrasamples=[kind], planarconfig="contig")
+    tifffile.imwrite(
+        tmp_path / "a.tif",
+        pixels,
+        photometric="minisblack",
+        extrasamples=[kind],
+        planarconfig="contig",
+    )
     photo = read_photo(tmp_path / "a.tif")
     np.testing.assert_allclose(medians(photo), np.tile(COLOURS[:, :1], 3), atol=0.01)
     assert any("transparency" in warning for warning in photo.warnings)
@@ -288,15 +345,22 @@ def test_a_second_channel_of_a_deep_grey_tiff_is_told_of(tmp_path, kind):
 def test_a_transparent_colour_of_a_16_bit_png(tmp_path, colours):
     pixels = levels(srgb(quadrants()), np.uint16)[..., 3 - colours :]
     clear = pixels[-1, 0]
-    path = png(tmp_path / "a.png", pixels if colours == 3 else pixels[..., 0], (b"tRNS", clear.astype(">u2").tobytes()))
+    path = png(
+        tmp_path / "a.png",
+        pixels if colours == 3 else pixels[..., 0],
+        (b"tRNS", clear.astype(">u2").tobytes()),
+    )
     photo = read_photo(path)
     np.testing.assert_array_equal(photo.original[40:, :40], 1)
-    assert photo.original[:20].max() < 0.99 and photo.warnings == ("Transparent parts are laid over white.",)
+    assert photo.original[:20].max() < 0.99 and photo.warnings == (
+        "Transparent parts are laid over white.",
+    )
 
 
 def test_the_profile_of_a_jpeg_2000(tmp_path):
     Image.fromarray(levels(srgb(quadrants(TO_P3)))).save(tmp_path / "plain.jp2")
-    data, profile = (tmp_path / "plain.jp2").read_bytes(), icc(DISPLAY_P3, SRGB)
+    data = (tmp_path / "plain.jp2").read_bytes()
+    profile = icc(DISPLAY_P3, SRGB)
     start = data.index(b"colr") - 4
     (size,) = struct.unpack_from(">I", data, start)
     box = b"colr\2\0\0" + profile
@@ -304,16 +368,27 @@ def test_the_profile_of_a_jpeg_2000(tmp_path):
     header = data.index(b"jp2h") - 4
     (header_size,) = struct.unpack_from(">I", data, header)
     grown = struct.pack(">I", header_size + len(box) - size)
-    (tmp_path / "a.jp2").write_bytes(data[:header] + grown + data[header + 4 : start] + box + data[start + size :])
+    (tmp_path / "a.jp2").write_bytes(
+        data[:header] + grown + data[header + 4 : start] + box + data[start + size :]
+    )
     assert_right(read_photo(tmp_path / "a.jp2"), 0.01)
 
 
 REPORTED_FILES = [
-    ("heif_avif_nclx", 0.04), ("png_colour_chunks", 0.015), ("jpg_dcf_adobergb", 0.02), ("tif_float_icc", 0.01),
-    ("tif_lab16", 0.05), ("tif_16_fourth_channel", 0.01), ("exr_chromaticities", 0.01), ("exr_luminance_chroma", 0.02),
-    ("exr_which_layer", 0.01), ("exr_windows", 0.01), ("hdr_primaries", 0.02), ("hdr_readonly_tmp", 0.02),
+    ("heif_avif_nclx", 0.04),
+    ("png_colour_chunks", 0.015),
+    ("jpg_dcf_adobergb", 0.02),
+    ("tif_float_icc", 0.01),
+    ("tif_lab16", 0.05),
+    ("tif_16_fourth_channel", 0.01),
+    ("exr_chromaticities", 0.01),
+    ("exr_luminance_chroma", 0.02),
+    ("exr_which_layer", 0.01),
+    ("exr_windows", 0.01),
+    ("hdr_primaries", 0.02),
+    ("hdr_readonly_tmp", 0.02),
     ("batch_names", 0.02),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("folder", "tolerance"), REPORTED_FILES)
@@ -333,5 +408,7 @@ def test_reported_transparent_grey(real_data):
 def test_reported_crop_of_a_dng(real_data):
     pytest.importorskip("rawpy", reason="needs rawpy")
     photo = read_photo(real_data(f"{REPORTED}/dng_default_crop/r_crop35.dng"))
-    assert photo.original.shape == (128, 192, 3) and photo.camera.fov == pytest.approx(39.6, abs=0.05)
+    assert photo.original.shape == (128, 192, 3) and photo.camera.fov == pytest.approx(
+        39.6, abs=0.05
+    )
     assert_right(photo, 0.02)

@@ -30,7 +30,10 @@ PLAIN = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
 
 
 def channels(picture, prefix="", names="RGB"):
-    return {f"{prefix}{name}": np.ascontiguousarray(picture[..., k], np.float32) for k, name in enumerate(names)}
+    return {
+        f"{prefix}{name}": np.ascontiguousarray(picture[..., k], np.float32)
+        for k, name in enumerate(names)
+    }
 
 
 def write(path, pixels, **header):
@@ -88,7 +91,9 @@ def test_stated_colours_that_cannot_be_used_are_told_of(tmp_path):
 
 
 def test_the_name_of_a_colour_space(tmp_path):
-    photo = read_photo(write(tmp_path / "a.exr", channels(quadrants(TO_ACESCG)), colorInteropID="lin_ap1_scene"))
+    photo = read_photo(
+        write(tmp_path / "a.exr", channels(quadrants(TO_ACESCG)), colorInteropID="lin_ap1_scene")
+    )
     assert_right(photo, 0.003)
 
 
@@ -101,18 +106,27 @@ def write_sparse(path, channels):
     height, width = next(iter(channels.values()))[0].shape
     names = sorted(channels)
     steps = {name: channels[name][1] for name in names}
-    listed = b"".join(name.encode() + b"\0" + struct.pack("<iiii", 1, 0, steps[name], steps[name]) for name in names)
+    listed = b"".join(
+        name.encode() + b"\0" + struct.pack("<iiii", 1, 0, steps[name], steps[name])
+        for name in names
+    )
     box = struct.pack("<4i", 0, 0, width - 1, height - 1)
     header = b"\x76\x2f\x31\x01" + struct.pack("<i", 2)
-    header += attribute("channels", "chlist", listed + b"\0") + attribute("compression", "compression", b"\0")
+    header += attribute("channels", "chlist", listed + b"\0") + attribute(
+        "compression", "compression", b"\0"
+    )
     header += attribute("dataWindow", "box2i", box) + attribute("displayWindow", "box2i", box)
-    header += attribute("lineOrder", "lineOrder", b"\0") + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    header += attribute("lineOrder", "lineOrder", b"\0") + attribute(
+        "pixelAspectRatio", "float", struct.pack("<f", 1)
+    )
     header += attribute("screenWindowCenter", "v2f", bytes(8))
     header += attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
     lines = []
     for y in range(height):
         kept = [name for name in names if y % steps[name] == 0]
-        line = b"".join(channels[name][0][y, :: steps[name]].astype("<f2").tobytes() for name in kept)
+        line = b"".join(
+            channels[name][0][y, :: steps[name]].astype("<f2").tobytes() for name in kept
+        )
         lines.append(struct.pack("<ii", y, len(line)) + line)
     starts = len(header) + 8 * height + np.cumsum([0, *map(len, lines[:-1])])
     path.write_bytes(header + starts.astype("<u8").tobytes() + b"".join(lines))
@@ -140,10 +154,14 @@ def parts(path, **pictures):
 @pytest.mark.parametrize(
     ("picture", "others"),
     [
-        ("rgba", ["normal"]), ("C", ["N"]), ("ViewLayer.Combined", ["ViewLayer.DiffCol", "ViewLayer.Normal"]),
-        ("beauty_denoised", ["albedo"]), ("Beauty", ["AO", "unknown"]), ("mine", ["Depth", "diffuse_color"]),
+        ("rgba", ["normal"]),
+        ("C", ["N"]),
+        ("ViewLayer.Combined", ["ViewLayer.DiffCol", "ViewLayer.Normal"]),
+        ("beauty_denoised", ["albedo"]),
+        ("Beauty", ["AO", "unknown"]),
+        ("mine", ["Depth", "diffuse_color"]),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("as_parts", [True, False])
 def test_the_layer_that_is_the_picture(tmp_path, picture, others, as_parts):
     pictures = {name: 1 - quadrants() for name in others} | {picture: quadrants()}
@@ -151,7 +169,9 @@ def test_the_layer_that_is_the_picture(tmp_path, picture, others, as_parts):
         file = parts(tmp_path / "a.exr", **pictures)
     else:
         layers = [channels(values, f"{name}.") for name, values in pictures.items()]
-        file = write(tmp_path / "a.exr", {name: values for layer in layers for name, values in layer.items()})
+        file = write(
+            tmp_path / "a.exr", {name: values for layer in layers for name, values in layer.items()}
+        )
     photo = read_photo(file)
     assert_right(photo, 1e-3)
     assert photo.layer == picture
@@ -159,13 +179,17 @@ def test_the_layer_that_is_the_picture(tmp_path, picture, others, as_parts):
 
 
 def test_names_of_layers_are_ranked():
-    ranked = sorted(["Cryptomatte00", "diffuse", "foo", "beauty", "rgba", "Noisy Image", "N"], key=picture_rank)
+    ranked = sorted(
+        ["Cryptomatte00", "diffuse", "foo", "beauty", "rgba", "Noisy Image", "N"], key=picture_rank
+    )
     assert ranked[:4] == ["rgba", "beauty", "Noisy Image", "foo"]
     assert picture_rank("normal") > picture_rank("anything")
 
 
 def test_a_layer_by_its_name(tmp_path):
-    file = parts(tmp_path / "a.exr", rgba=1 - quadrants(), beauty=quadrants(), normal=quadrants() * 0.5)
+    file = parts(
+        tmp_path / "a.exr", rgba=1 - quadrants(), beauty=quadrants(), normal=quadrants() * 0.5
+    )
     assert read_exr_photo(file).layer == "rgba"
     photo = read_photo(file, layer="BEAUTY")
     assert photo.layer == "beauty"
@@ -179,7 +203,9 @@ def test_a_layer_by_its_name(tmp_path):
 
 
 def test_a_scene_keeps_its_layer(tmp_path):
-    file = parts(tmp_path / "a.exr", rgba=1 - quadrants(shape=(24, 33)), beauty=quadrants(shape=(24, 33)))
+    file = parts(
+        tmp_path / "a.exr", rgba=1 - quadrants(shape=(24, 33)), beauty=quadrants(shape=(24, 33))
+    )
     photo = read_photo(file, layer="beauty")
     scene = replace(make_scene(24, 33), photo=photo, camera=photo.camera)
     save_scene(scene, tmp_path / "a.scene")
@@ -189,7 +215,9 @@ def test_a_scene_keeps_its_layer(tmp_path):
 
 def test_layer_on_the_command_line(refused, tmp_path):
     file = parts(tmp_path / "a.exr", rgba=quadrants(), beauty=quadrants())
-    assert "choose one of rgba, beauty" in refused("invert", file, "-o", tmp_path / "a.scene", "--layer", "nothing")
+    assert "choose one of rgba, beauty" in refused(
+        "invert", file, "-o", tmp_path / "a.scene", "--layer", "nothing"
+    )
 
 
 # Windows and pixels
@@ -202,8 +230,14 @@ def test_the_display_window_is_the_photo(tmp_path):
     assert photo.original.shape == (64, 96, 3)
     np.testing.assert_allclose(photo.original * 2.0**-photo.stops, quadrants(), atol=1e-6)
     inner = quadrants()[8:56, 8:80]
-    cut = read_photo(write(tmp_path / "cut.exr", channels(inner), **windows((8, 8, 72, 48), (0, 0, 96, 64))))
-    assert cut.original.shape == (64, 96, 3) and not cut.original[:8].any() and not cut.original[:, 80:].any()
+    cut = read_photo(
+        write(tmp_path / "cut.exr", channels(inner), **windows((8, 8, 72, 48), (0, 0, 96, 64)))
+    )
+    assert (
+        cut.original.shape == (64, 96, 3)
+        and not cut.original[:8].any()
+        and not cut.original[:, 80:].any()
+    )
     assert_right(cut, 1e-4)
     assert any("does not fill" in note for note in cut.warnings)
 
@@ -247,7 +281,9 @@ def test_pixels_that_are_not_square(tmp_path, shape, step):
 
 def test_a_pixel_shape_that_is_not_believed(tmp_path):
     photo = read_photo(write(tmp_path / "a.exr", channels(quadrants()), pixelAspectRatio=1e6))
-    assert photo.original.shape == (64, 96, 3) and any("taken as square" in note for note in photo.warnings)
+    assert photo.original.shape == (64, 96, 3) and any(
+        "taken as square" in note for note in photo.warnings
+    )
 
 
 # Radiance
@@ -261,7 +297,9 @@ def radiance(path, picture, lines="", resolution="-Y {height} +X {width}", kind=
     packed = np.concatenate([mantissa, exponent + 128], -1).astype(np.uint8)
     height, width = picture.shape[:2]
     size = resolution.format(height=height, width=width)
-    path.write_bytes(f"#?RADIANCE\n{lines}FORMAT=32-bit_rle_{kind}\n\n{size}\n".encode() + packed.tobytes())
+    path.write_bytes(
+        f"#?RADIANCE\n{lines}FORMAT=32-bit_rle_{kind}\n\n{size}\n".encode() + packed.tobytes()
+    )
     return path
 
 
@@ -270,13 +308,20 @@ def radiance(path, picture, lines="", resolution="-Y {height} +X {width}", kind=
     [
         (TO_2020, "PRIMARIES=0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290\n", 1, "rgbe"),
         (np.eye(3), "COLORCORR=2 1 .5\n", (2, 1, 0.5), "rgbe"),
-        (np.eye(3), "COLORCORR=2 1 .5\nCOLORCORR=2 2 2\nEXPOSURE=3\nEXPOSURE= 0.5\n", (6, 3, 1.5), "rgbe"),
+        (
+            np.eye(3),
+            "COLORCORR=2 1 .5\nCOLORCORR=2 2 2\nEXPOSURE=3\nEXPOSURE= 0.5\n",
+            (6, 3, 1.5),
+            "rgbe",
+        ),
         (TO_XYZ_E, "", 1, "xyze"),
     ],
     ids=["primaries", "colorcorr", "factors", "xyze"],
 )
 def test_the_header_of_a_radiance_picture(tmp_path, matrix, lines, factor, kind):
-    assert_right(read_photo(radiance(tmp_path / "a.hdr", quadrants(matrix) * factor, lines, kind=kind)), 0.01)
+    assert_right(
+        read_photo(radiance(tmp_path / "a.hdr", quadrants(matrix) * factor, lines, kind=kind)), 0.01
+    )
 
 
 @pytest.mark.parametrize(

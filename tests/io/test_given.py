@@ -16,14 +16,17 @@ LEVELS = np.random.default_rng(5).integers(0, 256, (12, 17, 3)).astype(np.uint8)
 
 def test_display_arrays_are_what_a_png_of_them_is(tmp_path):
     Image.fromarray(LEVELS).save(tmp_path / "a.png")
-    photo, file = photo_of(LEVELS, encoded=True), read_photo(tmp_path / "a.png")
+    photo = photo_of(LEVELS, encoded=True)
+    file = read_photo(tmp_path / "a.png")
     assert np.array_equal(photo.original, file.original) and photo.path is None and photo.source
     assert not photo.hdr and photo.fov_source == "default"
     deep = LEVELS.astype(np.uint16) * 257
     assert np.array_equal(photo_of(deep, encoded=True).original, srgb_to_linear(deep))
     floats = photo_of(LEVELS / 255, encoded=True)
     assert np.abs(floats.original - photo.original).max() < 1e-6
-    assert np.array_equal(photo_of(LEVELS[..., 0], encoded=True).original, photo.original[..., :1].repeat(3, -1))
+    assert np.array_equal(
+        photo_of(LEVELS[..., 0], encoded=True).original, photo.original[..., :1].repeat(3, -1)
+    )
 
 
 def test_linear_arrays_are_light(tmp_path):
@@ -41,8 +44,12 @@ def test_pictures_keep_their_profile_and_exif():
     exif = picture.getexif()
     exif[0x0112] = 6
     assert photo_of(picture).original.shape == (17, 12, 3)
-    assert np.array_equal(photo_of(Image.fromarray(LEVELS)).original, photo_of(LEVELS, encoded=True).original)
-    assert photo_of(picture.convert("CMYK")).warnings == ("CMYK without a usable profile: colours are approximate.",)
+    assert np.array_equal(
+        photo_of(Image.fromarray(LEVELS)).original, photo_of(LEVELS, encoded=True).original
+    )
+    assert photo_of(picture.convert("CMYK")).warnings == (
+        "CMYK without a usable profile: colours are approximate.",
+    )
     assert photo_of(Image.fromarray(LEVELS[..., 0].astype(np.float32))).hdr
 
 
@@ -53,7 +60,10 @@ def test_open_files_are_read_from_where_they_stand(tmp_path):
         photo = photo_of(file)
     assert photo.name == "kitchen.png" and photo.source == content
     assert photo_of(io.BytesIO(content)).path is None
-    with open(tmp_path / "kitchen.png", encoding="latin-1") as text, pytest.raises(InputError, match="binary mode"):
+    with (
+        open(tmp_path / "kitchen.png", encoding="latin-1") as text,
+        pytest.raises(InputError, match="binary mode"),
+    ):
         photo_of(text)
 
 

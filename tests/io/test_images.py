@@ -103,7 +103,9 @@ def test_masks(tmp_path):
     cv2.imwrite(str(tmp_path / "red.png"), mask[..., None] * np.uint8([0, 0, 1]))
     np.testing.assert_array_equal(read_mask(tmp_path / "red.png", (40, 60)), mask > 0)
     cv2.imwrite(str(tmp_path / "alpha.png"), np.dstack([np.full((40, 60, 3), 255, np.uint8), mask]))
-    np.testing.assert_array_equal(read_mask(tmp_path / "alpha.png", (40, 60)), mask > 0)  # transparent is outside
+    np.testing.assert_array_equal(
+        read_mask(tmp_path / "alpha.png", (40, 60)), mask > 0
+    )  # transparent is outside
     assert read_map(tmp_path / "alpha.png").min() == 1, "a map has no alpha"
     photo = np.random.default_rng(0).integers(40, 200, (40, 60, 3)).astype(np.uint8)
     cv2.imwrite(str(tmp_path / "photo.png"), photo)
@@ -144,13 +146,21 @@ def test_overview_of_any_shape(shape):
 
 def write_channels(path, **channels):
     """An EXR of constant channels, float32 unless they have another type."""
-    flat = {name: np.full((9, 12), v, getattr(v, "dtype", np.float32)) for name, v in channels.items()}
-    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, flat) as file:
+    flat = {
+        name: np.full((9, 12), v, getattr(v, "dtype", np.float32)) for name, v in channels.items()
+    }
+    with OpenEXR.File(
+        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, flat
+    ) as file:
         file.write(str(path))
     return path
 
 
-LAYERS = {f"{name}.{c}": value + k for name, value in (("albedo", 1), ("beauty", 5)) for k, c in enumerate("RGB")}
+LAYERS = {
+    f"{name}.{c}": value + k
+    for name, value in (("albedo", 1), ("beauty", 5))
+    for k, c in enumerate("RGB")
+}
 
 
 @pytest.mark.parametrize(
@@ -159,7 +169,11 @@ LAYERS = {f"{name}.{c}": value + k for name, value in (("albedo", 1), ("beauty",
         ({**LAYERS, "depth.Z": 9}, False, [5, 6, 7]),
         ({"R": np.float16(1), "G": np.float16(2), "B": np.float16(3), "A": 1}, False, [1, 2, 3, 1]),
         ({**LAYERS, "R": 1, "G": 2, "B": 3}, False, [1, 2, 3]),
-        ({f"View.Combined.{c}": k for k, c in enumerate("RGBA")} | {"View.Mist.Z": 9}, False, [0, 1, 2, 3]),
+        (
+            {f"View.Combined.{c}": k for k, c in enumerate("RGBA")} | {"View.Mist.Z": 9},
+            False,
+            [0, 1, 2, 3],
+        ),
         ({**LAYERS, "Z": 9}, False, 9),
         ({**LAYERS, "Z": 9}, True, [5, 6, 7]),
         ({"Y": 0.5, "A": 0.25}, True, [0.5, 0.5, 0.5, 0.25]),
@@ -181,9 +195,14 @@ def test_a_depth_is_no_photo(tmp_path):
     """Alone it is refused; before the picture, as a part of its own, it is passed over."""
     with pytest.raises(InputError, match="RGB or Y is needed"):
         read_exr_photo(write_channels(tmp_path / "depth.exr", Z=7))
-    pixels = lambda value: np.full((9, 12), value, np.float32)  # noqa: E731
-    parts = [OpenEXR.Part({}, {"Z": pixels(7)}, "depth"),
-             OpenEXR.Part({}, {"R": pixels(0.25), "G": pixels(0.5), "B": pixels(0.75)}, "rgb")]  # fmt: skip
+
+    def pixels(value):
+        return np.full((9, 12), value, np.float32)
+
+    parts = [
+        OpenEXR.Part({}, {"Z": pixels(7)}, "depth"),
+        OpenEXR.Part({}, {"R": pixels(0.25), "G": pixels(0.5), "B": pixels(0.75)}, "rgb"),
+    ]
     with OpenEXR.File(parts) as file:
         file.write(str(tmp_path / "parts.exr"))
     assert np.allclose(read_exr_photo(tmp_path / "parts.exr").linear, [0.25, 0.5, 0.75])
@@ -192,10 +211,22 @@ def test_a_depth_is_no_photo(tmp_path):
 @pytest.mark.parametrize(
     ("pixels", "settings", "words"),
     [
-        (np.zeros((3, 20, 30), np.uint16), {"photometric": "rgb", "planarconfig": "separate"}, "one after the other"),
-        (np.zeros((3, 20, 30), np.float32), {"photometric": "rgb", "planarconfig": "separate"}, "one after the other"),
+        (
+            np.zeros((3, 20, 30), np.uint16),
+            {"photometric": "rgb", "planarconfig": "separate"},
+            "one after the other",
+        ),
+        (
+            np.zeros((3, 20, 30), np.float32),
+            {"photometric": "rgb", "planarconfig": "separate"},
+            "one after the other",
+        ),
         (np.zeros((20, 30), np.uint16), {"photometric": "miniswhite"}, "inverted"),
-        (np.zeros((20, 30, 4), np.uint16), {"photometric": "rgb", "extrasamples": ["assocalpha"]}, "premultiplied"),
+        (
+            np.zeros((20, 30, 4), np.uint16),
+            {"photometric": "rgb", "extrasamples": ["assocalpha"]},
+            "premultiplied",
+        ),
     ],
 )
 def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words):
@@ -205,7 +236,9 @@ def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words
 
 
 def test_several_threads_write_one_file_and_lift_one_limit(tmp_path):
-    before, both, entered = Image.MAX_IMAGE_PIXELS, threading.Barrier(2), threading.Semaphore(0)
+    before = Image.MAX_IMAGE_PIXELS
+    both = threading.Barrier(2)
+    entered = threading.Semaphore(0)
 
     def write(content):
         with whole_file(tmp_path / "a.txt", force=True) as temporary:
@@ -228,4 +261,6 @@ def test_several_threads_write_one_file_and_lift_one_limit(tmp_path):
         for end, done in zip(ends, lifted):
             end.set()
             done.result()
-    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"] and before == Image.MAX_IMAGE_PIXELS
+    assert [file.name for file in tmp_path.iterdir()] == [
+        "a.txt"
+    ] and before == Image.MAX_IMAGE_PIXELS

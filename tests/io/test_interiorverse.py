@@ -26,7 +26,10 @@ def folder(tmp_path):
 
 def _write(scene, name):
     size = (12, 16)
-    grey = lambda v: np.full((*size, 3), v, np.float32)  # noqa: E731
+
+    def grey(v):
+        return np.full((*size, 3), v, np.float32)
+
     depth = np.full(size, 2000, np.float32)
     depth[:2] = np.inf
     normal = grey(0)
@@ -36,7 +39,14 @@ def _write(scene, name):
     material[..., 0], material[..., 1] = 0.3, 0.7
     mask = np.ones(size, np.float32)
     mask[:, 0] = 0
-    maps = {"im": grey(4), "albedo": grey(0.25), "material": material, "depth": depth, "normal": normal, "mask": mask}
+    maps = {
+        "im": grey(4),
+        "albedo": grey(0.25),
+        "material": material,
+        "depth": depth,
+        "normal": normal,
+        "mask": mask,
+    }
     for key, values in maps.items():
         write_exr(scene / f"{name}_{key}.exr", values)
 
@@ -44,7 +54,9 @@ def _write(scene, name):
 def test_the_layout_in_our_conventions(folder):
     source = open_sources([folder])
     assert isinstance(source, InteriorVerse) and len(source) == 4
-    assert source.notes == ("2 scenes of the split 'train' are not there (dataset_85/LOST, dataset_120/LOST ...).",)
+    assert source.notes == (
+        "2 scenes of the split 'train' are not there (dataset_85/LOST, dataset_120/LOST ...).",
+    )
     sample = source.read(0)
     surface = sample.mask > 0
     assert not surface[:2].any() and not surface[:, 0].any() and surface[2:, 1:].all()

@@ -26,7 +26,9 @@ LEVELS = np.random.default_rng(1).integers(0, 256, (30, 41, 3)).astype(np.uint8)
 
 def video_curve(encoded):
     """The inverse of BT.2020's: neither a power nor sRGB's, so a profile has samples of it."""
-    return np.where(encoded < 0.081, encoded / 4.5, ((np.maximum(encoded, 0) + 0.099) / 1.099) ** (1 / 0.45))
+    return np.where(
+        encoded < 0.081, encoded / 4.5, ((np.maximum(encoded, 0) + 0.099) / 1.099) ** (1 / 0.45)
+    )
 
 
 P3 = profile_of(spaces.space("Display P3", spaces.DISPLAY_P3, spaces.srgb_curve))
@@ -98,14 +100,21 @@ def test_sixteen_bits_stay_sixteen(kind, profile, tmp_path):
     assert cv2.imread(str(tmp_path / f"eight.{kind}"), cv2.IMREAD_UNCHANGED).dtype == np.uint8
 
 
-@pytest.mark.parametrize(("kind", "quality", "worst"), [("jpg", 95, 12), ("webp", 90, 25), ("avif", 90, 25)])
+@pytest.mark.parametrize(
+    ("kind", "quality", "worst"), [("jpg", 95, 12), ("webp", 90, 25), ("avif", 90, 25)]
+)
 def test_lossy_formats_take_a_quality(kind, quality, worst, tmp_path):
-    ramp = cv2.resize(np.random.default_rng(3).integers(0, 256, (5, 6, 3)).astype(np.uint8), (96, 80))
+    ramp = cv2.resize(
+        np.random.default_rng(3).integers(0, 256, (5, 6, 3)).astype(np.uint8), (96, 80)
+    )
     photo = photo_of_levels(tmp_path, ramp, icc_profile=P3)
     for name, value in (("good", quality), ("bad", 10)):
         mt.save_image(tmp_path / f"{name}.{kind}", photo.original, photo, quality=value)
     image = Image.open(tmp_path / f"good.{kind}")
-    assert np.abs(np.asarray(image, np.int16) - ramp).max() <= worst and image.info["icc_profile"] == P3
+    assert (
+        np.abs(np.asarray(image, np.int16) - ramp).max() <= worst
+        and image.info["icc_profile"] == P3
+    )
     assert (tmp_path / f"bad.{kind}").stat().st_size < (tmp_path / f"good.{kind}").stat().st_size
 
 
@@ -171,9 +180,15 @@ def test_exif_goes_along_upright_and_names_the_program(kind, source, tmp_path):
     taken = found.get_ifd(0x8769)
     assert (taken[0x9003], taken[0xA405]) == ("2026:05:04 10:11:12", 28)
     assert (taken[0xA002], taken[0xA003]) == (30, 41)
-    assert found.get_ifd(0x8825)[1] == "N" and [float(v) for v in found.get_ifd(0x8825)[2]] == [48.0, 8.0, 0.0]
+    assert found.get_ifd(0x8825)[1] == "N" and [float(v) for v in found.get_ifd(0x8825)[2]] == [
+        48.0,
+        8.0,
+        0.0,
+    ]
     again = read_photo(tmp_path / f"out.{kind}")
-    assert again.original.shape == photo.original.shape and again.camera.fov == pytest.approx(photo.camera.fov)
+    assert again.original.shape == photo.original.shape and again.camera.fov == pytest.approx(
+        photo.camera.fov
+    )
 
 
 def test_a_deep_tiff_has_exif_too_and_other_programs_read_it(tmp_path):
@@ -181,7 +196,10 @@ def test_a_deep_tiff_has_exif_too_and_other_programs_read_it(tmp_path):
     mt.save_image(tmp_path / "out.tif", photo.original, photo)
     with TiffFile(tmp_path / "out.tif") as file:
         page = file.pages[0]
-        assert page.tags["Software"].value == SOFTWARE and page.tags["InterColorProfile"].value == srgb_profile()
+        assert (
+            page.tags["Software"].value == SOFTWARE
+            and page.tags["InterColorProfile"].value == srgb_profile()
+        )
         assert page.compression.name == "ADOBE_DEFLATE" and page.bitspersample == 16
 
 
@@ -197,7 +215,9 @@ def test_a_makers_note_that_a_jpeg_has_no_room_for(tmp_path, monkeypatch):
     monkeypatch.setattr("materialist.io.out.encode._EXIF_BYTES", 2000)
     photo = photo_of_levels(tmp_path, exif=exif)
     (note,) = mt.save_image(tmp_path / "out.jpg", photo.original, photo)
-    assert "maker" in note and Image.open(tmp_path / "out.jpg").getexif().get_ifd(0x8769)[0xA405] == 28
+    assert (
+        "maker" in note and Image.open(tmp_path / "out.jpg").getexif().get_ifd(0x8769)[0xA405] == 28
+    )
 
 
 def test_without_a_photo_a_picture_is_srgb(tmp_path):
@@ -268,7 +288,9 @@ def test_profiles_say_what_the_space_does(space):
     # LittleCMS, which other programs use, agrees.
     image = Image.fromarray(np.random.default_rng(4).integers(60, 190, (8, 8, 3)).astype(np.uint8))
     source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
-    theirs = ImageCms.profileToProfile(image, source, ImageCms.createProfile("sRGB"), renderingIntent=1)
+    theirs = ImageCms.profileToProfile(
+        image, source, ImageCms.createProfile("sRGB"), renderingIntent=1
+    )
     ours = srgb_levels(space.linear(np.asarray(image)))
     assert np.abs(np.asarray(theirs, np.int16) - ours).max() <= 2
 
@@ -284,7 +306,9 @@ def test_a_heic_of_more_bits_is_a_deep_photo(bits, tmp_path):
     mt.save_image(tmp_path / "out.png", photo.original, photo)
     stored = cv2.imread(str(tmp_path / "out.png"), cv2.IMREAD_UNCHANGED)
     assert stored.dtype == (np.uint16 if bits > 8 else np.uint8)
-    assert np.abs(read_photo(tmp_path / "out.png").original - photo.original).max() < (1e-4 if bits > 8 else 1e-6)
+    assert np.abs(read_photo(tmp_path / "out.png").original - photo.original).max() < (
+        1e-4 if bits > 8 else 1e-6
+    )
 
 
 @pytest.mark.parametrize(
@@ -297,7 +321,9 @@ def test_a_heic_of_more_bits_is_a_deep_photo(bits, tmp_path):
     ],
 )
 def test_profiles_have_the_names_that_people_know(primaries, curve, name):
-    profile = ImageCms.ImageCmsProfile(io.BytesIO(profile_of(spaces.space("mine", primaries, curve)))).profile
+    profile = ImageCms.ImageCmsProfile(
+        io.BytesIO(profile_of(spaces.space("mine", primaries, curve)))
+    ).profile
     assert profile.profile_description == name
 
 

@@ -76,8 +76,22 @@ def test_the_files_of_the_contract(scene, tmp_path):
     save_scene(scene, tmp_path / "deep/down/a.scene")
     root = tmp_path / "deep/down/a.scene"
     maps = ("albedo", "roughness", "metallic", "normal", "depth")
-    expected = {"scene.json", "photo.exr", "photo.png", "original.png", "envmap.exr", "mesh.ply", "plane_label.png"}
-    expected |= {"rerender.exr", "rerender.png", "report.json", "overview.png", "maps/shading_residual.exr"}
+    expected = {
+        "scene.json",
+        "photo.exr",
+        "photo.png",
+        "original.png",
+        "envmap.exr",
+        "mesh.ply",
+        "plane_label.png",
+    }
+    expected |= {
+        "rerender.exr",
+        "rerender.png",
+        "report.json",
+        "overview.png",
+        "maps/shading_residual.exr",
+    }
     expected |= {f"{folder}/{name}.exr" for folder in ("prior", "maps") for name in maps}
     assert {str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()} == expected
     assert os.listdir(tmp_path / "deep/down") == ["a.scene"]
@@ -103,7 +117,9 @@ def test_force_alone_replaces_a_scene_and_never_what_somebody_put_beside_it(scen
     for name in ("mask.png", "maps/mask.png", "original.psd", ".keys/a.txt", "bodies/notes.txt"):
         (place / name).parent.mkdir(exist_ok=True)
         (place / name).write_text("mine")
-        with pytest.raises(OutputError, match=f"holds {re.escape(name)}, which does not belong to a scene package"):
+        with pytest.raises(
+            OutputError, match=f"holds {re.escape(name)}, which does not belong to a scene package"
+        ):
             save_scene(scene, place, force=True)
         assert (place / name).read_text() == "mine"
         (place / name).unlink()
@@ -116,7 +132,11 @@ def test_force_never_replaces_what_is_not_a_scene(scene, tmp_path):
     (tmp_path / "holiday/precious.jpg").write_text("x")
     (tmp_path / "file").write_text("x")
     (tmp_path / "link").symlink_to(tmp_path / "holiday")
-    for name, words in (("holiday", "not a scene package"), ("file", "not a scene package"), ("link", "is a link")):
+    for name, words in (
+        ("holiday", "not a scene package"),
+        ("file", "not a scene package"),
+        ("link", "is a link"),
+    ):
         with pytest.raises(OutputError, match=words):
             save_scene(scene, tmp_path / name, force=True)
     assert (tmp_path / "holiday/precious.jpg").exists()
@@ -187,7 +207,9 @@ def test_leftovers_of_a_killed_run_are_swept_by_the_next_save(scene, tmp_path):
     with pytest.raises(SceneError, match="mv "):
         load_scene(place)
     save_scene(replace(scene, provenance={}), place, force=True)
-    assert load_scene(place).provenance == {"tool_version": __version__} and os.listdir(tmp_path) == ["a.scene"]
+    assert load_scene(place).provenance == {"tool_version": __version__} and os.listdir(
+        tmp_path
+    ) == ["a.scene"]
 
 
 def test_missing_and_unknown_packages(scene, tmp_path):
@@ -204,7 +226,9 @@ def test_missing_and_unknown_packages(scene, tmp_path):
         load_scene(root)
     (root / "scene.json").write_text(json.dumps(meta))
     write_exr(root / "maps/albedo.exr", scene.materials.albedo[:-1])
-    with pytest.raises(SceneError, match=r"albedo.exr is \[23, 33, 3\], the scene needs \[24, 33, 3\]"):
+    with pytest.raises(
+        SceneError, match=r"albedo.exr is \[23, 33, 3\], the scene needs \[24, 33, 3\]"
+    ):
         load_scene(root)
 
 

@@ -21,7 +21,9 @@ from materialist.io.package import load_scene, save_scene
 from materialist.types import Scene
 
 resource = pytest.importorskip("resource", reason="needs POSIX limits")
-FEW = settings(max_examples=60, deadline=5000, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FEW = settings(
+    max_examples=60, deadline=5000, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +61,14 @@ def window(file, *corners):
 def counted(file, vertices, faces):
     """Let the header of a PLY promise other counts."""
     lines = file.read_bytes().split(b"\n")
-    named = [f"element vertex {vertices}".encode() if line.startswith(b"element vertex") else line for line in lines]
-    named = [f"element face {faces}".encode() if line.startswith(b"element face") else line for line in named]
+    named = [
+        f"element vertex {vertices}".encode() if line.startswith(b"element vertex") else line
+        for line in lines
+    ]
+    named = [
+        f"element face {faces}".encode() if line.startswith(b"element face") else line
+        for line in named
+    ]
     file.write_bytes(b"\n".join(named))
 
 
@@ -114,10 +122,18 @@ CASES = {
     "infinite in JSON": lambda root: said(root, '"ior": 1.5', '"ior": 1e999'),
     "many faces": lambda root: counted(root / "mesh.ply", 9, 9_999_999_999),
     "many vertices": lambda root: counted(root / "bodies/0.ply", 4_000_000_000, 2),
-    "a face of no pixel": lambda root: ply_end(root / "mesh.ply", struct.pack("<ih", 2**31 - 1, -1)),
-    "a face of a pixel below 0": lambda root: ply_end(root / "mesh.ply", struct.pack("<ih", -1, -1)),
-    "a light without its scale": lambda root: shutil.copy(root / "envmap.exr", root / "prior/light.exr"),
-    "a huge light": lambda root: window(shutil.copy(root / "envmap.exr", root / "prior/light.exr"), 0, 0, 2**30, 2**30),
+    "a face of no pixel": lambda root: ply_end(
+        root / "mesh.ply", struct.pack("<ih", 2**31 - 1, -1)
+    ),
+    "a face of a pixel below 0": lambda root: ply_end(
+        root / "mesh.ply", struct.pack("<ih", -1, -1)
+    ),
+    "a light without its scale": lambda root: shutil.copy(
+        root / "envmap.exr", root / "prior/light.exr"
+    ),
+    "a huge light": lambda root: window(
+        shutil.copy(root / "envmap.exr", root / "prior/light.exr"), 0, 0, 2**30, 2**30
+    ),
     "text for a count": lambda root: counted(root / "mesh.ply", "many", 2),
     "deep JSON": lambda root: (root / "scene.json").write_text('{"a":' * 100_000),
     **{f"no {name}": lambda root, name=name: (root / name).unlink() for name in FILES},
@@ -163,7 +179,9 @@ def test_bytes_that_were_changed(copied, data):
         place = data.draw(st.integers(0, min(len(content) - 1, 2000)))
         new = data.draw(st.binary(min_size=1, max_size=8))
         content[place : place + len(new)] = new
-    file.write_bytes(content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content)
+    file.write_bytes(
+        content[: data.draw(st.integers(0, len(content)))] if data.draw(st.booleans()) else content
+    )
     read(root)
 
 
@@ -179,8 +197,11 @@ def test_sizes_that_were_changed(copied, data):
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3), max_leaves=5,
-)  # fmt: skip
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
+    max_leaves=5,
+)
 
 
 @FEW

@@ -42,7 +42,9 @@ def save(path, pixels, **options):
 @pytest.mark.parametrize("suffix", ["png", "tiff", "bmp", "webp"])
 def test_lossless_8_bit_files_decode_exactly(tmp_path, suffix):
     pixels = picture()
-    photo = read_photo(save(tmp_path / f"a.{suffix}", pixels, **({"lossless": True} if suffix == "webp" else {})))
+    photo = read_photo(
+        save(tmp_path / f"a.{suffix}", pixels, **({"lossless": True} if suffix == "webp" else {}))
+    )
     np.testing.assert_allclose(photo.linear, srgb_to_linear(pixels), atol=1e-6)
     assert photo.linear.dtype == np.float32 and photo.linear.flags.c_contiguous
     assert photo.source == (tmp_path / f"a.{suffix}").read_bytes() and photo.warnings == ()
@@ -88,8 +90,12 @@ def test_exr_of_any_unit_is_exposed_by_whole_stops_and_clipped_to_ten(tmp_path, 
     write_exr(tmp_path / "a.exr", values)
     photo = read_photo(tmp_path / "a.exr")
     assert photo.hdr and any("clipped" in warning for warning in photo.warnings)
-    assert any("stops" in warning for warning in photo.warnings) == (unit != 1) == (photo.stops != 0)
-    np.testing.assert_array_equal(photo.original * np.float32(2.0**-photo.stops), values)  # not a digit is lost
+    assert (
+        any("stops" in warning for warning in photo.warnings) == (unit != 1) == (photo.stops != 0)
+    )
+    np.testing.assert_array_equal(
+        photo.original * np.float32(2.0**-photo.stops), values
+    )  # not a digit is lost
     np.testing.assert_array_equal(photo.linear, np.minimum(photo.original, 10))
     assert 0.63 < np.percentile(photo.linear.max(-1), 97) < 1.28
 
@@ -98,14 +104,18 @@ def test_exr_of_any_unit_is_exposed_by_whole_stops_and_clipped_to_ten(tmp_path, 
 def test_transparent_parts_are_white_in_any_unit(tmp_path, unit):
     alpha = np.ones((20, 30, 1), np.float32)
     alpha[:, :12] = 0
-    colour = alpha * np.float32(unit) * np.linspace(0.1, 0.9, 600, dtype=np.float32).reshape(20, 30, 1)
+    colour = (
+        alpha * np.float32(unit) * np.linspace(0.1, 0.9, 600, dtype=np.float32).reshape(20, 30, 1)
+    )
     pixels = np.concatenate([colour, colour, colour, alpha], -1)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, {"RGBA": pixels}).write(str(tmp_path / "a.exr"))
     photo = read_photo(tmp_path / "a.exr")
     np.testing.assert_array_equal(photo.linear[:, :12], 1)
     assert photo.hdr and 0.2 < np.median(photo.linear[:, 12:]) < 1 and exposed(photo) is photo
-    np.testing.assert_array_equal(decode_photo(tmp_path / "a.exr").exposed(photo.stops), photo.original)
+    np.testing.assert_array_equal(
+        decode_photo(tmp_path / "a.exr").exposed(photo.stops), photo.original
+    )
 
 
 def test_a_photo_from_memory_is_exposed_and_one_pixel_at_one_is_no_clipping(tmp_path):
@@ -115,7 +125,9 @@ def test_a_photo_from_memory_is_exposed_and_one_pixel_at_one_is_no_clipping(tmp_
     np.testing.assert_array_equal(photo.original, 128 * values)
     bright = np.clip(values * 128, 0, 1)
     bright[0, 0] = 500
-    assert exposed(Photo(bright, Camera(70, 60, 40.0), bright, True)).linear.max() == 10  # without any stops
+    assert (
+        exposed(Photo(bright, Camera(70, 60, 40.0), bright, True)).linear.max() == 10
+    )  # without any stops
     ordinary = Photo(values, Camera(70, 60, 40.0), values)
     assert exposed(ordinary) is ordinary
     values[0, 0] = 1
@@ -167,20 +179,31 @@ def test_alpha_is_laid_over_white(tmp_path, depth):
 @pytest.mark.parametrize("orientation", range(1, 9))
 @pytest.mark.parametrize(
     ("suffix", "depth"),
-    [("png", np.uint8), ("png", np.uint16), ("tif", np.uint8), ("tif", np.uint16), ("tif", np.float32)],
+    [
+        ("png", np.uint8),
+        ("png", np.uint16),
+        ("tif", np.uint8),
+        ("tif", np.uint16),
+        ("tif", np.float32),
+    ],
 )
 def test_orientation_turns_the_photo_upright(tmp_path, orientation, suffix, depth):
     """As Pillow turns it."""
-    pixels, exif = picture(10, 14), Image.Exif()
+    pixels = picture(10, 14)
+    exif = Image.Exif()
     exif[274] = orientation
     save(tmp_path / "b.png", pixels, exif=exif)
     upright = np.asarray(ImageOps.exif_transpose(Image.open(tmp_path / "b.png")))
-    file, values = tmp_path / f"a.{suffix}", pixels.astype(depth) * depth(257 if depth == np.uint16 else 1)
+    file = tmp_path / f"a.{suffix}"
+    values = pixels.astype(depth) * depth(257 if depth == np.uint16 else 1)
     if suffix == "tif":
-        tifffile.imwrite(file, values, photometric="rgb", extratags=[(274, "H", 1, orientation, True)])
+        tifffile.imwrite(
+            file, values, photometric="rgb", extratags=[(274, "H", 1, orientation, True)]
+        )
     else:
         cv2.imwrite(str(file), values[..., ::-1])
-        data, block = file.read_bytes(), exif.tobytes().removeprefix(b"Exif\0\0")
+        data = file.read_bytes()
+        block = exif.tobytes().removeprefix(b"Exif\0\0")
         file.write_bytes(data[:33] + chunk(b"eXIf", block) + data[33:])
     expected = upright.astype(np.float32) if depth == np.float32 else srgb_to_linear(upright)
     np.testing.assert_allclose(decode_photo(file).linear, expected, atol=1e-6)
@@ -202,7 +225,8 @@ def test_wide_gamut_profile_is_converted(tmp_path):
     swapped = bytearray(srgb)
     count = struct.unpack_from(">I", swapped, 128)[0]
     entries = {bytes(swapped[132 + 12 * i : 136 + 12 * i]): 132 + 12 * i for i in range(count)}
-    red, green = entries[b"rXYZ"], entries[b"gXYZ"]
+    red = entries[b"rXYZ"]
+    green = entries[b"gXYZ"]
     swapped[red : red + 4], swapped[green : green + 4] = b"gXYZ", b"rXYZ"
     pixels = picture()
     photo = read_photo(save(tmp_path / "a.png", pixels, icc_profile=bytes(swapped)))
@@ -245,11 +269,12 @@ def _bad_files(folder):
     noise = np.random.default_rng(0).integers(0, 256, (64, 64, 3)).astype(np.uint8)
     cut = "damaged or truncated"
     for name, content, words in (
-        ("empty.jpg", b"", "is empty"), ("letter.jpg", b"Dear photographer, " * 20, "not an image"),
+        ("empty.jpg", b"", "is empty"),
+        ("letter.jpg", b"Dear photographer, " * 20, "not an image"),
         ("stub.exr", b"\x76\x2f\x31\x01", "damaged|readable"),
         ("stub.hdr", b"#?RADIANCE\n\n-Y 64 +X 64\n1234", cut),
         ("huge.png", png_header(20000, 20000), "400 megapixels; the limit is 200"),
-    ):  # fmt: skip
+    ):
         (folder / name).write_bytes(content)
         yield folder / name, words
     yield folder / "nothing.jpg", "no picture at"
@@ -261,10 +286,12 @@ def _bad_files(folder):
     write_exr(folder / "cut.exr", noise / np.float32(255))
     yield _cut(folder / "cut.exr", 0.6), "damaged|readable"
     for name, pixels, words in (
-        ("1.png", noise[:1, :1], "1 x 1 pixels"), ("thin.png", noise[:3], "64 x 3 pixels"),
+        ("1.png", noise[:1, :1], "1 x 1 pixels"),
+        ("thin.png", noise[:3], "64 x 3 pixels"),
         ("ribbon.png", np.zeros((100, 20000, 3), np.uint8), "20000 x 100.*8:1"),
-        ("black.png", noise * 0, "entirely black"), ("flat.png", noise * 0 + 90, "one flat colour"),
-    ):  # fmt: skip
+        ("black.png", noise * 0, "entirely black"),
+        ("flat.png", noise * 0 + 90, "one flat colour"),
+    ):
         yield save(folder / name, pixels), words
     for value in (np.nan, np.inf):
         values = noise.astype(np.float32)
@@ -287,19 +314,31 @@ def test_odd_inputs_all_work(real_data):
     assert len(shapes) == 10
     assert shapes["orientation6_streetlamp_exif.jpg"] == (128, 96, 3)
     assert shapes["orientation8_landscape.jpg"] == (96, 128, 3)
-    assert any("360" in w for w in read_photo(folder / "panorama_braunschweig_equirect.jpg").warnings)
+    assert any(
+        "360" in w for w in read_photo(folder / "panorama_braunschweig_equirect.jpg").warnings
+    )
 
 
 def write_dng(path, *tags, orientation=1):
     """A grey ramp of 96 x 64 in a colour filter array; returns its values."""
     ramp = np.broadcast_to(np.linspace(2000, 60000, 96), (64, 96))
-    rational = [part for row in XYZ_TO_SRGB for value in row for part in (round(value * 10000), 10000)]
+    rational = [
+        part for row in XYZ_TO_SRGB for value in row for part in (round(value * 10000), 10000)
+    ]
     camera = [
-        (274, "H", 1, orientation), (271, "s", 0, "Test"), (272, "s", 0, "Camera"), (33421, "H", 2, (2, 2)),
-        (33422, "B", 4, bytes([0, 1, 1, 2])), (41989, "H", 1, 50), (50706, "B", 4, bytes([1, 4, 0, 0])),
-        (50708, "s", 0, "Test Camera"), (50717, "I", 1, 65535), (50721, "2i", 9, rational), (50728, "2I", 3, [1] * 6),
+        (274, "H", 1, orientation),
+        (271, "s", 0, "Test"),
+        (272, "s", 0, "Camera"),
+        (33421, "H", 2, (2, 2)),
+        (33422, "B", 4, bytes([0, 1, 1, 2])),
+        (41989, "H", 1, 50),
+        (50706, "B", 4, bytes([1, 4, 0, 0])),
+        (50708, "s", 0, "Test Camera"),
+        (50717, "I", 1, 65535),
+        (50721, "2i", 9, rational),
+        (50728, "2I", 3, [1] * 6),
         (50778, "H", 1, 21),
-    ]  # fmt: skip
+    ]
     extra = [(*tag, True) for tag in (*camera, *tags)]
     tifffile.imwrite(path, ramp.astype(np.uint16), photometric=32803, extratags=extra)
     return ramp / 65535
@@ -329,7 +368,9 @@ def test_the_default_crop_of_a_dng(tmp_path, active, left, top, orientation):
     crop = (50719, "I", 2, (10, 4)), (50720, "I", 2, (60, 40))
     ramp = write_dng(tmp_path / "a.dng", *crop, *active, orientation=orientation)
     found = read_photo(tmp_path / "a.dng").original.mean(-1)
-    upright = {1: found, 3: found[::-1, ::-1], 6: np.rot90(found, 1), 8: np.rot90(found, -1)}[orientation]
+    upright = {1: found, 3: found[::-1, ::-1], 6: np.rot90(found, 1), 8: np.rot90(found, -1)}[
+        orientation
+    ]
     assert upright.shape == (40, 60)
     expected = ramp[top : top + 40, left : left + 60]
     ratio = (upright / expected)[4:-4, 4:-4]
@@ -340,7 +381,8 @@ def test_the_default_crop_of_a_dng(tmp_path, active, left, top, orientation):
 def test_more_names_of_photos(tmp_path, suffix):
     register_heif_opener()
     assert suffix in SUFFIXES
-    pixels, kind = picture(64, 96), {".jfif": "JPEG", ".jp2": "JPEG2000", ".hif": "HEIF"}.get(suffix)
+    pixels = picture(64, 96)
+    kind = {".jfif": "JPEG", ".jp2": "JPEG2000", ".hif": "HEIF"}.get(suffix)
     Image.fromarray(pixels).save(tmp_path / f"a{suffix}", kind)
     photo = read_photo(tmp_path / f"a{suffix}")
     assert np.abs(linear_to_srgb(photo.linear) - pixels / 255).mean() < 0.02

@@ -40,8 +40,10 @@ def with_alpha(colour):
 
 def write(folder, name):
     """A large file of that kind."""
-    path, colour = folder / name, pixels()
-    deep, light = colour.astype(np.uint16) * 257, colour / np.float32(255)
+    path = folder / name
+    colour = pixels()
+    deep = colour.astype(np.uint16) * 257
+    light = colour / np.float32(255)
     if name.endswith("16.png"):
         cv2.imwrite(str(path), with_alpha(deep) if "rgba" in name else deep)
     elif name == "float.tif":
@@ -50,12 +52,16 @@ def write(folder, name):
         tifffile.imwrite(path, deep, photometric="cielab")
     elif name.endswith(".exr"):
         header = {"compression": OpenEXR.ZIPS_COMPRESSION, "type": OpenEXR.scanlineimage}
-        OpenEXR.File(header, {"RGBA": with_alpha(light)} if "rgba" in name else {"RGB": light}).write(str(path))
+        OpenEXR.File(
+            header, {"RGBA": with_alpha(light)} if "rgba" in name else {"RGB": light}
+        ).write(str(path))
     elif name == "a.hdr":
         cv2.imwrite(str(path), light)
     else:
         settings = {"progressive": True} if name == "progressive.jpg" else {}
-        mode = {"grey": "L", "palette": "P", "bit": "1", "cmyk": "CMYK"}.get(name.partition(".")[0], "RGB")
+        mode = {"grey": "L", "palette": "P", "bit": "1", "cmyk": "CMYK"}.get(
+            name.partition(".")[0], "RGB"
+        )
         image = Image.fromarray(with_alpha(colour) if "rgba" in name else colour)
         exif = Image.Exif()
         exif[274] = 6 if name == "turned.jpg" else 1
@@ -66,10 +72,31 @@ def write(folder, name):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    ["rgb.png", "rgba.png", "grey.png", "palette.png", "bit.png", "rgb16.png", "rgba16.png", "rgb.jpg", "turned.jpg",
-     "progressive.jpg", "cmyk.jpg", "rgb.webp", "rgba.webp", "rgb.heic", "rgb.avif", "rgb.jp2", "rgb.tif", "float.tif",
-     "lab16.tif", "rgb.exr", "rgba.exr", "a.hdr"],
-)  # fmt: skip
+    [
+        "rgb.png",
+        "rgba.png",
+        "grey.png",
+        "palette.png",
+        "bit.png",
+        "rgb16.png",
+        "rgba16.png",
+        "rgb.jpg",
+        "turned.jpg",
+        "progressive.jpg",
+        "cmyk.jpg",
+        "rgb.webp",
+        "rgba.webp",
+        "rgb.heic",
+        "rgb.avif",
+        "rgb.jp2",
+        "rgb.tif",
+        "float.tif",
+        "lab16.tif",
+        "rgb.exr",
+        "rgba.exr",
+        "a.hdr",
+    ],
+)
 def test_every_kind_takes_no_more_memory_than_its_header_predicts(tmp_path, name):
     check(tmp_path, name)
 
@@ -77,9 +104,13 @@ def test_every_kind_takes_no_more_memory_than_its_header_predicts(tmp_path, name
 def check(tmp_path, name):
     register_heif_opener()
     path = write(tmp_path, name)
-    Image.fromarray(np.random.default_rng(0).integers(0, 255, (16, 16, 3)).astype(np.uint8)).save(tmp_path / "s.png")
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (16, 16, 3)).astype(np.uint8)).save(
+        tmp_path / "s.png"
+    )
     small = tmp_path / "s.png"
-    done = subprocess.run([sys.executable, "-c", MEASURE, path, small], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURE, path, small], capture_output=True, text=True, check=True
+    )
     assert int(done.stdout) < peak_bytes(path)
     assert peak_bytes(path) <= path.stat().st_size + 40 * SHAPE[0] * SHAPE[1]
 

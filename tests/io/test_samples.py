@@ -27,7 +27,9 @@ def test_a_sample_in_our_conventions(tmp_path):
 
 
 def test_several_sets_are_one(tmp_path):
-    folders = [made_samples.write_set(tmp_path / name, count) for name, count in (("a", 2), ("b", 3))]
+    folders = [
+        made_samples.write_set(tmp_path / name, count) for name, count in (("a", 2), ("b", 3))
+    ]
     source = open_sources(folders)
     assert len(source) == 5
     assert [source.number(k) for k in range(5)] == [0, 1, 0, 1, 2]

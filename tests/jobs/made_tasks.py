@@ -26,7 +26,12 @@ def answer(report, how="fine", out=None, wait=0.0):
     if how == "found":
         report.found(name="albedo", file="a.jpg")
     time.sleep(60 if how == "wait" else wait)
-    return {"how": how, "pid": os.getpid(), "threads": os.environ.get("OMP_NUM_THREADS"), "outdated": report.outdated}
+    return {
+        "how": how,
+        "pid": os.getpid(),
+        "threads": os.environ.get("OMP_NUM_THREADS"),
+        "outdated": report.outdated,
+    }
 
 
 def until(done, seconds=15.0):

@@ -22,7 +22,11 @@ def test_a_task_is_done_in_another_process_without_our_password(monkeypatch):
 
 @pytest.mark.parametrize(
     ("how", "words"),
-    [("fail", "It is too dark."), ("bug", r"cannot be read \(RuntimeError\)"), ("die", "is damaged")],
+    [
+        ("fail", "It is too dark."),
+        ("bug", r"cannot be read \(RuntimeError\)"),
+        ("die", "is damaged"),
+    ],
 )
 def test_a_failure_is_a_sentence(how, words):
     with pytest.raises(InputError, match=words):

@@ -28,11 +28,16 @@ def test_results_failures_and_the_queue_goes_on(jobs, tmp_path):
 
 
 def test_order_limit_and_stop(jobs, tmp_path):
-    first, second, third = ask(jobs, "wait", tmp_path), ask(jobs, "wait", tmp_path), ask(jobs, "fine", tmp_path, "bert")
+    first = ask(jobs, "wait", tmp_path)
+    second = ask(jobs, "wait", tmp_path)
+    third = ask(jobs, "fine", tmp_path, "bert")
     until(lambda: first.stage == "light")
     assert (first.state, second.state) == (RUNNING, QUEUED)
     assert jobs.ahead(second) == 1 and jobs.ahead(third) == 2
-    assert jobs.unfinished("me", "invert") == [first, second] and jobs.unfinished("bert", "final") == []
+    assert (
+        jobs.unfinished("me", "invert") == [first, second]
+        and jobs.unfinished("bert", "final") == []
+    )
     until(lambda: list(tmp_path.glob(f".partial-{first.worker.pid}*")))
     jobs.stop(second)
     jobs.stop(first)

@@ -23,9 +23,17 @@ def told(worker, how, **more):
 def test_one_process_does_task_after_task_until_it_dies():
     worker = Worker(environment={"OMP_NUM_THREADS": "7"}, keep_errors=True)
     done, kinds = told(worker, "found")
-    assert kinds == [PROGRESS, FOUND] and done.facts["threads"] == "7" and done.facts["pid"] == worker.pid
+    assert (
+        kinds == [PROGRESS, FOUND]
+        and done.facts["threads"] == "7"
+        and done.facts["pid"] == worker.pid
+    )
     failed, _ = told(worker, "fail")
-    assert failed.kind == FAILED and failed.facts["reason"] == "It is too dark." and failed.facts["stage"] == "light"
+    assert (
+        failed.kind == FAILED
+        and failed.facts["reason"] == "It is too dark."
+        and failed.facts["stage"] == "light"
+    )
     assert failed.facts["error"] == "InputError" and not failed.facts["bug"] and failed.number == 2
     bug = told(worker, "bug")[0].facts
     assert bug["bug"] and "RuntimeError: three is not four" in bug["trace"]

@@ -21,7 +21,8 @@ def test_psnr_of_a_known_offset_on_the_srgb_encoding():
 
 
 def test_values_above_one_are_clipped_in_psnr_but_not_in_linear_mse():
-    a, b = np.full((4, 4, 3), 2.0), np.full((4, 4, 3), 7.0)
+    a = np.full((4, 4, 3), 2.0)
+    b = np.full((4, 4, 3), 7.0)
     assert metrics.psnr(a, b) == float("inf")
     assert metrics.mse_linear(a, b) == pytest.approx(25.0)
 
@@ -45,19 +46,27 @@ def test_ssim_is_one_for_equal_pictures_and_falls_with_structure_lost():
     assert metrics.ssim(picture, np.full_like(picture, picture.mean())) < 0.1
     assert metrics.ssim(picture[:5, :7], picture[:5, :7]) == pytest.approx(1)
     # Two flat pictures have no variance: SSIM is then its luminance term alone.
-    x, y, c1 = 0.25, 0.75, 0.01**2
-    flat = metrics.ssim(np.full((16, 16, 3), srgb_to_linear(x)), np.full((16, 16, 3), srgb_to_linear(y)))
+    x = 0.25
+    y = 0.75
+    c1 = 0.01**2
+    flat = metrics.ssim(
+        np.full((16, 16, 3), srgb_to_linear(x)), np.full((16, 16, 3), srgb_to_linear(y))
+    )
     assert flat == pytest.approx((2 * x * y + c1) / (x * x + y * y + c1), abs=1e-4)
 
 
 @pytest.mark.parametrize("name", ["psnr", "ssim"])
 def test_noise_of_two_halves_is_taken_out(name):
-    clean, corrected = getattr(metrics, name), getattr(metrics, f"{name}_without_noise")
+    clean = getattr(metrics, name)
+    corrected = getattr(metrics, f"{name}_without_noise")
     rng = np.random.default_rng(5)
-    photo = np.clip(0.4 + 0.2 * np.sin(np.indices((96, 96)).sum(0) / 7)[..., None] * [1, 0.5, -1], 0, 1)
+    photo = np.clip(
+        0.4 + 0.2 * np.sin(np.indices((96, 96)).sum(0) / 7)[..., None] * [1, 0.5, -1], 0, 1
+    )
     rendered = photo * [0.9, 1.0, 1.1]
     halves = [rendered + rng.normal(0, 0.03, photo.shape) for _ in range(2)]
-    wanted, noisy = clean(rendered, photo), clean(sum(halves) / 2, photo)
+    wanted = clean(rendered, photo)
+    noisy = clean(sum(halves) / 2, photo)
     found = corrected(*halves, photo)
     assert corrected(rendered, rendered, photo) == pytest.approx(wanted, rel=1e-3)
     assert abs(found - wanted) < 0.1 * abs(noisy - wanted)
@@ -73,7 +82,8 @@ def test_linear_map_is_degree_one_with_norm_of_its_gradient(axis):
 
 
 def test_sh_error_of_constant_maps_is_the_difference_times_root_four_pi():
-    a, b = np.full((H, 2 * H, 3), 1.0), np.full((16, 32, 3), 3.0)
+    a = np.full((H, 2 * H, 3), 1.0)
+    b = np.full((16, 32, 3), 3.0)
     assert metrics.sh_error(a, b) == pytest.approx(2 * np.sqrt(4 * np.pi), rel=1e-4)
     assert metrics.sh_error_relative(b, a) == pytest.approx(2, rel=1e-4)
     red = a.copy()
@@ -85,7 +95,9 @@ def test_the_residual_finds_smooth_shading_again():
     rendering = np.random.default_rng(0).uniform(0.2, 0.8, (48, 64, 3)).astype(np.float32)
     shade = np.exp(np.linspace(-1, 1, 64))[None, :, None]
     found = shading_residual(rendering * shade, rendering)
-    np.testing.assert_allclose(found[4:-4, 4:-4], np.broadcast_to(shade, found.shape)[4:-4, 4:-4], rtol=0.03)
+    np.testing.assert_allclose(
+        found[4:-4, 4:-4], np.broadcast_to(shade, found.shape)[4:-4, 4:-4], rtol=0.03
+    )
     assert metrics.psnr(rendering * found, rendering * shade) > 40
 
 
@@ -96,7 +108,8 @@ def test_noise_of_the_rendering_stays_in_the_rendering():
 
 
 def test_limits_of_the_residual_and_pixels_without_a_number():
-    photo, rendering = np.zeros((8, 8, 3), np.float32), np.ones((8, 8, 3), np.float32)
+    photo = np.zeros((8, 8, 3), np.float32)
+    rendering = np.ones((8, 8, 3), np.float32)
     rendering[0, 0] = np.nan
     found = shading_residual(photo, rendering)
     assert np.isfinite(found).all() and found.min() >= 1 / LIMIT - 1e-6

@@ -39,7 +39,11 @@ def test_the_truth_scores_best(truth):
 def test_one_factor_is_forgiven_in_albedo_and_depth(truth):
     darker = replace(truth.materials, albedo=truth.materials.albedo / 2)
     found = score(replace(truth, materials=darker, depth=truth.depth * 3), truth)
-    assert found["albedo_psnr"] > 90 and found["albedo_psnr_raw"] < 20 and found["albedo_scale"] == pytest.approx(2)
+    assert (
+        found["albedo_psnr"] > 90
+        and found["albedo_psnr_raw"] < 20
+        and found["albedo_scale"] == pytest.approx(2)
+    )
     assert found["depth_mae"] < 1e-5 and found["depth_si_log_rmse"] < 1e-6
     assert found["depth_mae_raw"] == pytest.approx(2 * truth.depth[4:].mean(), rel=1e-5)
 
@@ -58,9 +62,14 @@ def test_only_surface_counts(truth):
     wrong[:4] = 1
     found = score(replace(truth, materials=replace(truth.materials, albedo=wrong)), truth)
     assert found["albedo_psnr"] == 100
-    noise = replace(truth.materials, roughness=np.random.default_rng(1).uniform(0, 0.8, (24, 32)).astype(np.float32))
+    noise = replace(
+        truth.materials,
+        roughness=np.random.default_rng(1).uniform(0, 0.8, (24, 32)).astype(np.float32),
+    )
     assert score(replace(truth, materials=noise), truth)["roughness_ssim"] < 0.1
-    far = replace(truth, depth=np.where(np.arange(24)[:, None] < 20, 0, truth.depth))  # sky is no agreement
+    far = replace(
+        truth, depth=np.where(np.arange(24)[:, None] < 20, 0, truth.depth)
+    )  # sky is no agreement
     assert score(replace(far, materials=noise), far)["roughness_ssim"] < 0.5
     assert score(truth, replace(truth, depth=np.zeros_like(truth.depth))) == {}
 
@@ -83,12 +92,21 @@ def test_depth_order():
     sky = np.where(far, 0, true)  # no surface there, which is behind everything
     # Pairs of two far pixels, 1 in 100, count half.
     assert ordinal_accuracy(sky, true) == pytest.approx(0.995, abs=0.004)
-    assert ordinal_accuracy(np.random.default_rng(2).random((40, 40)), true) == pytest.approx(0.5, abs=0.03)
+    assert ordinal_accuracy(np.random.default_rng(2).random((40, 40)), true) == pytest.approx(
+        0.5, abs=0.03
+    )
 
 
 def test_pooled_psnr_is_of_the_mean_error():
-    found = summary([{"metallic_mse": 0.01, "metallic_psnr": 20.0}, {"metallic_mse": 0.0, "metallic_psnr": 100.0}])
-    assert found["metallic_psnr"] == 60 and found["metallic_psnr_pooled"] == pytest.approx(23.01, abs=0.01)
+    found = summary(
+        [
+            {"metallic_mse": 0.01, "metallic_psnr": 20.0},
+            {"metallic_mse": 0.0, "metallic_psnr": 100.0},
+        ]
+    )
+    assert found["metallic_psnr"] == 60 and found["metallic_psnr_pooled"] == pytest.approx(
+        23.01, abs=0.01
+    )
     assert summary([]) == {}
 
 
@@ -96,13 +114,16 @@ def test_relative_depth_after_the_median_factor():
     true = np.array([[1, 2, 4, 0]], np.float32)
     assert depth_abs_rel(np.array([[3, 6, 12, 5]], np.float32), true) == pytest.approx(0, abs=1e-6)
     assert depth_abs_rel(np.array([[1, 2, 8, 5]], np.float32), true) == pytest.approx(1 / 3)
-    assert depth_abs_rel(np.array([[1, 2, 0, 5]], np.float32), true) == pytest.approx(1 / 3)  # taken for sky
+    assert depth_abs_rel(np.array([[1, 2, 0, 5]], np.float32), true) == pytest.approx(
+        1 / 3
+    )  # taken for sky
     assert depth_abs_rel(np.zeros_like(true), true) == 1
     assert np.isnan(depth_abs_rel(true, np.zeros_like(true)))
 
 
 def test_mean_angle_of_a_part():
-    up, out = np.zeros((2, 2, 3), np.float32), np.zeros((2, 2, 3), np.float32)
+    up = np.zeros((2, 2, 3), np.float32)
+    out = np.zeros((2, 2, 3), np.float32)
     up[..., 1], out[..., 2] = 1, 1
     out[0] = up[0]
     everywhere = np.ones((2, 2), bool)

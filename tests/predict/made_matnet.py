@@ -21,18 +21,29 @@ def made_network(seed: int = 0) -> MatNet:
         torch.manual_seed(seed)
         network = MatNet(TINY)
         for parameter in network.parameters():
-            parameter.data = torch.randn_like(parameter) * (0.3 if parameter.ndim < 2 else parameter[0].numel() ** -0.5)
+            parameter.data = torch.randn_like(parameter) * (
+                0.3 if parameter.ndim < 2 else parameter[0].numel() ** -0.5
+            )
     return network.eval()
 
 
 def check_conventions(prediction: Prediction, size: tuple[int, int]) -> None:
     """Assert what every predictor's answer for a photo of that size keeps to."""
     assert prediction.materials.albedo.shape == prediction.normal.shape == (*size, 3)
-    assert prediction.depth.shape == prediction.materials.roughness.shape == prediction.materials.metallic.shape == size
+    assert (
+        prediction.depth.shape
+        == prediction.materials.roughness.shape
+        == prediction.materials.metallic.shape
+        == size
+    )
     for values in vars(prediction.materials).values():
         assert values.dtype == np.float32 and values.min() >= 0 and values.max() <= 1
     np.testing.assert_allclose(np.linalg.norm(prediction.normal, axis=-1), 1, atol=1e-5)
-    assert prediction.depth.min() >= 0 and np.isfinite(prediction.depth).all() and prediction.depth.dtype == np.float32
+    assert (
+        prediction.depth.min() >= 0
+        and np.isfinite(prediction.depth).all()
+        and prediction.depth.dtype == np.float32
+    )
 
 
 def made_photo(height: int = 20, width: int = 31, fov: float = 40.0) -> Photo:

@@ -10,7 +10,8 @@ from materialist.errors import InputError
 from materialist.predict import get_predictor
 from materialist.predict.protocol import MAPS
 
-H, W = 20, 32
+H = 20
+W = 32
 
 
 @pytest.fixture
@@ -26,17 +27,23 @@ def maps_of(prediction):
 def test_known_maps_are_kept_and_the_others_predicted(names, photo):
     known = {name: values for name, values in good_maps(H, W).items() if name in names}
     prediction = get_predictor("constant", prior=mt.Prior(**known)).predict(photo)
-    found, plain = maps_of(prediction), maps_of(get_predictor("constant").predict(photo))
+    found = maps_of(prediction)
+    plain = maps_of(get_predictor("constant").predict(photo))
     for name in MAPS:
         if name in names:
-            assert np.allclose(found[name], known[name], atol=1e-6) and prediction.sources[name] == "arrays"
+            assert (
+                np.allclose(found[name], known[name], atol=1e-6)
+                and prediction.sources[name] == "arrays"
+            )
         elif (name, "depth" in names) != ("normal", True):  # unknown normals follow the depth
             assert np.array_equal(found[name], plain[name])
     assert ("constant" in prediction.predictor) == (set(names) != set(MAPS))
 
 
 def test_no_network_is_opened_where_all_is_known(photo, monkeypatch):
-    monkeypatch.setattr("materialist.predict.registry._open", lambda *_: pytest.fail("a predictor was opened"))
+    monkeypatch.setattr(
+        "materialist.predict.registry._open", lambda *_: pytest.fail("a predictor was opened")
+    )
     prediction = get_predictor(prior=mt.Prior(**good_maps(H, W))).predict(photo)
     assert prediction.predictor == "arrays" and prediction.warnings == ()
 
@@ -45,13 +52,20 @@ def test_other_sizes_are_resampled_and_other_types_converted(photo):
     large = good_maps(2 * H, 2 * W)["depth"].astype(np.float64)
     prediction = get_predictor("constant", prior=mt.Prior(depth=large)).predict(photo)
     assert prediction.depth.shape == (H, W) and prediction.depth.dtype == np.float32
-    assert any("The prior's depth is 64x40 and was resampled to 32x20" in note for note in prediction.warnings)
+    assert any(
+        "The prior's depth is 64x40 and was resampled to 32x20" in note
+        for note in prediction.warnings
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "values", "words"),
     [
-        ("depth", np.ones((H, W, 3)), r"The prior's depth is float64\[20, 32, 3\]; give numbers of the shape \[H, W\]"),
+        (
+            "depth",
+            np.ones((H, W, 3)),
+            r"The prior's depth is float64\[20, 32, 3\]; give numbers of the shape \[H, W\]",
+        ),
         ("normal", np.ones((H, W)), r"shape \[H, W, 3\]"),
         ("depth", np.full((H, W), np.nan), "The prior's depth has 640 NaN"),
         ("depth", np.zeros((H, W)), "is 0 everywhere"),
@@ -68,5 +82,7 @@ def test_maps_that_cannot_be_meant(name, values, words, photo):
 
 
 def test_a_map_has_one_source():
-    with pytest.raises(InputError, match="The depth is in the prior and has a predictor of its own"):
+    with pytest.raises(
+        InputError, match="The depth is in the prior and has a predictor of its own"
+    ):
         get_predictor("constant", depth="moge:there", prior=mt.Prior(depth=np.ones((H, W))))

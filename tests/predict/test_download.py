@@ -8,11 +8,23 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from materialist.errors import WeightsError
-from materialist.predict.models import chosen, download, folder_of, hub_model, is_complete, require, weights_file
+from materialist.predict.models import (
+    chosen,
+    download,
+    folder_of,
+    hub_model,
+    is_complete,
+    require,
+    weights_file,
+)
 from materialist.predict.weights import verify_folder
 
 MODEL = hub_model("matnet")
-CONTENT = {"config.json": b"{}", "matnet_weights.pth": bytes(range(256)) * 9000, "README.md": b"not needed"}
+CONTENT = {
+    "config.json": b"{}",
+    "matnet_weights.pth": bytes(range(256)) * 9000,
+    "README.md": b"not needed",
+}
 COMMIT = "1" * 40
 
 
@@ -26,10 +38,16 @@ class Hub(BaseHTTPRequestHandler):
         if not self.path.startswith("/api/models/Lez/MatNet"):
             return self.answer_file(body=True)
         files = [
-            {"rfilename": name, "size": len(c), "lfs": {"size": len(c), "pointerSize": 9, "sha256": self.digest(name)}}
+            {
+                "rfilename": name,
+                "size": len(c),
+                "lfs": {"size": len(c), "pointerSize": 9, "sha256": self.digest(name)},
+            }
             for name, c in self.server.files.items()
         ]
-        return self.answer(200, json.dumps({"id": "Lez/MatNet", "sha": COMMIT, "siblings": files}).encode(), {})
+        return self.answer(
+            200, json.dumps({"id": "Lez/MatNet", "sha": COMMIT, "siblings": files}).encode(), {}
+        )
 
     def digest(self, name):
         return self.server.claims.get(name, hashlib.sha256(self.server.files[name]).hexdigest())
@@ -63,7 +81,9 @@ def folder(models, monkeypatch):
 @pytest.fixture
 def hub(monkeypatch):
     server = ThreadingHTTPServer(("127.0.0.1", 0), Hub)
-    server.files, server.claims, server.log = dict(CONTENT), {}, []
+    server.files = dict(CONTENT)
+    server.claims = {}
+    server.log = []
     threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True).start()
     monkeypatch.setenv("HF_ENDPOINT", f"http://127.0.0.1:{server.server_port}")
     yield server
@@ -78,7 +98,9 @@ def test_a_download_is_whole_checked_listed_and_not_repeated(hub, folder):
     assert hub.log == ["config.json", "matnet_weights.pth"]
     assert weights_file(folder).name == "matnet_weights.pth" and len(verify_folder(folder)) == 64
     sums = (folder / "SHA256SUMS").read_text()
-    assert f"{hashlib.sha256(CONTENT['matnet_weights.pth']).hexdigest()}  matnet_weights.pth\n" in sums
+    assert (
+        f"{hashlib.sha256(CONTENT['matnet_weights.pth']).hexdigest()}  matnet_weights.pth\n" in sums
+    )
     hub.log.clear()
     assert download(MODEL) == folder and hub.log == []
     download(MODEL, force=True)
@@ -106,11 +128,28 @@ def test_an_unknown_or_odd_repository_is_refused(hub):
 
 def test_the_best_format_of_each_folder_is_chosen():
     names = [
-        "model_index.json", "README.md", "figure.png", "tokenizer/vocab.json", "tokenizer/merges.txt",
-        "unet/config.json", "unet/a.safetensors", "unet/a.fp16.safetensors", "unet/a.bin",
-        "vae/b.safetensors", "vae/b.bin", "old/c.bin", "old/c.fp16.bin", "w.pth",
-    ]  # fmt: skip
+        "model_index.json",
+        "README.md",
+        "figure.png",
+        "tokenizer/vocab.json",
+        "tokenizer/merges.txt",
+        "unet/config.json",
+        "unet/a.safetensors",
+        "unet/a.fp16.safetensors",
+        "unet/a.bin",
+        "vae/b.safetensors",
+        "vae/b.bin",
+        "old/c.bin",
+        "old/c.fp16.bin",
+        "w.pth",
+    ]
     assert set(chosen(names)) == {
-        "model_index.json", "tokenizer/vocab.json", "tokenizer/merges.txt", "unet/config.json",
-        "unet/a.fp16.safetensors", "vae/b.safetensors", "old/c.fp16.bin", "w.pth",
-    }  # fmt: skip
+        "model_index.json",
+        "tokenizer/vocab.json",
+        "tokenizer/merges.txt",
+        "unet/config.json",
+        "unet/a.fp16.safetensors",
+        "vae/b.safetensors",
+        "old/c.fp16.bin",
+        "w.pth",
+    }

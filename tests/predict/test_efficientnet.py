@@ -16,7 +16,9 @@ FIGURES = (
 
 def picture():
     """Two ramps and a ripple, 260 x 260: the size for which that package pads."""
-    rows, columns = torch.meshgrid(torch.linspace(0, 1, 260), torch.linspace(0, 1, 260), indexing="ij")
+    rows, columns = torch.meshgrid(
+        torch.linspace(0, 1, 260), torch.linspace(0, 1, 260), indexing="ij"
+    )
     return torch.stack([rows, columns, (6 * rows * columns).sin() * 0.5 + 0.5])[None]
 
 

@@ -12,7 +12,8 @@ from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.predict import get_predictor
 
-H, W = 20, 32
+H = 20
+W = 32
 
 
 def good_maps(height: int = H, width: int = W) -> dict[str, np.ndarray]:
@@ -47,12 +48,18 @@ def test_exr_maps_come_back_bit_for_bit(tmp_path):
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 def test_png_maps_are_decoded_by_their_meaning(tmp_path, dtype):
-    maps, top = good_maps(), np.iinfo(dtype).max
+    maps = good_maps()
+    top = np.iinfo(dtype).max
     maps["depth"] /= maps["depth"].max()
-    encoded = maps | {"albedo": linear_to_srgb(maps["albedo"]), "normal": maps["normal"] * 0.5 + 0.5}
+    encoded = maps | {
+        "albedo": linear_to_srgb(maps["albedo"]),
+        "normal": maps["normal"] * 0.5 + 0.5,
+    }
     for name, values in encoded.items():
         pixels = np.round(values * top).astype(dtype)
-        cv2.imwrite(str(tmp_path / f"{name}.png"), pixels[..., ::-1] if pixels.ndim == 3 else pixels)
+        cv2.imwrite(
+            str(tmp_path / f"{name}.png"), pixels[..., ::-1] if pixels.ndim == 3 else pixels
+        )
     prediction = get_predictor(f"maps:{tmp_path}").predict(made_photo(H, W))
     close = 1.5 / top
     assert np.allclose(linear_to_srgb(prediction.materials.albedo), encoded["albedo"], atol=close)
@@ -70,7 +77,9 @@ def test_missing_maps_are_neutral_and_told(tmp_path):
     assert (prediction.materials.roughness == 0.5).all()
     assert np.allclose(prediction.materials.metallic, 0.1)
     assert np.allclose(prediction.normal, [0, 0, 1], atol=1e-4)
-    assert [w for w in prediction.warnings if "roughness" in w] and [w for w in prediction.warnings if "metallic" in w]
+    assert [w for w in prediction.warnings if "roughness" in w] and [
+        w for w in prediction.warnings if "metallic" in w
+    ]
     assert [w for w in prediction.warnings if "normal" in w]
 
 
@@ -88,7 +97,9 @@ def test_maps_of_other_sizes_are_resampled_and_told(tmp_path):
     depth = np.full((2 * H, 2 * W), 10.0, np.float32)
     depth[7:23, 9:31] = 2.0
     depth[:5] = 0
-    prediction = get_predictor(write(tmp_path, **(maps | {"depth": depth}))).predict(made_photo(H, W))
+    prediction = get_predictor(write(tmp_path, **(maps | {"depth": depth}))).predict(
+        made_photo(H, W)
+    )
     assert set(np.unique(prediction.depth.round(4))) == {0.0, 2.0, 10.0}
     prediction = get_predictor(f"maps:{tmp_path}").predict(made_photo(3 * H, 3 * W))
     assert set(np.unique(prediction.depth.round(4))) == {0.0, 2.0, 10.0}
@@ -137,6 +148,8 @@ def test_depths_that_no_scene_has_are_sky(tmp_path, far):
     depth = np.full((H, W), far, np.float32)
     depth[H // 2 :] = 3
     depth[-1] = 4000
-    found = get_predictor(write(tmp_path, **{**good_maps(), "depth": depth})).predict(made_photo(H, W))
+    found = get_predictor(write(tmp_path, **{**good_maps(), "depth": depth})).predict(
+        made_photo(H, W)
+    )
     assert (found.depth[: H // 2] == 0).all() and (found.depth[H // 2 :] == depth[H // 2 :]).all()
     assert any("taken as sky" in note for note in found.warnings)

@@ -26,8 +26,10 @@ def test_a_plane_is_exact_up_to_the_border(normal, radius):
 
 
 def test_two_planes_keep_their_normals_at_the_edge_between_them():
-    wall, floor = np.array([0, 0, 1.0]), np.array([0, 1.0, 0])
-    d_wall, d_floor = plane_depth(CAMERA, wall, -4.0), plane_depth(CAMERA, floor, -1.0)
+    wall = np.array([0, 0, 1.0])
+    floor = np.array([0, 1.0, 0])
+    d_wall = plane_depth(CAMERA, wall, -4.0)
+    d_floor = plane_depth(CAMERA, floor, -1.0)
     on_floor = (d_floor > 0) & (d_floor < d_wall)
     normal = normals_from_depth(np.where(on_floor, d_floor, d_wall), CAMERA)
     assert np.percentile(angle(normal[on_floor], floor), 99) < 0.1
@@ -65,9 +67,12 @@ def room() -> np.ndarray:
 @pytest.mark.parametrize(("inverse", "relative"), KINDS)
 def test_normals_reveal_the_shift(inverse, relative):
     true = room()
-    values, normal = relative(true).astype(np.float32), normals_from_depth(true, VIEW)
+    values = relative(true).astype(np.float32)
+    normal = normals_from_depth(true, VIEW)
     depth, ratio, fitted = from_relative(values, VIEW, normal, inverse=inverse)
-    assert fitted and ratio == pytest.approx(np.percentile(true, 99.5) / np.percentile(true, 0.5), rel=0.12)
+    assert fitted and ratio == pytest.approx(
+        np.percentile(true, 99.5) / np.percentile(true, 0.5), rel=0.12
+    )
     assert np.std(np.log(depth / true)) < 0.05
 
 
@@ -75,10 +80,13 @@ def test_normals_reveal_the_shift(inverse, relative):
 def test_a_wall_that_faces_the_camera_may_be_most_of_the_picture(share):
     """Its normals are right at any ratio; the floor before it tells, however little of it is seen."""
     rows = np.arange(72)[:, None] + 0.5
-    horizon, foot = 0.15 * 72, share * 72
+    horizon = 0.15 * 72
+    foot = share * 72
     inverse = np.maximum(rows - horizon, foot - horizon) * np.ones((1, 96))
     true = (60 / inverse).astype(np.float32)
-    ratio = from_relative((1 / true).astype(np.float32), VIEW, normals_from_depth(true, VIEW), inverse=True)[1]
+    ratio = from_relative(
+        (1 / true).astype(np.float32), VIEW, normals_from_depth(true, VIEW), inverse=True
+    )[1]
     assert ratio == pytest.approx(np.percentile(true, 99.5) / np.percentile(true, 0.5), rel=0.12)
 
 

@@ -16,7 +16,8 @@ from materialist.predict.normals import normals_from_depth
 from materialist.predict.protocol import MAPS
 from materialist.types import Materials, Prediction
 
-H, W = 20, 32
+H = 20
+W = 32
 
 
 @pytest.fixture
@@ -27,7 +28,8 @@ def photo():
 @pytest.fixture
 def other(tmp_path):
     """maps:DIR with every map, all unlike those of `constant`."""
-    folder, maps = tmp_path / "other", good_maps(H, W)
+    folder = tmp_path / "other"
+    maps = good_maps(H, W)
     folder.mkdir()
     return write(folder, **maps), maps
 
@@ -96,7 +98,9 @@ def test_a_folder_needs_only_the_maps_that_are_wanted(photo, other, tmp_path):
     assert np.array_equal(mixed.materials.albedo, albedo) and mixed.sources["depth"] == "constant"
     assert not any("There is no" in note for note in mixed.warnings)
     derived = normals_from_depth(theirs["depth"], photo.camera, radius=2)
-    assert np.allclose(get_predictor(f"maps:{tmp_path}", depth=spec).predict(photo).normal, derived, atol=1e-6)
+    assert np.allclose(
+        get_predictor(f"maps:{tmp_path}", depth=spec).predict(photo).normal, derived, atol=1e-6
+    )
     with pytest.raises(InputError, match="no depth"):
         get_predictor("constant", depth=f"maps:{tmp_path}").predict(photo)
 
@@ -104,7 +108,8 @@ def test_a_folder_needs_only_the_maps_that_are_wanted(photo, other, tmp_path):
 def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeypatch):
     """Where the network saw sky, and the depth is someone else's, it knows no normal, and its note is void."""
     spec, theirs = other
-    depth, up = theirs["depth"].copy(), np.zeros((H, W, 3), np.float32)
+    depth = theirs["depth"].copy()
+    up = np.zeros((H, W, 3), np.float32)
     depth[:8], up[..., 1] = 0, 1
     up[:8] = [0, 0, 1]
     materials = Materials(theirs["albedo"], theirs["roughness"], theirs["metallic"])
@@ -112,7 +117,9 @@ def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeyp
     monkeypatch.setattr(predictor, "infer", lambda *_, **__: seen)
     mixed = get_predictor("bundled", depth=spec).predict(photo)
     assert np.allclose(mixed.normal[8:], [0, 1, 0]) and mixed.warnings == ()
-    assert np.allclose(mixed.normal[:8], normals_from_depth(theirs["depth"], photo.camera, radius=2)[:8], atol=1e-6)
+    assert np.allclose(
+        mixed.normal[:8], normals_from_depth(theirs["depth"], photo.camera, radius=2)[:8], atol=1e-6
+    )
     assert "40% of the picture" in get_predictor("bundled", albedo=spec).predict(photo).warnings[0]
 
 

@@ -16,7 +16,15 @@ MODELS = (
     ("Chair", "Living room", "chair", 45, 45, 90, "elevation#N=0\n"),
     ("Mug", "Kitchen", "mug", 8, 8, 10, ""),
     ("Wardrobe", "Bedroom", "box", 100, 60, 200, ""),
-    ("Lamp", "Lights", "lamp", 20, 20, 40, "lightSourceX#N=10\nlightSourceY#N=10\nlightSourceZ#N=35\n"),
+    (
+        "Lamp",
+        "Lights",
+        "lamp",
+        20,
+        20,
+        40,
+        "lightSourceX#N=10\nlightSourceY#N=10\nlightSourceZ#N=35\n",
+    ),
     ("Caf\\u00e9 sign", "Miscellaneous", "box", 40, 4, 30, "elevation#N=150\n"),
     ("Jar", "Kitchen", "jar", 10, 10, 10, ""),
     ("Net", "Kitchen", "net", 10, 10, 10, ""),
@@ -52,7 +60,10 @@ def box_lines(low, high, start, material, uv=False):
     lines.append(f"usemtl {material}")
     first = 4 * (start - 1) // 8 + 1  # texture coordinates before these
     for quad in QUADS:
-        marks = [f"{start + corner}/{first + k}" if uv else f"{start + corner}" for k, corner in enumerate(quad)]
+        marks = [
+            f"{start + corner}/{first + k}" if uv else f"{start + corner}"
+            for k, corner in enumerate(quad)
+        ]
         lines.append("f " + " ".join(marks))
     return lines
 
@@ -82,7 +93,8 @@ def grain():
 
 def make_archive(path):
     """Write the catalogue; returns its path."""
-    lines, holes = [HEAD], np.full((8, 8, 4), 255, np.uint8)
+    lines = [HEAD]
+    holes = np.full((8, 8, 4), 255, np.uint8)
     holes[::2, :, 3] = 0
     with zipfile.ZipFile(path, "w") as file:
         for number, (name, category, model, width, depth, height, more) in enumerate(MODELS, 1):
@@ -113,5 +125,6 @@ def make_photographs(folder):
 
 def make_stock(folder):
     """A stock of the catalogue and the photographs, with a cache below `folder`."""
-    archive, photographs = make_archive(folder / "made.sh3f"), make_photographs(folder)
+    archive = make_archive(folder / "made.sh3f")
+    photographs = make_photographs(folder)
     return Stock(listing((archive,), photographs, folder / "cache"))

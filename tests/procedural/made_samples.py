@@ -24,16 +24,27 @@ def arrays(height: int = 48, width: int = 64, fov: float = 50.0, seed: int = 0) 
     albedo = (linear_to_srgb(paints[stripes]) * 255 + 0.5).astype(np.uint8)
     albedo[~surface] = 0
     linear = srgb_to_linear(albedo)
-    shading = np.linspace(0.4, 1.1, width)[None, :, None] * np.array([1.0, 0.9, 0.8]) * np.ones((height, 1, 1))
+    shading = (
+        np.linspace(0.4, 1.1, width)[None, :, None]
+        * np.array([1.0, 0.9, 0.8])
+        * np.ones((height, 1, 1))
+    )
     metallic = np.where(np.arange(width) > 3 * width // 4, 255, 0)[None].repeat(height, 0)
     rest = 0.05 + 0.3 * (metallic[..., None] > 0) * linear
-    image = np.where(surface[..., None], linear * (1 - metallic[..., None] / 255) * shading + rest, 0.9)
+    image = np.where(
+        surface[..., None], linear * (1 - metallic[..., None] / 255) * shading + rest, 0.9
+    )
     return {
-        "image": image.astype(np.float16), "shading": shading.astype(np.float16), "albedo": albedo,
-        "roughness": np.full((height, width), 102, np.uint8), "metallic": (metallic * surface).astype(np.uint8),
+        "image": image.astype(np.float16),
+        "shading": shading.astype(np.float16),
+        "albedo": albedo,
+        "roughness": np.full((height, width), 102, np.uint8),
+        "metallic": (metallic * surface).astype(np.uint8),
         "normal": np.where(surface[..., None], np.round(NORMAL * 127), 0).astype(np.int8),
-        "depth": depth.astype(np.float16), "mask": surface.astype(np.uint8), "fov": np.float32(fov),
-    }  # fmt: skip
+        "depth": depth.astype(np.float16),
+        "mask": surface.astype(np.uint8),
+        "fov": np.float32(fov),
+    }
 
 
 def write_set(folder: Path, count: int = 4, **options) -> Path:

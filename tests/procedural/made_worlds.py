@@ -22,14 +22,17 @@ def plain(colour, roughness=0.6, metallic=0.0, emission=(0.0, 0.0, 0.0)):
 
 def room(*, window: bool, lamp: bool, sky: float = 1.0) -> World:
     """A closed box of 2 m with a metal and a painted block, lit by a window in its right side and by a lamp."""
-    grey, red = plain((0.6, 0.6, 0.55)), plain((0.7, 0.2, 0.15), 0.4)
+    grey = plain((0.6, 0.6, 0.55))
+    red = plain((0.7, 0.2, 0.15), 0.4)
     parts = [
-        ScenePart(s.sheet((-1, 0, 1), 2 * X, -2 * Z), grey), ScenePart(s.sheet((-1, 2, -1), 2 * X, 2 * Z), grey),
-        ScenePart(s.sheet((-1, 0, -1), 2 * X, 2 * Y), grey), ScenePart(s.sheet((1, 0, 1), -2 * X, 2 * Y), grey),
+        ScenePart(s.sheet((-1, 0, 1), 2 * X, -2 * Z), grey),
+        ScenePart(s.sheet((-1, 2, -1), 2 * X, 2 * Z), grey),
+        ScenePart(s.sheet((-1, 0, -1), 2 * X, 2 * Y), grey),
+        ScenePart(s.sheet((1, 0, 1), -2 * X, 2 * Y), grey),
         ScenePart(s.sheet((-1, 0, 1), -2 * Z, 2 * Y), red),
         block((0.5, 0.7, 0.5), (0.3, 0, -0.3), plain((0.9, 0.7, 0.4), 0.3, 1.0), 0.05, turn=0.5),
         block((0.4, 0.4, 0.4), (-0.4, 0, 0), red, turn=0.2),
-    ]  # fmt: skip
+    ]
     side = RoomWall(2.0, 2.0, [Opening(0.6, 1.4, 0.6, 1.5)] if window else [])
     parts += moved(surface(side, grey), (1, 0, -1), -np.pi / 2)
     if lamp:
@@ -57,29 +60,47 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
     from materialist.render.variant import setup
 
     mi = setup()
-    rotation, origin = world.view.to_scene, world.view.position
-    description = {"type": "scene", "integrator": {"type": "path", "max_depth": depth, "rr_depth": 100}}
+    rotation = world.view.to_scene
+    origin = world.view.position
+    description = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": depth, "rr_depth": 100},
+    }
     for k, part in enumerate(world.parts):
         material = part.material
-        flat = lambda v: {  # noqa: E731
-            "type": "bitmap", "raw": True, "data": mi.TensorXf(np.tile(np.float32(v), (2, 2, 1))),
-        }  # fmt: skip
-        colour, roughness, metallic = map(flat, (material.colours[0], material.roughness[0], material.metallic[0]))
-        bsdf = {"type": "materialist_disney", "base_color": colour, "roughness": roughness, "metallic": metallic}
+
+        def flat(v):
+            return {
+                "type": "bitmap",
+                "raw": True,
+                "data": mi.TensorXf(np.tile(np.float32(v), (2, 2, 1))),
+            }
+
+        colour, roughness, metallic = map(
+            flat, (material.colours[0], material.roughness[0], material.metallic[0])
+        )
+        bsdf = {
+            "type": "materialist_disney",
+            "base_color": colour,
+            "roughness": roughness,
+            "metallic": metallic,
+        }
         light = None
         if max(material.emission) > 0:
             radiance = (np.array(material.emission) * material.colours[0]).tolist()
             light = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
-        place, normals = (part.solid.vertices - origin) @ rotation, part.solid.normals @ rotation
+        place = (part.solid.vertices - origin) @ rotation
+        normals = part.solid.normals @ rotation
         solid = replace(part.solid, vertices=place, normals=normals)
         description[f"part{k}"] = shape(mi, solid, bsdf, light)
     grid = on_mitsuba_grid(world.envmap, np)
     to_camera = np.eye(4)
     to_camera[:3, :3] = rotation.T
     description["sky"] = {
-        "type": "envmap", "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
+        "type": "envmap",
+        "bitmap": mi.Bitmap(np.ones((9, 8, 3), np.float32)),
         "to_world": mi.ScalarTransform4f(to_camera) @ half_turn(mi),
-    }  # fmt: skip
+    }
     description["sensor"] = sensor(Camera(size, size, world.view.fov), look_along(mi))
     scene = mi.load_dict(description)
     params = mi.traverse(scene)

@@ -37,12 +37,15 @@ def test_the_picture_changes_where_the_thing_is(tmp_path, monkeypatch):
     monkeypatch.setattr(cutouts, "SETTINGS", replace(cutouts.SETTINGS, shadow=0.0))
     made_cutouts.write_disc(tmp_path / "disc.png")
     disc = cutouts.load_cutout(tmp_path / "disc.png")
-    before, thing = np.full((96, 128, 3), 0.2, np.float32), np.full((96, 128), -3, np.int16)
+    before = np.full((96, 128, 3), 0.2, np.float32)
+    thing = np.full((96, 128), -3, np.int16)
     sizes = []
     for seed in range(20):
         after, found = cutouts.paste(before, thing, [disc], np.random.default_rng(seed))
         new = found > 0
-        assert set(np.unique(found)) - {-3} <= set(range(1, cutouts.SETTINGS.most + 1)) and new.any()
+        assert (
+            set(np.unique(found)) - {-3} <= set(range(1, cutouts.SETTINGS.most + 1)) and new.any()
+        )
         np.testing.assert_array_equal(found[~new], -3)
         changed = np.abs(after - before).max(-1) > 1e-3
         assert (new & ~changed).sum() == 0 and (changed & ~new).sum() < 0.4 * new.sum() + 40

@@ -20,10 +20,16 @@ from materialist.procedural.sample import make_sample
 
 SIZE = 32
 CONTRACT = {
-    "image": (np.float16, 3), "shading": (np.float16, 3), "albedo": (np.uint8, 3), "roughness": (np.uint8, 0),
-    "metallic": (np.uint8, 0), "normal": (np.int8, 3), "depth": (np.float16, 0), "mask": (np.uint8, 0),
+    "image": (np.float16, 3),
+    "shading": (np.float16, 3),
+    "albedo": (np.uint8, 3),
+    "roughness": (np.uint8, 0),
+    "metallic": (np.uint8, 0),
+    "normal": (np.int8, 3),
+    "depth": (np.float16, 0),
+    "mask": (np.uint8, 0),
     "thing": (np.int16, 0),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +76,10 @@ def test_a_sample_depends_on_seed_and_number_alone(made, options, tmp_path):
 
 
 def test_resume_makes_what_is_missing_and_nothing_else(made, options):
-    gone, kept = sample_path(made, 2), sample_path(made, 3)
-    before, stamp = arrays(made, 2), kept.stat().st_mtime_ns
+    gone = sample_path(made, 2)
+    kept = sample_path(made, 3)
+    before = arrays(made, 2)
+    stamp = kept.stat().st_mtime_ns
     gone.unlink()
     (made / "samples" / ".0000005.npz.0.partial-99-0.npz").write_bytes(b"half a sample")
     assert produce(made, options, count=6, resume=True) == 1
@@ -88,7 +96,9 @@ def test_other_sets_are_not_gone_on_with(made, options, tmp_path):
     (tmp_path / "set").mkdir()
     told = identity(made)
     assert (told["format"], told["size"], told["seed"], told["options"]["spp"]) == (1, SIZE, 11, 4)
-    (tmp_path / "set" / "dataset.json").write_text(json.dumps({**told, "content": told["content"] - 1}))
+    (tmp_path / "set" / "dataset.json").write_text(
+        json.dumps({**told, "content": told["content"] - 1})
+    )
     with pytest.raises(InputError, match="begun with content"):
         produce(tmp_path / "set", options, count=2, resume=True)
     with pytest.raises(InputError, match=r"dataset\.json"):
@@ -97,16 +107,23 @@ def test_other_sets_are_not_gone_on_with(made, options, tmp_path):
 
 def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
     options = DataSetOptions(size=SIZE, seed=11, spp=1, device="cpu", only="still-life")
-    train, aside = make_sample(3, options), make_sample(3, replace(options, split="heldout"))
+    train = make_sample(3, options)
+    aside = make_sample(3, replace(options, split="heldout"))
     assert train["fov"] != aside["fov"] and not np.array_equal(train["thing"], aside["thing"])
 
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
-    [({"size": 30}, "30"), ({"size": 33}, "33"), ({"spp": 0}, "spp is 0"), ({"seed": -1}, "-1"),
-     ({"split": "dev"}, "'dev'"), ({"only": "castle"}, "'castle'.*outdoor"),
-     ({"meshes": Path("/nowhere")}, "/nowhere")],
-)  # fmt: skip
+    [
+        ({"size": 30}, "30"),
+        ({"size": 33}, "33"),
+        ({"spp": 0}, "spp is 0"),
+        ({"seed": -1}, "-1"),
+        ({"split": "dev"}, "'dev'"),
+        ({"only": "castle"}, "'castle'.*outdoor"),
+        ({"meshes": Path("/nowhere")}, "/nowhere"),
+    ],
+)
 def test_options_that_cannot_be(wrong, said):
     with pytest.raises(InputError, match=said):
         DataSetOptions(**wrong)
@@ -119,10 +136,14 @@ FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 
 @pytest.mark.parametrize(
     "text",
-    ["no mesh", HEADER + FACES + "0 0 0\n", HEADER + FACES + CORNERS + "3 0 1 9\n",
-     HEADER + FACES + 3 * "0 0 0\n" + "3 0 1 2\n"],
+    [
+        "no mesh",
+        HEADER + FACES + "0 0 0\n",
+        HEADER + FACES + CORNERS + "3 0 1 9\n",
+        HEADER + FACES + 3 * "0 0 0\n" + "3 0 1 2\n",
+    ],
     ids=["text", "cut off", "corner that is not there", "point"],
-)  # fmt: skip
+)
 def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
@@ -137,18 +158,42 @@ def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
 def test_the_splits_share_no_file(tmp_path):
     for name in (*sorted(HELD_OUT), "teapot", "vase"):
         (tmp_path / f"{name}.ply").touch()
-    train, aside = (DataSetOptions(meshes=tmp_path, split=split).mesh_files for split in ("train", "heldout"))
+    train, aside = (
+        DataSetOptions(meshes=tmp_path, split=split).mesh_files for split in ("train", "heldout")
+    )
     assert [p.stem for p in train] == ["teapot", "vase"]
     assert {p.stem for p in aside} == HELD_OUT
 
 
 @pytest.mark.slow
 def test_a_killed_run_leaves_whole_samples_only(tmp_path):
-    command = [sys.executable, "-m", "materialist", "train", "data", "-o", str(tmp_path / "d"), "--count", "500",
-               "--size", "32", "--spp", "4", "--seed", "11", "--device", "cpu", "--real", "0"]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "materialist",
+        "train",
+        "data",
+        "-o",
+        str(tmp_path / "d"),
+        "--count",
+        "500",
+        "--size",
+        "32",
+        "--spp",
+        "4",
+        "--seed",
+        "11",
+        "--device",
+        "cpu",
+        "--real",
+        "0",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 120
-    while len(list((tmp_path / "d" / "samples").glob("[0-9]*.npz"))) < 2 and time.monotonic() < deadline:
+    while (
+        len(list((tmp_path / "d" / "samples").glob("[0-9]*.npz"))) < 2
+        and time.monotonic() < deadline
+    ):
         assert process.poll() is None
         time.sleep(0.1)
     os.kill(process.pid, signal.SIGKILL)
@@ -162,7 +207,8 @@ def test_a_killed_run_leaves_whole_samples_only(tmp_path):
 
 
 def test_the_command_makes_resumes_and_draws(done, refused, tmp_path):
-    folder, sheet = tmp_path / "set", tmp_path / "sheet.png"
+    folder = tmp_path / "set"
+    sheet = tmp_path / "sheet.png"
     make = (
         "train",
         "data",

@@ -11,9 +11,13 @@ from materialist.procedural import lights
 
 def test_a_tilted_camera_sees_the_sky_tilted():
     """Degree-1 harmonics are a vector: it must turn with the frame."""
-    radiance = lambda d: np.repeat(1 + d[..., 1:2], 3, axis=-1)  # noqa: E731
+
+    def radiance(d):
+        return np.repeat(1 + d[..., 1:2], 3, axis=-1)
+
     angle = 0.5
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     looking_down = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])  # camera -> scene: -Z goes down
     up_in_camera = looking_down.T @ [0, 1, 0]
     assert (looking_down @ [0, 0, -1])[1] < 0
@@ -25,5 +29,10 @@ def test_a_tilted_camera_sees_the_sky_tilted():
 def test_skies_have_a_mean_of_one_and_are_lighter_above():
     for k in range(4):
         envmap = lights.outdoors(np.random.default_rng(k))
-        assert luminance(envmap).mean(1) @ row_solid_angle(256) * 512 / (4 * np.pi) == pytest.approx(1, rel=1e-3)
-        assert luminance(envmap[: len(envmap) // 2]).mean() > luminance(envmap[len(envmap) // 2 :]).mean()
+        assert luminance(envmap).mean(1) @ row_solid_angle(256) * 512 / (
+            4 * np.pi
+        ) == pytest.approx(1, rel=1e-3)
+        assert (
+            luminance(envmap[: len(envmap) // 2]).mean()
+            > luminance(envmap[len(envmap) // 2 :]).mean()
+        )

@@ -21,7 +21,9 @@ def labels(material, size=SIZE, fov=20, height=2.0):
     ground = ScenePart(s.sheet((-1, 0, 1), 2 * X, -2 * Z), material)
     world = World([ground], still().envmap, look((0, height, 1e-4), (0, 0, 0), fov))
     packed = packing.pack(world, np.random.default_rng(0))
-    return sample.labels_of(tracer.SampleTracer(packed, Camera(size, size, fov), device="cpu").probe())
+    return sample.labels_of(
+        tracer.SampleTracer(packed, Camera(size, size, fov), device="cpu").probe()
+    )
 
 
 def test_solid_noise_is_periodic_and_of_slope_one():
@@ -35,8 +37,12 @@ def test_solid_noise_is_periodic_and_of_slope_one():
 def test_heights_repeat_and_pass_through_the_field():
     kind = relief.SOLID[0]
     places = np.array([[3, 5, 7]]) / relief.SIDE
-    assert relief.height(kind, places)[0] == pytest.approx(relief.heights()[kind][3, 5, 7], abs=1e-3)
-    assert relief.height(kind, places + 2)[0] == pytest.approx(relief.height(kind, places)[0], abs=1e-3)
+    assert relief.height(kind, places)[0] == pytest.approx(
+        relief.heights()[kind][3, 5, 7], abs=1e-3
+    )
+    assert relief.height(kind, places + 2)[0] == pytest.approx(
+        relief.height(kind, places)[0], abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("kind", relief.SOLID)
@@ -63,14 +69,17 @@ def test_joints_of_bricks_slope_down():
     height = 0.01 * (0.3 * field[..., 2] - field[..., 1])
     # The ground's texture coordinates are metres from its corner (-1, 1), v towards -Z: (x, y) of the picture.
     camera = Camera(96, 96, 20)
-    x, y = (np.arange(96) + 0.5 - 48) / camera.focal * 2, (48 - np.arange(96) - 0.5) / camera.focal * 2
+    x = (np.arange(96) + 0.5 - 48) / camera.focal * 2
+    y = (48 - np.arange(96) - 0.5) / camera.focal * 2
     u, v = np.meshgrid(x + 1, y + 1)
     step = 0.5 / tiles.SIZE
 
     def at(u, v):
         return height[(v / step % tiles.SIZE).astype(int), (u / step % tiles.SIZE).astype(int)]
 
-    slope = np.stack([at(u + step, v) - at(u - step, v), at(u, v + step) - at(u, v - step)], -1) / (2 * step)
+    slope = np.stack([at(u + step, v) - at(u - step, v), at(u, v + step) - at(u, v - step)], -1) / (
+        2 * step
+    )
     bent = -seen[..., :2] / seen[..., 2:]
     steep = np.abs(slope) > 0.3
     assert steep.sum() > 100
@@ -84,19 +93,30 @@ def test_a_picture_lies_upright_on_a_surface():
     pixels[..., 1] = np.array([60, 120, 180])[:, None]
     pixels[..., 2] = 90
     material = Material(
-        0, ((1.0, 1.0, 0.5),) * 3, 0.0, repeat=(2, -2), offset=(0.0, 0.0), picture=ColourPicture(pixels)
+        0,
+        ((1.0, 1.0, 0.5),) * 3,
+        0.0,
+        repeat=(2, -2),
+        offset=(0.0, 0.0),
+        picture=ColourPicture(pixels),
     )
     albedo = labels(material, 64, fov=2 * np.degrees(np.arctan(0.5)))["albedo"]
     expected = (pixels / 255.0) ** 2 * [1, 1, 0.5]
     for row in range(3):
         for column in range(5):
-            y, x = int((row + 0.5) / 3 * 64), int((column + 0.5) / 5 * 64)
-            np.testing.assert_allclose(albedo[y, x], np.maximum(expected[row, column], 0.01), rtol=0.02)
+            y = int((row + 0.5) / 3 * 64)
+            x = int((column + 0.5) / 5 * 64)
+            np.testing.assert_allclose(
+                albedo[y, x], np.maximum(expected[row, column], 0.01), rtol=0.02
+            )
 
 
 def test_pictures_are_packed_once_each():
     one, other = (ColourPicture(np.full((7, 5, 3), value, np.uint8)) for value in (10, 20))
-    parts = [ScenePart(s.slab((1, 1, 1)), replace(plain((1,) * 3), picture=p)) for p in (one, other, one, None)]
+    parts = [
+        ScenePart(s.slab((1, 1, 1)), replace(plain((1,) * 3), picture=p))
+        for p in (one, other, one, None)
+    ]
     world = World(parts, still().envmap, look((0, 1, 3), (0, 0, 0), 40))
     packed = packing.pack(world, np.random.default_rng(0))
     starts = packed.material[:, 24].astype(int)

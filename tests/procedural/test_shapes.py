@@ -34,7 +34,8 @@ def test_solids_face_outwards_and_stand_on_the_ground(name):
 
 
 def test_a_level_set_has_the_volume_the_radius_and_the_normals_of_a_ball():
-    centre, radius = np.array([0.1, -0.2, 0.05]), 0.7
+    centre = np.array([0.1, -0.2, 0.05])
+    radius = 0.7
     ball = level_set(lambda p: np.linalg.norm(p - centre, axis=-1) - radius, 1.1, points=48)
     out = ball.vertices - centre
     np.testing.assert_allclose(np.linalg.norm(out, axis=-1), radius, atol=0.01)

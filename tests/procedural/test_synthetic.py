@@ -41,4 +41,7 @@ def test_render_repeats_the_photo_and_is_linear_in_the_light(sample):
 def test_meshes_and_captures_of_a_data_folder_are_used(mitsuba, real_data):
     sample = make_sample(4, 4, 4, size=(24, 32), data=real_data("data"), spp=4)
     assert np.isfinite(sample.photo.linear).all() and (sample.truth.depth > 0).mean() > 0.5
-    assert max(len(i.solid.vertices) for i in scenes.arrangement(4, seed=0, data=real_data("data"))) > 1000
+    assert (
+        max(len(i.solid.vertices) for i in scenes.arrangement(4, seed=0, data=real_data("data")))
+        > 1000
+    )

@@ -11,23 +11,32 @@ def wall(camera: Camera, depth: float = 2.0, holes=None) -> Geometry:
     seen = np.full((camera.height, camera.width), depth, np.float32)
     if holes is not None:
         seen[holes] = 0
-    return build_geometry(seen, np.tile(np.float32([0, 0, 1]), (*seen.shape, 1)), camera, completion="none")
+    return build_geometry(
+        seen, np.tile(np.float32([0, 0, 1]), (*seen.shape, 1)), camera, completion="none"
+    )
 
 
 def empty(camera: Camera) -> Geometry:
     """One triangle behind the camera: every ray sees the sky."""
     vertices = np.float32([[0, 0, 5], [1, 0, 5], [0, 1, 5]])
     mesh = Mesh(
-        vertices, np.int32([[0, 1, 2]]), np.tile(np.float32([0, 0, -1]), (3, 1)), np.zeros((3, 2), np.float32),
-        np.int32([0]), np.int16([-1]),
-    )  # fmt: skip
+        vertices,
+        np.int32([[0, 1, 2]]),
+        np.tile(np.float32([0, 0, -1]), (3, 1)),
+        np.zeros((3, 2), np.float32),
+        np.int32([0]),
+        np.int16([-1]),
+    )
     return Geometry(mesh, np.full((camera.height, camera.width), -1, np.int8))
 
 
 def with_floor(geometry: Geometry, label, height: float = -1.5, size: float = 40.0) -> Geometry:
     """`geometry` and, as plane 0, a floor at y = `height`; `label` [H, W] says which pixels give it its material."""
-    mesh, count = geometry.mesh, len(geometry.mesh.vertices)
-    floor = np.float32([[-size, height, size], [size, height, size], [size, height, -size], [-size, height, -size]])
+    mesh = geometry.mesh
+    count = len(geometry.mesh.vertices)
+    floor = np.float32(
+        [[-size, height, size], [size, height, size], [size, height, -size], [-size, height, -size]]
+    )
     faces = np.int32([[0, 1, 2], [0, 2, 3]]) + count
     joined = Mesh(
         np.concatenate([mesh.vertices, floor]),
@@ -53,4 +62,6 @@ def uniform(camera: Camera, albedo=0.5, roughness: float = 1.0, metallic: float 
 def random_maps(seed: int, size: tuple[int, int]) -> Materials:
     """Values from 0.3 to 0.8, each pixel its own."""
     draw = np.random.default_rng(seed).uniform
-    return Materials(*(draw(0.3, 0.8, (*size, *channels)).astype(np.float32) for channels in ((3,), (), ())))
+    return Materials(
+        *(draw(0.3, 0.8, (*size, *channels)).astype(np.float32) for channels in ((3,), (), ()))
+    )

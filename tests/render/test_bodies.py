@@ -13,13 +13,16 @@ from materialist.render.scene import GLASS_DEPTH, RenderScene
 from materialist.types import Body, Camera, Surface
 
 CAMERA = Camera(48, 32, 40.0)
-DISTANCE, RADIUS = 5.0, 1.0
+DISTANCE = 5.0
+RADIUS = 1.0
 
 
 def sphere(surface: Surface) -> Body:
     """A sphere on the camera's axis."""
     solid = shapes.moved(shapes.ball(192), (0, 0, -DISTANCE), scale=RADIUS)
-    vertices, normals, uv = (a.astype(np.float32) for a in (solid.vertices, solid.normals, solid.uv))
+    vertices, normals, uv = (
+        a.astype(np.float32) for a in (solid.vertices, solid.normals, solid.uv)
+    )
     return Body(vertices, solid.faces.astype(np.int32), normals, uv, surface)
 
 
@@ -57,10 +60,14 @@ def test_clear_glass_in_uniform_light_is_invisible():
     assert np.abs(seen - 1).max() < 0.1
 
 
-@pytest.mark.parametrize("ior, roughness", [(1.5, 0.2), (1.5, 0.5), (1.5, 1.0), (1.0, 0.7), (2.0, 0.7)])
+@pytest.mark.parametrize(
+    "ior, roughness", [(1.5, 0.2), (1.5, 0.5), (1.5, 1.0), (1.0, 0.7), (2.0, 0.7)]
+)
 def test_rough_glass_in_uniform_light_is_invisible(ior, roughness):
     """Without the gain 0.81 at 0.5, and 0.32 at 1."""
-    seen = picture(sphere(surface(roughness=roughness, transmission=1.0, ior=ior)), uniform(), spp=128)
+    seen = picture(
+        sphere(surface(roughness=roughness, transmission=1.0, ior=ior)), uniform(), spp=128
+    )
     assert seen[disc()].mean() == pytest.approx(1, abs=0.015)
 
 
@@ -72,7 +79,9 @@ def test_tint_colours_what_passes_through_once():
 
 def test_transmission_mixes_the_opaque_body_and_the_glass():
     mixed = surface(albedo=0.6, transmission=0.3, ior=1.0)
-    opaque, half = (picture(sphere(s), uniform(), spp=256)[disc()].mean() for s in (surface(0.6), mixed))
+    opaque, half = (
+        picture(sphere(s), uniform(), spp=256)[disc()].mean() for s in (surface(0.6), mixed)
+    )
     assert half == pytest.approx(0.7 * opaque + 0.3, rel=0.01)
 
 
@@ -87,16 +96,22 @@ def test_the_share_of_a_pixel_covered_by_a_body():
     assert not first_hits(target.mi_scene, CAMERA, {"body1": None}, size).share.any()
 
 
-@pytest.mark.parametrize("at", [(1.9, 0.4, -5.0), (0.0, 0.0, -1.0), (0.0, 0.0, 3.0), (30.0, 0.0, -5.0)])
+@pytest.mark.parametrize(
+    "at", [(1.9, 0.4, -5.0), (0.0, 0.0, -1.0), (0.0, 0.0, 3.0), (30.0, 0.0, -5.0)]
+)
 def test_looking_around_bodies_alone_sees_what_looking_everywhere_does(at, monkeypatch):
     """Beyond the frame, around the camera, behind it, and out of view."""
     body = sphere(surface())
-    body = replace(body, vertices=body.vertices + np.array(at, np.float32) + (0, 0, np.float32(DISTANCE)))
-    scene, box = RenderScene(empty(CAMERA), CAMERA, bodies=(body,)).mi_scene, (slice(3, 60), slice(10, 96))
+    body = replace(
+        body, vertices=body.vertices + np.array(at, np.float32) + (0, 0, np.float32(DISTANCE))
+    )
+    scene = RenderScene(empty(CAMERA), CAMERA, bodies=(body,)).mi_scene
+    box = (slice(3, 60), slice(10, 96))
     seen = first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)
     monkeypatch.setattr("materialist.render.pixels._around", lambda *given: given[-1])
     for found, slow in zip(
-        vars(seen).values(), vars(first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)).values()
+        vars(seen).values(),
+        vars(first_hits(scene, CAMERA, {"body0": body}, (64, 96), box)).values(),
     ):
         np.testing.assert_array_equal(found, slow)
     assert seen.share.any() == (at[0] < 2 and at[2] < 0)
@@ -104,9 +119,14 @@ def test_looking_around_bodies_alone_sees_what_looking_everywhere_does(at, monke
 
 def test_radiance_is_that_of_the_rays_that_meet_the_body_first():
     columns = np.indices((CAMERA.height, CAMERA.width))[1]
-    geometry = wall(CAMERA, 2.0, holes=columns >= CAMERA.width // 2)  # hides the left half of the sphere
+    geometry = wall(
+        CAMERA, 2.0, holes=columns >= CAMERA.width // 2
+    )  # hides the left half of the sphere
     target = RenderScene(geometry, CAMERA, bodies=(sphere(surface(0.5, 1.0)),))
     target.set_envmap(uniform())
-    seen = radiance(target, columns.shape, np.s_[:, :], spp=64, seed=1, max_depth=3, names=["body0"])
-    left, right = disc() & (columns < CAMERA.width // 2 - 1), disc() & (columns > CAMERA.width // 2)
+    seen = radiance(
+        target, columns.shape, np.s_[:, :], spp=64, seed=1, max_depth=3, names=["body0"]
+    )
+    left = disc() & (columns < CAMERA.width // 2 - 1)
+    right = disc() & (columns > CAMERA.width // 2)
     assert (seen[left] == 0).all() and seen[right].min() > 0.1

@@ -33,7 +33,8 @@ def random_light(seed, height=6):
 
 def test_the_gradient_of_the_light_adds_up_to_the_picture(corner):
     """Radiance is linear in the light: <dL/dE, E> = L, and dL/dE of a texel is the picture that it alone makes."""
-    maps, envmap = random_maps(8, SIZE), random_light(9)
+    maps = random_maps(8, SIZE)
+    envmap = random_light(9)
     inputs = leaves(maps, envmap)
     corner.render_torch(*inputs, spp=16384, seed=1).sum().backward()
     gradient = inputs[3].grad.numpy()
@@ -45,13 +46,18 @@ def test_the_gradient_of_the_light_adds_up_to_the_picture(corner):
         alone = np.zeros_like(envmap)
         alone[texel] = 1
         corner.set_envmap(alone)
-        assert gradient[texel] == pytest.approx(corner.render(spp=16384, seed=5).sum((0, 1)), rel=0.08)
+        assert gradient[texel] == pytest.approx(
+            corner.render(spp=16384, seed=5).sum((0, 1)), rel=0.08
+        )
 
 
 @pytest.fixture(scope="module")
 def inputs():
     rng = np.random.default_rng(0)
-    draw = lambda low, high, *shape: torch.from_numpy(rng.uniform(low, high, shape).astype(np.float32))  # noqa: E731
+
+    def draw(low, high, *shape):
+        return torch.from_numpy(rng.uniform(low, high, shape).astype(np.float32))
+
     return {
         "albedo": draw(0.2, 0.8, 3, 5, 3),
         "roughness": draw(0.4, 0.8, 3, 5),
@@ -65,7 +71,9 @@ def loss(corner, inputs, weight, seed=0):
 
 
 def test_the_value_is_the_path_tracers(corner, inputs):
-    corner.set_materials(Materials(*(inputs[k].numpy() for k in ("albedo", "roughness", "metallic"))))
+    corner.set_materials(
+        Materials(*(inputs[k].numpy() for k in ("albedo", "roughness", "metallic")))
+    )
     corner.set_envmap(inputs["envmap"].numpy())
     expected = corner.render(spp=SPP, seed=1, max_depth=3)
     image = corner.render_torch(**inputs, spp=SPP, seed=2, max_depth=3)
@@ -73,7 +81,9 @@ def test_the_value_is_the_path_tracers(corner, inputs):
     np.testing.assert_allclose(image.numpy(), expected, rtol=0.03)
 
 
-@pytest.mark.parametrize(("name", "step"), [("albedo", 0.05), ("roughness", 0.03), ("metallic", 0.05), ("envmap", 0.2)])
+@pytest.mark.parametrize(
+    ("name", "step"), [("albedo", 0.05), ("roughness", 0.03), ("metallic", 0.05), ("envmap", 0.2)]
+)
 def test_gradients_are_finite_differences(corner, inputs, name, step):
     """Along a random direction of each input, the floor's share by way of the mean included."""
     rng = np.random.default_rng(1)
@@ -82,6 +92,9 @@ def test_gradients_are_finite_differences(corner, inputs, name, step):
     variable = inputs[name].clone().requires_grad_()
     loss(corner, {**inputs, name: variable}, weight).backward()
     analytic = float((variable.grad * direction).sum())
-    ends = [float(loss(corner, {**inputs, name: inputs[name] + s * step * direction}, weight)) for s in (1, -1)]
+    ends = [
+        float(loss(corner, {**inputs, name: inputs[name] + s * step * direction}, weight))
+        for s in (1, -1)
+    ]
     numeric = (ends[0] - ends[1]) / (2 * step)
     assert analytic == pytest.approx(numeric, rel=0.03), (analytic, numeric)

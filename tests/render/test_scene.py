@@ -31,7 +31,8 @@ def scene_of(geometry, materials=None, envmap=WHITE, camera=CAMERA):
 
 def camera_rays(scene, x, y):
     """Mitsuba's rays through screen positions x, y [N] in pixels."""
-    mi, camera = scene.mi, scene.camera
+    mi = scene.mi
+    camera = scene.camera
     film = mi.Point2f(np.float32(x / camera.width), np.float32(y / camera.height))
     return scene.mi_scene.sensors()[0].sample_ray(0, 0, film, mi.Point2f(0.5, 0.5))[0]
 
@@ -48,12 +49,16 @@ def test_rays_go_through_the_pixels_of_the_camera_model(camera):
     scene = RenderScene(wall(camera), camera, device="cpu")
     row, col = np.indices((camera.height, camera.width)).reshape(2, -1)
     direction = np.array(camera_rays(scene, col + 0.5, row + 0.5).d).T
-    np.testing.assert_allclose(direction / -direction[:, 2:], pixel_rays(camera).reshape(-1, 3), atol=2e-5)
+    np.testing.assert_allclose(
+        direction / -direction[:, 2:], pixel_rays(camera).reshape(-1, 3), atol=2e-5
+    )
 
 
 def test_no_garbage_is_collected_while_a_rendering_is_recorded(monkeypatch):
     """A scene that goes meanwhile would end the process."""
-    scene, seen, select = scene_of(wall(CAMERA), uniform(CAMERA)), [], dr.select
+    scene = scene_of(wall(CAMERA), uniform(CAMERA))
+    seen = []
+    select = dr.select
     monkeypatch.setattr(dr, "select", lambda *a: seen.append(gc.isenabled()) or select(*a))
     scene.render(spp=1)
     assert seen and not any(seen) and gc.isenabled()
@@ -66,9 +71,15 @@ def test_every_pixel_shows_its_own_material():
     for seed in range(3):
         si = scene.mi_scene.ray_intersect(camera_rays(scene, *inside_pixels(CAMERA, seed)))
         bsdf = scene.mi_scene.shapes()[0].bsdf()
-        np.testing.assert_allclose(np.array(bsdf.base_color.eval(si)).T, maps.albedo.reshape(-1, 3), atol=1e-6)
-        np.testing.assert_allclose(np.array(bsdf.roughness.eval_1(si)), maps.roughness.reshape(-1), atol=1e-6)
-        np.testing.assert_allclose(np.array(bsdf.metallic.eval_1(si)), maps.metallic.reshape(-1), atol=1e-6)
+        np.testing.assert_allclose(
+            np.array(bsdf.base_color.eval(si)).T, maps.albedo.reshape(-1, 3), atol=1e-6
+        )
+        np.testing.assert_allclose(
+            np.array(bsdf.roughness.eval_1(si)), maps.roughness.reshape(-1), atol=1e-6
+        )
+        np.testing.assert_allclose(
+            np.array(bsdf.metallic.eval_1(si)), maps.metallic.reshape(-1), atol=1e-6
+        )
 
 
 @pytest.mark.parametrize(("rough", "metallic"), [(0.3, 0.7), (1.0, 0.0)])
@@ -108,9 +119,13 @@ def test_sky_pixels_see_the_light():
     envmap = np.random.default_rng(2).random((6, 12, 3)).astype(np.float32)
     scene = scene_of(wall(CAMERA, holes=holes), envmap=envmap)
     image = scene.render(spp=400, seed=1)
-    offsets = (np.stack(np.meshgrid(np.arange(16), np.arange(16)), -1).reshape(-1, 2) + 0.5) / 16 - 0.5
+    offsets = (
+        np.stack(np.meshgrid(np.arange(16), np.arange(16)), -1).reshape(-1, 2) + 0.5
+    ) / 16 - 0.5
     within = [pixel_rays(CAMERA) + np.float32([u, -v, 0]) / CAMERA.focal for u, v in offsets]
-    expected = np.mean([environment(unit(rays).reshape(-1, 3), envmap) for rays in within], axis=0).reshape(*SIZE, 3)
+    expected = np.mean(
+        [environment(unit(rays).reshape(-1, 3), envmap) for rays in within], axis=0
+    ).reshape(*SIZE, 3)
     np.testing.assert_allclose(image[holes], expected[holes], atol=0.01)
 
 
@@ -123,13 +138,21 @@ def test_continued_planes_carry_the_means_of_their_own_pixels():
     maps = random_maps(4, SIZE)
     scene = scene_of(geometry, maps)
     for plane in (0, 1):
-        for name, field in (("base_color", maps.albedo), ("roughness", maps.roughness), ("metallic", maps.metallic)):
-            value, mean = scene.params[f"plane{plane}.bsdf.{name}.data"], field[label == plane].mean(0)
-            np.testing.assert_allclose(value, np.broadcast_to(np.atleast_1d(mean), np.shape(value)), rtol=1e-5)
+        for name, field in (
+            ("base_color", maps.albedo),
+            ("roughness", maps.roughness),
+            ("metallic", maps.metallic),
+        ):
+            value = scene.params[f"plane{plane}.bsdf.{name}.data"]
+            mean = field[label == plane].mean(0)
+            np.testing.assert_allclose(
+                value, np.broadcast_to(np.atleast_1d(mean), np.shape(value)), rtol=1e-5
+            )
 
 
 def test_updates_give_the_picture_of_a_fresh_scene():
-    maps, envmap = random_maps(5, SIZE), np.random.default_rng(6).random((8, 16, 3)).astype(np.float32)
+    maps = random_maps(5, SIZE)
+    envmap = np.random.default_rng(6).random((8, 16, 3)).astype(np.float32)
     label = np.full(SIZE, -1)
     label[4:] = 0
     geometry = with_floor(wall(CAMERA), label)
@@ -142,8 +165,13 @@ def test_updates_give_the_picture_of_a_fresh_scene():
 
 
 def test_a_pixel_has_its_paths_whatever_else_is_traced():
-    scene = scene_of(wall(CAMERA), random_maps(3, SIZE), np.random.default_rng(1).random((8, 16, 3)).astype(np.float32))
-    whole, some = scene.render(spp=9, seed=4), np.random.default_rng(2).random(SIZE) < 0.3
+    scene = scene_of(
+        wall(CAMERA),
+        random_maps(3, SIZE),
+        np.random.default_rng(1).random((8, 16, 3)).astype(np.float32),
+    )
+    whole = scene.render(spp=9, seed=4)
+    some = np.random.default_rng(2).random(SIZE) < 0.3
     part = scene.render(spp=9, seed=4, where=some)
     np.testing.assert_array_equal(part[some], whole[some])
     assert not part[~some].any()
@@ -152,9 +180,12 @@ def test_a_pixel_has_its_paths_whatever_else_is_traced():
 def test_bad_light_maps_and_options_are_refused():
     scene = RenderScene(wall(CAMERA), CAMERA, device="cpu")
     for envmap, says in (
-        (np.ones((4, 9, 3)), r"\(4, 9, 3\)"), (np.ones((2, 4, 3)), r"\(2, 4, 3\)"), (np.ones((4, 8)), r"\(4, 8\)"),
-        (np.full((4, 8, 3), np.nan), "nan"), (np.full((4, 8, 3), -1.0), "-1"),
-    ):  # fmt: skip
+        (np.ones((4, 9, 3)), r"\(4, 9, 3\)"),
+        (np.ones((2, 4, 3)), r"\(2, 4, 3\)"),
+        (np.ones((4, 8)), r"\(4, 8\)"),
+        (np.full((4, 8, 3), np.nan), "nan"),
+        (np.full((4, 8, 3), -1.0), "-1"),
+    ):
         with pytest.raises(InputError, match=says):
             scene.set_envmap(envmap)
     with pytest.raises(InputError, match=r"\(7, 12, 3\)"):
@@ -167,7 +198,9 @@ def test_normals_along_the_picture_s_x_are_normals_like_others():
     """Of a wall seen edge on, on facets that face the camera: u runs along them, where a shading frame needs others."""
     normal = np.zeros((*SIZE, 3), np.float32)
     normal[..., 0] = 1
-    scene = scene_of(build_geometry(np.full(SIZE, 2, np.float32), normal, CAMERA, completion="none"))
+    scene = scene_of(
+        build_geometry(np.full(SIZE, 2, np.float32), normal, CAMERA, completion="none")
+    )
     assert np.isfinite(scene.render(spp=4)).all()
 
 
@@ -183,7 +216,8 @@ def misses(scene):
     """Rays through the middles of all horizontal and vertical mesh edges inside the picture that hit nothing."""
     mi = scene.mi
     row, col = np.indices((63, 95)).reshape(2, -1) + 1.0
-    x, y = np.concatenate([col + 0.5, col]) / 96, np.concatenate([row, row + 0.5]) / 64
+    x = np.concatenate([col + 0.5, col]) / 96
+    y = np.concatenate([row, row + 0.5]) / 64
     film = mi.Point2f(x.astype(np.float32), y.astype(np.float32))
     ray = scene.mi_scene.sensors()[0].sample_ray(0, 0, film, mi.Point2f(0.5, 0.5))[0]
     return int((~np.array(scene.mi_scene.ray_intersect_preliminary(ray).is_valid())).sum())
@@ -212,7 +246,11 @@ def test_another_photo_needs_no_other_kernel():
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             scene.render(spp=4)
-            return {k["hash"] for k in dr.kernel_history() if k.get("ir") and len(k["ir"].getvalue()) > 50_000}
+            return {
+                k["hash"]
+                for k in dr.kernel_history()
+                if k.get("ir") and len(k["ir"].getvalue()) > 50_000
+            }
 
     first = kernels(CAMERA)
     assert first and kernels(Camera(CAMERA.width + 3, CAMERA.height + 2, CAMERA.fov + 7)) == first

@@ -20,7 +20,9 @@ def libraries(tmp_path, monkeypatch):
             (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / name).write_bytes(b"")
         monkeypatch.setattr(
-            variant, "_PLACES", [str(tmp_path / f"{below}*LLVM*") for below in ("", "*/lib/", "*/*/lib/")]
+            variant,
+            "_PLACES",
+            [str(tmp_path / f"{below}*LLVM*") for below in ("", "*/lib/", "*/*/lib/")],
         )
         return tmp_path
 
@@ -42,7 +44,9 @@ def test_the_best_library_is_taken(libraries, names, best):
     assert find_llvm().version == best
 
 
-@pytest.mark.parametrize(("name", "says"), [("libLLVM-15.so.1", "LLVM 15"), ("libLLVM.so", "no LLVM library")])
+@pytest.mark.parametrize(
+    ("name", "says"), [("libLLVM-15.so.1", "LLVM 15"), ("libLLVM.so", "no LLVM library")]
+)
 def test_a_wrong_choice_of_the_user_is_explained(libraries, monkeypatch, name, says):
     monkeypatch.setenv("DRJIT_LIBLLVM_PATH", str(libraries(name) / name))
     with pytest.raises(SetupError, match=says):
@@ -58,9 +62,12 @@ def test_a_wrong_library_never_aborts(libraries, tmp_path):
     )
     for start in ("", "import drjit\n"):
         result = subprocess.run(
-            [sys.executable, "-c", start + program], env={"DRJIT_LIBLLVM_PATH": str(name), "PATH": "/usr/bin"},
-            capture_output=True, text=True, timeout=120,
-        )  # fmt: skip
+            [sys.executable, "-c", start + program],
+            env={"DRJIT_LIBLLVM_PATH": str(name), "PATH": "/usr/bin"},
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
         assert result.returncode == 1 and "SetupError: " in result.stderr, result.stderr
 
 

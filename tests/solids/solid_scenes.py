@@ -25,7 +25,9 @@ GROUND = np.where(_FALLING < -1e-3, (FOOT @ UP) / np.where(_FALLING < -1e-3, _FA
 def standing(solid: shapes.Solid) -> shapes.Solid:
     """A body with its foot at the origin, on FOOT along UP."""
     right = np.array([1.0, 0, 0])
-    frame = np.stack([right, UP, np.cross(right, UP)])  # rows: the body's x, y, z in the camera's frame
+    frame = np.stack(
+        [right, UP, np.cross(right, UP)]
+    )  # rows: the body's x, y, z in the camera's frame
     return shapes.Solid(solid.vertices @ frame + FOOT, solid.faces, solid.normals @ frame, solid.uv)
 
 
@@ -37,7 +39,9 @@ def turned(corners) -> shapes.Solid:
 def lines(*corners):
     """A profile along straight lines, with points enough for sharp edges."""
     step = np.linspace(0.001, 0.999, 60)[:, None]
-    return np.concatenate([a + step * (np.asarray(b) - a) for a, b in itertools.pairwise(map(np.asarray, corners))])
+    return np.concatenate(
+        [a + step * (np.asarray(b) - a) for a, b in itertools.pairwise(map(np.asarray, corners))]
+    )
 
 
 def arc(centre, radius, first=-90, last=90, count=90):
@@ -61,5 +65,10 @@ def box() -> shapes.Solid:
     """A box standing on FOOT, turned a little."""
     solid = shapes.placed(shapes.box(np.array([0.6, 0.7, 0.5])), turn=0.35)
     return standing(
-        shapes.Solid(solid.vertices - [0, solid.vertices[:, 1].min(), 0], solid.faces, solid.normals, solid.uv)
+        shapes.Solid(
+            solid.vertices - [0, solid.vertices[:, 1].min(), 0],
+            solid.faces,
+            solid.normals,
+            solid.uv,
+        )
     )

@@ -50,7 +50,9 @@ def test_a_back_has_the_normals_that_are_known_of_it():
     shell = closed_proxy(depth, normal, mask, thick, CAMERA, back=leaning)
     out = (shell.vertices - [0.1, 0, -3]) / 0.6
     inner = np.linalg.norm(out[:, :2], axis=-1) < 0.9
-    np.testing.assert_allclose(shell.normals[inner & (out[:, 2] < 0)] @ [0.6, 0, -0.8], 1, atol=1e-6)
+    np.testing.assert_allclose(
+        shell.normals[inner & (out[:, 2] < 0)] @ [0.6, 0, -0.8], 1, atol=1e-6
+    )
     assert np.quantile((shell.normals * out).sum(-1)[inner & (out[:, 2] > 0)], 0.01) > 0.99
 
 
@@ -77,7 +79,9 @@ def masks():
     yield "a diagonal line", np.abs(rows - columns) < 3, 2
 
 
-@pytest.mark.parametrize(("name", "mask", "expected"), list(masks()), ids=[name for name, _, _ in masks()])
+@pytest.mark.parametrize(
+    ("name", "mask", "expected"), list(masks()), ids=[name for name, _, _ in masks()]
+)
 def test_any_mask_gives_a_watertight_surface(name, mask, expected):
     shell = closed_proxy(*plate(mask))
     solid = solid_of(shell)

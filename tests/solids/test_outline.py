@@ -22,7 +22,9 @@ def seen_badly(solid, blur=0.4):
 def vase():
     height = np.linspace(0, 1, 120)
     side = np.stack([0.2 + 0.1 * np.sin(2.2 * np.pi * height), 0.9 * height], -1)
-    return seen_badly(turned(np.concatenate([lines((0, 0), side[0]), side, lines(side[-1], (0, 0.9))])))
+    return seen_badly(
+        turned(np.concatenate([lines((0, 0), side[0]), side, lines(side[-1], (0, 0.9))]))
+    )
 
 
 @pytest.mark.parametrize("behind", [GROUND, None])
@@ -33,11 +35,13 @@ def test_a_vase_is_known_by_its_outline(vase, behind):
     there = mask & (entered > 0)
     assert there.sum() > 0.97 * mask.sum()
     angle, given = (
-        np.degrees(np.arccos(np.clip((n * front.normal).sum(-1), -1, 1)))[there].mean() for n in (facing, normal)
+        np.degrees(np.arccos(np.clip((n * front.normal).sum(-1), -1, 1)))[there].mean()
+        for n in (facing, normal)
     )
     assert angle < 10 < 20 < given
     assert (
-        np.abs(thick - front.thickness)[mask].sum() < (0.15 if behind is None else 0.08) * front.thickness[mask].sum()
+        np.abs(thick - front.thickness)[mask].sum()
+        < (0.15 if behind is None else 0.08) * front.thickness[mask].sum()
     )
     assert is_closed(body.body(CAMERA)) and is_closed(body.body(CAMERA, wall=0.03))
     assert surface_of_revolution(depth, normal, mask, CAMERA) is None  # nothing tells its axis
@@ -47,7 +51,9 @@ def test_on_the_ground_it_stands_where_it_stands(vase):
     depth, normal, mask, _ = vase
     body, _ = surface_of_revolution(1.15 * depth, normal, mask, CAMERA, up=UP, behind=GROUND)
     offset = body.axis.foot - FOOT
-    assert np.linalg.norm(offset - (offset @ UP) * UP) < 0.06  # not 0.45: the map has it farther away
+    assert (
+        np.linalg.norm(offset - (offset @ UP) * UP) < 0.06
+    )  # not 0.45: the map has it farther away
     assert 0 < ((body.body(CAMERA).vertices - FOOT) @ UP).min() < 0.02
 
 
@@ -58,7 +64,12 @@ def test_boxes_rings_and_what_is_cut_lopsided_or_a_line_are_none(vase):
     assert surface_of_revolution(depth, normal, mask, CAMERA, up=UP) is None
     depth, normal, mask, _ = vase
     row = np.flatnonzero(mask.any(1))[3]
-    assert surface_of_revolution(depth[row:], normal[row:], mask[row:], Camera(120, 110 - row, 40.0), up=UP) is None
+    assert (
+        surface_of_revolution(
+            depth[row:], normal[row:], mask[row:], Camera(120, 110 - row, 40.0), up=UP
+        )
+        is None
+    )
     rows, columns = np.indices(mask.shape)
     middle = int(np.median(np.nonzero(mask)[0]))
     handle = mask | (np.hypot(rows - middle, columns - np.flatnonzero(mask[middle]).max()) < 10)

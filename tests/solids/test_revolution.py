@@ -11,7 +11,9 @@ from materialist.solids.outline import surface_of_revolution
 def revolved(profile):
     """The body, its thickness, and what is seen of the true one."""
     front, mask = view(turned(profile))
-    body, thick = surface_of_revolution(front.depth, front.normal, mask, CAMERA, up=UP, behind=GROUND)
+    body, thick = surface_of_revolution(
+        front.depth, front.normal, mask, CAMERA, up=UP, behind=GROUND
+    )
     return body, thick, front, mask
 
 
@@ -59,19 +61,26 @@ def test_its_axis_and_front_are_those_of_the_object(pot):
 
 
 def test_a_cylinder_becomes_an_open_pot(pot, ball):
-    body, wall = pot[0], 0.05
+    body = pot[0]
+    wall = 0.05
     shell = body.vessel(CAMERA, wall)
     assert is_closed(shell)
     place = body.axis.of(shell.vertices.astype(float)) - [0, body.profile.floor]
     high = place[:, 1].max()
     glass = np.pi * (0.3**2 - 0.25**2) * (high - wall) + np.pi * 0.3**2 * wall
-    assert volume(shell) == pytest.approx(glass, rel=0.15)  # the inner corner is round, and full of glass
-    assert volume(shell) < volume(body.body(CAMERA, wall=wall)) - 0.5 * np.pi * 0.25**2 * wall  # the lid is gone
+    assert volume(shell) == pytest.approx(
+        glass, rel=0.15
+    )  # the inner corner is round, and full of glass
+    assert (
+        volume(shell) < volume(body.body(CAMERA, wall=wall)) - 0.5 * np.pi * 0.25**2 * wall
+    )  # the lid is gone
     # Along the axis, from above, nothing is met before the bottom; the inside looks at the axis.
     assert place[place[:, 0] < 0.1, 1].max() < 1.5 * wall
     away = shell.vertices - body.axis.foot
     out = away - (away @ body.axis.up)[:, None] * body.axis.up
     facing = (shell.normals * out).sum(1) / np.maximum(np.linalg.norm(out, axis=1), 1e-9)
     side = (place[:, 1] > 0.2) & (place[:, 1] < 0.5)
-    assert (facing[side & (place[:, 0] > 0.28)] > 0.9).all() and (facing[side & (place[:, 0] < 0.27)] < -0.9).all()
+    assert (facing[side & (place[:, 0] > 0.28)] > 0.9).all() and (
+        facing[side & (place[:, 0] < 0.27)] < -0.9
+    ).all()
     assert body.vessel(CAMERA, 0.4) is None  # no room inside

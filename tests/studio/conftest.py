@@ -26,9 +26,13 @@ def empty_page(browser):
     """A page of a new browser that notes its requests and the errors in it, refused content too."""
     context = browser.new_context(viewport={"width": 1280, "height": 1000}, accept_downloads=True)
     made = context.new_page()
-    made.requested, made.errors = [], []
+    made.requested = []
+    made.errors = []
     made.on("request", lambda request: made.requested.append(request.url))
-    refused = lambda words: made.errors.append(words) if "Content Security Policy" in words else None  # noqa: E731
+
+    def refused(words):
+        return made.errors.append(words) if "Content Security Policy" in words else None
+
     made.on("console", lambda message: refused(message.text))
     made.on("pageerror", lambda error: made.errors.append(str(error)))
     made.set_default_timeout(40_000)
@@ -81,7 +85,8 @@ def opened(studio):
 @pytest.fixture
 def session(opened):
     """The open session without edits."""
-    opened.edits, opened.next_object = EditList(), {}
+    opened.edits = EditList()
+    opened.next_object = {}
     opened.deselect()
     opened._past = []
     (opened.workspace / "edits.yaml").unlink(missing_ok=True)  # a test may have left another page's

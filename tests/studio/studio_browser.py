@@ -41,7 +41,9 @@ def slide(page, name, value):
     """Move a slider, and wait for the next picture."""
     before = page.evaluate(PICTURE)
     move(page, name, value)
-    page.wait_for_function("(old) => document.querySelector('#stage .photo').src !== old", arg=before)
+    page.wait_for_function(
+        "(old) => document.querySelector('#stage .photo').src !== old", arg=before
+    )
 
 
 def pixels(page):

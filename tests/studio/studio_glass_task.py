@@ -23,4 +23,6 @@ def trace(report, scene, others, step):
         raise InputError("The camera sees nothing of the object; mark another one.")
     time.sleep(0.2)
     report("trace", 0, 1)
-    return Pane(np.full((1, 2, 3), ior, np.float32), np.float32([[1, 0.2]]), np.array([[False, True]]))
+    return Pane(
+        np.full((1, 2, 3), ior, np.float32), np.float32([[1, 0.2]]), np.array([[False, True]])
+    )

@@ -12,7 +12,8 @@ from materialist.io.package import save_scene
 from materialist.studio.selection import read_pick
 from materialist.types import Camera, FitReport, Scene
 
-HEIGHT, WIDTH = 48, 64
+HEIGHT = 48
+WIDTH = 64
 
 
 def block() -> np.ndarray:
@@ -53,7 +54,11 @@ def zipped(file: Path, members: dict[str, str | bytes]) -> Path:
 def zipped_package(folder: Path, root: str = "", **more: str) -> Path:
     """The room's package as a zip file, in a folder `root/` of it."""
     scene = package(folder)
-    files = {f"{root}{file.relative_to(scene)}": file.read_bytes() for file in scene.rglob("*") if file.is_file()}
+    files = {
+        f"{root}{file.relative_to(scene)}": file.read_bytes()
+        for file in scene.rglob("*")
+        if file.is_file()
+    }
     return zipped(folder / "a.zip", files | more)
 
 

@@ -21,10 +21,24 @@ def free_port() -> int:
 @contextmanager
 def studio(folder: Path, *arguments: str):
     """(process, address) of a studio that runs as long, once it answers."""
-    port, work, log = free_port(), str(folder / "work"), folder / "studio.log"
-    command = [sys.executable, "-m", "materialist", "studio", *arguments, "--port", str(port), "--work", work]
+    port = free_port()
+    work = str(folder / "work")
+    log = folder / "studio.log"
+    command = [
+        sys.executable,
+        "-m",
+        "materialist",
+        "studio",
+        *arguments,
+        "--port",
+        str(port),
+        "--work",
+        work,
+    ]
     with log.open("w") as out:
-        process = subprocess.Popen(command, stdout=out, stderr=out, env={**os.environ, "OMP_NUM_THREADS": "1"})
+        process = subprocess.Popen(
+            command, stdout=out, stderr=out, env={**os.environ, "OMP_NUM_THREADS": "1"}
+        )
     address = f"http://127.0.0.1:{port}"
 
     def answers():

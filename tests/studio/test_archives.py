@@ -34,22 +34,34 @@ def packed(session, tmp_path):
     upload("sky.exr", "envmap", lambda name: session.light(envmap=name, gain="auto"))
     objects.set_option(session, "mesh", library_file(session, "Cube"))
     objects.place(session, 50, 40)
-    session.edits = session.edits.add(Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"}))
+    session.edits = session.edits.add(
+        Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"})
+    )
     session.save()
     pack(session.edits.steps, session.workspace / "edits.yaml", tmp_path / "edits.zip")
     return session, tmp_path / "edits.zip"
 
 
 def test_results_are_whole_files(tmp_path):
-    told = lambda stage, done, total: None  # noqa: E731
+    def told(stage, done, total):
+        return None
+
     scene = package(tmp_path)
     (tmp_path / "edits.yaml").write_text("- edit: {box: [12, 12, 40, 36], hue: 40}\n")
-    tasks.take(told, str(scene), tuple(read_recipe(tmp_path / "edits.yaml")), str(tmp_path / "a.zip"), "glb")
+    tasks.take(
+        told,
+        str(scene),
+        tuple(read_recipe(tmp_path / "edits.yaml")),
+        str(tmp_path / "a.zip"),
+        "glb",
+    )
     tasks.take(told, str(scene), (), str(tmp_path / "a.html"), "html")
     tasks.mesh(told, str(scene), str(tmp_path / "a.glb"))
     names = zipfile.ZipFile(tmp_path / "a.zip").namelist()
     assert "a/scene.glb" in names and "a/scene.light.hdr" in names
-    assert (tmp_path / "a.html").stat().st_size > 10_000 and (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"
+    assert (tmp_path / "a.html").stat().st_size > 10_000 and (tmp_path / "a.glb").read_bytes()[
+        :4
+    ] == b"glTF"
     assert not list(tmp_path.glob(".partial*"))
 
 
@@ -63,12 +75,16 @@ def other_photo(studio, session) -> Session:
 def test_what_was_taken_away_comes_back_on_another_photo(studio, packed):
     session, file = packed
     with zipfile.ZipFile(file) as made:
-        assert len(made.namelist()) == 5  # the list, a mask, a texture, a light, a mesh: also one in a list of meshes
+        assert (
+            len(made.namelist()) == 5
+        )  # the list, a mask, a texture, a light, a mesh: also one in a list of meshes
     other = other_photo(studio, session)
     other.read_edits(file)
     assert [step.kind for step in other.edits.steps] == ["edit", "relight", "insert", "drop"]
     ours, theirs = (apply(page.scene, list(page.edits.steps)) for page in (session, other))
-    assert np.array_equal(ours.materials.albedo, theirs.materials.albedo) and len(theirs.bodies) == 1
+    assert (
+        np.array_equal(ours.materials.albedo, theirs.materials.albedo) and len(theirs.bodies) == 1
+    )
     assert not list(other.workspace.glob("thing-*")) and not list(other.workspace.glob(".load-*"))
     assert len(list(other.workspace.iterdir())) == 5
     other.read_edits(file)  # again: the same files
@@ -99,13 +115,18 @@ LIST = "- edit: {mask: m.png, hue: 3}"
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ("- edit: {mask: /etc/hostname, hue: 3}", "plain file name"), ("- edit: {mask: ../x.png}", "plain file name"),
-        ("- edit: {mask: nothere.png}", "not here"), ("- edit: {colour: red}", "says 'colour'"),
-        ("- explode: {}", "must be one of"), ("!!python/object/apply:os.system ['true']", "must be one of"),
-        ("- relight: {envmap: /etc/hostname}", "plain file name"), ("- drop: {mesh: [a.ply], at: [3, 4]}", "not here"),
+        ("- edit: {mask: /etc/hostname, hue: 3}", "plain file name"),
+        ("- edit: {mask: ../x.png}", "plain file name"),
+        ("- edit: {mask: nothere.png}", "not here"),
+        ("- edit: {colour: red}", "says 'colour'"),
+        ("- explode: {}", "must be one of"),
+        ("!!python/object/apply:os.system ['true']", "must be one of"),
+        ("- relight: {envmap: /etc/hostname}", "plain file name"),
+        ("- drop: {mesh: [a.ply], at: [3, 4]}", "not here"),
         ("- drop: {mesh: [../a.ply], at: [3, 4]}", "plain file name"),
         ("- drop: {mesh: [[a.ply]], at: [3, 4]}", "plain file name"),
-        ({"readme.txt": "x"}, "holds no edits.yaml"), ({"edits.yaml": LIST}, "lacks the file m.png"),
+        ({"readme.txt": "x"}, "holds no edits.yaml"),
+        ({"edits.yaml": LIST}, "lacks the file m.png"),
         ({"edits.yaml": "- edit: {mask: ../m.png}", "../m.png": "x"}, "plain file name"),
         ({"edits.yaml": "- edit: {mask: /etc/hostname}"}, "plain file name"),
         ({"edits.yaml": LIST, "m.png": "no picture"}, "not an image"),
@@ -114,23 +135,33 @@ LIST = "- edit: {mask: m.png, hue: 3}"
         ({"edits.yaml": "- drop: {mesh: [a.exe], at: [1, 2]}", "a.exe": "MZ"}, "not a mesh"),
         ({"edits.yaml": "- explode: {}"}, "must be one of"),
     ],
-)  # fmt: skip
-def test_lists_and_zips_that_are_refused_leave_nothing(studio, session, tmp_path, monkeypatch, given, words):
+)
+def test_lists_and_zips_that_are_refused_leave_nothing(
+    studio, session, tmp_path, monkeypatch, given, words
+):
     monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(upload_megabytes=2))
-    file, before = tmp_path / "edits.yaml", sorted(session.workspace.iterdir())
+    file = tmp_path / "edits.yaml"
+    before = sorted(session.workspace.iterdir())
     if isinstance(given, dict):
         file = zipped(tmp_path / "a.zip", given)
     else:
         file.write_text(given)
     with pytest.raises(InputError, match=words) as error:
         session.read_edits(file)
-    assert str(tmp_path) not in studio.without_folders(str(error.value)) and session.edits.steps == ()
+    assert (
+        str(tmp_path) not in studio.without_folders(str(error.value)) and session.edits.steps == ()
+    )
     assert sorted(session.workspace.iterdir()) == before
 
 
 def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path):
     write_png(tmp_path / "m.png", block().astype(np.uint8) * 255)
-    members = {"room/edits.yaml": LIST, "room/m.png": (tmp_path / "m.png").read_bytes(), "room/x.py": "x", "../e": "x"}
+    members = {
+        "room/edits.yaml": LIST,
+        "room/m.png": (tmp_path / "m.png").read_bytes(),
+        "room/x.py": "x",
+        "../e": "x",
+    }
     desk = tmp_path / "desk"
     desk.mkdir()
     (step,) = unpack(desk, zipped(tmp_path / "a.zip", members), Allowance())

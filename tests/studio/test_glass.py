@@ -52,7 +52,9 @@ def test_the_last_value_wins_and_the_picture_is_kept(tracer, log):
     asked = len(log.read_text().splitlines())
     tracer.ask((), glass(1.3))  # the same wish again
     assert not tracer.state.waiting and len(log.read_text().splitlines()) == asked
-    assert len({line.split()[0] for line in log.read_text().splitlines()}) == 1  # one process for all
+    assert (
+        len({line.split()[0] for line in log.read_text().splitlines()}) == 1
+    )  # one process for all
 
 
 def test_failures_are_told_and_the_next_value_is_tried(tracer):
@@ -75,9 +77,16 @@ def report(stages, outdated=False):
 
 
 def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
-    scene, others = str(package(tmp_path)), (Step("relight", {"ambient": "0.5"}, tmp_path),)
-    given = {"mask": write_mask(tmp_path, block()), "ior": "1.2", "thickness": "symmetry", "tint": "1,0.5,0.5"}
-    first, late = [], []
+    scene = str(package(tmp_path))
+    others = (Step("relight", {"ambient": "0.5"}, tmp_path),)
+    given = {
+        "mask": write_mask(tmp_path, block()),
+        "ior": "1.2",
+        "thickness": "symmetry",
+        "tint": "1,0.5,0.5",
+    }
+    first = []
+    late = []
     pane = studio_glass.trace(report(first), scene, others, Step("glass", given, tmp_path))
     assert first == ["build", "trace"]
     dim = replace(room(), envmap=room().envmap * 0.5)
@@ -90,4 +99,6 @@ def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
     assert studio_glass.trace(report(late, outdated=True), scene, others, newer) is None
     assert late == ["build"]  # the body is kept, and nothing is traced
     with pytest.raises(InputError, match="must be 4 numbers"):
-        studio_glass.trace(report([]), scene, others, Step("glass", {"ior": "1.4", "box": "0,0,9"}, tmp_path))
+        studio_glass.trace(
+            report([]), scene, others, Step("glass", {"ior": "1.4", "box": "0,0,9"}, tmp_path)
+        )

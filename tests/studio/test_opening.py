@@ -27,7 +27,9 @@ def large_png(path, side):
     """A black picture of 8 bits, side x side, of a few kilobytes."""
 
     def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
 
     packer = zlib.compressobj(9)
     row = bytes(1 + 3 * side)
@@ -64,7 +66,9 @@ def test_a_small_file_of_a_large_picture(tmp_path, limited, option):
     file = large_png(tmp_path / "a.png", 7000)
     assert file.stat().st_size < 500_000
     before = psutil.Process().memory_info().rss
-    with pytest.raises(InputError, match=r"a\.png.*(needs more than 0.6 GB|may have up to 8 megapixels)"):
+    with pytest.raises(
+        InputError, match=r"a\.png.*(needs more than 0.6 GB|may have up to 8 megapixels)"
+    ):
         uploads.used(tmp_path, file, option, Allowance(), lambda name: pytest.fail("it was used"))
     assert psutil.Process().memory_info().rss - before < 50e6
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
@@ -74,7 +78,9 @@ def test_a_small_file_of_a_large_mesh(tmp_path, limited):
     file = sparse_glb(tmp_path / "a.glb", 400_000_000)
     before = psutil.Process().memory_info().rss
     with pytest.raises(InputError, match=r"a\.glb"):
-        uploads.used(tmp_path, file, uploads.MESH, Allowance(), lambda name: pytest.fail("it was used"))
+        uploads.used(
+            tmp_path, file, uploads.MESH, Allowance(), lambda name: pytest.fail("it was used")
+        )
     assert psutil.Process().memory_info().rss - before < 50e6
 
 

@@ -179,7 +179,11 @@ def test_a_password_closes_the_door(tmp_path):
         with pytest.raises(urllib.error.HTTPError, match="401"):
             browser.open(f"{address}/config")
         data = urllib.parse.urlencode({"password": "open sesame"}).encode()
-        assert browser.open(f"{address}/login", data).status == browser.open(f"{address}/config").status == 200
+        assert (
+            browser.open(f"{address}/login", data).status
+            == browser.open(f"{address}/config").status
+            == 200
+        )
         process.send_signal(2)
         assert process.wait(20) in (0, 130)
 
@@ -198,9 +202,12 @@ def test_two_people_at_once(browser, tmp_path):
             page.wait_for_selector("#stage .view[data-selected=yes]")
         slide(pages[0], "hue", 120)
         slide(pages[1], "hue", -120)
-        green, blue = pixels(pages[0])[24, 25], pixels(pages[1])[24, 25]
+        green = pixels(pages[0])[24, 25]
+        blue = pixels(pages[1])[24, 25]
         assert green.argmax() == 1 and blue.argmax() == 2
-        assert "hue 120" in pages[0].inner_text("#steps") and "hue -120" in pages[1].inner_text("#steps")
+        assert "hue 120" in pages[0].inner_text("#steps") and "hue -120" in pages[1].inner_text(
+            "#steps"
+        )
         for context in contexts:
             context.close()
 
@@ -209,7 +216,9 @@ def test_two_people_at_once(browser, tmp_path):
 def test_the_whole_story(page, tmp_path):
     """A dropped photo, cancelled and begun again, reloaded in the middle, edited, traced, taken away."""
     page.set_default_timeout(300_000)
-    Image.open(example_path("coffee")).resize((150, 100)).save(tmp_path / "coffee.png")  # nothing is enlarged
+    Image.open(example_path("coffee")).resize((150, 100)).save(
+        tmp_path / "coffee.png"
+    )  # nothing is enlarged
     page.get_by_role("tab", name="Open").click()
     page.set_input_files("#file input[type=file]", str(tmp_path / "coffee.png"))
     page.wait_for_selector("#facts >> text=is ready")

@@ -1,7 +1,17 @@
 """The brush, falling objects and live glass in a real browser."""
 
 import pytest
-from studio_browser import PICTURE, click_photo, mask, move, pixels, place, press, select_block, slide
+from studio_browser import (
+    PICTURE,
+    click_photo,
+    mask,
+    move,
+    pixels,
+    place,
+    press,
+    select_block,
+    slide,
+)
 
 MASK = "getComputedStyle(document.querySelector('#stage .fill')).maskImage"
 
@@ -29,7 +39,12 @@ def test_the_brush_paints_and_rubs_out(page):
     assert page.locator("#stage .ring").get_attribute("r") == "3"
     stroke(page, [(0.2, 0.75), (0.8, 0.75)])
     painted = mask(page)
-    assert painted[36, 14:50].all() and painted[33:39, 30].all() and not painted[30].any() and not painted[42].any()
+    assert (
+        painted[36, 14:50].all()
+        and painted[33:39, 30].all()
+        and not painted[30].any()
+        and not painted[42].any()
+    )
     stroke(page, [(0.5, 0.25), (0.5, 0.6)])  # adds, in whatever mode
     assert mask(page)[20, 32] and mask(page)[36, 20]
     stroke(page, [(0.5, 0.6), (0.5, 0.95)], key="Alt")
@@ -71,7 +86,10 @@ def test_the_photo_is_seen_as_long_as_a_key_is_held(page):
     before = page.locator("#stage .before")
     page.locator("#before").hover()
     keys = page.keyboard
-    for hold, let_go in ((lambda: keys.down("b"), lambda: keys.up("b")), (page.mouse.down, page.mouse.up)):
+    for hold, let_go in (
+        (lambda: keys.down("b"), lambda: keys.up("b")),
+        (page.mouse.down, page.mouse.up),
+    ):
         hold()
         assert before.is_visible() and before.get_attribute("src") == photo
         let_go()
@@ -90,7 +108,8 @@ def test_light_that_was_dragged_is_made_again_at_rest(page):
 
 def test_selecting_by_clicks(page):
     select_block(page)
-    first, one = mask(page), page.evaluate(MASK)
+    first = mask(page)
+    one = page.evaluate(MASK)
     click_photo(page, 0.8, 0.8, ["Shift"])
     page.wait_for_function(f"(old) => {MASK} !== old", arg=one)
     assert mask(page).sum() > first.sum()
@@ -120,7 +139,9 @@ def test_glass_follows_its_slider(page):
     page.wait_for_selector("#stage .view[data-waiting=yes]")
     page.wait_for_selector("#stage .badge >> text=Glass traced")
     coated = pixels(page)[20:28, 20:30].reshape(-1, 3).mean(0)
-    assert coated[0] - coated[1] > clear[20:28, 20:30, 0].mean() - clear[20:28, 20:30, 1].mean() + 10  # red again
+    assert (
+        coated[0] - coated[1] > clear[20:28, 20:30, 0].mean() - clear[20:28, 20:30, 1].mean() + 10
+    )  # red again
     page.locator("#steps .text").click()  # no longer current, and current again
     page.wait_for_selector("#steps li:not(.current)")
     page.locator("#steps .text").click()
@@ -156,10 +177,11 @@ def test_a_refused_file_leaves_its_field(page, tmp_path):
     (tmp_path / "empty.yaml").write_text("nothing")
     (tmp_path / "none.obj").write_text("v 0 0 0\n")
     for tab, part, name, words in (
-        ("Open", "file", "broken.png", "not an image"), ("Light", "own_map", "broken.png", "not an image"),
+        ("Open", "file", "broken.png", "not an image"),
+        ("Light", "own_map", "broken.png", "not an image"),
         ("Take away", "recipe", "empty.yaml", "holds no list"),
         ("Objects", "own_mesh", "none.obj", "no faces|no triangles|empty"),
-    ):  # fmt: skip
+    ):
         page.get_by_role("tab", name=tab).click()
         page.set_input_files(f"#{part} input[type=file]", str(tmp_path / name))
         page.wait_for_selector(f"text=/{words}/")

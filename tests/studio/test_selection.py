@@ -35,11 +35,19 @@ def test_box_and_brush():
 
 @pytest.mark.parametrize(
     "data",
-    [None, {}, {"tool": "click"}, {"tool": "click", "at": [1]}, {"tool": "rm", "at": []},
-     {"tool": "click", "at": ["a", 1]}, {"tool": "click", "at": [float("nan"), 1]},
-     {"tool": "click", "at": [1, 2], "mode": "x"},
-     {"tool": "brush", "points": [[1]]}, {"tool": "box", "at": [1, 2, 3]}],
-)  # fmt: skip
+    [
+        None,
+        {},
+        {"tool": "click"},
+        {"tool": "click", "at": [1]},
+        {"tool": "rm", "at": []},
+        {"tool": "click", "at": ["a", 1]},
+        {"tool": "click", "at": [float("nan"), 1]},
+        {"tool": "click", "at": [1, 2], "mode": "x"},
+        {"tool": "brush", "points": [[1]]},
+        {"tool": "box", "at": [1, 2, 3]},
+    ],
+)
 def test_nonsense_from_the_page(data):
     with pytest.raises(InputError):
         read_pick(data)

@@ -32,13 +32,20 @@ def test_an_edit_from_click_to_recipe(session):
     session.set("edit", hue="120")
     session.set("edit", roughness="0.2")
     steps = read_recipe(session.workspace / "edits.yaml")
-    assert len(steps) == 1 and steps[0].options == {"mask": steps[0].options["mask"], "hue": "120", "roughness": "0.2"}
+    assert len(steps) == 1 and steps[0].options == {
+        "mask": steps[0].options["mask"],
+        "hue": "120",
+        "roughness": "0.2",
+    }
     edited = apply(room(), steps)
     changed = (edited.materials.albedo != room().materials.albedo).any(-1)
     assert changed[block()].mean() > 0.9 and not changed[~block()].any()
     session.set("edit", hue=None)
     session.set("edit", roughness=None)
-    assert apply(room(), read_recipe(session.workspace / "edits.yaml")).materials.roughness.min() == 0.5
+    assert (
+        apply(room(), read_recipe(session.workspace / "edits.yaml")).materials.roughness.min()
+        == 0.5
+    )
 
 
 def test_a_slider_without_a_number_writes_nothing(session):
@@ -67,7 +74,9 @@ def test_undo_takes_a_whole_drag_back_and_choices_one_by_one(session):
     for left in ({"texture": "a.png"}, {"albedo": "#303030"}):
         session.undo()
         (step,) = session.edits.steps
-        assert {name: step.options[name] for name in ("texture", "albedo") if name in step.options} == left
+        assert {
+            name: step.options[name] for name in ("texture", "albedo") if name in step.options
+        } == left
     session.undo()
     assert session.edits.steps == () and not (session.workspace / "edits.yaml").exists()
     for envmap in ("a.exr", "b.exr", "b.exr"):  # the same again changes nothing
@@ -81,7 +90,10 @@ def test_undo_takes_a_whole_drag_back_and_choices_one_by_one(session):
     assert session.edits.steps[0].options["envmap"] == "a.exr"
     session.undo(again=True)
     session.undo(again=True)
-    assert session.edits.steps[0].options["envmap"] == "b.exr" and len(session.edits.steps[0].options["lamps"]) == 1
+    assert (
+        session.edits.steps[0].options["envmap"] == "b.exr"
+        and len(session.edits.steps[0].options["lamps"]) == 1
+    )
     session.undo()
     session.light(ambient="0.5")
     with pytest.raises(InputError, match="nothing to do again"):
@@ -120,7 +132,12 @@ def test_choosing_a_step_brings_its_region_and_values_back(session):
     assert (session.selection.mask & block()).sum() > 0.9 * block().sum()
     assert control_values(session)["hue"] == 90 and control_values(session)["roughness"] == 0.5
     values = control_values(session)
-    assert (values["rotate"], values["ambient"], values["sun_on"], values["elevation"]) == (30, 0.5, True, 20)
+    assert (values["rotate"], values["ambient"], values["sun_on"], values["elevation"]) == (
+        30,
+        0.5,
+        True,
+        20,
+    )
     session.act("up", 1)
     assert [s.kind for s in session.edits.steps] == ["relight", "edit"]
     with pytest.raises(InputError, match="no longer"):
@@ -155,7 +172,9 @@ def test_reopened_where_it_was_left(studio, session):
 
 def test_a_preview_closed_while_it_prepares_is_freed(session, monkeypatch):
     """Its next part would wait in the queue, and hold the scene, until after `free_memory`."""
-    begun, ends, seen = threading.Event(), threading.Event(), []
+    begun = threading.Event()
+    ends = threading.Event()
+    seen = []
 
     def prepare(preview):
         begun.set()
@@ -178,7 +197,8 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
     """What somebody wrote by hand must not vanish with the next button."""
     click(session)
     session.set("edit", roughness="0.2")
-    file, project = session.workspace / "edits.yaml", session.project
+    file = session.workspace / "edits.yaml"
+    project = session.project
     text = file.read_text().replace("0.2", "0.2\n    texture: ../wood.png")
     file.write_text(text)
     other = Session("me")
@@ -193,12 +213,15 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
 def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_history(session):
     click(session)
     session.set("edit", hue="10")
-    stack, past = session.edits, session._past
+    stack = session.edits
+    past = session._past
     (session.workspace / "edits.yaml").write_text("- relight: {rotate: 20}\n")
     for act in (
-        lambda: session.set("edit", hue="60"), session.undo, lambda: session.act("toggle", 0),
+        lambda: session.set("edit", hue="60"),
+        session.undo,
+        lambda: session.act("toggle", 0),
         lambda: session.light(rotate="5"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InputError, match="changed in another place"):
             act()
         assert session.edits == stack and session._past == past
@@ -220,12 +243,18 @@ def test_an_edit_by_click_or_box_grows_by_a_mask(session, tmp_path, where):
 
 @pytest.mark.parametrize(
     ("bad", "words"),
-    [("edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 5}", "exactly one"), ("relight: {rotate: abc}", "rotate"),
-     ("relight: {lamps: [[a, b, 1, 2700, 1]]}", "lamp"), ("insert: {mesh: thing-cube.ply}", "at")],
-)  # fmt: skip
+    [
+        ("edit: {click: [25, 24], box: [1, 1, 9, 9], hue: 5}", "exactly one"),
+        ("relight: {rotate: abc}", "rotate"),
+        ("relight: {lamps: [[a, b, 1, 2700, 1]]}", "lamp"),
+        ("insert: {mesh: thing-cube.ply}", "at"),
+    ],
+)
 def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, words):
     (session.workspace / "thing-cube.ply").touch()
-    (session.workspace / "edits.yaml").write_text(f"- edit: {{click: [25, 24], hue: 50}}\n- {bad}\n")
+    (session.workspace / "edits.yaml").write_text(
+        f"- edit: {{click: [25, 24], hue: 50}}\n- {bad}\n"
+    )
     other = Session("me")
     other.open(session.project)
     other.live.wait()
@@ -243,8 +272,14 @@ def test_ticking_and_moving_leave_the_current_one():
     edits = EditList(steps, 2)
     assert edits.toggled(0).current == 2 and edits.toggled(0).toggled(0).current == 2
     assert edits.toggled(2).current is None and edits.toggled(2).toggled(2).current is None
-    assert edits.moved(0, 1).current == 2 and edits.moved(1, 1).current == 1 and edits.moved(2, -1).current == 1
-    assert EditList(steps).moved(0, 1).current is None and EditList(steps).toggled(1).current is None
+    assert (
+        edits.moved(0, 1).current == 2
+        and edits.moved(1, 1).current == 1
+        and edits.moved(2, -1).current == 1
+    )
+    assert (
+        EditList(steps).moved(0, 1).current is None and EditList(steps).toggled(1).current is None
+    )
 
 
 def test_an_object_falls_and_lies_there(session, monkeypatch):
@@ -260,9 +295,16 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     assert objects.let_fall(session, 0.5) == []
     step = session.edits.steps[0]
     assert [s.kind for s in session.edits.steps] == ["drop"] and session.current_kind == "drop"
-    assert step.options["at"] == ["32", "34"] and step.options["scale"] == "0.5" and step.options["seed"] == "0"
+    assert (
+        step.options["at"] == ["32", "34"]
+        and step.options["scale"] == "0.5"
+        and step.options["seed"] == "0"
+    )
     lies = session.live.edited(session.edits.active).bodies[0]
-    assert lies.vertices.shape == stands.vertices.shape and np.abs(lies.vertices - stands.vertices).max() > 0.01
+    assert (
+        lies.vertices.shape == stands.vertices.shape
+        and np.abs(lies.vertices - stands.vertices).max() > 0.01
+    )
     replayed = apply(floor.scene, read_recipe(session.workspace / "edits.yaml")).bodies[0]
     np.testing.assert_allclose(replayed.vertices, lies.vertices, atol=1e-6)
     objects.let_fall(session, 0.5)
@@ -278,8 +320,12 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
 def test_the_report_is_plain_and_harmless():
     scene = replace(room(), report=replace(room().report, warnings=("<img src=x> [a](b)",)))
     text = report(scene)
-    assert "31.5 dB from the photo" in text and "40.0°" in text and "&lt;img src=x> &#91;a](b)" in text
-    assert all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in maps(room())) and len(maps(room())) == 8
+    assert (
+        "31.5 dB from the photo" in text and "40.0°" in text and "&lt;img src=x> &#91;a](b)" in text
+    )
+    assert (
+        all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in maps(room())) and len(maps(room())) == 8
+    )
 
 
 def test_places_are_pixels_and_those_outside_are_refused(session):

@@ -38,7 +38,10 @@ def test_people_are_kept_apart(shared):
     session = shared.session("page", bert)
     assert shared.projects(bert) == [] and shared.projects(anna) == [project]
     shared.start = shared.work.new("For all", LOCAL_PERSON)
-    assert shared.projects(bert) == [shared.start] and shared.project(shared.start.name, bert) == shared.start
+    assert (
+        shared.projects(bert) == [shared.start]
+        and shared.project(shared.start.name, bert) == shared.start
+    )
     with pytest.raises(InputError, match="no longer"):
         shared.open(session, project.name)
     for page, person in ((None, bert), ("page", anna)):
@@ -74,9 +77,15 @@ def test_a_port_in_use_is_one_sentence(refused, tmp_path):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--port", "0"], ["--port", "99999"], ["--work", "/proc/nowhere"], ["--workers", "0"],
-     ["/no/such/scene"], ["x" * 300]],
-)  # fmt: skip
+    [
+        ["--port", "0"],
+        ["--port", "99999"],
+        ["--work", "/proc/nowhere"],
+        ["--workers", "0"],
+        ["/no/such/scene"],
+        ["x" * 300],
+    ],
+)
 def test_bad_options_end_with_2_and_make_no_folder(refused, arguments, tmp_path):
     work = [] if "--work" in arguments else ["--work", tmp_path / "w"]
     port = [] if "--port" in arguments else ["--port", "47391"]
@@ -87,7 +96,8 @@ def test_bad_options_end_with_2_and_make_no_folder(refused, arguments, tmp_path)
 def test_files_are_handed_over_under_names_nobody_guesses(shared):
     file = shared.work.root / "result.png"
     file.write_bytes(b"x")
-    first, second = shared.public_copy("anna", file), shared.public_copy("anna", file)
+    first = shared.public_copy("anna", file)
+    second = shared.public_copy("anna", file)
     assert first != second and first.startswith(str(shared.work.cache))
     assert len(first.split("/")[-2]) == 32
     assert str(shared.files.path("anna", first)) == first
@@ -98,7 +108,10 @@ def test_files_are_handed_over_under_names_nobody_guesses(shared):
 
 def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
     session = shared.session("page", shared.person("a" * 32))
-    jobs = {kind: Job(kind, session.person, tmp_path, print) for kind in ("final", "take", "invert", "mesh")}
+    jobs = {
+        kind: Job(kind, session.person, tmp_path, print)
+        for kind in ("final", "take", "invert", "mesh")
+    }
     for job in jobs.values():
         session.note_job(job)
     shared.leave("page")
@@ -107,11 +120,16 @@ def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
 
 def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
     text = f"/srv/a b.txt: {tmp_path}/photo-001/x.png and '/home/me/y.exr' are damaged; see https://a.example/b (1/2)"
-    assert shared.without_folders(text) == "a b.txt: x.png and 'y.exr' are damaged; see https://a.example/b (1/2)"
+    assert (
+        shared.without_folders(text)
+        == "a b.txt: x.png and 'y.exr' are damaged; see https://a.example/b (1/2)"
+    )
     assert str(tmp_path) not in str(PageContext(shared).message(InputError(text)))
     session = shared.session("page", "a" * 32)
     session.project = shared.work.new("One", session.person)
-    assert str(tmp_path) not in widgets.commands(session) and "photo-001" in widgets.commands(session)
+    assert str(tmp_path) not in widgets.commands(session) and "photo-001" in widgets.commands(
+        session
+    )
     session.local = True
     assert f"cd {tmp_path}" in widgets.commands(session)
 
@@ -121,7 +139,8 @@ def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path, monkey
     assert "Done in" in PageContext(shared).state(job)
     monkeypatch.setitem(sys.modules, "pyoidn", None)
     assert "not denoised" in PageContext(shared).state(job)
-    job.state, job.message = FAILED, "<script>alert(1)</script>"
+    job.state = FAILED
+    job.message = "<script>alert(1)</script>"
     shown = PageContext(shared).state(job)
     assert "<script>" not in shown and 'role="alert"' in shown
     assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
@@ -174,7 +193,8 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
             made.jobs.submit(Job("final", "me", Path(work), answer, {"how": "wait", "out": work}))
         sys.exit(run_to_exit_code(app, ["studio", "--port", port, "--work", work]))
     """
-    port, command = free_port(), [sys.executable, "-c", script, str(tmp_path / "work")]
+    port = free_port()
+    command = [sys.executable, "-c", script, str(tmp_path / "work")]
     process = subprocess.Popen(
         [*command, str(port)], env={**os.environ, "TMPDIR": str(tmp_path)}, stdout=subprocess.PIPE
     )
@@ -182,15 +202,22 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
         if b"The studio is open" in line:
             break
     until(lambda: len(list((tmp_path / "work").glob(".partial-*"))) == 2, 60)
-    held = [urllib.request.urlopen(f"http://127.0.0.1:{port}/gradio_api/heartbeat/{page}") for page in "ab"]
+    held = [
+        urllib.request.urlopen(f"http://127.0.0.1:{port}/gradio_api/heartbeat/{page}")
+        for page in "ab"
+    ]
     process.terminate()
     assert process.wait(30) == -15 and held
     until(lambda: not list((tmp_path / "work").glob(".partial-*")))
     assert [file.name for file in tmp_path.iterdir() if file.name != "work"] == []
 
 
-def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_closes_them(shared, monkeypatch):
-    freed, begun, go_on = [], threading.Event(), threading.Event()
+def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_closes_them(
+    shared, monkeypatch
+):
+    freed = []
+    begun = threading.Event()
+    go_on = threading.Event()
 
     class Busy(Future):
         """Memory that is being given back until the test lets it."""
@@ -205,7 +232,9 @@ def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_close
 
     monkeypatch.setattr("materialist.studio.studio.free_memory", free)
     for number in range(201):
-        shared.session(f"page{number}", f"person{number}").live = SimpleNamespace(close=lambda: None)
+        shared.session(f"page{number}", f"person{number}").live = SimpleNamespace(
+            close=lambda: None
+        )
     shared.leave("page0")
     assert begun.wait(10)
     for number in range(1, 201):
@@ -231,8 +260,11 @@ def test_one_freeing_serves_all_who_wait_for_it(monkeypatch):
 def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shared, monkeypatch):
     monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(page_seconds=0))
     person = "a" * 32
-    silent, open_ = shared.session("silent", person), shared.session("open", person, beats=True)
-    assert shared.session("silent", person) is not silent and shared.session("open", person) is open_
+    silent = shared.session("silent", person)
+    open_ = shared.session("open", person, beats=True)
+    assert (
+        shared.session("silent", person) is not silent and shared.session("open", person) is open_
+    )
 
 
 def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
@@ -240,7 +272,9 @@ def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
     for _ in range(SETTINGS.jobs_a_person):
         shared.submit(session, wait, shared.work.root)
     with pytest.raises(InputError, match="6 jobs waiting"):
-        _start_inversion(PageContext(shared), session, str(example_path("example:cat")), "auto", 512, "auto")
+        _start_inversion(
+            PageContext(shared), session, str(example_path("example:cat")), "auto", 512, "auto"
+        )
     assert not shared.work.projects()
 
 
@@ -249,7 +283,9 @@ def test_little_is_remembered_of_people_who_are_gone(shared, monkeypatch):
     for person in "abac":
         shared.note_last(person, "photo-001")
     assert [*shared.last] == ["a", "c"]
-    shared.quota._claims["a"] = deque([quota.Claim(time.monotonic() - 3601, SETTINGS.storage_quota)])
+    shared.quota._claims["a"] = deque(
+        [quota.Claim(time.monotonic() - 3601, SETTINGS.storage_quota)]
+    )
     shared.claim("b", 10)
     assert [*shared.quota._claims] == ["b"]
     for person in "abac":
@@ -264,10 +300,13 @@ def test_the_disk_of_the_photos_counts_too(shared, monkeypatch):
         shared.claim("a", 10)
 
 
-def test_path_traced_pictures_of_a_page_are_files_of_their_own_and_the_last_stays(shared, monkeypatch):
+def test_path_traced_pictures_of_a_page_are_files_of_their_own_and_the_last_stays(
+    shared, monkeypatch
+):
     """The job of the first is stopped."""
     session = shared.session("page", "a" * 32)
-    session.project, made = shared.work.new("One", session.person), []
+    session.project = shared.work.new("One", session.person)
+    made = []
 
     def work(self, session, task, output, **arguments):
         output.with_suffix(".png").write_text(str(len(made)))

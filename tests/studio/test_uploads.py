@@ -22,14 +22,20 @@ pytestmark = pytest.mark.usefixtures("opens_here")
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        ("a.exe", b"MZ", "not a photo"), ("a.svg", b"<svg/>", "not a photo"), ("a.png", b"hello", "not an image"),
-        ("a.png", b"", "empty"), ("a.exr", b"\x76\x2f\x31\x01rest", "no readable EXR"),
-        ("a.hdr", b"#?RADIANCE\n\n", "no size"), ("noending", b"x", "not a photo"),
-        ("a.png", png_header(30_000, 30_000), "megapixels"), ("a.png", png_header(30_000, 2_500), "75 megapixels"),
-        ("a.png", png_header(30_000, 100), "longer than"), ("a.png", png_header(4, 4), "at least"),
+        ("a.exe", b"MZ", "not a photo"),
+        ("a.svg", b"<svg/>", "not a photo"),
+        ("a.png", b"hello", "not an image"),
+        ("a.png", b"", "empty"),
+        ("a.exr", b"\x76\x2f\x31\x01rest", "no readable EXR"),
+        ("a.hdr", b"#?RADIANCE\n\n", "no size"),
+        ("noending", b"x", "not a photo"),
+        ("a.png", png_header(30_000, 30_000), "megapixels"),
+        ("a.png", png_header(30_000, 2_500), "75 megapixels"),
+        ("a.png", png_header(30_000, 100), "longer than"),
+        ("a.png", png_header(4, 4), "at least"),
         ("a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 40000 +X 50000\n", "2000 megapixels"),
     ],
-)  # fmt: skip
+)
 def test_pictures_are_refused_by_their_header(tmp_path, name, content, message):
     file = tmp_path / name
     file.write_bytes(content)
@@ -63,7 +69,9 @@ def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_p
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(decoded_bytes=100_000))
     with pytest.raises(SceneError, match="GB of memory") as error:
         tab_open._unpack(PageContext(studio), Session("me"), file)
-    assert studio.work.projects() == before and str(studio.work.root) not in studio.without_folders(str(error.value))
+    assert studio.work.projects() == before and str(studio.work.root) not in studio.without_folders(
+        str(error.value)
+    )
 
 
 def test_zips_that_are_none(tmp_path, monkeypatch):
@@ -71,7 +79,9 @@ def test_zips_that_are_none(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="not a readable zip"):
         archives.unpack_scene(tmp_path / "a.zip", tmp_path / "target", Allowance())
     with pytest.raises(InputError, match="no scene package"):
-        archives.unpack_scene(zipped(tmp_path / "b.zip", {"readme.txt": "x"}), tmp_path / "target", Allowance())
+        archives.unpack_scene(
+            zipped(tmp_path / "b.zip", {"readme.txt": "x"}), tmp_path / "target", Allowance()
+        )
     large = zipped(tmp_path / "c.zip", {"scene.json": "{}", "mesh.ply": b"\0" * 5_000_000})
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(unpacked_bytes=1_000_000))
     with pytest.raises(InputError, match="unpacks to"):

@@ -20,7 +20,9 @@ def test_a_project_survives_a_restart(tmp_path):
     assert again.ready
 
 
-@pytest.mark.parametrize("title", ["../../etc/passwd", "/abs", "a\0b\n\n<script>", "CON", "x" * 500, ""])
+@pytest.mark.parametrize(
+    "title", ["../../etc/passwd", "/abs", "a\0b\n\n<script>", "CON", "x" * 500, ""]
+)
 def test_a_title_is_never_a_path(tmp_path, title):
     work = WorkFolder(tmp_path / "work")
     project = work.new(title, "me")
@@ -45,15 +47,19 @@ def test_downloads_carry_the_name_of_the_photo(tmp_path, title, stem):
 
 def test_a_damaged_card_hides_its_project_alone(tmp_path):
     work = WorkFolder(tmp_path)
-    broken, good = work.new("a", "me"), work.new("b", "me")
+    broken = work.new("a", "me")
+    good = work.new("b", "me")
     (broken.folder / CARD).write_text("{")
     assert [p.name for p in work.projects()] == [good.name]
 
 
 def test_the_newest_photo_is_first_and_no_folder_is_two_studios(tmp_path, monkeypatch):
-    one, other = WorkFolder(tmp_path), WorkFolder(tmp_path)
+    one = WorkFolder(tmp_path)
+    other = WorkFolder(tmp_path)
     for number in (999, 1000):
-        monkeypatch.setattr("materialist.studio.workspace.count", lambda _, number=number: iter([number]))
+        monkeypatch.setattr(
+            "materialist.studio.workspace.count", lambda _, number=number: iter([number])
+        )
         one.new("a", "me")
     assert [project.name for project in one.projects()] == ["photo-1000", "photo-999"]
     monkeypatch.setattr("materialist.studio.workspace.count", lambda _: iter([999, 1000, 1001]))

@@ -16,7 +16,12 @@ from materialist.train.schedule import Budget
 from materialist.train.trainer import RunOptions, Trainer
 
 NETWORK = BundledArchitecture(
-    widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8, light=16
+    widths=(8, 8, 16, 32),
+    blocks=(1, 1, 1, 1),
+    attention=1,
+    decoder_blocks=(1, 1, 1),
+    fine=8,
+    light=16,
 )
 SMALL = {"side": 32, "batch": 2, "warm_up": 2, "bfloat16": False}
 WIDTHS = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
@@ -25,7 +30,9 @@ WIDTHS = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
 def bundled(data: Path, *, samples=0, architecture=NETWORK, **changes) -> BundledTask:
     """The bundled network's task, a thousand times smaller than the real one."""
     recipe = RECIPE.changed(**(SMALL | changes))
-    return BundledTask(open_sources([data]), recipe, score_samples=samples, architecture=architecture)
+    return BundledTask(
+        open_sources([data]), recipe, score_samples=samples, architecture=architecture
+    )
 
 
 def clicks(views: Path, **changes) -> ClickTask:
@@ -42,9 +49,13 @@ def trainer(task, run: Path, *, steps: int, resume=False, notes=None, **options)
     """A run that writes no checkpoint before its end."""
     note = (lambda _: None) if notes is None else notes.append
     return Trainer(
-        task, run, budget=Budget(steps=steps), options=RunOptions(**{"checkpoint_seconds": 1e9, "seed": 3, **options}),
-        resume=resume, note=note,
-    )  # fmt: skip
+        task,
+        run,
+        budget=Budget(steps=steps),
+        options=RunOptions(**{"checkpoint_seconds": 1e9, "seed": 3, **options}),
+        resume=resume,
+        note=note,
+    )
 
 
 def click_view(seed: int) -> dict:

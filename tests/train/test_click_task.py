@@ -24,7 +24,8 @@ def test_clicks_lie_on_what_they_ask_for():
     for _ in range(60):
         maps, mask = draw_click(view, 64, rng)
         assert maps.shape == (CHANNELS, 64, 64) and mask.shape == (64, 64) and mask.any()
-        spots, box = maps[SPOT] == 1, maps[BOX] == 1
+        spots = maps[SPOT] == 1
+        box = maps[BOX] == 1
         assert spots.any() != box.any(), "clicks or a box"
         assert mask[spots].all(), "every click lies on the object"
         if box.any():
@@ -46,7 +47,11 @@ def test_the_loss_has_a_closed_form():
 def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):
-        produce_set(data, DataSetOptions(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"), count=1)
+        produce_set(
+            data,
+            DataSetOptions(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"),
+            count=1,
+        )
     views = tmp_path / "run" / "views"
     produce_views(sets[0], views)
     (made,) = load_views(views)
@@ -63,8 +68,11 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
 
 
 def test_cut_outs_are_things_of_further_views(tmp_path):
-    data, folder = tmp_path / "set", tmp_path / "cutouts"
-    produce_set(data, DataSetOptions(size=64, seed=11, spp=1, device="cpu", only="still-life"), count=1)
+    data = tmp_path / "set"
+    folder = tmp_path / "cutouts"
+    produce_set(
+        data, DataSetOptions(size=64, seed=11, spp=1, device="cpu", only="still-life"), count=1
+    )
     folder.mkdir()
     made_cutouts.write_disc(folder / "red.png")
     produce_views(data, tmp_path / "views", folder)

@@ -9,7 +9,19 @@ from materialist.predict.bundled.network import BundledNetwork
 def test_one_step_and_its_weights(done, data, tmp_path):
     small = ("--size", 32, "--batch", 1, "--workers", 0, "--score-samples", 0, "--device", "cpu")
     more = made_samples.write_set(tmp_path / "more", 3)
-    made = done("train", "matnet", "--data", data, "--data", more, "-o", tmp_path / "run", "--steps", 1, *small)
+    made = done(
+        "train",
+        "matnet",
+        "--data",
+        data,
+        "--data",
+        more,
+        "-o",
+        tmp_path / "run",
+        "--steps",
+        1,
+        *small,
+    )
     assert made["step"] == 1
     weights = tmp_path / "run" / "weights.safetensors"
     assert weights.stat().st_size < 40e6, "what the package can hold"

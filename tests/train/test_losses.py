@@ -16,7 +16,8 @@ def _random(*shape, seed=0):
 
 
 def test_means_see_only_the_mask():
-    a, b = torch.zeros(1, 3, 4, 4), torch.ones(1, 3, 4, 4)
+    a = torch.zeros(1, 3, 4, 4)
+    b = torch.ones(1, 3, 4, 4)
     mask = torch.zeros(1, 1, 4, 4)
     mask[..., :2] = 1
     b[..., 2:] = 99
@@ -26,7 +27,8 @@ def test_means_see_only_the_mask():
 
 
 def test_silog_is_the_papers_formula():
-    predicted, true = _random(2, 1, 5, 7) + 0.5, 4 * _random(2, 1, 5, 7, seed=1) + 0.1
+    predicted = _random(2, 1, 5, 7) + 0.5
+    true = 4 * _random(2, 1, 5, 7, seed=1) + 0.1
     true[0, 0, 0, 0] = 25  # beyond [0, 20]: left out
     mask = torch.ones_like(true)
     kept = (true <= 20).numpy()
@@ -69,7 +71,9 @@ def test_slopes_know_a_plane_from_its_depth():
     mask = torch.ones(1, 1, 32, 32)
     assert losses.slopes(depth.log(), rays, true, mask).item() < 1e-3
     flat = torch.zeros(1, 1, 32, 32)
-    assert losses.slopes(flat, rays, true, mask).item() == pytest.approx(1 - 0.8 / np.sqrt(0.98), abs=0.01)
+    assert losses.slopes(flat, rays, true, mask).item() == pytest.approx(
+        1 - 0.8 / np.sqrt(0.98), abs=0.01
+    )
 
 
 def test_all_losses_have_finite_gradients_at_zero_error():
@@ -89,15 +93,21 @@ def test_the_loss_of_the_light_is_that_of_the_weighted_directions():
     found = torch.zeros(1, 4, 8, 16)
     found[:, :3] = np.log(2)
     likelihood, irradiance = losses.light(found, true)
-    assert likelihood.item() == pytest.approx(0, abs=1e-6) and irradiance.item() == pytest.approx(0, abs=1e-6)
+    assert likelihood.item() == pytest.approx(0, abs=1e-6) and irradiance.item() == pytest.approx(
+        0, abs=1e-6
+    )
     found[:, :3] += np.log(1.5)
     likelihood, irradiance = losses.light(found, true)
     assert likelihood.item() == pytest.approx(np.log(1.5), rel=1e-5)
-    assert irradiance.item() == pytest.approx(0.5, rel=1e-5)  # half as much again in every coefficient
+    assert irradiance.item() == pytest.approx(
+        0.5, rel=1e-5
+    )  # half as much again in every coefficient
     found[:, 3] = np.log(np.log(1.5))  # the scale that fits the error best
     assert losses.light(found, true)[0].item() == pytest.approx(1 + np.log(np.log(1.5)), rel=1e-5)
     both = losses.light(found.expand(2, -1, -1, -1), torch.cat([true, 0 * true]))
-    assert both[1].item() == pytest.approx(0.5, rel=1e-5), "a light that is not known does not count"
+    assert both[1].item() == pytest.approx(0.5, rel=1e-5), (
+        "a light that is not known does not count"
+    )
 
 
 def test_the_likeliest_scale_is_the_mean_error():

@@ -53,7 +53,10 @@ def test_only_flips_upside_down_and_crops(task, source):
     maps["image"] = maps["image"].clip(0, 1)
     flipped = {name: values[:, ::-1] for name, values in maps.items()}
     flipped["normal"] = flipped["normal"] * [[[1]], [[-1]], [[1]]]
-    windows = [{n: sliding_window_view(v, (32, 32), (1, 2)) for n, v in whole.items()} for whole in (maps, flipped)]
+    windows = [
+        {n: sliding_window_view(v, (32, 32), (1, 2)) for n, v in whole.items()}
+        for whole in (maps, flipped)
+    ]
     seen = set()
     for seed in range(8):
         drawn = task.draw(0, 32, np.random.default_rng(seed))
@@ -71,7 +74,10 @@ def test_colours_at_the_sky_are_those_of_the_surface():
     """Next to the sky, which has no albedo, a surface of one paint keeps it; the picture itself is mixed."""
     mask = torch.zeros(1, 24, 24)
     mask[:, 10:] = 1
-    small = {name: mask.expand(3 if name in ("image", "albedo", "normal") else 1, -1, -1) * 0.6 for name in MAPS}
+    small = {
+        name: mask.expand(3 if name in ("image", "albedo", "normal") else 1, -1, -1) * 0.6
+        for name in MAPS
+    }
     large = enlarged(small | {"mask": mask}, [80, 96])
     here = large["mask"][0] > 0
     assert 0.2 < here.float().mean() < 0.95 and large["image"][0][here].min() < 0.5
@@ -85,9 +91,15 @@ def test_starting_from_other_checkpoints(network, tmp_path):
     anything = {k: v for k, v in other.items() if not k.startswith("material_head.")}
     torch.save(anything, tmp_path / "depth_anything.pth")
     copied = load_start(network, tmp_path / "depth_anything.pth")
-    assert anything.keys() <= set(copied) and any(name.startswith("material_head.") for name in copied)
-    torch.testing.assert_close(network.state_dict()["pretrained.cls_token"], other["pretrained.cls_token"])
-    dino = {k.removeprefix("pretrained."): v for k, v in other.items() if k.startswith("pretrained.")}
+    assert anything.keys() <= set(copied) and any(
+        name.startswith("material_head.") for name in copied
+    )
+    torch.testing.assert_close(
+        network.state_dict()["pretrained.cls_token"], other["pretrained.cls_token"]
+    )
+    dino = {
+        k.removeprefix("pretrained."): v for k, v in other.items() if k.startswith("pretrained.")
+    }
     torch.save(dino, tmp_path / "dinov2.pth")
     assert len(load_start(MatNet(TINY), tmp_path / "dinov2.pth")) == len(dino)
     torch.save({"x": torch.ones(3)}, tmp_path / "else.pth")
@@ -98,5 +110,9 @@ def test_starting_from_other_checkpoints(network, tmp_path):
 def test_a_run_leaves_weights_that_the_predictor_takes_for_its_own(task, tmp_path):
     file = tmp_path / "w.safetensors"
     task.network().save(file, {"step": 1})
-    assert metadata(file)["format"] == MatNet.FORMAT and json.loads(metadata(file)["facts"]) == {"step": 1}
-    assert not any(p.requires_grad for n, p in task.network().named_parameters() if n.startswith("pretrained."))
+    assert metadata(file)["format"] == MatNet.FORMAT and json.loads(metadata(file)["facts"]) == {
+        "step": 1
+    }
+    assert not any(
+        p.requires_grad for n, p in task.network().named_parameters() if n.startswith("pretrained.")
+    )

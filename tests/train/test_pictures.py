@@ -19,7 +19,9 @@ def stored(folder, count):
 
 
 def varied(folder, count, seed):
-    return pictures.varied(stored(folder, count), 32, AugmentSettings(), torch.Generator().manual_seed(seed))
+    return pictures.varied(
+        stored(folder, count), 32, AugmentSettings(), torch.Generator().manual_seed(seed)
+    )
 
 
 def test_crops_and_mirrors_keep_the_plane(tmp_path):
@@ -50,18 +52,25 @@ def test_light_is_mirrored_and_exposed_with_its_picture(tmp_path):
     batch = varied(folder, 32, seed=2)
     mirrored = batch["image"][..., :8].mean((1, 2, 3)) > batch["image"][..., -8:].mean((1, 2, 3))
     assert mirrored.any() and not mirrored.all()
-    right, left = batch["light"][:, 1, 8, 20], batch["light"][:, 1, 8, 4]
-    np.testing.assert_allclose((right / left).log(), torch.where(mirrored, -1.0, 1.0) * np.log(3), rtol=1e-3)
+    right = batch["light"][:, 1, 8, 20]
+    left = batch["light"][:, 1, 8, 4]
+    np.testing.assert_allclose(
+        (right / left).log(), torch.where(mirrored, -1.0, 1.0) * np.log(3), rtol=1e-3
+    )
     darker = torch.minimum(right, left).log()
     brightness = batch["image"][:, 1].mean((1, 2)).clamp(1e-3, 1)
     assert np.corrcoef(darker, brightness.log())[0, 1] > 0.7
 
 
 def test_recolouring_is_the_render_of_the_new_albedo(tmp_path):
-    row = {n: t.float() for n, t in stored(made_samples.write_set(tmp_path, 1, height=SIZE, width=SIZE), 1).items()}
+    row = {
+        n: t.float()
+        for n, t in stored(made_samples.write_set(tmp_path, 1, height=SIZE, width=SIZE), 1).items()
+    }
     settings = AugmentSettings(recoloured=1.0, repainted=1.0)
     new = pictures.recolour(row, settings, torch.Generator().manual_seed(0))
-    dielectric, surface = 1 - row["metallic"], row["mask"] > 0
+    dielectric = 1 - row["metallic"]
+    surface = row["mask"] > 0
     rest = row["image"] - row["albedo"] * dielectric * row["shading"]
     expected = new["albedo"] * dielectric * row["shading"] + rest
     on = surface.expand(-1, 3, -1, -1)
@@ -70,7 +79,9 @@ def test_recolouring_is_the_render_of_the_new_albedo(tmp_path):
     metal = (row["metallic"] > 0.5).expand(-1, 3, -1, -1)
     torch.testing.assert_close(new["albedo"][metal], row["albedo"][metal])
     assert (new["albedo"] - row["albedo"])[on].abs().max() > 0.02 and new["albedo"].max() <= 1
-    row["shading"] = torch.full_like(row["shading"], torch.nan)  # a picture whose shading is not known
+    row["shading"] = torch.full_like(
+        row["shading"], torch.nan
+    )  # a picture whose shading is not known
     new = pictures.recolour(row, settings, torch.Generator().manual_seed(0))
     torch.testing.assert_close(new["albedo"], row["albedo"])
     torch.testing.assert_close(new["image"], row["image"])

@@ -28,7 +28,10 @@ def test_one_bad_file_does_not_end_a_run(tmp_path, caplog):
 
 
 def test_sets_of_pictures_of_different_sizes_are_refused(tmp_path):
-    sets = [made_samples.write_set(tmp_path / str(edge), 1, height=edge, width=edge) for edge in (32, 64)]
+    sets = [
+        made_samples.write_set(tmp_path / str(edge), 1, height=edge, width=edge)
+        for edge in (32, 64)
+    ]
     task = made_runs.bundled(sets[0])
     task.source.folders = sets
     with pytest.raises(InputError, match="use sets of one size"):

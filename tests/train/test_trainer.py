@@ -44,7 +44,8 @@ def run(data, tmp_path_factory):
 
 def during(trainer, number, act):
     """Call `act` in the step with that number, counted from 1."""
-    step, count = trainer._step, [0]
+    step = trainer._step
+    count = [0]
 
     def counted(batch):
         found = step(batch)
@@ -57,7 +58,9 @@ def during(trainer, number, act):
 
 
 def weights_of(trainer):
-    return torch.cat([p.detach().flatten() for n in (trainer.network, trainer.averaged) for p in n.parameters()])
+    return torch.cat(
+        [p.detach().flatten() for n in (trainer.network, trainer.averaged) for p in n.parameters()]
+    )
 
 
 def test_a_run_learns_and_tells(run):
@@ -112,7 +115,11 @@ def test_a_run_that_was_killed_ends_as_one_that_was_not(kind, tasks, tmp_path):
 
 def test_a_termination_of_the_whole_group_is_a_stop_like_any_other(data, tmp_path):
     trainer = made_runs.trainer(made_runs.bundled(data), tmp_path / "run", steps=10_000, workers=1)
-    during(trainer, 1, lambda: [p.terminate() for p in (*psutil.Process().children(), psutil.Process())])
+    during(
+        trainer,
+        1,
+        lambda: [p.terminate() for p in (*psutil.Process().children(), psutil.Process())],
+    )
     assert trainer.fit() == {}
     assert checkpoint.load(tmp_path / "run", "matnet")["schedule"]["step"] == 1
 
@@ -136,7 +143,9 @@ def test_a_run_is_not_overwritten_nor_mixed_up(run, data, tasks, tmp_path):
     with pytest.raises(InputError, match="another network"):
         made_runs.trainer(other, folder, steps=1, resume=True)
     for kind in ("clicks", "refraction"):
-        with pytest.raises(InputError, match=f"holds a run of `train matnet`, not of `train {kind}`"):
+        with pytest.raises(
+            InputError, match=f"holds a run of `train matnet`, not of `train {kind}`"
+        ):
             made_runs.trainer(tasks[kind](), folder, steps=1, resume=True)
     (tmp_path / "file").write_text("")
     for place in ("file", "file/run"):
@@ -156,12 +165,23 @@ def test_checkpoints_are_whole_or_refused(tmp_path):
 
 
 def test_pictures_grow_with_the_run(data, tmp_path):
-    assert [RECIPE.side_at(p) for p in (0, 0.29, 0.3, 0.74, 0.75, 1)] == [128, 128, 192, 192, 256, 256]
+    assert [RECIPE.side_at(p) for p in (0, 0.29, 0.3, 0.74, 0.75, 1)] == [
+        128,
+        128,
+        192,
+        192,
+        256,
+        256,
+    ]
     assert RECIPE.changed(side=96).side_at(0) == 96
     task = made_runs.bundled(data, side=64, growth=((0.5, 32),))
     trainer = made_runs.trainer(task, tmp_path / "run", steps=6)
-    losses, sides = task.losses, []
-    task.losses = lambda network, batch: (sides.append(batch["image"].shape[-1]), losses(network, batch))[1]
+    losses = task.losses
+    sides = []
+    task.losses = lambda network, batch: (
+        sides.append(batch["image"].shape[-1]),
+        losses(network, batch),
+    )[1]
     trainer.fit()
     assert sides == [32] * 3 + [64] * 3, "in the middle of a pass of two steps"
 

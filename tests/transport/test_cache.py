@@ -12,7 +12,8 @@ from materialist.transport.cache import ROUGHNESS_LEVELS, CacheSettings, Transpo
 from materialist.types import Camera, Geometry, Mesh
 
 CAMERA = Camera(12, 9, 60.0)
-WALL_DISTANCE, WALL_HEIGHT = 6.0, 3.0
+WALL_DISTANCE = 6.0
+WALL_HEIGHT = 3.0
 WALL_PIXEL = 5
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -23,13 +24,19 @@ def quads(*corners, pixels, planes) -> Geometry:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     faces = np.concatenate(
-        [[[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]] for q in range(len(corners))]
+        [
+            [[4 * q, 4 * q + 1, 4 * q + 2], [4 * q, 4 * q + 2, 4 * q + 3]]
+            for q in range(len(corners))
+        ]
     )
     mesh = Mesh(
-        vertices=corners.reshape(-1, 3), faces=faces.astype(np.int32),
-        normals=np.repeat(normal, 4, 0).astype(np.float32), uv=np.zeros((4 * len(corners), 2), np.float32),
-        face_pixel=np.repeat(pixels, 2).astype(np.int32), face_plane=np.repeat(planes, 2).astype(np.int16),
-    )  # fmt: skip
+        vertices=corners.reshape(-1, 3),
+        faces=faces.astype(np.int32),
+        normals=np.repeat(normal, 4, 0).astype(np.float32),
+        uv=np.zeros((4 * len(corners), 2), np.float32),
+        face_pixel=np.repeat(pixels, 2).astype(np.int32),
+        face_plane=np.repeat(planes, 2).astype(np.int16),
+    )
     return Geometry(mesh, np.full((CAMERA.height, CAMERA.width), -1, np.int8))
 
 
@@ -40,13 +47,17 @@ def floor(size: float = 400.0):
 
 def wall(size: float = 400.0):
     """Corners of a long wall that stands on the floor, before the camera."""
-    low, high, z = -1.0, WALL_HEIGHT - 1, -WALL_DISTANCE
+    low = -1.0
+    high = WALL_HEIGHT - 1
+    z = -WALL_DISTANCE
     return [[-size, low, z], [size, low, z], [size, high, z], [-size, high, z]]
 
 
 @pytest.fixture(scope="module")
 def open_floor():
-    return TransportCache(quads(floor(), pixels=[0], planes=[-1]), CAMERA, CacheSettings(1024, 1024))
+    return TransportCache(
+        quads(floor(), pixels=[0], planes=[-1]), CAMERA, CacheSettings(1024, 1024)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +68,12 @@ def walled_floor():
 
 def hemisphere(rows: int = 400):
     """Midpoint directions of the hemisphere above +Y [N, 3], and their cosine-weighted solid angles [N]."""
-    theta, phi = np.meshgrid((np.arange(rows) + 0.5) / rows * np.pi / 2, (np.arange(2 * rows) + 0.5) / rows * np.pi)
-    d = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1).reshape(-1, 3)
+    theta, phi = np.meshgrid(
+        (np.arange(rows) + 0.5) / rows * np.pi / 2, (np.arange(2 * rows) + 0.5) / rows * np.pi
+    )
+    d = np.stack(
+        [np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], -1
+    ).reshape(-1, 3)
     weight = np.cos(theta) * np.sin(theta) * (np.pi / 2 / rows) * (np.pi / rows)
     return d, weight.ravel()
 
@@ -66,7 +81,9 @@ def hemisphere(rows: int = 400):
 def floor_rows(cache):
     """Some rows of the tables, on the floor: index, position [3], direction to the camera [3]."""
     position = np.array(cache.position).T
-    on_floor = np.flatnonzero((np.abs(position[:, 1] + 1) < 1e-3) & (position[:, 2] > -WALL_DISTANCE + 0.3))
+    on_floor = np.flatnonzero(
+        (np.abs(position[:, 1] + 1) < 1e-3) & (position[:, 2] > -WALL_DISTANCE + 0.3)
+    )
     for row in on_floor[:: max(1, len(on_floor) // 5)]:
         p = position[row].astype(np.float64)
         yield row, p, -p / np.linalg.norm(p)
@@ -81,7 +98,9 @@ def test_open_plane_under_constant_light_has_the_analytic_diffuse_lobe(open_floo
     d, weight = hemisphere()
     for row, _, wo in floor_rows(open_floor):
         expected = 2 * (diffuse_coefficients(UP, d, wo) * weight[:, None]).sum(0) / np.pi
-        np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 1], expected, rtol=2e-3, atol=2e-3)
+        np.testing.assert_allclose(
+            tables.diffuse[row].reshape(3, 3)[:, 1], expected, rtol=2e-3, atol=2e-3
+        )
 
 
 def test_a_small_sun_is_neither_missed_nor_met_twice():
@@ -91,7 +110,12 @@ def test_a_small_sun_is_neither_missed_nor_met_twice():
     for azimuth, elevation in np.random.default_rng(2).uniform((-180, 35), (180, 80), (24, 2)):
         _, light = with_sun(constant(1.0, 256), azimuth, elevation)
         d = texel_directions(256, 512)
-        solid = 2 * np.pi / 512 * (np.cos(np.arange(256) / 256 * np.pi) - np.cos(np.arange(1, 257) / 256 * np.pi))
+        solid = (
+            2
+            * np.pi
+            / 512
+            * (np.cos(np.arange(256) / 256 * np.pi) - np.cos(np.arange(1, 257) / 256 * np.pi))
+        )
         truth = (light[..., 0] * np.maximum(d[..., 1], 0) * solid[:, None]).sum() / np.pi
         ratio.append(cache.gather(light, None).diffuse[:, 0].numpy().mean() / truth)
     assert np.std(ratio) < 0.12, ratio
@@ -131,7 +155,9 @@ def test_wall_hides_the_light_behind_it(walled_floor):
     for row, p, wo in floor_rows(walled_floor):
         seen = (d[:, 2] < 0) & ~_meets_wall(p, d)
         gap = WALL_DISTANCE + p[2]
-        closed_form = 0.5 * gap / np.hypot(gap, WALL_HEIGHT)  # strip of infinite length beside a horizontal element
+        closed_form = (
+            0.5 * gap / np.hypot(gap, WALL_HEIGHT)
+        )  # strip of infinite length beside a horizontal element
         assert (seen * weight).sum() / np.pi == pytest.approx(closed_form, abs=2e-3)
         expected = (diffuse_coefficients(UP, d, wo) * (seen * weight)[:, None]).sum(0) / np.pi
         np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 0], expected, atol=6e-3)
@@ -146,7 +172,9 @@ def test_wall_sends_the_radiance_of_its_pixel(plane):
     tables = cache.gather(constant(0.0), radiance)
     d, weight = hemisphere()
     for row, p, wo in floor_rows(cache):
-        expected = (diffuse_coefficients(UP, d, wo) * (_meets_wall(p, d) * weight)[:, None]).sum(0) / np.pi
+        expected = (diffuse_coefficients(UP, d, wo) * (_meets_wall(p, d) * weight)[:, None]).sum(
+            0
+        ) / np.pi
         measured = tables.diffuse[row].reshape(3, 3).numpy()
         np.testing.assert_allclose(measured, expected[:, None] * [3, 2, 1], atol=1.5e-2)
 
@@ -162,8 +190,11 @@ def _meets_wall(p, d):
 def test_equal_seeds_give_equal_tables():
     geometry = quads(floor(), wall(), pixels=[0, WALL_PIXEL], planes=[-1, -1])
     rng = np.random.default_rng(1)
-    envmap, radiance = rng.random((16, 32, 3)), rng.random((CAMERA.height, CAMERA.width, 3))
-    first, again, other = (TransportCache(geometry, CAMERA, seed=s).gather(envmap, radiance) for s in (4, 4, 5))
+    envmap = rng.random((16, 32, 3))
+    radiance = rng.random((CAMERA.height, CAMERA.width, 3))
+    first, again, other = (
+        TransportCache(geometry, CAMERA, seed=s).gather(envmap, radiance) for s in (4, 4, 5)
+    )
     assert first.diffuse.equal(again.diffuse) and first.specular.equal(again.specular)
     assert not first.diffuse.equal(other.diffuse)
 
@@ -171,7 +202,9 @@ def test_equal_seeds_give_equal_tables():
 def test_points_fill_the_square():
     """Every cell of a 64 x 64 grid holds 4 points, give or take one a side: far more even than random."""
     count = 1 << 14
-    x, y = np.array(point(dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, count), mi.Point2f(0.2, 0.7)))
+    x, y = np.array(
+        point(dr.arange(mi.UInt32, count), dr.opaque(mi.UInt32, count), mi.Point2f(0.2, 0.7))
+    )
     assert x.min() >= 0 and y.min() >= 0 and x.max() < 1 and y.max() < 1
     counts, _, _ = np.histogram2d(x, y, bins=64, range=[[0, 1], [0, 1]])
     assert counts.min() >= 2 and counts.max() <= 6

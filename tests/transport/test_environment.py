@@ -24,16 +24,22 @@ def look(envmap, directions):
 @given(st.integers(0, 10**6))
 def test_lookup_equals_the_shares_of_the_light_matrix(seed):
     """`texels_around` spreads a ray over the texels that `lookup` reads."""
-    envmap, d = random_map(8, seed), np.random.default_rng(seed).standard_normal((64, 3))
+    envmap = random_map(8, seed)
+    d = np.random.default_rng(seed).standard_normal((64, 3))
     d /= np.linalg.norm(d, axis=-1, keepdims=True)
     index, share = texels_around(d, (8, 16))
     np.testing.assert_allclose(share.sum(-1), 1, atol=1e-9)
-    np.testing.assert_allclose((envmap.reshape(-1, 3)[index] * share[..., None]).sum(1), look(envmap, d), atol=2e-4)
+    np.testing.assert_allclose(
+        (envmap.reshape(-1, 3)[index] * share[..., None]).sum(1), look(envmap, d), atol=2e-4
+    )
 
 
 def test_halving_keeps_the_mean_radiance_of_the_sphere():
     envmap = random_map(16)
-    mean = lambda e: (e * row_solid_angle(len(e))[:, None, None]).sum((0, 1))  # noqa: E731
+
+    def mean(e):
+        return (e * row_solid_angle(len(e))[:, None, None]).sum((0, 1))
+
     half = halve(envmap)
     assert half.shape == (8, 16, 3)
     np.testing.assert_allclose(mean(half), mean(envmap), rtol=1e-5)

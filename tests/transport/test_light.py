@@ -51,7 +51,10 @@ def test_matrix_times_light_is_gather_and_shade(both):
 
 def test_matrix_sums_what_surfaces_send(both):
     cache, _, materials, matrix = both
-    radiance = materials.albedo * np.linspace(0.2, 2, materials.albedo.shape[1], dtype=np.float32)[None, :, None]
+    radiance = (
+        materials.albedo
+        * np.linspace(0.2, 2, materials.albedo.shape[1], dtype=np.float32)[None, :, None]
+    )
     black = np.zeros((HEIGHT, 2 * HEIGHT, 3), np.float32)
     indirect = matrix.combine(matrix.indirect(torch.from_numpy(cache.slot_radiance(radiance))))
     reference = shaded(both, black, radiance)
@@ -60,9 +63,12 @@ def test_matrix_sums_what_surfaces_send(both):
 
 
 def test_direct_light_is_linear_and_differentiable(both):
-    matrix, rng = both[3], torch.Generator().manual_seed(0)
+    matrix = both[3]
+    rng = torch.Generator().manual_seed(0)
     a, b = (torch.rand(2 * HEIGHT**2, 3, generator=rng) for _ in range(2))
-    torch.testing.assert_close(matrix.direct(2 * a + b), 2 * matrix.direct(a) + matrix.direct(b), rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(
+        matrix.direct(2 * a + b), 2 * matrix.direct(a) + matrix.direct(b), rtol=1e-4, atol=1e-5
+    )
     envmap = a.clone().requires_grad_()
     (gradient,) = torch.autograd.grad(matrix.direct(envmap)[0, 5, 1], envmap)
     torch.testing.assert_close(gradient[:, 1], matrix.parts[0][5])
@@ -83,7 +89,9 @@ def test_other_materials_give_their_own_light(both, change):
     again = light_matrix(cache, changed, rows, HEIGHT)
     found = again.combine(again.direct(flat))
     reference = shaded((cache, rows, changed, None), envmap, None)
-    assert relative_error(found, reference) < 0.035  # of metals, gathering interpolates between roughness levels
+    assert (
+        relative_error(found, reference) < 0.035
+    )  # of metals, gathering interpolates between roughness levels
     assert relative_error(matrix.combine(matrix.direct(flat)), reference) > 0.05
 
 
@@ -122,7 +130,9 @@ def test_a_low_light_of_one_texel_reaches_all_pixels_that_see_it(scene):
     """What cosine-weighted rays seldom meet."""
     cache, materials, rows = scene
     matt = replace(materials, metallic=0 * materials.metallic)
-    matrix, many = (light_matrix(cache, matt, rows, HEIGHT, **k) for k in ({}, {"sphere_samples": 32768}))
+    matrix, many = (
+        light_matrix(cache, matt, rows, HEIGHT, **k) for k in ({}, {"sphere_samples": 32768})
+    )
     compared = 0
     for column in range(0, 2 * HEIGHT, 5):
         light = torch.zeros(HEIGHT, 2 * HEIGHT, 3)

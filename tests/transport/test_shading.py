@@ -13,7 +13,10 @@ P = 6
 @pytest.fixture
 def tables():
     generator = torch.Generator().manual_seed(3)
-    draw = lambda *shape: torch.rand(*shape, generator=generator, dtype=torch.float64)  # noqa: E731
+
+    def draw(*shape):
+        return torch.rand(*shape, generator=generator, dtype=torch.float64)
+
     return Tables(draw(P, 9), draw(len(ROUGHNESS_LEVELS), P, 6))
 
 
@@ -28,10 +31,14 @@ def slow_twin(tables, albedo, roughness, metallic):
     """A (1 - M) (D0 + D1 R + D2 R^2) + C_0 S0(R) + S1(R), a pixel and a channel at a time."""
     out = np.zeros((P, 3))
     for p in range(P):
-        r, m = float(roughness[p]), float(metallic[p])
+        r = float(roughness[p])
+        m = float(metallic[p])
         for c in range(3):
             d = [float(tables.diffuse[p, 3 * k + c]) for k in range(3)]
-            s = [np.interp(r, ROUGHNESS_LEVELS, tables.specular[:, p, 3 * k + c].numpy()) for k in range(2)]
+            s = [
+                np.interp(r, ROUGHNESS_LEVELS, tables.specular[:, p, 3 * k + c].numpy())
+                for k in range(2)
+            ]
             a = float(albedo[p, c])
             base = 0.04 * (1 - m) + m * a
             out[p, c] = a * (1 - m) * (d[0] + d[1] * r + d[2] * r * r) + base * s[0] + s[1]
@@ -40,7 +47,9 @@ def slow_twin(tables, albedo, roughness, metallic):
 
 def test_shading_equals_the_slow_twin(tables):
     materials = draw_materials()
-    np.testing.assert_allclose(shade(tables, *materials).numpy(), slow_twin(tables, *materials), rtol=1e-7)
+    np.testing.assert_allclose(
+        shade(tables, *materials).numpy(), slow_twin(tables, *materials), rtol=1e-7
+    )
 
 
 @pytest.mark.parametrize("roughness", [0.0, 0.03, 1.0])

@@ -16,7 +16,8 @@ def furnished_room(size: int, *, completion: str = "planes") -> tuple[Camera, Ge
     depth, normal, label = room(camera)
     ball, ball_normal = sphere_depth(camera, (0.85, -0.5, -3.4), 0.5)
     closer = ball < depth
-    depth, label = np.where(closer, ball, depth), np.where(closer, 3, label)
+    depth = np.where(closer, ball, depth)
+    label = np.where(closer, 3, label)
     normal = np.where(closer[..., None], ball_normal, normal).astype(np.float32)
     geometry = build_geometry(depth.astype(np.float32), normal, camera, completion=completion)
     return camera, geometry, _materials(unproject(depth.astype(np.float32), camera), label)
@@ -24,12 +25,17 @@ def furnished_room(size: int, *, completion: str = "planes") -> tuple[Camera, Ge
 
 def _materials(points, label) -> Materials:
     """Maps by object (0 floor, 1 wall, 2 box, 3 ball) and position [H, W, 3]."""
-    albedo = np.array([[0.55, 0.45, 0.35], [0.6, 0.6, 0.65], [0.25, 0.5, 0.3], [0.8, 0.55, 0.25]])[label]
-    roughness, metallic = np.array([0.35, 0.8, 0.5, 0.2])[label], np.array([0.0, 0.1, 0.4, 1.0])[label]
+    albedo = np.array([[0.55, 0.45, 0.35], [0.6, 0.6, 0.65], [0.25, 0.5, 0.3], [0.8, 0.55, 0.25]])[
+        label
+    ]
+    roughness = np.array([0.35, 0.8, 0.5, 0.2])[label]
+    metallic = np.array([0.0, 0.1, 0.4, 1.0])[label]
     wave = 0.5 + 0.5 * np.sin(3 * points[..., 0]) * np.cos(2 * points[..., 2] + points[..., 1])
     albedo = albedo * (0.7 + 0.3 * wave[..., None])
     return Materials(
-        albedo.astype(np.float32), (roughness + 0.15 * wave).astype(np.float32), metallic.astype(np.float32)
+        albedo.astype(np.float32),
+        (roughness + 0.15 * wave).astype(np.float32),
+        metallic.astype(np.float32),
     )
 
 
@@ -50,7 +56,9 @@ def away_from_edges(depth, pixels: int = 3):
     """[H, W] bool: no surface of another depth, no end of the picture within so many pixels. depth: [H, W]."""
     inverse = np.where(depth > 0, 1 / np.maximum(depth, 1e-9), 0)
     padded = np.pad(inverse, 1, mode="edge")
-    curvature = [np.abs(np.diff(padded, 2, axis=k))[s] for k, s in ((0, np.s_[:, 1:-1]), (1, np.s_[1:-1]))]
+    curvature = [
+        np.abs(np.diff(padded, 2, axis=k))[s] for k, s in ((0, np.s_[:, 1:-1]), (1, np.s_[1:-1]))
+    ]
     edge = np.maximum(*curvature) > 0.01 * np.maximum(inverse, 1e-9)
     kernel = np.ones((2 * pixels + 1, 2 * pixels + 1), np.uint8)
     return (cv2.dilate(edge.astype(np.uint8), kernel) == 0) & (depth > 0)

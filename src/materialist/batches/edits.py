@@ -20,8 +20,13 @@ def edits_for(path: str | Path, name: str) -> "list[Step]":
     """
     from materialist.edits.recipe import with_files
 
-    put = lambda _, value: value.replace("{name}", name) if isinstance(value, str) else value  # noqa: E731
-    return [with_files(step, put) for step in _steps(path, Path(path).read_bytes() if Path(path).is_file() else b"")]
+    def put(_, value):
+        return value.replace("{name}", name) if isinstance(value, str) else value
+
+    return [
+        with_files(step, put)
+        for step in _steps(path, Path(path).read_bytes() if Path(path).is_file() else b"")
+    ]
 
 
 @lru_cache(maxsize=1)
@@ -36,10 +41,13 @@ def edits_key(path: str | Path, name: str, spp: int, quality: int | None = None)
     """SHA-256 (hex) of what the edited photo depends on beside the scene: steps, the files they name, samples, and
     how well it is encoded."""
     described = [
-        [step.kind, step.options, [_content(file, key) for key, file in _files(step)]] for step in edits_for(path, name)
+        [step.kind, step.options, [_content(file, key) for key, file in _files(step)]]
+        for step in edits_for(path, name)
     ]
     return hashlib.sha256(
-        json.dumps([described, spp, *([] if quality is None else [quality])], sort_keys=True).encode()
+        json.dumps(
+            [described, spp, *([] if quality is None else [quality])], sort_keys=True
+        ).encode()
     ).hexdigest()
 
 
@@ -62,6 +70,9 @@ def _content(file: Path, key: str) -> list[str] | None:
     from materialist.edits.insert.meshes import files_beside
 
     try:
-        return [file_hash(file), *(file_hash(other) for other in (files_beside(file) if key == "mesh" else ()))]
+        return [
+            file_hash(file),
+            *(file_hash(other) for other in (files_beside(file) if key == "mesh" else ())),
+        ]
     except OSError:
         return None

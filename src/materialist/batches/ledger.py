@@ -23,7 +23,9 @@ FORMAT = 1
 class Ledger:
     """The events of a batch. Open it with `open_ledger`."""
 
-    def __init__(self, file: BinaryIO, events: list[dict[str, Any]], options: dict[str, Any]) -> None:
+    def __init__(
+        self, file: BinaryIO, events: list[dict[str, Any]], options: dict[str, Any]
+    ) -> None:
         self._file = file
         self.key = hashlib.sha256(json.dumps(options, sort_keys=True).encode()).hexdigest()[:16]
         """Stands for the options of this batch; results of other options do not count as done."""
@@ -38,7 +40,9 @@ class Ledger:
         """Write one event. Raises OutputError when the disk is full or read-only."""
         entry = {"event": event, "key": self.key, **facts}
         line = (json.dumps(entry, ensure_ascii=True) + "\n").encode()
-        self._note(entry)  # first, so that a Ctrl-C during the write finds the summary no older than the file
+        self._note(
+            entry
+        )  # first, so that a Ctrl-C during the write finds the summary no older than the file
         with writing(LEDGER):
             if self._file.write(line) < len(line):
                 raise OSError("the disk is full")
@@ -55,7 +59,7 @@ class Ledger:
 @contextmanager
 def open_ledger(
     runs: str | Path, options: dict[str, Any], *, resume: bool = False, force: bool = False
-) -> Iterator[Ledger]:  # fmt: skip
+) -> Iterator[Ledger]:
     """The ledger of RUNS, which is made where it is missing; it is closed, and unlocked, when the block ends.
 
     Without `resume`, RUNS must be empty or, with `force`, hold an earlier batch, which is begun anew. With `resume` it
@@ -82,7 +86,9 @@ def open_ledger(
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # it ends with the process
         except BlockingIOError as error:
-            raise OutputError(f"Another batch is at work in {folder}; wait for it, or name another folder.") from error
+            raise OutputError(
+                f"Another batch is at work in {folder}; wait for it, or name another folder."
+            ) from error
         events = read_events(path)
         if resume and not force:
             _require_same(events, options, folder)

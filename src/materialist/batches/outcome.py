@@ -12,10 +12,29 @@ from typing import Any
 from materialist.io.atomic import write_whole
 
 COLUMNS = (
-    "id", "name", "status", "reason", "psnr", "ssim", "seconds", "cpu_seconds", "invert_seconds", "edit_seconds",
-    "peak_rss_mb", "width", "height", "fov", "predictor", "attempts", "scene_bytes", "scene_hash", "picture",
-    "picture_hash", "photo_hash", "warnings",
-)  # fmt: skip
+    "id",
+    "name",
+    "status",
+    "reason",
+    "psnr",
+    "ssim",
+    "seconds",
+    "cpu_seconds",
+    "invert_seconds",
+    "edit_seconds",
+    "peak_rss_mb",
+    "width",
+    "height",
+    "fov",
+    "predictor",
+    "attempts",
+    "scene_bytes",
+    "scene_hash",
+    "picture",
+    "picture_hash",
+    "photo_hash",
+    "warnings",
+)
 """Columns of the summary; a photo that failed has only the reason."""
 
 
@@ -44,8 +63,13 @@ class Outcome:
     @property
     def hash(self) -> str:
         """Of all results: equal for equal photos and options, however many workers and interruptions there were."""
-        results = sorted((row["name"], f"{row['scene_hash']} {row['picture_hash'] or ''}") for row in self.of("done"))
-        return hashlib.sha256("\n".join(f"{name} {value}" for name, value in results).encode()).hexdigest()
+        results = sorted(
+            (row["name"], f"{row['scene_hash']} {row['picture_hash'] or ''}")
+            for row in self.of("done")
+        )
+        return hashlib.sha256(
+            "\n".join(f"{name} {value}" for name, value in results).encode()
+        ).hexdigest()
 
     @property
     def exit_code(self) -> int:
@@ -93,7 +117,11 @@ def _cell(value: Any) -> Any:
         value = " | ".join(value)
     if isinstance(value, float):
         return f"{value:.6g}"
-    return f"'{value}" if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r") else value
+    return (
+        f"'{value}"
+        if isinstance(value, str) and value[:1] in ("=", "+", "-", "@", "\t", "\r")
+        else value
+    )
 
 
 def write_page(outcome: Outcome) -> None:
@@ -106,8 +134,13 @@ def write_page(outcome: Outcome) -> None:
     assets = files("materialist.batches") / "assets"
     template = Environment(autoescape=True).from_string((assets / "page.html").read_text("utf-8"))
     order = {"failed": 0, "done": 1, "open": 2}
-    rows = sorted(outcome.rows, key=lambda row: order[row["status"]])  # what needs a look comes first
+    rows = sorted(
+        outcome.rows, key=lambda row: order[row["status"]]
+    )  # what needs a look comes first
     page = template.render(
-        title=outcome.runs.resolve().name, style=(assets / "page.css").read_text("utf-8"), outcome=outcome, rows=rows,
-    )  # fmt: skip
+        title=outcome.runs.resolve().name,
+        style=(assets / "page.css").read_text("utf-8"),
+        outcome=outcome,
+        rows=rows,
+    )
     write_whole(outcome.runs / "index.html", page.encode("utf-8"))

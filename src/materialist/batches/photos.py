@@ -29,7 +29,9 @@ class Listed:
     location: str
 
 
-def list_photos(source: str | Path, *, runs: str | Path, notes: list[str] | None = None) -> list[Listed]:
+def list_photos(
+    source: str | Path, *, runs: str | Path, notes: list[str] | None = None
+) -> list[Listed]:
     """The photos of SOURCE, sorted by name, each once.
 
     SOURCE is a folder (searched with its subfolders; hidden files, scene packages and the results of batches are
@@ -39,10 +41,13 @@ def list_photos(source: str | Path, *, runs: str | Path, notes: list[str] | None
 
     Raises InputError where there is nothing to do, SetupError where a URL needs a library that is not installed.
     """
-    text, notes = str(source), [] if notes is None else notes
+    text = str(source)
+    notes = [] if notes is None else notes
     if is_url(text):
         found = [Listed(without_secrets(url), url) for url in list_url(text, SUFFIXES)]
-    elif text.startswith(PREFIX) or (Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()):
+    elif text.startswith(PREFIX) or (
+        Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()
+    ):
         found = [_named(text, Path())]
     elif Path(text).is_dir():
         found = _of_folder(Path(text), Path(runs), notes)
@@ -56,10 +61,13 @@ def list_photos(source: str | Path, *, runs: str | Path, notes: list[str] | None
 
 
 def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
-    found, others = list[Listed](), list[str]()
+    found = list[Listed]()
+    others = list[str]()
     seen = {os.path.realpath(runs)}
     if os.path.realpath(folder) in seen:
-        raise InputError(f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}.")
+        raise InputError(
+            f"RUNS cannot be {runs}, the folder of the photos; name another, such as {runs / 'runs'}."
+        )
     try:
         for place, below, files in os.walk(folder, onerror=_raise, followlinks=True):
             real = os.path.realpath(place)
@@ -73,13 +81,20 @@ def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
                     continue
                 path = Path(place) / name
                 # Bytes of a path that are no UTF-8 cannot be written into a table; they become escapes.
-                id = path.relative_to(folder).as_posix().encode("utf-8", "backslashreplace").decode("utf-8")
+                id = (
+                    path.relative_to(folder)
+                    .as_posix()
+                    .encode("utf-8", "backslashreplace")
+                    .decode("utf-8")
+                )
                 if path.suffix.lower() in SUFFIXES:
                     found.append(Listed(id, os.path.abspath(path)))
                 else:
                     others.append(id)
     except OSError as error:
-        raise InputError(f"The folder {folder} cannot be read: {error.strerror or error}.") from error
+        raise InputError(
+            f"The folder {folder} cannot be read: {error.strerror or error}."
+        ) from error
     if others:
         notes.append(f"Passed over, as their names are no photo's: {_some(sorted(others))}.")
     return found
@@ -99,12 +114,16 @@ def _of_list(file: Path, notes: list[str]) -> list[Listed]:
     try:
         lines = file.read_text("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file} is no list of photos ({error}); write one path or URL on each line.") from error
+        raise InputError(
+            f"{file} is no list of photos ({error}); write one path or URL on each line."
+        ) from error
     entries = [re.split(r"(?:^|\s)#", line.strip(), maxsplit=1)[0].rstrip() for line in lines]
     listed = [_named(entry, file.parent) for entry in entries if entry]
     repeated = [id for id, times in Counter(photo.id for photo in listed).items() if times > 1]
     if repeated:
-        notes.append(f"More than one line of {file.name} names {_some(repeated)}; each is done once.")
+        notes.append(
+            f"More than one line of {file.name} names {_some(repeated)}; each is done once."
+        )
     return listed
 
 
@@ -129,7 +148,11 @@ def unique_names(ids: Iterable[str], known: Mapping[str, str] | None = None) -> 
     for form in (_stem, lambda one: one.replace("://", "/"), _hashed):
         proposed = {one: _clean(form(one)) for one in ids if one not in names}
         count = Counter(name.casefold() for name in proposed.values())
-        chosen = {i: n for i, n in proposed.items() if count[n.casefold()] == 1 and n.casefold() not in used}
+        chosen = {
+            i: n
+            for i, n in proposed.items()
+            if count[n.casefold()] == 1 and n.casefold() not in used
+        }
         names |= chosen
         used |= {name.casefold() for name in chosen.values()}
     return names

@@ -45,16 +45,27 @@ def plan(photos: list[Listed], ledger: Ledger, template: PhotoTask) -> list[Phot
         entry = ledger.last.get(photo.id, {})
         if entry.get("key") != ledger.key or not _inverted(entry, task):
             return task
-        return None if _edited(entry, task) else replace(task, kept={k: entry[k] for k in OF_THE_SCENE if k in entry})
+        return (
+            None
+            if _edited(entry, task)
+            else replace(task, kept={k: entry[k] for k in OF_THE_SCENE if k in entry})
+        )
 
-    with ThreadPoolExecutor(8) as threads:  # reading and hashing: the disk's time, not the interpreter's
+    with ThreadPoolExecutor(
+        8
+    ) as threads:  # reading and hashing: the disk's time, not the interpreter's
         return [task for task in threads.map(left, photos) if task is not None]
 
 
 def _inverted(entry: dict[str, Any], task: PhotoTask) -> bool:
     """Whether the scene of the ledger's last entry is there, whole, and of the photo as it is now."""
-    size, version = entry.get("scene_bytes"), entry.get("photo_version")
-    return bool(size and version) and size == package_size(task.scene) and version == fingerprint(task.location)
+    size = entry.get("scene_bytes")
+    version = entry.get("photo_version")
+    return (
+        bool(size and version)
+        and size == package_size(task.scene)
+        and version == fingerprint(task.location)
+    )
 
 
 def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:
@@ -62,7 +73,9 @@ def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:
     if entry.get("event") != "done" or task.how.recipe is None:
         return entry.get("event") == "done"
     try:
-        same = entry.get("edits") == edits_key(task.how.recipe, task.name, task.how.spp, task.how.quality)
+        same = entry.get("edits") == edits_key(
+            task.how.recipe, task.name, task.how.spp, task.how.quality
+        )
         return same and entry.get("picture_hash") == file_hash(task.picture)
     except OSError:
         return False

@@ -34,7 +34,11 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
         found = [(str(one), _path(str(one))) for one in map(system.unstrip_protocol, paths)]
-    return [one for one, path in found if path.suffix.lower() in suffixes and not path.name.startswith(".")]
+    return [
+        one
+        for one, path in found
+        if path.suffix.lower() in suffixes and not path.name.startswith(".")
+    ]
 
 
 def fingerprint(location: str) -> str | None:

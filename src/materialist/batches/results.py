@@ -7,7 +7,15 @@ from pathlib import Path
 from materialist.errors import SceneError
 from materialist.io.atomic import MARKER
 
-RESULTS = ("photo.exr", "envmap.exr", "mesh.ply", "plane_label.png", "rerender.exr", "prior/*.exr", "maps/*.exr")
+RESULTS = (
+    "photo.exr",
+    "envmap.exr",
+    "mesh.ply",
+    "plane_label.png",
+    "rerender.exr",
+    "prior/*.exr",
+    "maps/*.exr",
+)
 """Files that the hash covers beside the camera. Times, memory, paths and pictures with figures are left out."""
 
 

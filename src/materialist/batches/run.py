@@ -33,7 +33,9 @@ class BatchSettings:
     """How often a batch does things; tuned by eye."""
 
     tries: int = 3  # how often a photo is begun whose worker dies
-    refresh: float = 30.0  # seconds between two writings of the summary and the page while the batch runs
+    refresh: float = (
+        30.0  # seconds between two writings of the summary and the page while the batch runs
+    )
 
 
 SETTINGS = BatchSettings()
@@ -41,7 +43,11 @@ SETTINGS = BatchSettings()
 
 @documented(BatchOptions)
 def batch(
-    source: str | Path, runs: str | Path, *, progress: Watch | None = None, **options: Unpack[BatchKeywords]
+    source: str | Path,
+    runs: str | Path,
+    *,
+    progress: Watch | None = None,
+    **options: Unpack[BatchKeywords],
 ) -> Outcome:
     """Invert every photo of SOURCE into RUNS/NAME.scene, and apply a list of edits to each as RUNS/NAME.FORMAT.
 
@@ -59,13 +65,20 @@ def batch(
     own = {one.name for one in fields(BatchOptions)}
     values: dict[str, Any] = dict(options)
     how = BatchOptions(**{name: value for name, value in values.items() if name in own})
-    asked: dict[str, Any] = {"predictor": "auto", "size": 512, "fov": "auto", "seed": 0, "device": "auto"}
+    asked: dict[str, Any] = {
+        "predictor": "auto",
+        "size": 512,
+        "fov": "auto",
+        "seed": 0,
+        "device": "auto",
+    }
     asked |= {name: value for name, value in values.items() if name not in own}
     check_options(asked)
     if how.recipe is not None:
         edits_for(how.recipe, "")  # a list that cannot be read is told before anything is written
     notes: list[str] = []
-    photos, folder = list_photos(source, runs=runs, notes=notes), Path(runs)
+    photos = list_photos(source, runs=runs, notes=notes)
+    folder = Path(runs)
     told = {**asked, "tool_version": __version__}
     with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
         template = PhotoTask("", "", "", folder.resolve(), asked, how)
@@ -92,15 +105,22 @@ def _pool(how: BatchOptions, tasks: int, device: str, size: int) -> LocalPool | 
 def environments(workers: int, device: str) -> list[dict[str, str]]:
     """Environment variables of each worker: one thread, and its GPU where there are any."""
     gpus = visible_gpus(device)
-    return [SINGLE_THREAD | ({"CUDA_VISIBLE_DEVICES": gpus[k % len(gpus)]} if gpus else {}) for k in range(workers)]
+    return [
+        SINGLE_THREAD | ({"CUDA_VISIBLE_DEVICES": gpus[k % len(gpus)]} if gpus else {})
+        for k in range(workers)
+    ]
 
 
 def default_workers(device: str = "auto", size: int = 512) -> int:
     """One for each GPU that may be used, else one for each processor as far as memory reaches."""
     if gpus := visible_gpus(device):
         return len(gpus)
-    processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    worker = 720 + 2.9e-3 * size**2  # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
+    processors = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
+    worker = (
+        720 + 2.9e-3 * size**2
+    )  # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
     return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker)))
 
 
@@ -122,10 +142,14 @@ def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
         return None
     task, file = found[0]
     if len(found) == len(tasks):
-        raise InputError(f"No photo has the files that {recipe} names (there is no {file} for {task.id}); put them "
-                         "there, and add `resume=True`.")  # fmt: skip
-    return (f"{len(found)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
-            "they get a scene, but no edited photo unless it is there by then.")  # fmt: skip
+        raise InputError(
+            f"No photo has the files that {recipe} names (there is no {file} for {task.id}); put them "
+            "there, and add `resume=True`."
+        )
+    return (
+        f"{len(found)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
+        "they get a scene, but no edited photo unless it is there by then."
+    )
 
 
 @dataclass
@@ -150,7 +174,8 @@ class _Run:
 
     def work(self, pool: LocalPool | RayPool) -> None:
         """Run until every photo is over, or an error occurs that would fail all of them."""
-        waiting, written = deque(self.tasks.values()), time.monotonic()
+        waiting = deque(self.tasks.values())
+        written = time.monotonic()
         try:
             while waiting or self.stages:
                 while waiting and pool.free() > 0:
@@ -166,8 +191,11 @@ class _Run:
             pool.close()
 
     def outcome(self) -> Outcome:
-        rows, kept = tuple(self._row(photo) for photo in self.photos), len(self.photos) - len(self.tasks)
-        return Outcome(self.runs, rows, kept, time.monotonic() - self.start, self.options, tuple(self.notes))
+        rows = tuple(self._row(photo) for photo in self.photos)
+        kept = len(self.photos) - len(self.tasks)
+        return Outcome(
+            self.runs, rows, kept, time.monotonic() - self.start, self.options, tuple(self.notes)
+        )
 
     def write(self) -> None:
         outcome = self.outcome()
@@ -175,15 +203,23 @@ class _Run:
         write_page(outcome)
 
     def _begin(self, pool: LocalPool | RayPool, task: PhotoTask) -> None:
-        places = ([] if task.kept else [task.scene]) + ([] if task.how.recipe is None else [task.picture])
+        places = ([] if task.kept else [task.scene]) + (
+            [] if task.how.recipe is None else [task.picture]
+        )
         for place in places:
             if place.exists() and place.name not in self.ledger.owned:
                 reason = f"{place} exists and is not of this batch; move it away."
-                self._end(task, FAILED, {"error": "OutputError", "reason": reason, "bug": False, "stage": "begin"})
+                self._end(
+                    task,
+                    FAILED,
+                    {"error": "OutputError", "reason": reason, "bug": False, "stage": "begin"},
+                )
                 return
         self.tries[task.id] += 1
         self.stages[task.id] = "begin"
-        self.ledger.append("begin", id=task.id, name=task.name, owned=[place.name for place in places], **task.kept)
+        self.ledger.append(
+            "begin", id=task.id, name=task.name, owned=[place.name for place in places], **task.kept
+        )
         pool.begin(task.id, process, {"task": task})
 
     def _hear(self, task: PhotoTask, message: Message) -> bool:
@@ -191,21 +227,34 @@ class _Run:
         if message.kind == PROGRESS:
             self.stages[task.id] = str(message.facts["stage"])
             return False
-        facts, stage = message.facts, self.stages.pop(task.id)
+        facts = message.facts
+        stage = self.stages.pop(task.id)
         if message.kind == LOST and self.tries[task.id] < SETTINGS.tries:
             self.tell(f"{task.id}: {facts['reason']} It is begun again.")
             return True
         if message.kind == FAILED:
             _stop_if_for_all(facts)
         if message.kind == LOST:
-            facts = {**facts, "reason": f"{facts['reason']} It was begun {SETTINGS.tries} times.", "stage": stage}
+            facts = {
+                **facts,
+                "reason": f"{facts['reason']} It was begun {SETTINGS.tries} times.",
+                "stage": stage,
+            }
         self._end(task, DONE if message.kind == DONE else FAILED, facts)
         return False
 
     def _end(self, task: PhotoTask, event: str, facts: dict[str, Any]) -> None:
         self.failed += event == FAILED
-        self.ended[task.id] = event  # first, as in the ledger: Ctrl-C may come while the entry goes to the disk
-        self.ledger.append(event, id=task.id, name=task.name, attempts=self.tries[task.id], **{**task.kept, **facts})
+        self.ended[task.id] = (
+            event  # first, as in the ledger: Ctrl-C may come while the entry goes to the disk
+        )
+        self.ledger.append(
+            event,
+            id=task.id,
+            name=task.name,
+            attempts=self.tries[task.id],
+            **{**task.kept, **facts},
+        )
         if event == FAILED:
             line = f"failed: {facts['reason']}"
         else:
@@ -219,7 +268,8 @@ class _Run:
         self.watch(Status(len(self.photos), over - self.failed, self.failed, running, news))
 
     def _row(self, photo: Listed) -> Row:
-        entry, task = self.ledger.last.get(photo.id, {}), self.tasks.get(photo.id)
+        entry = self.ledger.last.get(photo.id, {})
+        task = self.tasks.get(photo.id)
         name = task.name if task else entry.get("name", "")
         status = "done" if task is None else self.ended.get(photo.id, "open")
         return {**dict.fromkeys(COLUMNS), **entry, "id": photo.id, "name": name, "status": status}

@@ -24,7 +24,9 @@ from materialist.pipeline import peak_rss_mb
 from materialist.types import Array, Progress, Scene
 
 SINGLE_THREAD = {
-    **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OIDN_NUM_THREADS"), "1"),
+    **dict.fromkeys(
+        ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OIDN_NUM_THREADS"), "1"
+    ),
     "OIDN_SET_AFFINITY": "0",
 }
 """Environment of every worker. Sums over several threads are rounded in another order, which a fit amplifies: with one
@@ -59,12 +61,16 @@ class PhotoTask:
         return self.runs / f"{self.name}.{self.how.format}"
 
     def named_options(self) -> dict[str, Any]:
-        return {k: v.replace("{name}", self.name) if isinstance(v, str) else v for k, v in self.options.items()}
+        return {
+            k: v.replace("{name}", self.name) if isinstance(v, str) else v
+            for k, v in self.options.items()
+        }
 
 
 def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     """Do a task. Returns the facts for the ledger and the summary; raises the errors of the inversion and the edit."""
-    start, processor = time.perf_counter(), time.process_time()
+    start = time.perf_counter()
+    processor = time.process_time()
     scene, facts = _scene(task, report)
     pictures = [scene.photo.linear, scene.rerender]
     warnings = scene.warnings
@@ -78,17 +84,25 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
             raise
         pictures.append(picture)
         warnings += notes
-        facts |= {"edit_seconds": time.perf_counter() - begun, "picture_hash": file_hash(task.picture)}
+        facts |= {
+            "edit_seconds": time.perf_counter() - begun,
+            "picture_hash": file_hash(task.picture),
+        }
         facts["picture"] = task.picture.name
         facts["edits"] = edits_key(task.how.recipe, task.name, task.how.spp, task.how.quality)
     write_whole(task.runs / "thumbs" / f"{task.name}.jpg", _thumbnails(pictures))
     metrics = scene.report.metrics
     facts |= {
-        "scene_hash": package_hash(task.scene), "scene_bytes": package_size(task.scene),
-        "width": scene.camera.width, "height": scene.camera.height, "fov": scene.camera.fov,
-        "predictor": scene.prior.predictor, "psnr": metrics.get("rerender_psnr_path"),
-        "ssim": metrics.get("rerender_ssim_path"), "warnings": list(dict.fromkeys(warnings)),
-    }  # fmt: skip
+        "scene_hash": package_hash(task.scene),
+        "scene_bytes": package_size(task.scene),
+        "width": scene.camera.width,
+        "height": scene.camera.height,
+        "fov": scene.camera.fov,
+        "predictor": scene.prior.predictor,
+        "psnr": metrics.get("rerender_psnr_path"),
+        "ssim": metrics.get("rerender_ssim_path"),
+        "warnings": list(dict.fromkeys(warnings)),
+    }
     del scene, pictures
     gc.collect()
     peak = peak_rss_mb()
@@ -102,7 +116,9 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
         return mt.load_scene(task.scene), dict(task.kept)
     ensure_writable(task.scene, force=True)
     options = task.named_options()
-    size, fov, layer = options.pop("size"), options.pop("fov"), options.pop("layer", None)
+    size = options.pop("size")
+    fov = options.pop("fov")
+    layer = options.pop("layer", None)
     report("read", 0, 1)
     photo_version = fingerprint(task.location)
     with local_copy(task.location) as file:
@@ -113,15 +129,23 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     report("start", 0, 1)
     begun = time.perf_counter()
     module, _, attribute = task.how.function.partition(":")
-    scene = getattr(import_module(module), attribute)(photo, size=size, fov=fov, progress=report, **options)
+    scene = getattr(import_module(module), attribute)(
+        photo, size=size, fov=fov, progress=report, **options
+    )
     report("save", 0, 1)
     mt.save_scene(scene, task.scene, force=True)
     photo_hash = hashlib.sha256(photo.source or b"").hexdigest()
     seconds = time.perf_counter() - begun
-    return scene, {"photo_hash": photo_hash, "photo_version": photo_version, "invert_seconds": seconds}
+    return scene, {
+        "photo_hash": photo_hash,
+        "photo_version": photo_version,
+        "invert_seconds": seconds,
+    }
 
 
-def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tuple[Array, list[str]]:
+def _edited(
+    task: PhotoTask, edits: Path, scene: Scene, report: Progress
+) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
     from materialist.edits.core.notes import (
         effect_notes,
@@ -132,15 +156,23 @@ def _edited(task: PhotoTask, edits: Path, scene: Scene, report: Progress) -> tup
     from materialist.edits.recipe import apply
 
     report("edit", 0, 1)
-    seed, device = task.options["seed"], task.options["device"]
+    seed = task.options["seed"]
+    device = task.options["device"]
     try:
         edited = apply(scene, edits_for(edits, task.name), seed=seed, device=device)
     except InputError as error:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
-    picture = mt.composite(scene, edited, spp=task.how.spp, seed=seed, device=device, progress=report)
+    picture = mt.composite(
+        scene, edited, spp=task.how.spp, seed=seed, device=device, progress=report
+    )
     written = mt.save_image(task.picture, picture, scene, quality=task.how.quality, force=True)
     change = mean_change(scene, picture)
-    notes = [*warnings_since(scene, edited), *effect_notes(scene, edited, change), *noise_notes(), *written]
+    notes = [
+        *warnings_since(scene, edited),
+        *effect_notes(scene, edited, change),
+        *noise_notes(),
+        *written,
+    ]
     return picture, notes
 
 
@@ -152,5 +184,8 @@ def _thumbnails(pictures: list[Array]) -> bytes:
     gap = np.full((size[1], 4, 3), 255, np.uint8)
     strip = [gap]
     for picture in pictures:
-        strip += [cv2.resize(srgb_levels(np.clip(picture, 0, 1)), size, interpolation=cv2.INTER_AREA), gap]
+        strip += [
+            cv2.resize(srgb_levels(np.clip(picture, 0, 1)), size, interpolation=cv2.INTER_AREA),
+            gap,
+        ]
     return encoded(np.concatenate(strip[1:-1], 1), "JPEG", quality=85)

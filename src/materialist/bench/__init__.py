@@ -7,13 +7,36 @@ from typing import Any
 from materialist.errors import InputError
 
 BENCHMARKS = (
-    "real", "photo-alone", "invert", "batch", "light", "ablation", "materials", "whdr", "predictor", "thickness",
-    "select", "glass", "edit", "plate", "studio", "paper", "gpu", "export",
-)  # fmt: skip
+    "real",
+    "photo-alone",
+    "invert",
+    "batch",
+    "light",
+    "ablation",
+    "materials",
+    "whdr",
+    "predictor",
+    "thickness",
+    "select",
+    "glass",
+    "edit",
+    "plate",
+    "studio",
+    "paper",
+    "gpu",
+    "export",
+)
 """Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""
 
 
-def run(name: str, *, output: str | Path, data: str | Path | None = None, force: bool = False, **options: Any) -> Path:
+def run(
+    name: str,
+    *,
+    output: str | Path,
+    data: str | Path | None = None,
+    force: bool = False,
+    **options: Any,
+) -> Path:
     """Run benchmark `name` and write report.json, report.md, plot.png and sheet.png into the folder `output`.
 
     `options` are the fields of the benchmark's class, as values or as texts. Returns the folder. Raises InputError

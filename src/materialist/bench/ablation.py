@@ -64,10 +64,18 @@ class AblationBench(Benchmark):
 
     tables: str = option("delta,steps,init,field,fov", "With commas.", kind="name")
     scenes: int = option(3, "How many photos.", **COUNT)
-    photos: bool = option(False, "Real photos, spread over those of DATA/photos; without DATA examples.", kind="switch")
+    photos: bool = option(
+        False,
+        "Real photos, spread over those of DATA/photos; without DATA examples.",
+        kind="switch",
+    )
     size: int = option(64, "Their width and height.", **SIZE)
-    predictor: str = option("bundled", "Of first materials and depth; `truth` takes the true ones.", kind="name")
-    longest: int = option(1000, "Steps in which the smallest L_re is looked for; the paper has 3000.", **COUNT)
+    predictor: str = option(
+        "bundled", "Of first materials and depth; `truth` takes the true ones.", kind="name"
+    )
+    longest: int = option(
+        1000, "Steps in which the smallest L_re is looked for; the paper has 3000.", **COUNT
+    )
     spp: int = option(128, "Paths a pixel of pictures that are compared.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
@@ -79,7 +87,9 @@ class AblationBench(Benchmark):
 
     def _real(self, data: Path | None) -> "Iterator[_Photo]":
         if self.predictor == "truth":
-            raise InputError("The predictor 'truth' has no maps of real photos; choose another, or leave out --photos.")
+            raise InputError(
+                "The predictor 'truth' has no maps of real photos; choose another, or leave out --photos."
+            )
         with TemporaryDirectory() as place:
             for location in chosen(data, self.scenes, Path(place)):
                 yield _Photo(self, read_photo(location, size=self.size))
@@ -94,10 +104,17 @@ class _Photo:
     """One photo: its prior, and the paper's light for it."""
 
     def __init__(
-        self, bench: AblationBench, photo: Photo, sample: SyntheticSample | None = None, other: Array | None = None
+        self,
+        bench: AblationBench,
+        photo: Photo,
+        sample: SyntheticSample | None = None,
+        other: Array | None = None,
     ):
         """`other` [h, 2h, 3] is the light of the relit pictures of a synthetic photo."""
-        self.bench, self.photo, self.sample, self.other = bench, photo, sample, other
+        self.bench = bench
+        self.photo = photo
+        self.sample = sample
+        self.other = other
 
     @cached_property
     def prior(self) -> Prediction:
@@ -115,7 +132,9 @@ class _Photo:
         fitting.fit_light(state, self.prior.materials)
         return fitting, state.envmap
 
-    def materials(self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False) -> Row:
+    def materials(
+        self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False
+    ) -> Row:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
         fitting, envmap = self.fitted
         engine: Any = fitting.engine
@@ -123,7 +142,8 @@ class _Photo:
         if blind:
             prior[:, 3:] = 0.5
         held = prior if blind else remapped(prior)
-        problem, photo = engine.material_problem(envmap), placed(self.photo.linear.reshape(-1, 3))[engine.pixels]
+        problem = engine.material_problem(envmap)
+        photo = placed(self.photo.linear.reshape(-1, 3))[engine.pixels]
         seen: list[float] = []
 
         def render(maps: torch.Tensor) -> torch.Tensor:
@@ -141,17 +161,28 @@ class _Photo:
         found = replaced(self.prior.materials, engine.pixels, maps)
         picture = fitting.render(found, envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
-        return {**self.against_photo(method, picture), "loss": loss, "steps": sum(r.steps for r in results)}
+        return {
+            **self.against_photo(method, picture),
+            "loss": loss,
+            "steps": sum(r.steps for r in results),
+        }
 
     def against_photo(self, method: str, picture: Array) -> Row:
         """A row of a picture [H, W, 3] against the photo, clipped as that is."""
-        compared = {name: getattr(metrics, name)(picture, self.photo.linear) for name in ("psnr", "ssim", "mse")}
+        compared = {
+            name: getattr(metrics, name)(picture, self.photo.linear)
+            for name in ("psnr", "ssim", "mse")
+        }
         return {"method": method, **compared}
 
 
-def _stages(targets: tuple[tuple[str, ...], ...], steps: int, **early: Any) -> tuple[MaterialStage, ...]:
+def _stages(
+    targets: tuple[tuple[str, ...], ...], steps: int, **early: Any
+) -> tuple[MaterialStage, ...]:
     """Stages that share the steps evenly; without `early` they run to the end."""
-    schedule = Schedule(learning_rate=3e-4, max_steps=max(1, steps // len(targets)), **(early or {"patience": 0}))
+    schedule = Schedule(
+        learning_rate=3e-4, max_steps=max(1, steps // len(targets)), **(early or {"patience": 0})
+    )
     return tuple(MaterialStage(target, schedule) for target in targets)
 
 
@@ -160,13 +191,17 @@ def _delta(photo: _Photo) -> Iterator[Row]:
     for name, targets in (("ARM", EACH[1:]), ("RM&A", (EACH[0], ("albedo",)))):
         for delta in photo.bench.deltas:
             stages = _stages(targets, photo.bench.short, patience=20, min_improvement=0.05)
-            yield photo.materials(f"delta {delta:g}, {name}", replace(PAPER.materials, delta=delta, stages=stages))
+            yield photo.materials(
+                f"delta {delta:g}, {name}", replace(PAPER.materials, delta=delta, stages=stages)
+            )
 
 
 def _steps(photo: _Photo) -> Iterator[Row]:
     """Table steps_ab."""
     for steps in photo.bench.steps:
-        yield photo.materials(f"{steps} steps", replace(PAPER.materials, stages=_stages(EACH, steps)))
+        yield photo.materials(
+            f"{steps} steps", replace(PAPER.materials, stages=_stages(EACH, steps))
+        )
 
 
 def _init(photo: _Photo) -> Iterator[Row]:
@@ -179,18 +214,25 @@ def _init(photo: _Photo) -> Iterator[Row]:
 def _field(photo: _Photo) -> Iterator[Row]:
     """Figure net_ab and table min_L_re."""
     for field, name in FIELDS.items():
-        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.short))
+        settings = replace(
+            PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.short)
+        )
         yield photo.materials(f"{name}, {photo.bench.short} steps", settings)
     for field in ("maps", "mlp"):
-        settings = replace(PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.longest))
+        settings = replace(
+            PAPER.materials, field=field, stages=_stages(EACH[1:], photo.bench.longest)
+        )
         yield photo.materials(f"{FIELDS[field]} w/o R, M", settings, blind=True)
 
 
 def _fov(photo: _Photo) -> Iterator[Row]:
     """Table fov_syn_ab."""
-    bench, sample, other = photo.bench, photo.sample, photo.other
+    bench = photo.bench
+    sample = photo.sample
+    other = photo.other
     for factor in bench.fovs:
-        camera, name = replace(photo.photo.camera, fov=factor * photo.photo.camera.fov), f"fov x {factor:g}"
+        camera = replace(photo.photo.camera, fov=factor * photo.photo.camera.fov)
+        name = f"fov x {factor:g}"
         if sample is None or other is None:
             settings = replace(PAPER.materials, stages=_stages(EACH[1:], bench.short))
             yield _Photo(bench, replace(photo.photo, camera=camera)).materials(name, settings)
@@ -198,11 +240,16 @@ def _fov(photo: _Photo) -> Iterator[Row]:
         seen = replace(sample, photo=replace(photo.photo, camera=camera))
         scene = true_scene(seen, completion="planes", seed=bench.seed)
         how: dict[str, Any] = {"spp": bench.spp, "seed": bench.seed + 1, "device": bench.device}
-        row, relit = photo.against_photo(name, rendered(scene, **how)), rendered(replace(scene, envmap=other), **how)
+        row = photo.against_photo(name, rendered(scene, **how))
+        relit = rendered(replace(scene, envmap=other), **how)
         truth = sample.scene.render(other, spp=bench.spp, seed=bench.seed + 3)
         yield {**row, "relit_psnr": metrics.psnr(relit, truth)}
 
 
 TABLES: dict[str, Callable[[_Photo], Iterator[Row]]] = {
-    "delta": _delta, "steps": _steps, "init": _init, "field": _field, "fov": _fov
-}  # fmt: skip
+    "delta": _delta,
+    "steps": _steps,
+    "init": _init,
+    "field": _field,
+    "fov": _fov,
+}

@@ -49,27 +49,47 @@ class BatchBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         counts = numbers("workers", self.workers, 1, 1024)
-        options = ("--size", str(self.size), "--seed", str(self.seed), "--device", self.device, "--json")
+        options = (
+            "--size",
+            str(self.size),
+            "--seed",
+            str(self.seed),
+            "--device",
+            self.device,
+            "--json",
+        )
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
             photos = chosen(data, self.photos, place)
             (place / "photos.txt").write_text("\n".join(photos) + "\n", "utf-8")
             begin = _usage()
             for k, photo in enumerate(photos):
-                materialist("invert", photo, "-o", str(place / f"{k}.scene"), *options, environment=SINGLE_THREAD)
+                materialist(
+                    "invert",
+                    photo,
+                    "-o",
+                    str(place / f"{k}.scene"),
+                    *options,
+                    environment=SINGLE_THREAD,
+                )
             single = _row("single inversions, one after the other", begin, len(photos))
             yield single
             hashes = {photo: package_hash(place / f"{k}.scene") for k, photo in enumerate(photos)}
             for count in counts:
-                begin, runs = _usage(), place / f"runs-{count}"
+                begin = _usage()
+                runs = place / f"runs-{count}"
                 listed = (str(place / "photos.txt"), "-o", str(runs), "--workers", str(count))
                 materialist("batch", *listed, *options, environment=SINGLE_THREAD)
                 row = _row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(photos))
                 done = json.loads((runs / "summary.json").read_text("utf-8"))["rows"]
                 if {one["id"]: one["scene_hash"] for one in done} != hashes:
-                    raise MaterialistError(f"A batch with {count} workers gave other scenes than single inversions.")
+                    raise MaterialistError(
+                        f"A batch with {count} workers gave other scenes than single inversions."
+                    )
                 over = {f"{name}overhead_percent": f"{name}seconds" for name in ("", "cpu_")}
-                yield row | {ours: 100 * (row[name] / single[name] - 1) for ours, name in over.items()}
+                yield row | {
+                    ours: 100 * (row[name] / single[name] - 1) for ours, name in over.items()
+                }
 
 
 def chosen(data: Path | None, photos: int, runs: Path) -> list[str]:

@@ -53,13 +53,17 @@ class Benchmark(OperationOptions, ABC):
         Raises InputError where there are no rows.
         """
         setup(self.device)
-        title, _, note = inspect.cleandoc(sys.modules[type(self).__module__].__doc__ or "").partition("\n\n")
+        title, _, note = inspect.cleandoc(
+            sys.modules[type(self).__module__].__doc__ or ""
+        ).partition("\n\n")
         settings = {name: None if value == "" else value for name, value in asdict(self).items()}
         settings["data"] = None if data is None else data.name
         report = Report(title, note, settings, self.columns, self.plotted)
         written = -self.write_every
         try:
-            for row in track(self.rows(data, report), "benchmark", total=None, console=Console(stderr=True)):
+            for row in track(
+                self.rows(data, report), "benchmark", total=None, console=Console(stderr=True)
+            ):
                 report.rows.append(row)
                 if time.monotonic() > written + self.write_every:
                     write(report, output)
@@ -89,17 +93,26 @@ def numbers(called: str, text: str, low: float, high: float, kind: type = int) -
     except ValueError:
         found = []
     if not all(low <= number <= high for number in found) or not found:
-        raise InputError(f"The {called} is {text!r}; give numbers from {low} to {high} with commas.")
+        raise InputError(
+            f"The {called} is {text!r}; give numbers from {low} to {high} with commas."
+        )
     return found
 
 
 def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -> None:
     """Run `materialist` with more in its environment; raises MaterialistError with its last lines when it fails."""
     command = [sys.executable, "-m", "materialist", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **(environment or {})})
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**os.environ, **(environment or {})}
+    )
     if done.returncode:
-        said = f"{done.stdout[-300:]}{done.stderr[-300:]}".strip() or "nothing; it may have run out of memory"
-        raise MaterialistError(f"materialist {' '.join(arguments)} ended with code {done.returncode}: {said}")
+        said = (
+            f"{done.stdout[-300:]}{done.stderr[-300:]}".strip()
+            or "nothing; it may have run out of memory"
+        )
+        raise MaterialistError(
+            f"materialist {' '.join(arguments)} ended with code {done.returncode}: {said}"
+        )
 
 
 def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dict[str, float]]:

@@ -18,7 +18,16 @@ import numpy as np
 
 from materialist import metrics, pipeline
 from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import KINDS, Edit, awaited, cup, edits, free_place, sample_and_light, true_scene
+from materialist.bench.edits import (
+    KINDS,
+    Edit,
+    awaited,
+    cup,
+    edits,
+    free_place,
+    sample_and_light,
+    true_scene,
+)
 from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.edits.composite.composite import composite, pictures
 from materialist.edits.composite.into_photo import into_photo
@@ -52,10 +61,16 @@ class EditBench(Benchmark):
 
     scenes: int = option(3, "Synthetic photos.", **COUNT_OR_0)
     size: int = option(96, "Their width and height.", **SIZE)
-    kinds: str = option(",".join(k for k in KINDS if k not in ("glass", "remove")), "Edits, with commas.", kind="name")
+    kinds: str = option(
+        ",".join(k for k in KINDS if k not in ("glass", "remove")),
+        "Edits, with commas.",
+        kind="name",
+    )
     spp: int = option(256, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(576, "Paths a pixel of the truth.", **COUNT)
-    caustics: int = option(16, "Times as many of the truth where light comes through glass: few find it.", **COUNT)
+    caustics: int = option(
+        16, "Times as many of the truth where light comes through glass: few find it.", **COUNT
+    )
     latency: int = option(512, "Size of the timed previews and final edit; 0: none.", **COUNT_OR_0)
     frames: int = option(36, "Frames of the timed film (extra physics); 0: none.", **COUNT_OR_0)
     large: int = option(4900, "Side of the large photo that an edit is brought into.", **SIZE)
@@ -63,20 +78,35 @@ class EditBench(Benchmark):
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         kinds = names("kinds", self.kinds, KINDS)
         for scene in range(self.scenes):
-            sample, other = sample_and_light(scene, 0, scene, size=self.size, data=data, seed=self.seed)
-            fitted, cost = timed(pipeline.invert, sample.photo, prior=sample.truth, seed=self.seed, device=self.device)
+            sample, other = sample_and_light(
+                scene, 0, scene, size=self.size, data=data, seed=self.seed
+            )
+            fitted, cost = timed(
+                pipeline.invert,
+                sample.photo,
+                prior=sample.truth,
+                seed=self.seed,
+                device=self.device,
+            )
             perfect = true_scene(sample)
             before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
             for edit in edits(sample, other, kinds):
-                for row in self._compared(edit, sample, before, perfect, (fitted, cost["seconds"]), report):
+                for row in self._compared(
+                    edit, sample, before, perfect, (fitted, cost["seconds"]), report
+                ):
                     yield {**row, "sample": sample.name}
         if self.latency:
             yield from self._latencies(data)
 
     def _compared(
-        self, edit: Edit, sample: SyntheticSample, before: Array, perfect: Scene, fitted: tuple[Scene, float],
+        self,
+        edit: Edit,
+        sample: SyntheticSample,
+        before: Array,
+        perfect: Scene,
+        fitted: tuple[Scene, float],
         report: Report,
-    ) -> Iterator[Row]:  # fmt: skip
+    ) -> Iterator[Row]:
         """Rows of one edit: untouched, the ceilings, and the fit; and its strip of the sheet.
 
         before: the true picture of the photo.
@@ -85,7 +115,8 @@ class EditBench(Benchmark):
         after = edit.truth.render(edit.envmap, spp=caustics * self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)
         shared: dict[str, Any] = {"spp": self.spp, "seed": self.seed, "device": self.device}
-        photo, truly = sample.photo.linear, edit.change(perfect)
+        photo = sample.photo.linear
+        truly = edit.change(perfect)
         yield {"method": f"{edit.kind}: untouched", **scores(photo, after, inside)}
         best = composite(perfect, truly, full_render=True, **shared)
         yield {"method": f"{CEILING} {edit.kind}", **scores(best, after, inside)}
@@ -93,7 +124,12 @@ class EditBench(Benchmark):
         yield {"method": f"{CEILING} {edit.kind}, composite", **scores(brought, after, inside)}
         scene, seconds = fitted
         picture, cost = timed(composite, scene, edit.change(scene), **shared)
-        yield {"method": f"{edit.kind}: edit", **scores(picture, after, inside), "fit_seconds": seconds, **cost}
+        yield {
+            "method": f"{edit.kind}: edit",
+            **scores(picture, after, inside),
+            "fit_seconds": seconds,
+            **cost,
+        }
         report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
@@ -108,19 +144,30 @@ class EditBench(Benchmark):
             preview.render(edited[0])  # the first one compiles
             for one in edited[1:]:
                 yield {"method": name, "sample": sample, **timed(preview.render, one)[1]}
-        yield from self._finals(scene, mask, {"material": lambda: changes[0], "light": lambda: turns[0]}, sample)
-        layers = render_layers(EditRenderer(scene, device=self.device), changes[0], spp=16, seed=self.seed)
+        yield from self._finals(
+            scene, mask, {"material": lambda: changes[0], "light": lambda: turns[0]}, sample
+        )
+        layers = render_layers(
+            EditRenderer(scene, device=self.device), changes[0], spp=16, seed=self.seed
+        )
         side = (self.large, self.large)
         large = np.asarray(cv2.resize(scene.photo.original, side, interpolation=cv2.INTER_CUBIC))
         grain = 0.03 * np.random.default_rng(0).standard_normal((*side, 1), np.float32)
         photo = replace(scene.photo, original=np.clip(large * (1 + grain), 0, 1))
         _, cost = timed(into_photo, photo, layers)
-        yield {"method": "final: into a large photo", "sample": f"{self.large} x {self.large}", **cost}
+        yield {
+            "method": "final: into a large photo",
+            "sample": f"{self.large} x {self.large}",
+            **cost,
+        }
 
-    def _finals(self, scene: Scene, mask: Array, given: dict[str, Callable[[], Scene]], sample: str) -> Iterator[Row]:
+    def _finals(
+        self, scene: Scene, mask: Array, given: dict[str, Callable[[], Scene]], sample: str
+    ) -> Iterator[Row]:
         """Seconds of edits from their options to their pictures, and of a film."""
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        made, floor = cup()[1], (scene.normal[..., 1] > 0.9) & (scene.depth > 0)
+        made = cup()[1]
+        floor = (scene.normal[..., 1] > 0.9) & (scene.depth > 0)
         place = free_place(floor) or (self.latency / 2, self.latency / 2)
         kinds = given | {
             "insertion": lambda: insert(scene, made, place),
@@ -131,7 +178,10 @@ class EditBench(Benchmark):
             _, cost = timed(lambda change=change: composite(scene, change(), **shared))
             yield {"method": f"final: {name}", "sample": sample, **cost}
         if self.frames:
-            film = lambda: list(pictures(scene, drop(scene, made, place, frames=self.frames), **shared))  # noqa: E731
+
+            def film():
+                return list(pictures(scene, drop(scene, made, place, frames=self.frames), **shared))
+
             yield {"method": f"drop: {self.frames} frames", "sample": sample, **timed(film)[1]}
 
 

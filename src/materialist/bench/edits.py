@@ -25,7 +25,11 @@ from materialist.procedural.objects.shapes import Solid
 from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 from materialist.types import Array, Body, Photo, Prediction, Scene
 
-SHIFTS = {f"{name}{sign}": (name, float(f"{sign}0.5")) for name in ("roughness", "metallic") for sign in "+-"}
+SHIFTS = {
+    f"{name}{sign}": (name, float(f"{sign}0.5"))
+    for name in ("roughness", "metallic")
+    for sign in "+-"
+}
 """The paper's "high" and "low" (Material Editing): what is shifted, and by how much."""
 ROOM = 0.25
 """What is left of a shift in [0, 1], at the least."""
@@ -58,7 +62,9 @@ class Edit:
 
     def traces(self, before: Array, after: Array) -> Array:
         """[H, W] bool: where the true picture changes visibly outside: in shadows and reflections."""
-        return ~self.mask & (np.abs(linear_to_srgb(after) - linear_to_srgb(before)).max(-1) > SHADOW)
+        return ~self.mask & (
+            np.abs(linear_to_srgb(after) - linear_to_srgb(before)).max(-1) > SHADOW
+        )
 
 
 def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[Edit]:
@@ -77,14 +83,18 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
         elif largest is None:
             continue
         else:
-            mask, item = things[largest], stage.items[largest]
+            mask = things[largest]
+            item = stage.items[largest]
             if kind == "remove":
-                change, others = partial(remove, mask=mask), []
+                change = partial(remove, mask=mask)
+                others = []
             elif kind == "glass":
-                change, others = partial(glass, mask=mask), [_of_glass(item, stage)]
+                change = partial(glass, mask=mask)
+                others = [_of_glass(item, stage)]
             else:
                 values, other = _material(kind, item)
-                change, others = partial(edit, mask=mask, **values), [other]
+                change = partial(edit, mask=mask, **values)
+                others = [other]
             items = [*stage.items[:largest], *others, *stage.items[largest + 1 :]]
             yield Edit(kind, change, staged(stage, items), sample.envmap, mask)
 
@@ -92,7 +102,9 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
 def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
     """The values of an edit, and the true object after it."""
     if kind == "hue":
-        return {"hue": 120.0}, replace(item, albedo=shifted_hsv(item.albedo.astype(np.float32), 120.0, 0.0, 0.0))
+        return {"hue": 120.0}, replace(
+            item, albedo=shifted_hsv(item.albedo.astype(np.float32), 120.0, 0.0, 0.0)
+        )
     if kind in SHIFTS:
         name, by = SHIFTS[kind]
         shifted: dict[str, Any] = {name: getattr(item, name) + np.sign(by) * _shift(item, kind)}
@@ -129,8 +141,12 @@ def free_place(floor: Array) -> tuple[float, float] | None:
 
 def cup() -> tuple[Solid, MeshModel]:
     """A blue cup, as a solid and as a mesh."""
-    solid = shapes.vessel(np.array([(0.35, 0), (0.45, 0.3), (0.5, 0.8), (0.48, 1.0)]), thickness=0.08)
-    vertices, normals, uv = (np.ascontiguousarray(x, np.float32) for x in (solid.vertices, solid.normals, solid.uv))
+    solid = shapes.vessel(
+        np.array([(0.35, 0), (0.45, 0.3), (0.5, 0.8), (0.48, 1.0)]), thickness=0.08
+    )
+    vertices, normals, uv = (
+        np.ascontiguousarray(x, np.float32) for x in (solid.vertices, solid.normals, solid.uv)
+    )
     surface = uniform_surface(np.array([0.15, 0.35, 0.6], np.float32), 0.4, 0.0)
     return solid, MeshModel((Body(vertices, solid.faces, normals, uv, surface),), "cup")
 
@@ -143,37 +159,67 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator
     solid, model = cup()
     material = "as-is" if kind == "insert" else "glass"
     (body,) = insert(true_scene(sample), model, at, material=material).bodies
-    placed = replace(solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64))
+    placed = replace(
+        solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64)
+    )
     ior = Glass().ior if kind == "glass cup" else None
-    albedo, roughness = body.surface.albedo, float(body.surface.roughness.mean())
-    truth = staged(stage, [*stage.items, Item(placed, np.tile(albedo, (2, 2, 1)), roughness, 0.0, ior)])
+    albedo = body.surface.albedo
+    roughness = float(body.surface.roughness.mean())
+    truth = staged(
+        stage, [*stage.items, Item(placed, np.tile(albedo, (2, 2, 1)), roughness, 0.0, ior)]
+    )
     mask = truth.seen == len(stage.items)
-    yield Edit(kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask)
+    yield Edit(
+        kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask
+    )
 
 
 def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]:
     """A scene with true maps, which cost the same as fitted ones, a region [H, W] bool of it, and what to call both."""
     scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=seed, spp=16))
-    mask, third = np.zeros(scene.depth.shape, bool), np.s_[size // 3 : 2 * size // 3]
+    mask = np.zeros(scene.depth.shape, bool)
+    third = np.s_[size // 3 : 2 * size // 3]
     mask[third, third] = True
     mask &= scene.depth > 0
     return scene, mask, f"{size} x {size}, {int(mask.sum())} pixels"
 
 
-def sample_and_light(scene: int, view: int, light: int, **how: Any) -> tuple[SyntheticSample, Array]:
+def sample_and_light(
+    scene: int, view: int, light: int, **how: Any
+) -> tuple[SyntheticSample, Array]:
     """The sample of these numbers, and the next light [h, 2h, 3] of its view; `how` as of `make_sample`."""
     sample, other = (make_sample(scene, view, k, **how) for k in (light, light + 1))
     return sample, other.envmap
 
 
 def true_scene(
-    sample: SyntheticSample, maps: Prediction | None = None, *, completion: str = "auto", seed: int = 0
-) -> Scene:  # fmt: skip
+    sample: SyntheticSample,
+    maps: Prediction | None = None,
+    *,
+    completion: str = "auto",
+    seed: int = 0,
+) -> Scene:
     """The sample as a fit without any error: true maps on the mesh of the true depth, true light; or other `maps`."""
-    return scene_of(sample.photo, maps or sample.truth, sample.envmap, completion=completion, seed=seed)
+    return scene_of(
+        sample.photo, maps or sample.truth, sample.envmap, completion=completion, seed=seed
+    )
 
 
-def scene_of(photo: Photo, maps: Prediction, envmap: Array, *, completion: str = "auto", seed: int = 0) -> Scene:
+def scene_of(
+    photo: Photo, maps: Prediction, envmap: Array, *, completion: str = "auto", seed: int = 0
+) -> Scene:
     """A photo with those maps and that light [h, 2h, 3], as they are: nothing is fitted."""
-    geometry = build_geometry(maps.depth, maps.normal, photo.camera, completion=completion, seed=seed)
-    return Scene(photo.camera, photo, maps, maps.materials, maps.normal, maps.depth, geometry, envmap, photo.linear)
+    geometry = build_geometry(
+        maps.depth, maps.normal, photo.camera, completion=completion, seed=seed
+    )
+    return Scene(
+        photo.camera,
+        photo,
+        maps,
+        maps.materials,
+        maps.normal,
+        maps.depth,
+        geometry,
+        envmap,
+        photo.linear,
+    )

@@ -37,35 +37,52 @@ from materialist.types import Array, Materials, Mesh, Scene
 class ExportBench(Benchmark):
     """Render the exports of one photo again; `data` as in `bench invert`, without `photo`."""
 
-    columns = (Column("photo", "PSNR, photo", "higher", 1), Column("ours", "PSNR, re-rendering", "higher", 1))
+    columns = (
+        Column("photo", "PSNR, photo", "higher", 1),
+        Column("ours", "PSNR, re-rendering", "higher", 1),
+    )
     plotted = ("photo", "ours")
 
     photo: str = option("example:coffee", "As in `bench invert`.", kind="name")
     size: int = option(192, "Longer side.", **SIZE)
     spp: int = option(256, "Paths a pixel.", **COUNT)
-    blender: str = option("", "The program, or a Python that has bpy, if not the one that is found.", kind="name")
+    blender: str = option(
+        "", "The program, or a Python that has bpy, if not the one that is found.", kind="name"
+    )
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as temporary:
             case = photo_case(self, data, self.photo, Path(temporary), self.size)
             how: dict[str, Any] = {"predictor": case.predictor, "fov": case.fov, "size": self.size}
             scene = pipeline.invert(case.photo, seed=self.seed, device=self.device, **how)
-            ours, photo = pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 1), scene.photo.linear
+            ours = pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 1)
+            photo = scene.photo.linear
             for name, picture in self._pictures(scene, Path(temporary)):
                 report.sheet.append(strip(photo, ours, picture))
-                yield {"method": name, "sample": "", "photo": psnr(picture, photo), "ours": psnr(picture, ours)}
+                yield {
+                    "method": name,
+                    "sample": "",
+                    "photo": psnr(picture, photo),
+                    "ours": psnr(picture, ours),
+                }
             if find_blender(self.blender or None) is None:
                 yield {"method": "Blender: none found, give --blender PROGRAM", "sample": ""}
 
     def _pictures(self, scene: Scene, folder: Path) -> Iterator[tuple[str, Array]]:
         """(what renders, [H, W, 3] linear)."""
         load = partial(mi.load_file, parallel=False, spp=self.spp)
-        rendered = lambda file: np.array(mi.render(load(str(file)), seed=mi.UInt32(self.seed)))  # noqa: E731
+
+        def rendered(file):
+            return np.array(mi.render(load(str(file)), seed=mi.UInt32(self.seed)))
+
         yield "another seed", pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 2)
         export(scene, folder / "mitsuba", to="mitsuba")
         yield "Mitsuba, our material", rendered(folder / "mitsuba" / "scene_materialist.xml")
         yield "Mitsuba, principled", rendered(folder / "mitsuba" / "scene.xml")
-        for to, name, light, read in (("glb", "a.glb", "a.light.hdr", _glb), ("usd", "a", "a/envmap.exr", _usd)):
+        for to, name, light, read in (
+            ("glb", "a.glb", "a.light.hdr", _glb),
+            ("usd", "a", "a/envmap.exr", _usd),
+        ):
             export(scene, folder / name, to=to)
             (folder / to).mkdir()
             lit = replace(scene, envmap=read_envmap(folder / light))
@@ -94,8 +111,11 @@ def _usd(folder: Path) -> Iterator[tuple]:
 
     stage: Any = Usd.Stage.Open(str(folder / "scene.usdc"))
     for mesh in (UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)):
-        name, st = mesh.GetPrim().GetName(), UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st")
-        nodes = [f"/Scene/Materials/{name}/{kind}" for kind in ("base_color", "roughness", "metallic")]
+        name = mesh.GetPrim().GetName()
+        st = UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st")
+        nodes = [
+            f"/Scene/Materials/{name}/{kind}" for kind in ("base_color", "roughness", "metallic")
+        ]
         files = [UsdShade.Shader.Get(stage, node).GetInput("file").Get().path for node in nodes]
         faces = np.reshape(mesh.GetFaceVertexIndicesAttr().Get(), (-1, 3))
         maps = [Image.open(folder / file) for file in files]

@@ -36,7 +36,12 @@ from materialist.predict.refraction.thickness import Thickness
 from materialist.procedural.synthetic import photographed
 from materialist.types import Array
 
-DRAWN = ("two_interface, true d", "two_interface, predicted d", "closed, predicted d", "closed, predicted d, inpainted")
+DRAWN = (
+    "two_interface, true d",
+    "two_interface, predicted d",
+    "closed, predicted d",
+    "closed, predicted d, inpainted",
+)
 """The methods whose pictures are shown."""
 
 
@@ -64,7 +69,10 @@ class GlassBench(Benchmark):
     envmaps: int = option(2, "Lights of each object.", **COUNT)
     iors: str = option("1.1,1.3", "Indices of refraction.", kind="name")
     background: str = option(
-        "room", "A patterned floor and wall, or the light alone.", kind="word", choices=("room", "envmap")
+        "room",
+        "A patterned floor and wall, or the light alone.",
+        kind="word",
+        choices=("room", "envmap"),
     )
     size: int = option(128, "Width and height of the pictures.", **SIZE)
     spp: int = option(144, "Paths a pixel of predictions.", **COUNT)
@@ -79,26 +87,33 @@ class GlassBench(Benchmark):
             shown: dict[str, Array] = {}
             yield from self._compared(case, behind, shown)
             if len(report.sheet) < self.pictures:
-                inside, room = case.stage.mask[..., None], behind["true"].picture
+                inside = case.stage.mask[..., None]
+                room = behind["true"].picture
                 glass = [case.truth, *(shown[name] for name in DRAWN)]
                 pictures = [np.where(inside, picture, room) for picture in glass]
                 report.sheet.append(strip(case.scene.photo.linear, *pictures))
         if self.latency:
             yield from self._latencies(data)
 
-    def _cases(self, data: Path | None, iors: list[float]) -> Iterator[tuple[Case, dict[str, Background]]]:
+    def _cases(
+        self, data: Path | None, iors: list[float]
+    ) -> Iterator[tuple[Case, dict[str, Background]]]:
         """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
         lights = {group: count() for group in scenes.GROUPS}  # both groups see the same ones
         for thing in scenes.things(data, self.shapes, self.seed):
             stage = scenes.GlassScene(thing, self.size, self.seed, self.background)
             for j in range(self.envmaps):
-                light = scenes.environment(next(lights[thing.group]), stage, data=data, seed=self.seed)
+                light = scenes.environment(
+                    next(lights[thing.group]), stage, data=data, seed=self.seed
+                )
                 room = stage.room.render(light, self.reference, seed=1)
                 gain = scenes.exposure(room)
                 grey = stage.grey.render(light * gain, self.reference, seed=2)
                 scene = true_scene(photographed(stage.grey, grey, light * gain, thing.name))
                 behind = {
-                    "true": Background(room * gain, stage.room.truth).fitted(scene.envmap, stage.room),
+                    "true": Background(room * gain, stage.room.truth).fitted(
+                        scene.envmap, stage.room
+                    ),
                     "inpainted": models.inpainted_background(scene, stage),
                 }
                 for ior in iors:
@@ -106,9 +121,12 @@ class GlassBench(Benchmark):
                     name = f"{thing.name} light {j} ior {ior:g}"
                     yield Case(stage, scene, truth, ior, name, self.spp), behind
 
-    def _compared(self, case: Case, behind: dict[str, Background], shown: dict[str, Array]) -> Iterator[Row]:
+    def _compared(
+        self, case: Case, behind: dict[str, Background], shown: dict[str, Array]
+    ) -> Iterator[Row]:
         """The rows of all methods for one case; their pictures go into `shown`."""
-        stage, true = case.stage, behind["true"]
+        stage = case.stage
+        true = behind["true"]
         d = models.thicknesses(case.scene, stage, true)
 
         def row(method: str, picture: Array, found: Thickness | None = None) -> Row:
@@ -139,20 +157,29 @@ class GlassBench(Benchmark):
         preview, cost = timed(lambda: GlassPreview(scene, mask, device=self.device, seed=self.seed))
         yield {"method": "preview: built once", "sample": sample, **cost}
         # Kernels are compiled at the first picture of a kind.
-        changes: list[tuple[str, dict[str, Any]]] = [("first picture of a kind", {"roughness": r}) for r in (0.0, 0.3)]
-        changes += [("ior", {"ior": ior}) for ior in (1.3, 1.7)] + [("tint", {"tint": (0.6, 0.9, 0.7)})]
-        changes += [("roughness", {"roughness": r}) for r in (0.2, 0.4)] + [("transmission", {"transmission": 0.9})]
+        changes: list[tuple[str, dict[str, Any]]] = [
+            ("first picture of a kind", {"roughness": r}) for r in (0.0, 0.3)
+        ]
+        changes += [("ior", {"ior": ior}) for ior in (1.3, 1.7)] + [
+            ("tint", {"tint": (0.6, 0.9, 0.7)})
+        ]
+        changes += [("roughness", {"roughness": r}) for r in (0.2, 0.4)] + [
+            ("transmission", {"transmission": 0.9})
+        ]
         for name, change in changes:
             _, cost = timed(preview.picture, **change, spp=16, seed=self.seed)
             yield {"method": f"preview: {name}", "sample": sample, **cost}
 
 
-def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, seed: int) -> Iterator[Row]:
+def sensitivity(
+    case: Case, d: Thickness, behind: Background, *, draws: int, seed: int
+) -> Iterator[Row]:
     """Rows of the two-interface model with thickness d (1 + e) (paper, Sensitivity Analysis of d).
 
     As there, the back's normal is the front's: the row to compare with is that of the same assumption.
     """
-    rng, largest = np.random.default_rng([seed, 10, *case.name.encode()]), scenes.PROTOCOL.noise
+    rng = np.random.default_rng([seed, 10, *case.name.encode()])
+    largest = scenes.PROTOCOL.noise
     for k in range(draws):
         noisy = replace(d, solid=d.solid * (1 + rng.uniform(-largest, largest)))
         picture = models.two_interface(case, noisy, behind, papers_back=True)
@@ -162,10 +189,15 @@ def sensitivity(case: Case, d: Thickness, behind: Background, *, draws: int, see
 
 def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str, float]:
     """The figures of a picture [H, W, 3] inside the mask, named by the object's group."""
-    mask, group, truth = case.stage.mask, case.stage.thing.group, case.truth
+    mask = case.stage.mask
+    group = case.stage.thing.group
+    truth = case.truth
     # Outside the mask both are the truth, so that windows that reach over its border compare equals.
     inside = np.where(mask[..., None], picture, truth)
-    found = {"psnr": metrics.psnr(inside, truth, mask=mask), "ssim": metrics.ssim(inside, truth, mask=mask)}
+    found = {
+        "psnr": metrics.psnr(inside, truth, mask=mask),
+        "ssim": metrics.ssim(inside, truth, mask=mask),
+    }
     found["frame"] = float(found["psnr"] - 10 * np.log10(mask.mean()))
     box = window(mask)
     if (distance := lpips(inside[box], truth[box])) is not None:

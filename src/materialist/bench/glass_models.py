@@ -51,23 +51,34 @@ class Background:
 
     def surfaces(self, camera: Camera) -> list[Item]:
         """The mesh of its depth, and its planes, which go on with their mean albedo."""
-        depth, albedo, found = self.maps.depth, self.maps.materials.albedo, list[Item]()
+        depth = self.maps.depth
+        albedo = self.maps.materials.albedo
+        found = list[Item]()
         if not depth.any():
             return found
         geometry = build_geometry(depth, self.maps.normal, camera)
         for k in np.unique(geometry.mesh.face_plane):
-            mean = np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3)) if k >= 0 else albedo
+            mean = (
+                np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3))
+                if k >= 0
+                else albedo
+            )
             mesh: Any = part(geometry.mesh, int(k))
             found.append(Item(mesh, mean, 1.0, 0.0))
         return found
 
     def fitted(self, envmap: Array, room: TrueScene) -> "Background":
         """With the albedo under which its surfaces, path-traced under the light, look like its picture."""
-        old, items = self.maps.materials, self.surfaces(room.camera)
+        old = self.maps.materials
+        items = self.surfaces(room.camera)
         if not items:
             return self
-        seen = denoised(staged(room, items).render(envmap, PROTOCOL.albedo_spp), old.albedo, self.maps.normal)
-        albedo = np.clip(old.albedo * self.picture / np.maximum(seen, 1e-6), 0, PROTOCOL.brightest_albedo)
+        seen = denoised(
+            staged(room, items).render(envmap, PROTOCOL.albedo_spp), old.albedo, self.maps.normal
+        )
+        albedo = np.clip(
+            old.albedo * self.picture / np.maximum(seen, 1e-6), 0, PROTOCOL.brightest_albedo
+        )
         materials = replace(old, albedo=albedo.astype(np.float32))
         return replace(self, maps=replace(self.maps, materials=materials))
 
@@ -80,17 +91,23 @@ def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
     if stage.room.items:
         photo = Background(scene.photo.linear, scene.prior).fitted(scene.envmap, stage.room)
         removed = remove(replace(scene, materials=photo.maps.materials), stage.mask)
-        return Background(removed.photo.linear, Prediction(removed.materials, removed.normal, removed.depth))
-    hole, maps = grown(stage.mask, 1), stage.room.truth
+        return Background(
+            removed.photo.linear, Prediction(removed.materials, removed.normal, removed.depth)
+        )
+    hole = grown(stage.mask, 1)
+    maps = stage.room.truth
     return Background(patched(scene.photo.linear, hole, ~hole, np.zeros(hole.shape, int)), maps)
 
 
-def two_interface(case: Case, found: Thickness, behind: Background, *, papers_back: bool = False) -> Array:
+def two_interface(
+    case: Case, found: Thickness, behind: Background, *, papers_back: bool = False
+) -> Array:
     """[H, W, 3] linear, inside the object's mask: the two-interface model.
 
     The normals of the back are the known ones, or with `papers_back` the opposite of the front's.
     """
-    scene, mask = case.scene, case.stage.mask
+    scene = case.scene
+    mask = case.stage.mask
     beyond = interfaces.Backdrop(behind.picture, behind.maps.depth, scene.envmap)
     material = Glass(ior=case.ior, model="two-interface", back="same" if papers_back else "found")
     return interfaces.two_interface(
@@ -100,11 +117,17 @@ def two_interface(case: Case, found: Thickness, behind: Background, *, papers_ba
 
 def closed(case: Case, found: Thickness, behind: Background) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
-    scene, mask, whole = case.scene, case.stage.mask, found.revolution
+    scene = case.scene
+    mask = case.stage.mask
+    whole = found.revolution
     if whole is not None:
         return before(case, whole.body(scene.camera), behind)
-    depth, normal, beyond = scene.depth, scene.normal, behind.maps.depth
-    body = closed_proxy(depth, normal, mask, found.solid, scene.camera, behind=beyond, back=found.back)
+    depth = scene.depth
+    normal = scene.normal
+    beyond = behind.maps.depth
+    body = closed_proxy(
+        depth, normal, mask, found.solid, scene.camera, behind=beyond, back=found.back
+    )
     return before(case, body, behind)
 
 
@@ -113,11 +136,13 @@ def before(case: Case, body: Any, behind: Background) -> Array:
 
     Denoised as `materialist glass` does, where the denoiser is installed.
     """
-    scene, mask = case.scene, case.stage.mask
+    scene = case.scene
+    mask = case.stage.mask
     things = [*behind.surfaces(scene.camera), replace(case.stage.item, solid=body, ior=case.ior)]
     picture = staged(case.stage.room, things).render(scene.envmap, case.spp)
     box = window(mask)
-    seen, normal = np.ascontiguousarray(picture[box]), np.ascontiguousarray(scene.normal[box])
+    seen = np.ascontiguousarray(picture[box])
+    normal = np.ascontiguousarray(scene.normal[box])
     picture[box] = denoised(seen, np.ones_like(seen), normal)
     return np.where(mask[..., None], picture, 0)
 
@@ -131,4 +156,7 @@ def thicknesses(scene: Scene, stage: GlassScene, behind: Background) -> dict[str
     methods: dict[str, Any] = {"true": stage.front.thickness, "predicted": "auto"}
     methods |= {name: name for name in ("network", "symmetry")}
     depth = behind.maps.depth
-    return {name: object_thickness(scene, stage.mask, how, behind=depth) for name, how in methods.items()}
+    return {
+        name: object_thickness(scene, stage.mask, how, behind=depth)
+        for name, how in methods.items()
+    }

@@ -82,10 +82,15 @@ def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:
         files = sorted((data / "meshes" / group).glob("*.ply"))
         files = [f for f in files if f.stem not in VESSELS]
         order = np.random.default_rng([seed, 6]).permutation(len(files))
-        loaded = (GlassObject(files[k].stem, group, shapes.placed(shapes.load(files[k]), scale=0.7)) for k in order)
+        loaded = (
+            GlassObject(files[k].stem, group, shapes.placed(shapes.load(files[k]), scale=0.7))
+            for k in order
+        )
         closed = list(islice((thing for thing in loaded if is_closed(thing.solid)), count))
         if not closed:
-            raise InputError(f"{data / 'meshes' / group} holds no closed .ply mesh; give another --data, or none.")
+            raise InputError(
+                f"{data / 'meshes' / group} holds no closed .ply mesh; give another --data, or none."
+            )
         found.append(closed)
     return [thing for pair in zip_longest(*found) for thing in pair if thing]
 
@@ -114,7 +119,8 @@ class GlassScene:
 
     def __init__(self, thing: GlassObject, size: int, seed: int = 0, background: str = "room"):
         rng = np.random.default_rng([seed, 9, *thing.name.encode()])
-        self.thing, self.background = thing, background
+        self.thing = thing
+        self.background = background
         view = _view(thing.solid, rng)
         turned = shapes.placed(thing.solid, turn=rng.uniform(-0.5, 0.5))
         turned = replace(turned, vertices=turned.vertices + np.array([0, LIFT, 0]))
@@ -142,11 +148,16 @@ def seen(solid: Solid, camera: Camera) -> SeenSide:
     """What the camera sees of a mesh in its frame."""
     # Off the centres of pixels by a little: rays through the edges of meshes may slip between faces.
     rays = pixel_rays(camera).astype(np.float64) + np.array([3e-5, 2e-5, 0])
-    paths, normal, back = look(ShapeTracer(solid), CameraPose(np.eye(3), np.eye(3), np.zeros(3)), rays)
+    paths, normal, back = look(
+        ShapeTracer(solid), CameraPose(np.eye(3), np.eye(3), np.zeros(3)), rays
+    )
     hit = np.isfinite(paths.first).reshape(rays.shape[:2])
     thickness = paths.solid.reshape(hit.shape) * np.linalg.norm(rays, axis=-1)
-    depth, away = np.where(hit, paths.first.reshape(hit.shape), 0), np.array([0, 0, -1], np.float32)
-    normal, back = (np.where(hit[..., None], x, none) for x, none in ((normal, -away), (back, away)))
+    depth = np.where(hit, paths.first.reshape(hit.shape), 0)
+    away = np.array([0, 0, -1], np.float32)
+    normal, back = (
+        np.where(hit[..., None], x, none) for x, none in ((normal, -away), (back, away))
+    )
     return SeenSide(depth.astype(np.float32), normal, thickness.astype(np.float32), back)
 
 
@@ -154,7 +165,11 @@ def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int =
     """[h, 2h, 3] light of that number in the frame of the scene's camera, its peaks clipped; h is ENVMAP_ROWS."""
     full = lights.envmap(lights.environment(index, seed=seed, data=data), scene.room.view.to_scene)
     rows = ENVMAP_ROWS[scene.background]
-    small = full if rows == len(full) else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)
+    small = (
+        full
+        if rows == len(full)
+        else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)
+    )
     return np.minimum(small, PROTOCOL.brightest * luminance(small).mean()).astype(np.float32)
 
 
@@ -171,12 +186,17 @@ def _room(rng: np.random.Generator) -> list[Item]:
     wall = shapes.panel(np.array([-3.0, 0, -back]), 6 * x, 3 * y, (7, 3.5))
     kinds = ("checker", "noise", "stripes", "wood", "spots")
     chosen = rng.choice(kinds, 2)
-    return [Item(p, patterns.pattern(rng, str(k)), 1.0, 0.0) for p, k in zip((floor, wall), chosen, strict=True)]
+    return [
+        Item(p, patterns.pattern(rng, str(k)), 1.0, 0.0)
+        for p, k in zip((floor, wall), chosen, strict=True)
+    ]
 
 
 def _view(solid: Solid, rng: np.random.Generator) -> Viewpoint:
     """A camera that looks down 8 to 25 degrees at the object, which takes about half of the picture."""
-    fov, tilt, azimuth = rng.uniform(30, 45), np.radians(rng.uniform(8, 25)), rng.uniform(-0.25, 0.25)
+    fov = rng.uniform(30, 45)
+    tilt = np.radians(rng.uniform(8, 25))
+    azimuth = rng.uniform(-0.25, 0.25)
     height = float(solid.vertices[:, 1].max())
     reach = max(height, float(np.abs(solid.vertices[:, [0, 2]]).max()) * 1.6)
     distance = reach / np.tan(np.radians(fov) / 2)

@@ -41,9 +41,14 @@ class GpuBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         there = usable_gpus() and torch.cuda.is_available()
-        report.settings["card"] = torch.cuda.get_device_name() if there else "none that Mitsuba and PyTorch can use"
+        report.settings["card"] = (
+            torch.cuda.get_device_name() if there else "none that Mitsuba and PyTorch can use"
+        )
         if self.device != "auto":
-            yield from ({"method": k, "sample": self.photo, self.device: s} for k, s in self._measured(report))
+            yield from (
+                {"method": k, "sample": self.photo, self.device: s}
+                for k, s in self._measured(report)
+            )
             return
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as folder:
             for device in ("cpu", "cuda")[: 1 + there]:  # a process keeps its device
@@ -55,16 +60,32 @@ class GpuBench(Benchmark):
     def _measured(self, report: Report) -> Iterator[tuple[str, float]]:
         """(stage, seconds) on this process's device."""
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        speed = PredictorBench(predictor="bundled", warmups=max(1, self.runs // 10), runs=self.runs, **shared)
+        speed = PredictorBench(
+            predictor="bundled", warmups=max(1, self.runs // 10), runs=self.runs, **shared
+        )
         for row in speed.rows(None, report):
             yield row["method"], row["median_ms"] / 1000
         scene, cost = timed(pipeline.invert, self.photo, size=self.size, **shared)
         spent = stages(list(scene.report.stages), cost["seconds"]).items()
-        yield from ((f"inversion, {STAGES.get(key.removesuffix('_s'), 'other')}", seconds) for key, seconds in spent)
+        yield from (
+            (f"inversion, {STAGES.get(key.removesuffix('_s'), 'other')}", seconds)
+            for key, seconds in spent
+        )
         yield "inversion", cost["seconds"]
-        mask = select(scene, click=[x * self.size / 512 for x in numbers("click", self.click, 0, 512)])
-        changes = {"edit": lambda: edit(scene, mask, hue=120), "glass": lambda: glass(scene, mask, **shared)}
+        mask = select(
+            scene, click=[x * self.size / 512 for x in numbers("click", self.click, 0, 512)]
+        )
+        changes = {
+            "edit": lambda: edit(scene, mask, hue=120),
+            "glass": lambda: glass(scene, mask, **shared),
+        }
         for name, change in changes.items():
-            yield name, timed(lambda change=change: composite(scene, change(), **shared))[1]["seconds"]
+            yield (
+                name,
+                timed(lambda change=change: composite(scene, change(), **shared))[1]["seconds"],
+            )
         step = step_row(scene.photo, scene.prior, self)
-        yield from {"step, cached": step["cached_step_ms"] / 1000, "step, PRB": step["prb_step_s"]}.items()
+        yield from {
+            "step, cached": step["cached_step_ms"] / 1000,
+            "step, PRB": step["prb_step_s"],
+        }.items()

@@ -22,7 +22,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.bench.benchmark import COUNT, COUNT_OR_0, Benchmark, Row, materialist, numbers, timed
+from materialist.bench.benchmark import (
+    COUNT,
+    COUNT_OR_0,
+    Benchmark,
+    Row,
+    materialist,
+    numbers,
+    timed,
+)
 from materialist.bench.report import Column, Report
 from materialist.buffers import placed
 from materialist.errors import InputError
@@ -42,9 +50,14 @@ from materialist.types import Photo, Prediction
 NATIVE = 512
 """Longer side of the synthetic photo; larger working sizes enlarge it."""
 STAGES = {
-    "predict": "prior", "geometry": "mesh", "scene": "scene", "engine": "cache", "light": "light",
-    "materials": "materials", "rerender": "re-render",
-}  # fmt: skip
+    "predict": "prior",
+    "geometry": "mesh",
+    "scene": "scene",
+    "engine": "cache",
+    "light": "light",
+    "materials": "materials",
+    "rerender": "re-render",
+}
 """Stages of report.json, and what the table calls them; see `stages` for the rest."""
 
 
@@ -84,7 +97,9 @@ class InvertBench(Benchmark):
     plotted = ("seconds", "peak_mb")
 
     sizes: str = option("256,512", "Longer sides, pixels, with commas.", kind="name")
-    photo: str = option("", "A file or example:NAME, inverted with the default predictor.", kind="name")
+    photo: str = option(
+        "", "A file or example:NAME, inverted with the default predictor.", kind="name"
+    )
     step_size: int = option(512, "Size of the step comparison; 0: none.", **COUNT_OR_0)
     preset: str = option("default", "That of `invert`.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
@@ -102,19 +117,33 @@ class InvertBench(Benchmark):
                 if self.at_once > 1:
                     yield self._together(case, size, folder, *options)
             if self.step_size:
-                photo = read_photo(_at_least(case, self.step_size, folder), size=self.step_size, fov=case.fov)
-                prior = get_predictor(case.predictor, device=self.device).predict(photo, seed=self.seed)
+                photo = read_photo(
+                    _at_least(case, self.step_size, folder), size=self.step_size, fov=case.fov
+                )
+                prior = get_predictor(case.predictor, device=self.device).predict(
+                    photo, seed=self.seed
+                )
                 yield step_row(photo, prior, self) | {"sample": case.name}
 
     def _together(self, case: InvertedPhoto, size: int, folder: Path, *options: str) -> Row:
         """The row of `at_once` inversions: the time until the last of them ends. Twice that of one is fair for two."""
         places = [Path(tempfile.mkdtemp(dir=folder)) for _ in range(self.at_once)]
         with ThreadPoolExecutor(self.at_once) as pool:
-            cost = timed(lambda: list(pool.map(lambda place: inversion(self, case, size, place, *options), places)))[1]
-        return {"method": f"{self.at_once} at once, {size}", "sample": case.name, "seconds": cost["seconds"]}
+            cost = timed(
+                lambda: list(
+                    pool.map(lambda place: inversion(self, case, size, place, *options), places)
+                )
+            )[1]
+        return {
+            "method": f"{self.at_once} at once, {size}",
+            "sample": case.name,
+            "seconds": cost["seconds"],
+        }
 
 
-def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int) -> InvertedPhoto:
+def photo_case(
+    bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int
+) -> InvertedPhoto:
     """What to invert, by the options; a synthetic photo with its true maps is written into `folder`."""
     if photo:
         return InvertedPhoto(Path(photo).name, photo, "auto")
@@ -133,16 +162,36 @@ def photo_case(bench: Benchmark, data: Path | None, photo: str, folder: Path, si
     for name, values in {**vars(sample.truth.materials), "normal": sample.truth.normal}.items():
         write_exr(folder / "maps" / f"{name}.exr", values)
     write_exr(folder / "maps" / "depth.exr", sample.truth.depth)
-    return InvertedPhoto("synthetic", folder / "photo.png", f"maps:{folder / 'maps'}", f"{sample.photo.camera.fov:.6g}")
+    return InvertedPhoto(
+        "synthetic",
+        folder / "photo.png",
+        f"maps:{folder / 'maps'}",
+        f"{sample.photo.camera.fov:.6g}",
+    )
 
 
 def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *options: str) -> Row:
     """The row of one inversion at `size`, in a process of its own; scratch files go into `folder`."""
-    photo, scene = _at_least(case, size, folder), folder / f"scene{size}"
+    photo = _at_least(case, size, folder)
+    scene = folder / f"scene{size}"
     command = (
-        "invert", str(photo), "-o", str(scene), "--predictor", case.predictor, "--fov", case.fov, "--size", str(size),
-        "--seed", str(bench.seed), "--device", bench.device, "--json", *options,
-    )  # fmt: skip
+        "invert",
+        str(photo),
+        "-o",
+        str(scene),
+        "--predictor",
+        case.predictor,
+        "--fov",
+        case.fov,
+        "--size",
+        str(size),
+        "--seed",
+        str(bench.seed),
+        "--device",
+        bench.device,
+        "--json",
+        *options,
+    )
     seconds = timed(lambda: materialist(*command))[1]["seconds"]
     told = json.loads((scene / "report.json").read_text())
     camera = json.loads((scene / "scene.json").read_text())["camera"]
@@ -178,7 +227,10 @@ def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
         # Stages named by what they move, as albedo, count as materials.
         name = {"trace": "engine"}.get(stage["name"], stage["name"])
         spent[name if name in STAGES else "materials"] += stage["seconds"]
-    return {**{f"{name}_s": spent[name] for name in STAGES}, "other_s": seconds - sum(spent.values())}
+    return {
+        **{f"{name}_s": spent[name] for name in STAGES},
+        "other_s": seconds - sum(spent.values()),
+    }
 
 
 def step_row(photo: Photo, prior: Prediction, bench: Benchmark) -> Row:
@@ -188,7 +240,9 @@ def step_row(photo: Photo, prior: Prediction, bench: Benchmark) -> Row:
     allocate memory, and the first one of PRB compiles kernels; they do not count. The light is grey, which changes no
     cost.
     """
-    seed, camera, light = bench.seed, photo.camera, np.full((256, 512, 3), 0.6, np.float32)
+    seed = bench.seed
+    camera = photo.camera
+    light = np.full((256, 512, 3), 0.6, np.float32)
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
     cached: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
     problem, traced = timed(lambda: cached.material_problem(light))

@@ -102,21 +102,36 @@ class LightBench(Benchmark):
     )
     plotted = ("sh_error_relative", "render_psnr", "seconds")
 
-    scenes: int = option(3, "Scenes; the paper has 10. Every scene and view begins with another light.", **COUNT)
+    scenes: int = option(
+        3, "Scenes; the paper has 10. Every scene and view begins with another light.", **COUNT
+    )
     views: int = option(1, "Viewpoints of each; the paper has 10.", **COUNT)
     lights: int = option(2, "Lights of each view; the paper has 10.", **COUNT)
     size: int = option(96, "Width and height of the photos.", **SIZE)
     methods: str = option("default,paper", "Names of METHODS, with commas.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
-    relight: bool = option(True, "Relight whole inversions, with and without continued planes.", kind="switch")
+    relight: bool = option(
+        True, "Relight whole inversions, with and without continued planes.", kind="switch"
+    )
     spp: int = option(256, "Samples a pixel of all pictures that are compared.", **COUNT)
-    unseen: bool = option(False, "Scenes in natural colours that no network was trained on.", kind="switch")
-    mirrors: bool = option(False, "Objects of polished metal (paper, table ab_envmap).", kind="switch")
+    unseen: bool = option(
+        False, "Scenes in natural colours that no network was trained on.", kind="switch"
+    )
+    mirrors: bool = option(
+        False, "Objects of polished metal (paper, table ab_envmap).", kind="switch"
+    )
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         methods = names("methods", self.methods, METHODS)
-        for scene, view, light in product(range(self.scenes), range(self.views), range(self.lights)):
-            how: dict[str, Any] = {"size": self.size, "data": data, "seed": self.seed, "unseen": self.unseen}
+        for scene, view, light in product(
+            range(self.scenes), range(self.views), range(self.lights)
+        ):
+            how: dict[str, Any] = {
+                "size": self.size,
+                "data": data,
+                "seed": self.seed,
+                "unseen": self.unseen,
+            }
             sample, other = sample_and_light(scene, view, scene + view + light, **how)
             sample = mirrored(sample) if self.mirrors else sample
             stage = _Stage(self, sample, other)
@@ -133,12 +148,15 @@ class _Stage:
 
     def __init__(self, bench: LightBench, sample: SyntheticSample, other: Array):
         """`other` [h, 2h, 3] is the light of the relit pictures."""
-        self.bench, self.sample, self.other = bench, sample, other
+        self.bench = bench
+        self.sample = sample
+        self.other = other
         self.photo = sample.scene.render(sample.envmap, spp=bench.spp, seed=bench.seed + 2)
 
     def relit(self) -> Iterator[Row]:
         """Rows of the ceiling and of whole inversions, with and without what is added to the mesh."""
-        truth, device = self.sample.truth, self.bench.device
+        truth = self.sample.truth
+        device = self.bench.device
         after = self.sample.scene.render(self.other, spp=self.bench.spp, seed=self.bench.seed + 3)
 
         def on(scene: Scene) -> dict[str, float]:
@@ -148,22 +166,35 @@ class _Stage:
         for completion, suffix in COMPLETIONS.items():
             perfect = true_scene(self.sample, completion=completion, seed=self.bench.seed)
             yield {"method": CEILING + suffix, **on(perfect)}
-            options: dict[str, Any] = {"completion": completion, "seed": self.bench.seed, "device": device}
+            options: dict[str, Any] = {
+                "completion": completion,
+                "seed": self.bench.seed,
+                "device": device,
+            }
             found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
             off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
             figures = self._of_light(found.envmap) | on(found)
-            yield {"method": "inversion" + suffix, **figures, "albedo_l1": float(off.mean()), **cost}
+            yield {
+                "method": "inversion" + suffix,
+                **figures,
+                "albedo_l1": float(off.mean()),
+                **cost,
+            }
 
     def fitted(self, methods: list[str]) -> Iterator[Row]:
         """A row for every method of fitting the light."""
-        bench, perfect = self.bench, true_scene(self.sample)
+        bench = self.bench
+        perfect = true_scene(self.sample)
         for name in methods:
-            method, completion = METHODS[name], bench.completion
+            method = METHODS[name]
+            completion = bench.completion
             given = given_maps(self.sample, method, seed=bench.seed, device=bench.device)
             (envmap, steps, geometry), cost = timed(
                 fit, self.sample, method, given, completion, seed=bench.seed, device=bench.device
             )
-            figures = self._of_light(envmap) | self._on(replace(perfect, geometry=geometry, envmap=envmap))
+            figures = self._of_light(envmap) | self._on(
+                replace(perfect, geometry=geometry, envmap=envmap)
+            )
             yield {"method": name, **figures, "steps": steps, **cost}
 
     def _of_light(self, envmap: Array) -> dict[str, float]:
@@ -180,25 +211,44 @@ class _Stage:
         return {"mesh_psnr": metrics.psnr(self._rendered(scene), self.photo)}
 
     def _rendered(self, scene: Scene) -> Array:
-        return rendered(scene, spp=self.bench.spp, seed=self.bench.seed + 1, device=self.bench.device)
+        return rendered(
+            scene, spp=self.bench.spp, seed=self.bench.seed + 1, device=self.bench.device
+        )
 
 
 def fit(
-    sample: SyntheticSample, method: Method, given: Prediction, completion: str, *, seed: int = 0, device: str = "auto"
+    sample: SyntheticSample,
+    method: Method,
+    given: Prediction,
+    completion: str,
+    *,
+    seed: int = 0,
+    device: str = "auto",
 ) -> tuple[Array, int, Geometry]:
     """(envmap [256, 512, 3], steps, mesh): what the method finds for the photo with the maps `given`."""
-    photo, named, height = sample.photo, preset(method.preset), sample.envmap.shape[0]
+    photo = sample.photo
+    named = preset(method.preset)
+    height = sample.envmap.shape[0]
     light = named.light
     if method.field not in FITLESS:
-        light = replace(light, field=method.field or light.field, height=method.height or light.height)
+        light = replace(
+            light, field=method.field or light.field, height=method.height or light.height
+        )
     setup = FitSetup(
-        photo, given, replace(named, light=light), completion, method.engine, envmap_height=height, seed=seed,
+        photo,
+        given,
+        replace(named, light=light),
+        completion,
+        method.engine,
+        envmap_height=height,
+        seed=seed,
         device=device,
-    )  # fmt: skip
+    )
     fit = prepare(setup)
     state = fit.start()
     if method.field in FITLESS:
-        problem, target = fit.engine.light_problem(given.materials), placed(photo.linear.reshape(-1, 3))
+        problem = fit.engine.light_problem(given.materials)
+        target = placed(photo.linear.reshape(-1, 3))
         if method.field == "constant":
             found = constant_light(problem, target)
         else:
@@ -213,17 +263,25 @@ def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: st
     """The maps that a method is given: true, predicted, or with the paper's neutral materials."""
     source: dict[str, Prediction] = {"true": sample.truth}
     if "predicted" in (method.maps, method.shape):
-        source["predicted"] = get_predictor("bundled", device=device).predict(sample.photo, seed=seed)
+        source["predicted"] = get_predictor("bundled", device=device).predict(
+            sample.photo, seed=seed
+        )
     if method.maps != "neutral":
         return replace(source[method.shape], materials=source[method.maps].materials)
     maps = zip(vars(sample.truth.materials).values(), NEUTRAL, strict=True)
-    return replace(source[method.shape], materials=Materials(*(np.full_like(m, v) for m, v in maps)))
+    return replace(
+        source[method.shape], materials=Materials(*(np.full_like(m, v) for m, v in maps))
+    )
 
 
 def constant_light(problem: Any, photo: Any) -> Any:
     """[h, 2h, 3] tensor of the colour that explains the photo [H W, 3] with the least square error."""
-    dark, lit = (problem.render(photo.new_full((problem.height, 2 * problem.height, 3), v)) for v in (0.0, 1.0))
-    gain, missing = lit - dark, photo[problem.pixels] - dark
+    dark, lit = (
+        problem.render(photo.new_full((problem.height, 2 * problem.height, 3), v))
+        for v in (0.0, 1.0)
+    )
+    gain = lit - dark
+    missing = photo[problem.pixels] - dark
     colour = ((missing * gain).sum(0) / (gain**2).sum(0)).clamp(min=0)
     return colour.expand(problem.height, 2 * problem.height, 3)
 
@@ -232,5 +290,10 @@ def mirrored(sample: SyntheticSample) -> SyntheticSample:
     """The sample with its objects in polished metal, photographed under the same light."""
     stage = sample.scene
     polished: dict[str, Any] = {"roughness": 0.1, "metallic": 1.0}
-    scene = staged(stage, [replace(x, **polished if k in stage.things else {}) for k, x in enumerate(stage.items)])
-    return photographed(scene, scene.render(sample.envmap, seed=1), sample.envmap, f"{sample.name} mirrors")
+    scene = staged(
+        stage,
+        [replace(x, **polished if k in stage.things else {}) for k, x in enumerate(stage.items)],
+    )
+    return photographed(
+        scene, scene.render(sample.envmap, seed=1), sample.envmap, f"{sample.name} mirrors"
+    )

@@ -66,7 +66,9 @@ class MaterialsBench(Benchmark):
     predictor: str = option("auto", "Names, with commas.", kind="name")
     limit: int = option(0, "At most so many samples, spread over the set; 0: all.", **COUNT_OR_0)
     split: str = option("test", "InteriorVerse's.", kind="name")
-    photographic: bool = option(True, "Tone, noise, blur and JPEG for procedural pictures.", kind="switch")
+    photographic: bool = option(
+        True, "Tone, noise, blur and JPEG for procedural pictures.", kind="switch"
+    )
     pictures: int = option(8, "Samples in sheet.png.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
@@ -74,7 +76,10 @@ class MaterialsBench(Benchmark):
             raise InputError(
                 "There is nothing to score; give --data DIR: materialist train data --split heldout -o DIR."
             )
-        sources = {spec: get_predictor(spec, device=self.device) for spec in names("predictor", self.predictor)}
+        sources = {
+            spec: get_predictor(spec, device=self.device)
+            for spec in names("predictor", self.predictor)
+        }
         for k, (name, photo, truth) in enumerate(self.samples(data, report)):
             absent = [name for name in MAPS if truth.sources and name not in truth.sources]
             report.settings.update({f"no true {which}": True for which in absent})
@@ -82,7 +87,12 @@ class MaterialsBench(Benchmark):
             for spec, source in sources.items():
                 found, cost = timed(source.predict, photo, seed=self.seed)
                 predictions.append(found)
-                yield {"method": spec, "sample": name, **_scores(found, truth, absent), "seconds": cost["seconds"]}
+                yield {
+                    "method": spec,
+                    "sample": name,
+                    **_scores(found, truth, absent),
+                    "seconds": cost["seconds"],
+                }
             if k < self.pictures:
                 report.sheet.append(strip(photo.linear, *predictions, truth))
         _pool(report.rows)
@@ -132,13 +142,19 @@ def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str
     figures = score(found, truth)
     if (truth.depth > 0).any():
         figures["depth_order"] = ordinal_accuracy(found.depth, truth.depth)
-    return {key: value for key, value in figures.items() if not key.startswith(tuple(f"{name}_" for name in absent))}
+    return {
+        key: value
+        for key, value in figures.items()
+        if not key.startswith(tuple(f"{name}_" for name in absent))
+    }
 
 
 def _pool(rows: list[Row]) -> None:
     """Give all rows the pooled PSNRs of their method, so that the table of means shows them."""
     for method in {row["method"] for row in rows}:
         own = [row for row in rows if row["method"] == method]
-        means = summary([{key: value for key, value in row.items() if key.endswith("_mse")} for row in own])
+        means = summary(
+            [{key: value for key, value in row.items() if key.endswith("_mse")} for row in own]
+        )
         for row in own:
             row.update({key: value for key, value in means.items() if key.endswith("_psnr_pooled")})

@@ -47,7 +47,13 @@ class Measure:
         """The folder that its benchmark is given, where it holds what that reads. Raises MaterialistError."""
         if self.needs and (given is None or not (given / self.needs).exists()):
             raise MaterialistError(f"Not run: it needs --data DIR with {self.needs}.")
-        parts = () if self.needs else ("photos",) if self.options.get("photos") else ("meshes", "envmaps")
+        parts = (
+            ()
+            if self.needs
+            else ("photos",)
+            if self.options.get("photos")
+            else ("meshes", "envmaps")
+        )
         there = given is not None and all((given / name).is_dir() for name in parts)
         return given / self.folder if given is not None and there else None
 
@@ -78,14 +84,19 @@ class Table:
                 yield [str(label), "published", *("–" if x is None else f"{x:g}" for x in told), ""]
             for method in filter(means.__contains__, methods):
                 found = [means[method].get(key) for key in self.columns]
-                cells = ("–" if x is None else f"{x:.{columns[k].digits}f}" for k, x in zip(self.columns, found))
+                cells = (
+                    "–" if x is None else f"{x:.{columns[k].digits}f}"
+                    for k, x in zip(self.columns, found)
+                )
                 yield [str(label), method, *cells, str(means[method]["samples"])]
 
 
 @cache
 def published() -> tuple[dict[str, Measure], list[Table]]:
     """What is measured, and the paper's tables in its order."""
-    content = yaml.safe_load((files("materialist.bench") / "assets" / "paper.yaml").read_text("utf-8"))
+    content = yaml.safe_load(
+        (files("materialist.bench") / "assets" / "paper.yaml").read_text("utf-8")
+    )
     measures = {name: Measure(**told) for name, told in content["measures"].items()}
     return measures, [Table(**told) for told in content["tables"]]
 
@@ -96,8 +107,12 @@ class PaperBench(OperationOptions):
 
     operation = "The benchmark"
 
-    quick: bool = option(False, "Few and small samples: a quarter of an hour on two cores.", kind="switch")
-    resume: bool = option(False, "Keep the rows in REPORT that have this commit and these settings.", kind="switch")
+    quick: bool = option(
+        False, "Few and small samples: a quarter of an hour on two cores.", kind="switch"
+    )
+    resume: bool = option(
+        False, "Keep the rows in REPORT that have this commit and these settings.", kind="switch"
+    )
     only: str = option("", "Names of measures, with commas; empty for all.", kind="name")
     seed: int = option(0, "Same seed, same result.", kind="whole", low=0, high=2**31 - 1)
     device: str = option("auto", "Where it runs.", kind="word", choices=("auto", "cpu", "cuda"))
@@ -108,7 +123,9 @@ class PaperBench(OperationOptions):
         wanted = names("measures", self.only or ",".join(measures), measures)
         make_folder(output / "rows")
         there = (output / "rows").glob("*.json") if self.resume else ()
-        rows: dict[str, dict[str, Any]] = {path.stem: json.loads(path.read_text("utf-8")) for path in there}
+        rows: dict[str, dict[str, Any]] = {
+            path.stem: json.loads(path.read_text("utf-8")) for path in there
+        }
         for name in wanted:
             try:
                 rows[name] = self._row(name, measures[name], data, output, rows.get(name, {}))
@@ -120,16 +137,28 @@ class PaperBench(OperationOptions):
         self, name: str, measure: Measure, data: Path | None, output: Path, kept: dict[str, Any]
     ) -> dict[str, Any]:
         """The figures of a measure, kept or new. Raises MaterialistError."""
-        place, options = measure.data(data), measure.options | (measure.quick if self.quick else measure.full)
+        place = measure.data(data)
+        options = measure.options | (measure.quick if self.quick else measure.full)
         options |= {"seed": options.get("seed", 0) + self.seed, "device": self.device}
-        key = plain({"commit": commit(), "settings": {**options, "data": None if place is None else place.name}})
+        key = plain(
+            {
+                "commit": commit(),
+                "settings": {**options, "data": None if place is None else place.name},
+            }
+        )
         if kept.items() >= key.items():
             return kept
         folder = output / "runs" / name
         make_folder(folder)
         _, cost = timed(benchmark_class(measure.bench).given(**options).run, place, folder)
         report = json.loads((folder / "report.json").read_text("utf-8"))
-        row = {**key, **cost, "quick": self.quick, "machine": report["machine"], "means": report["means"]}
+        row = {
+            **key,
+            **cost,
+            "quick": self.quick,
+            "machine": report["machine"],
+            "means": report["means"],
+        }
         write_whole(output / "rows" / f"{name}.json", json.dumps(row, indent=1))
         return row
 
@@ -137,14 +166,19 @@ class PaperBench(OperationOptions):
 @cache
 def commit() -> str:
     """The last commit of the package, `+` and a digest where it has changes since; without Git its version."""
-    git: Any = partial(subprocess.run, cwd=Path(__file__).parent.parent, capture_output=True, check=True)
+    git: Any = partial(
+        subprocess.run, cwd=Path(__file__).parent.parent, capture_output=True, check=True
+    )
     try:
         last, since = (
-            git(["git", *words, "--", "."]).stdout for words in (("log", "-1", "--format=%h"), ("diff", "HEAD"))
+            git(["git", *words, "--", "."]).stdout
+            for words in (("log", "-1", "--format=%h"), ("diff", "HEAD"))
         )
     except (OSError, subprocess.CalledProcessError):
         return __version__
-    return (last.decode().strip() or __version__) + (f"+{hashlib.sha256(since).hexdigest()[:6]}" if since else "")
+    return (last.decode().strip() or __version__) + (
+        f"+{hashlib.sha256(since).hexdigest()[:6]}" if since else ""
+    )
 
 
 def write_page(
@@ -154,14 +188,35 @@ def write_page(
     parts: list[dict[str, Any]] = []
     for table in tables:
         row: dict[str, Any] = rows.get(table.measure, {"absent": table.absent or "Not run yet."})
-        columns = {c.key: c for c in benchmark_class(measures[table.measure].bench).columns} if table.measure else {}
-        settings = ", ".join(f"{k} {v}" for k, v in row.get("settings", {}).items() if v is not None)
+        columns = (
+            {c.key: c for c in benchmark_class(measures[table.measure].bench).columns}
+            if table.measure
+            else {}
+        )
+        settings = ", ".join(
+            f"{k} {v}" for k, v in row.get("settings", {}).items() if v is not None
+        )
         first = all(part["table"].measure != table.measure for part in parts)
-        picture = _picture(output / "runs" / table.measure / "sheet.png") if first and "means" in row else ""
-        parts.append({"table": table, "row": row, "grid": list(table.grid(columns, row)) if table.measure else [],
-                      "settings": settings, "picture": picture})  # fmt: skip
-    told = {"parts": parts, "cores": os.cpu_count(), "commit": commit(),
-            "minutes": sum(row.get("seconds", 0) for row in rows.values()) / 60}  # fmt: skip
+        picture = (
+            _picture(output / "runs" / table.measure / "sheet.png")
+            if first and "means" in row
+            else ""
+        )
+        parts.append(
+            {
+                "table": table,
+                "row": row,
+                "grid": list(table.grid(columns, row)) if table.measure else [],
+                "settings": settings,
+                "picture": picture,
+            }
+        )
+    told = {
+        "parts": parts,
+        "cores": os.cpu_count(),
+        "commit": commit(),
+        "minutes": sum(row.get("seconds", 0) for row in rows.values()) / 60,
+    }
     assets = files("materialist.bench") / "assets"
     for kind in ("html", "md"):
         page = Environment(autoescape=kind == "html", trim_blocks=True, lstrip_blocks=True)
@@ -176,4 +231,7 @@ def _picture(path: Path, widest: int = 1400) -> str:
         return ""
     scale = min(1.0, widest / picture.shape[1])
     small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return "data:image/jpeg;base64," + base64.b64encode(cv2.imencode(".jpg", small)[1].tobytes()).decode()
+    return (
+        "data:image/jpeg;base64,"
+        + base64.b64encode(cv2.imencode(".jpg", small)[1].tobytes()).decode()
+    )

@@ -59,7 +59,10 @@ class PhotoAloneBench(Benchmark):
         Column("depth", "log depth RMSE", "lower"),
         Column("light", "SH error, relative", "lower"),
         Column("rerender", "re-rendering PSNR", "higher", 2),
-        *(Column(f"{name}_l1", f"{name} L1 from prior", "") for name in ("albedo", "roughness", "metallic")),
+        *(
+            Column(f"{name}_l1", f"{name} L1 from prior", "")
+            for name in ("albedo", "roughness", "metallic")
+        ),
         Column("seconds", "fit s", "lower", 1),
     )
     plotted = ("inside", "albedo", "light")
@@ -69,9 +72,13 @@ class PhotoAloneBench(Benchmark):
     kinds: str = option(",".join(KINDS[:6]), "Edits, with commas.", kind="name")
     predictor: str = option("bundled", "Where the maps come from.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
-    decompose: bool = option(False, "Adds the rows that are given a part of the truth.", kind="switch")
+    decompose: bool = option(
+        False, "Adds the rows that are given a part of the truth.", kind="switch"
+    )
     paper: int = option(
-        0, "Adds rows by the paper's own algorithm, of at most so many steps a stage; 0: none.", **COUNT_OR_0
+        0,
+        "Adds rows by the paper's own algorithm, of at most so many steps a stage; 0: none.",
+        **COUNT_OR_0,
     )
     spp: int = option(128, "Paths a pixel of composites.", **COUNT)
     truth_spp: int = option(256, "Paths a pixel of the truth.", **COUNT)
@@ -84,12 +91,24 @@ class PhotoAloneBench(Benchmark):
             for name, fitted, cost in self._fitted(sample):
                 scenes[name] = fitted
                 if name == "fitted":
-                    yield {"method": "maps: prior", "sample": sample.name, **map_figures(fitted.prior, sample)}
-                maps = replace(fitted.prior, materials=fitted.materials, normal=fitted.normal, depth=fitted.depth)
+                    yield {
+                        "method": "maps: prior",
+                        "sample": sample.name,
+                        **map_figures(fitted.prior, sample),
+                    }
+                maps = replace(
+                    fitted.prior,
+                    materials=fitted.materials,
+                    normal=fitted.normal,
+                    depth=fitted.depth,
+                )
                 yield {
-                    "method": f"maps: {name}", "sample": sample.name, **map_figures(maps, sample),
-                    "light": light_error(fitted.envmap, sample.envmap), **cost,
-                }  # fmt: skip
+                    "method": f"maps: {name}",
+                    "sample": sample.name,
+                    **map_figures(maps, sample),
+                    "light": light_error(fitted.envmap, sample.envmap),
+                    **cost,
+                }
             before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=5)
             for edit in edits(sample, light, kinds):
                 for row in self._compared(edit, sample, before, scenes, report):
@@ -97,44 +116,80 @@ class PhotoAloneBench(Benchmark):
 
     def _fitted(self, sample: SyntheticSample) -> Iterator[tuple[str, Scene, dict[str, float]]]:
         """Names of rows, their scenes, and figures of those that are inversions."""
-        shared: dict[str, Any] = {"completion": self.completion, "seed": self.seed, "device": self.device}
+        shared: dict[str, Any] = {
+            "completion": self.completion,
+            "seed": self.seed,
+            "device": self.device,
+        }
 
         def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
             found, cost = timed(pipeline.invert, sample.photo, **shared, **how)
-            left = {f"{key[9:]}_l1": v for key, v in found.report.metrics.items() if key.startswith("prior_l1_")}
-            return found, {**cost, **left, "rerender": metrics.psnr(found.rerender, sample.photo.linear)}
+            left = {
+                f"{key[9:]}_l1": v
+                for key, v in found.report.metrics.items()
+                if key.startswith("prior_l1_")
+            }
+            return found, {
+                **cost,
+                **left,
+                "rerender": metrics.psnr(found.rerender, sample.photo.linear),
+            }
 
         scene, cost = inverted(predictor=self.predictor)
         yield "fitted", scene, cost
         if self.paper:
-            yield "paper", *inverted(predictor=self.predictor, engine="path", settings=PAPER.at_most(self.paper))
+            yield (
+                "paper",
+                *inverted(
+                    predictor=self.predictor, engine="path", settings=PAPER.at_most(self.paper)
+                ),
+            )
         if not self.decompose:
             return
         for given in GIVEN:
             if given == "light":
-                scale = best_scale(sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0)
-                yield "+ light", replace(scene, envmap=(sample.envmap / max(scale, 1e-3)).astype(np.float32)), {}
+                scale = best_scale(
+                    sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0
+                )
+                yield (
+                    "+ light",
+                    replace(scene, envmap=(sample.envmap / max(scale, 1e-3)).astype(np.float32)),
+                    {},
+                )
             else:
                 yield f"+ {given}", *inverted(prior=with_truth(scene.prior, sample.truth, given))
         yield CEILING, true_scene(sample), {}
 
     def _compared(
-        self, edit: Edit, sample: SyntheticSample, before: Array, scenes: dict[str, Scene], report: Report
+        self,
+        edit: Edit,
+        sample: SyntheticSample,
+        before: Array,
+        scenes: dict[str, Scene],
+        report: Report,
     ) -> Iterator[Row]:
         """Rows of one edit, and its strip of the sheet; `before` is the true picture of the photo."""
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
         region = edit.region(before, after), edit.traces(before, after)
         shown = [sample.photo.linear, after]
-        yield {"method": f"{edit.kind}: untouched", **self._scores(edit, sample.photo.linear, after, *region)}
+        yield {
+            "method": f"{edit.kind}: untouched",
+            **self._scores(edit, sample.photo.linear, after, *region),
+        }
         for name, scene in scenes.items():
             try:
                 edited = edit.change(scene)
                 picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
             except InputError:
-                edited, picture = scene, sample.photo.linear
+                edited = scene
+                picture = sample.photo.linear
             if (edit.kind, name) == ("insert", "fitted"):
                 photo = sample.photo.linear
-                flat = photo if edited is scene else screen_space(photo, edited, picture, device=self.device)
+                flat = (
+                    photo
+                    if edited is scene
+                    else screen_space(photo, edited, picture, device=self.device)
+                )
                 shown.append(flat)
                 yield {"method": "insert: screen space", **self._scores(edit, flat, after, *region)}
             shown.append(picture)
@@ -142,7 +197,9 @@ class PhotoAloneBench(Benchmark):
             yield {"method": method, **self._scores(edit, picture, after, *region)}
         report.sheet.append(strip(*shown))
 
-    def _scores(self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array) -> dict[str, float]:
+    def _scores(
+        self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array
+    ) -> dict[str, float]:
         if edit.kind in SCALED:
             found = {"inside": aligned_psnr(picture, truth, inside)}
         else:
@@ -170,13 +227,17 @@ def with_truth(prior: Prediction, truth: Prediction, given: str) -> Prediction:
 def map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:
     """Maps against the truth."""
     keys = {
-        "albedo_psnr": "albedo", "roughness_psnr": "roughness", "normal_angle": "normal", "depth_si_log_rmse": "depth",
-    }  # fmt: skip
+        "albedo_psnr": "albedo",
+        "roughness_psnr": "roughness",
+        "normal_angle": "normal",
+        "depth_si_log_rmse": "depth",
+    }
     figures = score(maps, sample.truth)
     return {key: figures[name] for name, key in keys.items() if name in figures}
 
 
 def light_error(estimate: Array, truth: Array) -> float:
     """Relative error of the spherical harmonics of a light [h, 2h, 3], after the factor that makes it least."""
-    a, b = metrics.sh_coefficients(estimate), metrics.sh_coefficients(truth)
+    a = metrics.sh_coefficients(estimate)
+    b = metrics.sh_coefficients(truth)
     return metrics.sh_error_relative(estimate * (np.sum(a * b) / max(np.sum(a * a), 1e-12)), truth)

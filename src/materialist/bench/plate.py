@@ -51,27 +51,42 @@ class PlateBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         if data is None or not ((data / PLATE).is_file() and (data / PHOTO).is_file()):
-            raise InputError(f"This benchmark needs a pair of photos: --data DIR with {PLATE} and {PHOTO}.")
-        photo, plate = read_photo(data / PHOTO, size=self.size), read_photo(data / PLATE).original
-        sides, size = photo.original.shape[1::-1], photo.linear.shape[1::-1]
-        over = [cv2.warpAffine(x, ALIGNED, sides, flags=cv2.INTER_LINEAR) for x in (plate, np.ones_like(plate))]
+            raise InputError(
+                f"This benchmark needs a pair of photos: --data DIR with {PLATE} and {PHOTO}."
+            )
+        photo = read_photo(data / PHOTO, size=self.size)
+        plate = read_photo(data / PLATE).original
+        sides = photo.original.shape[1::-1]
+        size = photo.linear.shape[1::-1]
+        over = [
+            cv2.warpAffine(x, ALIGNED, sides, flags=cv2.INTER_LINEAR)
+            for x in (plate, np.ones_like(plate))
+        ]
         truth, there = (np.asarray(cv2.resize(x, size, interpolation=cv2.INTER_AREA)) for x in over)
         shown = there[..., 0] > 0.999
         mask = grown(orange(photo.linear), max(1, self.size // 170))
-        inside, around = mask & shown, grown(mask, self.size // 16) & ~mask & shown
+        inside = mask & shown
+        around = grown(mask, self.size // 16) & ~mask & shown
         pictures = [photo.linear, truth]
 
         def row(method: str, picture: Array, **more: float) -> Row:
             pictures.append(picture)
-            inner, outer = metrics.psnr(picture, truth, mask=inside), metrics.psnr(picture, truth, mask=around)
-            figures = {"inside": inner, "inside_ssim": metrics.ssim(picture, truth, mask=inside), "around": outer}
+            inner = metrics.psnr(picture, truth, mask=inside)
+            outer = metrics.psnr(picture, truth, mask=around)
+            figures = {
+                "inside": inner,
+                "inside_ssim": metrics.ssim(picture, truth, mask=inside),
+                "around": outer,
+            }
             return {"method": method, "sample": "jug", **figures, **more}
 
         yield row("untouched", photo.linear)
         shades = np.round(linear_to_srgb(photo.linear) * 255).astype(np.uint8)
         filled = cv2.inpaint(shades, mask.astype(np.uint8), 5, cv2.INPAINT_TELEA)
         yield row("diffused", srgb_to_linear(filled))
-        sources = {"bundled": "bundled"} | ({"published maps": f"maps:{data / MAPS}"} if (data / MAPS).is_dir() else {})
+        sources = {"bundled": "bundled"} | (
+            {"published maps": f"maps:{data / MAPS}"} if (data / MAPS).is_dir() else {}
+        )
         for name, predictor in sources.items():
             picture, cost = timed(self._removed, photo, predictor, mask)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))

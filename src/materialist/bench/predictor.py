@@ -46,7 +46,9 @@ class PredictorBench(Benchmark):
         for spec in names("predictor", self.predictor):
             source: Any = get_predictor(spec, device=self.device)
             network = getattr(source, "network", None)
-            work: dict[str, Callable[[], Any]] = {"predict": partial(source.predict, photo, seed=self.seed)}
+            work: dict[str, Callable[[], Any]] = {
+                "predict": partial(source.predict, photo, seed=self.seed)
+            }
             weights = {}
             if network is not None:
                 weights["parameters_m"] = sum(p.numel() for p in network.parameters()) / 1e6
@@ -55,9 +57,13 @@ class PredictorBench(Benchmark):
                 seconds = [timed(call)[1]["seconds"] for _ in range(self.warmups + self.runs)]
                 taken = 1e3 * np.array(seconds[self.warmups :])
                 yield {
-                    "method": f"{spec} {name}", "sample": 0, **weights, "mean_ms": float(taken.mean()),
-                    "median_ms": float(np.median(taken)), "fastest_ms": float(taken.min()),
-                }  # fmt: skip
+                    "method": f"{spec} {name}",
+                    "sample": 0,
+                    **weights,
+                    "mean_ms": float(taken.mean()),
+                    "median_ms": float(np.median(taken)),
+                    "fastest_ms": float(taken.min()),
+                }
 
 
 def forward(network: Any, size: int) -> Callable[[], Any]:
@@ -67,7 +73,10 @@ def forward(network: Any, size: int) -> Callable[[], Any]:
     side = max(step, round(size / step) * step)
     inputs = [torch.rand(1, 3, side, side, device=device)]
     if isinstance(network, BundledNetwork):
-        inputs = [inputs[0].contiguous(memory_format=torch.channels_last), torch.rand(1, 2, side, side, device=device)]
+        inputs = [
+            inputs[0].contiguous(memory_format=torch.channels_last),
+            torch.rand(1, 2, side, side, device=device),
+        ]
 
     def call() -> None:
         with torch.inference_mode():

@@ -63,7 +63,9 @@ def claim(folder: Path, *, force: bool = False) -> Path:
     require_parent(folder)
     with writing(folder):
         if folder.is_dir() and any(folder.iterdir()) and not force:
-            raise OutputError(f"{folder} is not empty; choose another folder, or add --force to write into it.")
+            raise OutputError(
+                f"{folder} is not empty; choose another folder, or add --force to write into it."
+            )
         make_folder(folder)
     return folder
 
@@ -76,7 +78,11 @@ def write(report: Report, folder: Path) -> None:
     content = {
         "title": report.title,
         "settings": report.settings,
-        "machine": {"cores": os.cpu_count(), "processor": platform.machine(), "python": platform.python_version()},
+        "machine": {
+            "cores": os.cpu_count(),
+            "processor": platform.machine(),
+            "python": platform.python_version(),
+        },
         "means": means(report),
         "rows": report.rows,
     }
@@ -110,7 +116,14 @@ def markdown(report: Report) -> str:
     table = means(report)
     arrow = {"higher": " ↑", "lower": " ↓", "": ""}
     head = ["method", "samples", *(c.title + arrow[c.better] for c in report.columns)]
-    lines = [f"# {report.title}", "", report.note, "", "| " + " | ".join(head) + " |", "|---" * len(head) + "|"]
+    lines = [
+        f"# {report.title}",
+        "",
+        report.note,
+        "",
+        "| " + " | ".join(head) + " |",
+        "|---" * len(head) + "|",
+    ]
     best: dict[tuple[str, str], float] = {}
     for c in report.columns:
         values: dict[str, list[float]] = {}
@@ -140,12 +153,18 @@ def _plot(report: Report, path: Path) -> None:
     """One panel a plotted column: a dot for every sample, a bar for the mean of each method."""
     table = means(report)
     titles = {c.key: c.title for c in report.columns}
-    figure = Figure(figsize=(3.6 * len(report.plotted), 0.45 * len(table) + 1.6), layout="constrained")
+    figure = Figure(
+        figsize=(3.6 * len(report.plotted), 0.45 * len(table) + 1.6), layout="constrained"
+    )
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(1, len(report.plotted), sharey=True))
     for axis, key in zip(axes, report.plotted, strict=True):
         for y, method in enumerate(table):
-            values = [r[key] for r in report.rows if r["method"] == method and np.isfinite(r.get(key, np.nan))]
+            values = [
+                r[key]
+                for r in report.rows
+                if r["method"] == method and np.isfinite(r.get(key, np.nan))
+            ]
             axis.barh(y, table[method].get(key, 0), color="#9db8d9", height=0.6)
             axis.plot(values, [y] * len(values), "o", color="#1f3b5c", markersize=3, alpha=0.6)
         axis.set_title(titles[key], fontsize=9)

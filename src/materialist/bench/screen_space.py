@@ -25,7 +25,9 @@ class ScreenSpaceSettings:
     beams: int = 192  # directions, by the light that comes from them
     steps: int = 32  # along each of them
     reach: float = 3.0  # length of a beam, in diagonals of the bodies; longer shadows are lost
-    thickness: float = 0.2  # of what is seen of the bodies, in their diagonals; the best of four on eight photos
+    thickness: float = (
+        0.2  # of what is seen of the bodies, in their diagonals; the best of four on eight photos
+    )
 
 
 SETTINGS = ScreenSpaceSettings()
@@ -49,14 +51,21 @@ def shadowed(scene: Scene, buffer: Array, size: float) -> Array:
     """
     height, width = buffer.shape
     points = unproject(scene.depth, scene.camera)
-    whole, lost = np.full((*buffer.shape, 3), 1e-9), np.zeros((*buffer.shape, 3))
+    whole = np.full((*buffer.shape, 3), 1e-9)
+    lost = np.zeros((*buffer.shape, 3))
     directions, beams = strongest(scene.envmap, SETTINGS.beams)
     for direction, beam in zip(directions, beams, strict=True):
         blocked = np.zeros(buffer.shape, bool)
         for step in (np.arange(SETTINGS.steps) + 0.5) / SETTINGS.steps:
-            place, depth = project(points + direction * (SETTINGS.reach * size * step), scene.camera)
-            column, row = (np.clip(place[..., k], 0, n - 1).astype(int) for k, n in ((0, width), (1, height)))
-            shown = (depth > 0) & (np.abs(place - [width / 2, height / 2]) < [width / 2, height / 2]).all(-1)
+            place, depth = project(
+                points + direction * (SETTINGS.reach * size * step), scene.camera
+            )
+            column, row = (
+                np.clip(place[..., k], 0, n - 1).astype(int) for k, n in ((0, width), (1, height))
+            )
+            shown = (depth > 0) & (
+                np.abs(place - [width / 2, height / 2]) < [width / 2, height / 2]
+            ).all(-1)
             met = np.where(shown, buffer[row, column], 0)
             blocked |= (met > 0) & (depth > met) & (depth < met + SETTINGS.thickness * size)
         received = np.clip(scene.normal @ direction, 0, None)[..., None] * beam

@@ -49,11 +49,15 @@ class SelectBench(Benchmark):
     )
     plotted = ("iou",)
 
-    scenes: int = option(12, "Pictures, and as many with captured meshes where DATA is given.", **COUNT)
+    scenes: int = option(
+        12, "Pictures, and as many with captured meshes where DATA is given.", **COUNT
+    )
     size: int = option(256, "Their width and height.", **SIZE)
     photo_size: int = option(512, "Longer side of photos with outlined objects.", **SIZE)
     smallest: int = option(400, "Pixels of an object that is clicked on.", **COUNT)
-    loose: float = option(0.1, "What a loose box adds on each side, in the object's shorter side.", low=0, high=1)
+    loose: float = option(
+        0.1, "What a loose box adds on each side, in the object's shorter side.", low=0, high=1
+    )
     spp: int = option(100, "Samples a pixel of the pictures.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
@@ -64,12 +68,21 @@ class SelectBench(Benchmark):
             yield from self._outlined(data / "photos", predictor)
         for folder in (None,) if data is None else (None, data):
             for k in range(self.scenes):
-                sample = make_sample(k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp)
+                sample = make_sample(
+                    k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp
+                )
                 name = f"{'captured' if folder else 'procedural'} {sample.name}"
-                for maps, found in (("bundled", predictor.predict(sample.photo)), ("true", sample.truth)):
+                for maps, found in (
+                    ("bundled", predictor.predict(sample.photo)),
+                    ("true", sample.truth),
+                ):
                     things = [(mask, mask) for mask in sample.scene.things.values()]
                     for row in self._selected(true_scene(sample, found), things, k):
-                        yield {**row, "method": f"{row['method']}, {maps} maps", "sample": f"{name} {row['sample']}"}
+                        yield {
+                            **row,
+                            "method": f"{row['method']}, {maps} maps",
+                            "sample": f"{name} {row['sample']}",
+                        }
 
     def _outlined(self, folder: Path, predictor: BundledPredictor) -> Iterator[Row]:
         """Rows of the photos of a folder whose objects are known."""
@@ -81,14 +94,22 @@ class SelectBench(Benchmark):
             scene = scene_of(photo, maps, np.ones((16, 32, 3), np.float32))
             things = clickable(objects, maps.depth.shape)
             for row in self._selected(scene, things, k):
-                yield {**row, "method": f"{row['method']}, photos", "sample": f"{name} {row['sample']}"}
+                yield {
+                    **row,
+                    "method": f"{row['method']}, photos",
+                    "sample": f"{name} {row['sample']}",
+                }
 
-    def _selected(self, scene: Scene, things: Sequence[tuple[Array, Array]], number: int) -> Iterator[Row]:
+    def _selected(
+        self, scene: Scene, things: Sequence[tuple[Array, Array]], number: int
+    ) -> Iterator[Row]:
         """A row a click, and a box, by every method; `things` are masks and where in them clicks may lie."""
         for method, (j, (mask, place)) in product(METHODS, enumerate(things)):
             if mask.sum() < self.smallest:
                 continue
-            for k, click in enumerate(clicks(place, scene.depth > 0, np.random.default_rng([number, j]))):
+            for k, click in enumerate(
+                clicks(place, scene.depth > 0, np.random.default_rng([number, j]))
+            ):
                 found = _scores(scene, mask, click=click, method=method)
                 yield {"method": method, "sample": f"object {j} click {k}", **found}
             for what, box in boxes(mask, self.loose).items():
@@ -104,7 +125,8 @@ def outlines() -> dict[str, list[dict[str, Any]]]:
 
 def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
     """[H, W] bool of an object of `outlines` in a photo of that shape."""
-    mask, scale = np.zeros(shape, bool), max(shape) / 512
+    mask = np.zeros(shape, bool)
+    scale = max(shape) / 512
     for inside, polygons in ((True, [thing["outline"]]), (False, thing.get("holes", []))):
         for corners in polygons:
             columns, rows = np.array(corners, float).T * scale - 0.5
@@ -112,15 +134,22 @@ def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
     return mask
 
 
-def clickable(objects: Sequence[dict[str, Any]], shape: tuple[int, ...]) -> list[tuple[Array, Array]]:
+def clickable(
+    objects: Sequence[dict[str, Any]], shape: tuple[int, ...]
+) -> list[tuple[Array, Array]]:
     """Masks of objects, and where in them a click means them: not on a `part`, which is an object of its own."""
     masks = [drawn(thing, shape) for thing in objects]
     parts = [mask for thing, mask in zip(objects, masks, strict=True) if thing.get("part")]
     other = np.logical_or.reduce([np.zeros(shape, bool), *parts])
-    return [(mask, mask if thing.get("part") else mask & ~other) for thing, mask in zip(objects, masks, strict=True)]
+    return [
+        (mask, mask if thing.get("part") else mask & ~other)
+        for thing, mask in zip(objects, masks, strict=True)
+    ]
 
 
-def clicks(mask: Array, usable: Array, rng: np.random.Generator, inside: float = 2.5) -> list[tuple[int, int]]:
+def clicks(
+    mask: Array, usable: Array, rng: np.random.Generator, inside: float = 2.5
+) -> list[tuple[int, int]]:
     """Two (column, row) in a mask [H, W] bool: its middle, and any place `inside` pixels from its border or more; both
     `usable` [H, W] bool."""
     away = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]

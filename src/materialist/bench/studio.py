@@ -50,12 +50,24 @@ _MOVE = """([name, value, waits]) => new Promise((done, fail) => {
 })"""
 """Moves a slider; milliseconds until its picture is decoded. `waits`: the page says when the picture is traced."""
 _GLASS_MOVES = (
-    ("glass_ior", 1.3), ("glass_ior", 1.7), ("glass_ior", 1.15), ("glass_roughness", 0.2), ("glass_roughness", 0.4),
-    ("glass_roughness", 0.1), ("glass_roughness", 0.0), ("glass_ior", 1.45),
-)  # fmt: skip
+    ("glass_ior", 1.3),
+    ("glass_ior", 1.7),
+    ("glass_ior", 1.15),
+    ("glass_roughness", 0.2),
+    ("glass_roughness", 0.4),
+    ("glass_roughness", 0.1),
+    ("glass_roughness", 0.0),
+    ("glass_ior", 1.45),
+)
 CYCLES = 20
 """Pages that are opened and closed again before the memory is measured that is kept."""
-_RANGES = {"hue": (-170, 170), "saturation": (-0.8, 1), "value": (-0.8, 0.8), "roughness": (0, 1), "metallic": (0, 1)}
+_RANGES = {
+    "hue": (-170, 170),
+    "saturation": (-0.8, 1),
+    "value": (-0.8, 0.8),
+    "roughness": (0, 1),
+    "metallic": (0, 1),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +96,10 @@ class StudioBench(Benchmark):
     size: int = option(512, "Working size.", **SIZE)
     moves: int = option(60, "Moves of sliders.", kind="whole", low=5, high=10_000)
     click: tuple[float, float] = option(
-        (0.3, 0.8), "Where an object is selected, as shares of width and height.", kind="numbers", count=2
+        (0.3, 0.8),
+        "Where an object is selected, as shares of width and height.",
+        kind="numbers",
+        count=2,
     )
     scene: str = option("", "A scene package that is opened in place of the photo.", kind="name")
 
@@ -100,7 +115,9 @@ class StudioBench(Benchmark):
             measured = self._measured(server, address, browser, photo)
         yield {"method": "studio", "sample": self.photo, **measured}
 
-    def _measured(self, server: psutil.Process, address: str, browser: Any, photo: Path) -> dict[str, float]:
+    def _measured(
+        self, server: psutil.Process, address: str, browser: Any, photo: Path
+    ) -> dict[str, float]:
         row = {"idle_mb": _resident(server)}
         if not self.scene:  # else every page would open the scene
             row["load_s"] = float(np.median([_load(browser, address) for _ in range(5)]))
@@ -119,10 +136,15 @@ class StudioBench(Benchmark):
         page.evaluate(_MOVE, ["hue", 40, False])
         row["reopen_s" if self.scene else "drop_s"] = time.perf_counter() - start
         stand = {name: float(page.input_value(f"#{name} input[type=range]")) for name in _RANGES}
-        times = [page.evaluate(_MOVE, [*move, False]) for move in slider_moves(self.moves, self.seed, stand)]
+        times = [
+            page.evaluate(_MOVE, [*move, False])
+            for move in slider_moves(self.moves, self.seed, stand)
+        ]
         row |= {"median_ms": float(np.median(times)), "p95_ms": float(np.quantile(times, 0.95))}
         page.get_by_role("tab", name="Light").click()
-        row["light_ms"] = float(np.median([page.evaluate(_MOVE, ["rotate", 30 * k, False]) for k in (1, 2, 3)]))
+        row["light_ms"] = float(
+            np.median([page.evaluate(_MOVE, ["rotate", 30 * k, False]) for k in (1, 2, 3)])
+        )
         page.evaluate(_MOVE, ["rotate", 0, False])
         row["scene_mb"] = _resident(server) - row["idle_mb"]
         row |= _glass(page)
@@ -164,11 +186,14 @@ def _dropped(page: Any, photo: Path, size: int) -> float:
 
 def slider_moves(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tuple[str, float]]:
     """Sliders in turn and where each goes: far enough from where it was (`stand`) that the picture must change."""
-    rng, last = np.random.default_rng(seed), dict(stand)
+    rng = np.random.default_rng(seed)
+    last = dict(stand)
     for k in range(moves):
         name = list(_RANGES)[k % len(_RANGES)]
         low, high = _RANGES[name]
-        while abs((value := round(float(rng.uniform(low, high)), 2)) - last[name]) < 0.05 * (high - low):
+        while abs((value := round(float(rng.uniform(low, high)), 2)) - last[name]) < 0.05 * (
+            high - low
+        ):
             pass
         last[name] = value
         yield name, value
@@ -183,7 +208,9 @@ def _glass(page: Any) -> dict[str, float]:
     for state in ("[data-waiting=yes]", ":not([data-waiting=yes])"):
         page.wait_for_selector(f"#stage .view{state}")
     body = time.perf_counter() - start
-    page.evaluate(_MOVE, ["glass_roughness", 0.3, True])  # kernels of another kind are compiled once
+    page.evaluate(
+        _MOVE, ["glass_roughness", 0.3, True]
+    )  # kernels of another kind are compiled once
     times = [page.evaluate(_MOVE, [*move, True]) for move in _GLASS_MOVES]
     return {"body_s": body, "glass_s": float(np.median(times)) / 1000}
 
@@ -194,8 +221,18 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    command = [sys.executable, "-m", "materialist", "studio", *([scene] if scene else []), "--port", str(port)]
-    process = subprocess.Popen([*command, "--work", str(folder / "work")], stdout=subprocess.DEVNULL)
+    command = [
+        sys.executable,
+        "-m",
+        "materialist",
+        "studio",
+        *([scene] if scene else []),
+        "--port",
+        str(port),
+    ]
+    process = subprocess.Popen(
+        [*command, "--work", str(folder / "work")], stdout=subprocess.DEVNULL
+    )
     address = f"http://127.0.0.1:{port}"
     try:
         end = time.monotonic() + 120
@@ -219,7 +256,9 @@ def _browser() -> Iterator[Any]:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError as error:
-        raise SetupError(f"This benchmark needs a browser: {install_command('playwright')}") from error
+        raise SetupError(
+            f"This benchmark needs a browser: {install_command('playwright')}"
+        ) from error
     if program is None:
         raise SetupError("This benchmark needs Chromium: apt-get install chromium")
     with sync_playwright() as driver:

@@ -48,17 +48,23 @@ class ThicknessBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         if data is not None and not (data / "meshes").is_dir():
-            raise InputError(f"{data} holds no folder 'meshes'; give one that does, or leave out --data.")
+            raise InputError(
+                f"{data} holds no folder 'meshes'; give one that does, or leave out --data."
+            )
         setup("cpu")
         network, _ = RefractionNet.load(Path(self.weights) if self.weights else WEIGHTS)
         plan = ViewPlan(self.shapes, self.views, "heldout", self.seed)
         for k in range(self.shapes):
             yield from _rows("held-out", f"shape {k}", network, make_views(k, plan))
-        for group in sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ():
+        for group in (
+            sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ()
+        ):
             for k, file in enumerate(captures(group, "**/*.ply")):
                 shape = Shape(centred(load(file)), hollow=False, upright=True)
                 rng = np.random.default_rng([self.seed, k])
-                views = draw_views(shape, ShapeTracer(shape.solid), rng, self.mesh_views, exact=True)
+                views = draw_views(
+                    shape, ShapeTracer(shape.solid), rng, self.mesh_views, exact=True
+                )
                 yield from _rows(f"{group.name} meshes", file.stem, network, views)
 
 
@@ -69,6 +75,8 @@ def _rows(group: str, name: str, network: Any, views: dict[str, Array]) -> Itera
     prior = {"solid": "symmetry", "back": "back_symmetry"}
     for k in range(len(each["solid"])):
         for method, names in (("RefractionNet", own), ("symmetry", prior)):
-            figures = {key: float(each[source][k]) for key, source in names.items() if source in each}
+            figures = {
+                key: float(each[source][k]) for key, source in names.items() if source in each
+            }
             figures = {key: value for key, value in figures.items() if np.isfinite(value)}
             yield {"method": f"{group}: {method}", "sample": f"{name} view {k}", **figures}

@@ -41,17 +41,24 @@ class WhdrBench(Benchmark):
     predictor: str = option("auto", "Names, with commas.", kind="name")
     size: int = option(512, "Longer side that the predictor works at.", **SIZE)
     limit: int = option(0, "At most so many pictures; 0: all.", **COUNT_OR_0)
-    every: int = option(1, "Every how-manieth by name; 5 is the usual test split (Narihira et al.).", **COUNT)
+    every: int = option(
+        1, "Every how-manieth by name; 5 is the usual test split (Narihira et al.).", **COUNT
+    )
     delta: float = option(0.1, "Relative difference from which albedos differ.", low=0, high=10)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         if data is None:
-            raise InputError("This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json.")
+            raise InputError(
+                "This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json."
+            )
         pairs = find(data)[:: self.every]
         pairs = pairs[: self.limit] if self.limit else pairs
         report.settings["pictures"] = len(pairs)
         sources: dict[str, Any] = dict.fromkeys(BASELINES)
-        sources |= {spec: get_predictor(spec, device=self.device) for spec in names("predictor", self.predictor)}
+        sources |= {
+            spec: get_predictor(spec, device=self.device)
+            for spec in names("predictor", self.predictor)
+        }
         for spec, source in sources.items():
             for picture, file in pairs:
                 photo = read_photo(picture, size=self.size)
@@ -69,7 +76,9 @@ def find(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name; raises InputError when there is none."""
     found = pairs(folder)
     if not found:
-        raise InputError(f"{folder} holds no picture with judgements (NAME.png and NAME.json, as IIW has them).")
+        raise InputError(
+            f"{folder} holds no picture with judgements (NAME.png and NAME.json, as IIW has them)."
+        )
     return found
 
 
@@ -77,7 +86,9 @@ def pairs(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name."""
     found = []
     for file in sorted(folder.glob("*.json")):
-        picture = next((p for s in ("png", "jpg") if (p := file.with_suffix(f".{s}")).is_file()), None)
+        picture = next(
+            (p for s in ("png", "jpg") if (p := file.with_suffix(f".{s}")).is_file()), None
+        )
         if picture is not None:
             found.append((picture, file))
     return found
@@ -101,11 +112,20 @@ def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple
     wrong = total = 0.0
     count = 0
     for comparison in judgements["intrinsic_comparisons"]:
-        answer, weight = comparison["darker"], comparison["darker_score"]
+        answer = comparison["darker"]
+        weight = comparison["darker_score"]
         pair = [points[comparison[name]] for name in ("point1", "point2")]
-        if answer not in ("1", "2", "E") or not weight or weight <= 0 or not all(p["opaque"] for p in pair):
+        if (
+            answer not in ("1", "2", "E")
+            or not weight
+            or weight <= 0
+            or not all(p["opaque"] for p in pair)
+        ):
             continue
-        places = [(min(int(p["y"] * height), height - 1), min(int(p["x"] * width), width - 1)) for p in pair]
+        places = [
+            (min(int(p["y"] * height), height - 1), min(int(p["x"] * width), width - 1))
+            for p in pair
+        ]
         first, second = (max(1e-10, float(albedo[place].mean())) for place in places)
         said = "1" if second / first > 1 + delta else "2" if first / second > 1 + delta else "E"
         wrong += weight * (said != answer)

@@ -64,8 +64,12 @@ def masking(direction: Array, normal: Array, alpha: float) -> Array:
 
 def _tangents(normal: Array) -> tuple[Array, Array]:
     """Two unit vectors [..., 3] each that make a right-handed frame with the normal (Duff et al. 2017)."""
-    x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]
+    x = normal[..., 0]
+    y = normal[..., 1]
+    z = normal[..., 2]
     sign = np.where(z < 0, -1.0, 1.0)
     a = -1 / (sign + z)
     b = x * y * a
-    return np.stack([1 + sign * x * x * a, sign * b, -sign * x], -1), np.stack([b, sign + y * y * a, -y], -1)
+    return np.stack([1 + sign * x * x * a, sign * b, -sign * x], -1), np.stack(
+        [b, sign + y * y * a, -y], -1
+    )

@@ -30,9 +30,11 @@ def diffuse_coefficients(cos_i, cos_o, cos_d):
 
     F_d(w) = 1 + (F_D90 - 1)(1 - n.w)^5 is linear in F_D90 = 0.5 + 2 R (h.w)^2, hence in R.
     """
-    fi, fo = schlick(cos_i), schlick(cos_o)
+    fi = schlick(cos_i)
+    fo = schlick(cos_o)
     slope = 2 * cos_d * cos_d
-    at_zero_i, at_zero_o = 1 - 0.5 * fi, 1 - 0.5 * fo
+    at_zero_i = 1 - 0.5 * fi
+    at_zero_o = 1 - 0.5 * fo
     return at_zero_i * at_zero_o, slope * (at_zero_i * fo + at_zero_o * fi), slope * slope * fi * fo
 
 
@@ -54,11 +56,16 @@ def fresnel(base, cosine):
 
 def half_vector_density(cos_wo, sin2_h, alpha):
     """Density, per solid angle of the mirrored direction, of mirroring `wo` at its visible normals."""
-    return distribution(sin2_h, alpha) * smith_g1(cos_wo, alpha) / (4 * library(cos_wo).clip(cos_wo, 1e-6, 1))
+    return (
+        distribution(sin2_h, alpha)
+        * smith_g1(cos_wo, alpha)
+        / (4 * library(cos_wo).clip(cos_wo, 1e-6, 1))
+    )
 
 
 def specular_probability(cosine, luminance, metallic):
     """With which probability to sample the specular lobe: its share of the reflectance, 0.1 at least."""
-    specular, diffuse = fresnel(base_reflectance(luminance, metallic), cosine), (1 - metallic) * luminance
+    specular = fresnel(base_reflectance(luminance, metallic), cosine)
+    diffuse = (1 - metallic) * luminance
     xp = library(cosine)
     return xp.clip(specular / xp.clip(specular + diffuse, 1e-6, 4), 0.1, 1)

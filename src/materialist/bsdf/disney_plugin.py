@@ -53,7 +53,9 @@ def register() -> None:
         def _value(self, wi, wo, albedo, roughness, metallic):
             """f_r cos(theta_o) for directions above the surface."""
             diffuse = albedo * (1 - metallic) * lobes.diffuse(wi, wo, roughness)
-            return diffuse + lobes.specular(wi, wo, alpha_of(roughness), base_reflectance(albedo, metallic))
+            return diffuse + lobes.specular(
+                wi, wo, alpha_of(roughness), base_reflectance(albedo, metallic)
+            )
 
         def sample(self, ctx, si, sample1, sample2, active=True):
             albedo, roughness, metallic = self._materials(si, active)
@@ -70,7 +72,9 @@ def register() -> None:
             active = active & (bs.pdf > 0)
             bs.eta = 1.0
             bs.sampled_type = dr.select(
-                take_specular, mi.UInt32(+mi.BSDFFlags.GlossyReflection), mi.UInt32(+mi.BSDFFlags.DiffuseReflection)
+                take_specular,
+                mi.UInt32(+mi.BSDFFlags.GlossyReflection),
+                mi.UInt32(+mi.BSDFFlags.DiffuseReflection),
             )
             bs.sampled_component = dr.select(take_specular, mi.UInt32(1), mi.UInt32(0))
             return bs, dr.select(active, value / dr.maximum(bs.pdf, 1e-20), mi.Color3f(0))
@@ -97,14 +101,18 @@ def register() -> None:
             face = self._face(si, side)
             height = dr.dot(face, wo)
             below = wo - 2 * height * face
-            found = [self._one(si.wi, w, probability, *materials, seen & (side * w.z > 0))
-                     for w, seen in ((wo, height >= 0), (below, height > 0))]  # fmt: skip
+            found = [
+                self._one(si.wi, w, probability, *materials, seen & (side * w.z > 0))
+                for w, seen in ((wo, height >= 0), (below, height > 0))
+            ]
             return found[0][0] + found[1][0], found[0][1] + found[1][1]
 
         def _one(self, wi, wo, probability, albedo, roughness, metallic, active):
             """Value and density of a direction by the shading normal alone, 0 where not `active`."""
             wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
-            value = dr.select(active, self._value(wi, wo, albedo, roughness, metallic), mi.Color3f(0))
+            value = dr.select(
+                active, self._value(wi, wo, albedo, roughness, metallic), mi.Color3f(0)
+            )
             density = lobes.density(wi, wo, dr.detach(alpha_of(roughness)), probability)
             return value, dr.select(active, density, 0)
 

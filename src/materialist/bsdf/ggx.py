@@ -13,7 +13,9 @@ MIN_ALPHA = 1e-3
 def library(values: Any) -> Any:
     """numpy, torch or drjit: the module whose functions take these values."""
     root = type(values).__module__.partition(".")[0]
-    return import_module({"torch": "torch", "drjit": "drjit", "mitsuba": "drjit"}.get(root, "numpy"))
+    return import_module(
+        {"torch": "torch", "drjit": "drjit", "mitsuba": "drjit"}.get(root, "numpy")
+    )
 
 
 def alpha_of(roughness):
@@ -33,7 +35,8 @@ def distribution(sin2, alpha):
 
 def smith_g1(cosine, alpha):
     """Smith masking of a direction with this cosine to the normal; the same for both sides."""
-    c, c2 = abs(cosine), cosine * cosine
+    c = abs(cosine)
+    c2 = cosine * cosine
     return 2 * c / (c + library(c).sqrt(c2 + alpha * alpha * (1 - c2)))
 
 
@@ -44,11 +47,17 @@ def visible_normal(wo, alpha, u, v) -> tuple[Any, Any, Any]:
     """
     x, y, z = wo
     xp = library(z)
-    x, y = alpha * x, alpha * y
+    x = alpha * x
+    y = alpha * y
     scale = 1 / xp.sqrt(x * x + y * y + z * z)
-    x, y, z = x * scale, y * scale, z * scale
+    x = x * scale
+    y = y * scale
+    z = z * scale
     cap = (1 - v) * (1 + z) - z
-    sine, phi = xp.sqrt(xp.clip(1 - cap * cap, 0, 1)), 6.283185307179586 * u
-    x, y, z = alpha * (sine * xp.cos(phi) + x), alpha * (sine * xp.sin(phi) + y), xp.clip(cap + z, 1e-6, 2)
+    sine = xp.sqrt(xp.clip(1 - cap * cap, 0, 1))
+    phi = 6.283185307179586 * u
+    x = alpha * (sine * xp.cos(phi) + x)
+    y = alpha * (sine * xp.sin(phi) + y)
+    z = xp.clip(cap + z, 1e-6, 2)
     scale = 1 / xp.sqrt(x * x + y * y + z * z)
     return x * scale, y * scale, z * scale

@@ -29,7 +29,9 @@ def diffuse(wi, wo, roughness):
 def specular(wi, wo, alpha, base):
     """f_s cos(theta_o) of base reflectance C_0."""
     _, sin2, cos_d = half_vector(wi, wo)
-    return fresnel(base, cos_d) * (half_vector_density(wi.z, sin2, alpha) * ggx.smith_g1(wo.z, alpha))
+    return fresnel(base, cos_d) * (
+        half_vector_density(wi.z, sin2, alpha) * ggx.smith_g1(wo.z, alpha)
+    )
 
 
 def density(wi, wo, alpha, probability):

@@ -43,7 +43,10 @@ def directional_albedo(ior: float, alpha: float) -> Array:
         reflected = fresnel_dielectric(along, relative)
         upward = (2 * along[..., None] * m - wi)[..., 2]
         downward = refract(-wi, m, 1 / relative)[0][..., 2]
-        shares = [np.where(sign * z > 0, smith_g1(z, alpha), 0) for sign, z in ((1, upward), (-1, downward))]
+        shares = [
+            np.where(sign * z > 0, smith_g1(z, alpha), 0)
+            for sign, z in ((1, upward), (-1, downward))
+        ]
         found.append((reflected * shares[0] + (1 - reflected) * shares[1]).mean((1, 2)))
     return np.stack(found)
 
@@ -65,7 +68,9 @@ def register() -> None:
 
         def _tabulate(self):
             params = mi.traverse(self.interface)
-            ior, alpha = (float(np.array(params[name]).ravel()[0]) for name in ("eta", "alpha.value"))
+            ior, alpha = (
+                float(np.array(params[name]).ravel()[0]) for name in ("eta", "alpha.value")
+            )
             self.table = mi.Float(np.maximum(directional_albedo(ior, alpha), MIN_ALBEDO).ravel())
 
         def traverse(self, cb):

@@ -14,10 +14,27 @@ ABOUT = "Physically based editing of a single photograph, by inverse rendering."
 MODELS = "List, download and verify networks from a model hub; no other command ever downloads."
 FREE = {"allow_extra_args": True, "ignore_unknown_options": True}
 COMMANDS: tuple[Callable[..., Any], ...] = (
-    scenes.invert, scenes.render, scenes.export, setup.doctor, edits.select, edits.edit, edits.glass, edits.remove,
-    edits.insert, edits.apply, edits.relight, edits.drop, batch.batch, studio.studio,
-)  # fmt: skip
-TRAINING: tuple[Callable[..., Any], ...] = (train.data, train.matnet, train.refraction, train.clicks)
+    scenes.invert,
+    scenes.render,
+    scenes.export,
+    setup.doctor,
+    edits.select,
+    edits.edit,
+    edits.glass,
+    edits.remove,
+    edits.insert,
+    edits.apply,
+    edits.relight,
+    edits.drop,
+    batch.batch,
+    studio.studio,
+)
+TRAINING: tuple[Callable[..., Any], ...] = (
+    train.data,
+    train.matnet,
+    train.refraction,
+    train.clicks,
+)
 app = group("materialist", ABOUT)
 for command in COMMANDS:
     add_command(app, command)
@@ -41,7 +58,9 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback(help=ABOUT)
 def _root(
-    version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
+    version: bool = typer.Option(
+        False, "--version", callback=_show_version, is_eager=True, help="Print the version."
+    ),
 ) -> None: ...
 
 

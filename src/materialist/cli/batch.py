@@ -20,26 +20,46 @@ if TYPE_CHECKING:
 
 def batch(
     source: Annotated[
-        str, typer.Argument(metavar="SOURCE", help="A folder of photos (with its subfolders), a list file, or a URL.")
+        str,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A folder of photos (with its subfolders), a list file, or a URL.",
+        ),
     ],
     output: Annotated[Path, output_option("RUNS", "Folder of the results.")],
     how: BatchOptions,
     computing: Computing,
-    predictor: Annotated[str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")] = "auto",
-    fov: Annotated[str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")] = "auto",
+    predictor: Annotated[
+        str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")
+    ] = "auto",
+    fov: Annotated[
+        str, typer.Option(help="Horizontal field of view in degrees, or auto: EXIF, else 35.")
+    ] = "auto",
     size: Annotated[int, typer.Option(help="Working size: longer side, pixels.")] = 512,
-    layer: Annotated[str | None, typer.Option(help="Which layer of EXR files is the photo.")] = None,
+    layer: Annotated[
+        str | None, typer.Option(help="Which layer of EXR files is the photo.")
+    ] = None,
 ) -> None:
     """Invert many photos, and apply a list of edits to each. Exit code 0: all done; 2: some failed, with reasons."""
     chosen: Any = {} if layer is None else {"layer": layer}
     try:
         with stage_progress(quiet=computing.as_json) as bars:
             outcome = mt.batch(
-                source, output, **vars(how), **chosen, predictor=predictor, size=size, fov=fov, seed=computing.seed,
-                device=computing.device, progress=lambda status: _told(bars, status, computing.as_json),
-            )  # fmt: skip
+                source,
+                output,
+                **vars(how),
+                **chosen,
+                predictor=predictor,
+                size=size,
+                fov=fov,
+                seed=computing.seed,
+                device=computing.device,
+                progress=lambda status: _told(bars, status, computing.as_json),
+            )
     except KeyboardInterrupt:
-        raise Interrupted("Interrupted; what is done stays. Go on with the same command and --resume.") from None
+        raise Interrupted(
+            "Interrupted; what is done stays. Go on with the same command and --resume."
+        ) from None
     try:
         _report(outcome, output, computing.as_json)
     finally:  # also where the reader of a pipe left
@@ -50,17 +70,29 @@ def batch(
 def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
     failed = [row for row in outcome.rows if row["status"] == "failed"]
     kept = f" ({outcome.kept} of them before)" if outcome.kept else ""
-    lines = [f"{outcome.count('done')} of {len(outcome.rows)} photos done{kept} in {outcome.seconds:.0f} s."]
+    lines = [
+        f"{outcome.count('done')} of {len(outcome.rows)} photos done{kept} in {outcome.seconds:.0f} s."
+    ]
     lines += [f"Failed: {row['id']}: {row['reason']}" for row in failed[:20]]
     lines += [f"... and {len(failed) - 20} more; see summary.csv"] if len(failed) > 20 else []
     lines += [f"Note: {note}" for note in outcome.notes]
     lines.append(f"Look at {output / 'index.html'}")
     report_success(
-        "batch", as_json, lines, ok=not outcome.exit_code, runs=str(output), photos=len(outcome.rows),
-        done=outcome.count("done"), failed=len(failed), kept=outcome.kept, seconds=outcome.seconds, hash=outcome.hash,
+        "batch",
+        as_json,
+        lines,
+        ok=not outcome.exit_code,
+        runs=str(output),
+        photos=len(outcome.rows),
+        done=outcome.count("done"),
+        failed=len(failed),
+        kept=outcome.kept,
+        seconds=outcome.seconds,
+        hash=outcome.hash,
         notes=list(outcome.notes),
-        failures=[{"id": row["id"], "reason": row["reason"]} for row in failed], exit_code=outcome.exit_code,
-    )  # fmt: skip
+        failures=[{"id": row["id"], "reason": row["reason"]} for row in failed],
+        exit_code=outcome.exit_code,
+    )
 
 
 def _told(bars: Progress, status: Status, quiet: bool) -> None:

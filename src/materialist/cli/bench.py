@@ -17,7 +17,9 @@ def bench(
     name: Annotated[str, typer.Argument(metavar="NAME", help=f"{', '.join(BENCHMARKS)}.")],
     output: Annotated[Path, output_option("REPORT", "Folder for the report.")],
     run: Run,
-    data: Annotated[Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder with meshes, HDR captures, photos.")
+    ] = None,
 ) -> None:
     """Run a benchmark. Its own options follow the name, as --scenes 10 or scenes=10."""
     options = parse_extra(context.args)

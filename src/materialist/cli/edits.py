@@ -7,7 +7,15 @@ from typing import Annotated, Any
 import typer
 
 import materialist as mt
-from materialist.cli.options import PictureOutput, Place, Region, Rendering, Run, SceneArgument, output_option
+from materialist.cli.options import (
+    PictureOutput,
+    Place,
+    Region,
+    Rendering,
+    Run,
+    SceneArgument,
+    output_option,
+)
 from materialist.cli.outcome import report_success
 from materialist.cli.picture import check_before, chosen_region, opened, write_film, write_result
 from materialist.errors import InputError
@@ -16,7 +24,10 @@ from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, R
 
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
 FPS = 24
-At = Annotated[list[str], typer.Option("--at", metavar="X,Y", help="A pixel at working size; several: one each.")]
+At = Annotated[
+    list[str],
+    typer.Option("--at", metavar="X,Y", help="A pixel at working size; several: one each."),
+]
 FramesPerSecond = Annotated[int, typer.Option(min=1, max=120, help="Frames per second.")]
 
 
@@ -25,7 +36,12 @@ class MovingLight(Relight):
     """Other light, which goes from one sun to the next in a film."""
 
     sun: tuple[tuple[float, float], ...] = option(  # type: ignore[assignment]
-        (), "A sun: degrees right of ahead, and above the horizon.", kind="numbers", count=2, many=True, metavar="AZ,EL"
+        (),
+        "A sun: degrees right of ahead, and above the horizon.",
+        kind="numbers",
+        count=2,
+        many=True,
+        metavar="AZ,EL",
     )
 
 
@@ -34,7 +50,9 @@ def select(
     output: Annotated[Path, output_option("MASK", "A .png; white is inside.")],
     region: Region,
     run: Run,
-    native: Annotated[bool, typer.Option("--native", help="At the photo's native size, with soft edges.")] = False,
+    native: Annotated[
+        bool, typer.Option("--native", help="At the photo's native size, with soft edges.")
+    ] = False,
 ) -> None:
     """Find the mask of an object from a click or a box, or check a given one; nothing of it is random."""
     import numpy as np
@@ -53,26 +71,42 @@ def select(
     write_image(output, np.repeat(srgb_to_linear(shown)[..., None], 3, -1), force=run.force)
     share = float(found.mean())
     report_success(
-        "select", run.as_json, [f"{int(found.sum())} pixels, {share:.1%} of the photo.", f"Look at {output}"],
-        mask=str(output), pixels=int(found.sum()), share=share,
-    )  # fmt: skip
+        "select",
+        run.as_json,
+        [f"{int(found.sum())} pixels, {share:.1%} of the photo.", f"Look at {output}"],
+        mask=str(output),
+        pixels=int(found.sum()),
+        share=share,
+    )
 
 
-def edit(scene: SceneArgument, output: PictureOutput, region: Region, options: MaterialEdit, how: Rendering) -> None:
+def edit(
+    scene: SceneArgument,
+    output: PictureOutput,
+    region: Region,
+    options: MaterialEdit,
+    how: Rendering,
+) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
     if options == MaterialEdit():
-        raise InputError("Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like.")
+        raise InputError(
+            "Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like."
+        )
     loaded, found = opened(scene, output, region, how)
     lines = [f"{int(found.sum())} pixels edited, {float(found.mean()):.0%} of the photo."]
     write_result("edit", loaded, mt.edit(loaded, found, options), output, how, lines=lines)
 
 
-def glass(scene: SceneArgument, output: PictureOutput, region: Region, options: Glass, how: Rendering) -> None:
+def glass(
+    scene: SceneArgument, output: PictureOutput, region: Region, options: Glass, how: Rendering
+) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
 
     if options.model == "two-interface" and how.full_render:
-        raise InputError(f"{PICTURED}--full-render would not show it; take --model closed, or leave that out.")
+        raise InputError(
+            f"{PICTURED}--full-render would not show it; take --model closed, or leave that out."
+        )
     loaded, found = opened(scene, output, region, how)
     edited = mt.glass(loaded, found, options)
     source = edited.provenance["edits"][-1]["thickness"]
@@ -80,7 +114,9 @@ def glass(scene: SceneArgument, output: PictureOutput, region: Region, options: 
     write_result("glass", loaded, edited, output, how, lines=lines)
 
 
-def remove(scene: SceneArgument, output: PictureOutput, region: Region, options: Removal, how: Rendering) -> None:
+def remove(
+    scene: SceneArgument, output: PictureOutput, region: Region, options: Removal, how: Rendering
+) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
     loaded, found = opened(scene, output, region, how)
     lines = [f"{int(found.sum())} pixels taken away."]
@@ -131,29 +167,41 @@ def apply(
 
 def relight(
     scene: SceneArgument,
-    output: Annotated[Path, output_option("OUT", "A picture as for edit; with --frames .mp4 or a folder.")],
+    output: Annotated[
+        Path, output_option("OUT", "A picture as for edit; with --frames .mp4 or a folder.")
+    ],
     options: MovingLight,
     lights: Place,
     how: Rendering,
     frames: Annotated[
         int | None,
-        typer.Option(metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."),
+        typer.Option(
+            metavar="N", help="A video: the light turns, or goes from --sun or --lamp to the next."
+        ),
     ] = None,
     fps: FramesPerSecond = FPS,
 ) -> None:
     """Show the photo under other light."""
     suns = options.sun
     if options == MovingLight() and frames is None:
-        raise InputError("No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim.")
+        raise InputError(
+            "No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim."
+        )
     alone = [("--fps", "--frames")] if fps != FPS and frames is None else []
     alone += [(flag, "--dim") for flag in lights.named if options.dim is None]
     if alone:
         flag, needed = alone[0]
-        raise InputError(f"{flag} says nothing without {needed}; give that, too, or leave {flag} out.")
+        raise InputError(
+            f"{flag} says nothing without {needed}; give that, too, or leave {flag} out."
+        )
     if frames is None and output.suffix.lower() == ".mp4":
-        raise InputError(f"{output} is a video; say of how many frames with --frames, for example --frames 48.")
+        raise InputError(
+            f"{output} is a video; say of how many frames with --frames, for example --frames 48."
+        )
     if frames is None and len(suns) > 1:
-        raise InputError("Several --sun are stations of a moving one; give --frames as well, or one --sun.")
+        raise InputError(
+            "Several --sun are stations of a moving one; give --frames as well, or one --sun."
+        )
     if frames is not None and how.save is not None:
         raise InputError("--save writes one scene; leave out --frames.")
     check_before(output, how, video=frames is not None)
@@ -179,7 +227,10 @@ def drop(
     frames: Annotated[int, typer.Option(metavar="N", help="Length of the film.")] = 48,
     fps: FramesPerSecond = FPS,
     rotate: Annotated[
-        str | None, typer.Option(metavar="DEG|A..B", help="Meanwhile the light turns to the right, from A to B.")
+        str | None,
+        typer.Option(
+            metavar="DEG|A..B", help="Meanwhile the light turns to the right, from A to B."
+        ),
     ] = None,
     how: Rendering = Rendering(),  # noqa: B008
 ) -> None:

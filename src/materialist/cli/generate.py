@@ -17,15 +17,21 @@ TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": 
 def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
     """A group of commands, of `app` where one is given."""
     made = typer.Typer(
-        name=name, help=help, no_args_is_help=True, add_completion=False, rich_markup_mode=None,
+        name=name,
+        help=help,
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode=None,
         pretty_exceptions_enable=False,
-    )  # fmt: skip
+    )
     if app is not None:
         app.add_typer(made)
     return made
 
 
-def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", **settings: Any) -> None:
+def add_command(
+    app: typer.Typer, function: Callable[..., Any], name: str = "", **settings: Any
+) -> None:
     """Register a function as the command of its name, its parameters of options classes spelled out as flags.
 
     Options are read from what was given; fields without a flag take the value of the other parameters of that name.
@@ -37,7 +43,9 @@ def add_command(app: typer.Typer, function: Callable[..., Any], name: str = "", 
 
     @wraps(function)
     def command(**values: Any) -> Any:
-        return function(**{key: _value(hints[key], named[key], own, values) for key, own in flags.items()})
+        return function(
+            **{key: _value(hints[key], named[key], own, values) for key, own in flags.items()}
+        )
 
     every = [flag for own in flags.values() for flag in own]
     command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
@@ -60,10 +68,16 @@ def _flags(kind: Any, parameter: inspect.Parameter, taken: set[str]) -> list[ins
         return [_parameter(parameter.name, kind, parameter.default)]
     declared = {name: told for name, told in declarations(kind).items() if name not in taken}
     usual = {name: default for name, (_, default) in declared.items()} | _usual(parameter)
-    return [flag for name, (told, _) in declared.items() for flag in _option_flags(name, told, usual[name])]
+    return [
+        flag
+        for name, (told, _) in declared.items()
+        for flag in _option_flags(name, told, usual[name])
+    ]
 
 
-def _value(kind: Any, parameter: inspect.Parameter, flags: list[inspect.Parameter], values: dict[str, Any]) -> Any:
+def _value(
+    kind: Any, parameter: inspect.Parameter, flags: list[inspect.Parameter], values: dict[str, Any]
+) -> Any:
     """The argument that the flags of a parameter spell."""
     own = {flag.name: values[flag.name] for flag in flags}
     if not _is_options(kind):
@@ -85,7 +99,10 @@ def _option_flags(name: str, told: Option, default: Any) -> list[inspect.Paramet
     if told.kind == "switch":
         help = f"{told.help}  [default: on]" if default is True else told.help
         texts = {name: (told.spells(name), help)}
-        texts |= {f"{name}__{word}": ([f"--{word}"], f"{told.help[:-1]}, {word}.") for word in told.choices}
+        texts |= {
+            f"{name}__{word}": ([f"--{word}"], f"{told.help[:-1]}, {word}.")
+            for word in told.choices
+        }
         return [_parameter(key, _flag(bool | None, *text), None) for key, text in texts.items()]
     kind: Any = str if told.choices else TYPES.get(told.kind, str)
     if told.kind == "word":
@@ -102,7 +119,9 @@ def _flag(kind: Any, names: list[str], help: str, **settings: Any) -> Any:
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+    return inspect.Parameter(
+        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation
+    )
 
 
 def _shown(default: Any) -> str | bool:

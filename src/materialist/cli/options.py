@@ -15,13 +15,16 @@ def output_option(metavar: str, help: str) -> Any:
     return typer.Option("-o", "--output", metavar=metavar, help=help)
 
 
-Json = Annotated[bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")]
+Json = Annotated[
+    bool, typer.Option("--json", help="Print the outcome as one line of JSON, the last on stdout.")
+]
 SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="A scene package.")]
 PictureOutput = Annotated[
-    Path, output_option("OUT", "A .png or .tif (as deep as the photo), .jpg, .webp, .avif, or .exr (linear, HDR).")
+    Path,
+    output_option(
+        "OUT", "A .png or .tif (as deep as the photo), .jpg, .webp, .avif, or .exr (linear, HDR)."
+    ),
 ]
-
-# fmt: off
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,13 +32,24 @@ class Computing(OperationOptions):
     """What every command that computes takes."""
 
     seed: int = option(
-        0, "Random seed: the same seed on the same machine gives the same result.", kind="whole", low=0,
-        high=2**31 - 1)
+        0,
+        "Random seed: the same seed on the same machine gives the same result.",
+        kind="whole",
+        low=0,
+        high=2**31 - 1,
+    )
     device: str = option(
-        "auto", "Where to compute; auto takes the GPU when there is one.", kind="word",
-        choices=("auto", "cpu", "cuda"))
+        "auto",
+        "Where to compute; auto takes the GPU when there is one.",
+        kind="word",
+        choices=("auto", "cpu", "cuda"),
+    )
     as_json: bool = option(
-        False, "Print the outcome as one line of JSON, the last on stdout.", kind="switch", flag="--json")
+        False,
+        "Print the outcome as one line of JSON, the last on stdout.",
+        kind="switch",
+        flag="--json",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +65,22 @@ class Place(OperationOptions):
 
     mask: Path | None = option(None, "The region: white inside.", kind="file", metavar="PNG")
     click: tuple[tuple[float, float], ...] = option(
-        (), "A pixel of the object, at working size; more than one helps.", kind="numbers", count=2, many=True,
-        called="--click", metavar="X,Y")
+        (),
+        "A pixel of the object, at working size; more than one helps.",
+        kind="numbers",
+        count=2,
+        many=True,
+        called="--click",
+        metavar="X,Y",
+    )
     box: tuple[float, float, float, float] | None = option(
-        None, "A box around the object.", kind="numbers", count=4, called="--box", metavar="X0,Y0,X1,Y1")
+        None,
+        "A box around the object.",
+        kind="numbers",
+        count=4,
+        called="--box",
+        metavar="X0,Y0,X1,Y1",
+    )
 
     @property
     def named(self) -> list[str]:
@@ -64,8 +90,12 @@ class Place(OperationOptions):
 @dataclass(frozen=True, kw_only=True)
 class Region(Place):
     method: str = option(
-        "network", "network: ClickNet; grabcut: colours alone; sam2 needs its weights.", kind="word",
-        choices=("network", "grabcut", "sam2"), flag="--with")
+        "network",
+        "network: ClickNet; grabcut: colours alone; sam2 needs its weights.",
+        kind="word",
+        choices=("network", "grabcut", "sam2"),
+        flag="--with",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,11 +103,24 @@ class PictureFile(Run):
     """How a picture is written."""
 
     quality: int | None = option(
-        None, "Of .jpg (default 95), .webp (90, 100 loses nothing) and .avif (85).", kind="whole", low=1, high=100)
+        None,
+        "Of .jpg (default 95), .webp (90, 100 loses nothing) and .avif (85).",
+        kind="whole",
+        low=1,
+        high=100,
+    )
     bits: int | None = option(
-        None, "A channel, 8 or 16, of .png and .tif; default: the photo's.", kind="whole", low=8, high=16)
+        None,
+        "A channel, 8 or 16, of .png and .tif; default: the photo's.",
+        kind="whole",
+        low=8,
+        high=16,
+    )
     exr_layers: bool = option(
-        False, "An .exr of many layers: beauty, albedo, diffuse, specular, N, Z, position, ...", kind="switch")
+        False,
+        "An .exr of many layers: beauty, albedo, diffuse, specular, N, Z, position, ...",
+        kind="switch",
+    )
 
     @property
     def encoding(self) -> dict[str, Any]:
@@ -90,15 +133,30 @@ class Rendering(PictureFile):
     """How an edited scene becomes a picture or a film."""
 
     spp: int = option(
-        PATHS, "Paths per pixel, of both renderings.", kind="whole", low=2, high=1_000_000, called="--spp")
+        PATHS,
+        "Paths per pixel, of both renderings.",
+        kind="whole",
+        low=2,
+        high=1_000_000,
+        called="--spp",
+    )
     denoise: bool | None = option(
-        None, "Clean the renderings (with pyoidn); default: where it is installed.", kind="switch",
-        flag="--denoise/--no-denoise")
+        None,
+        "Clean the renderings (with pyoidn); default: where it is installed.",
+        kind="switch",
+        flag="--denoise/--no-denoise",
+    )
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
     upscale: Any = option(
-        None, "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.", kind="function",
-        needs="full_render", metavar="FILE.py:FUNCTION")
-    save: Path | None = option(None, "Write the edited scene as well.", kind="file", metavar="SCENE2")
+        None,
+        "Your function that enlarges a plain rendering: [h, w, 3] linear to a larger one.",
+        kind="function",
+        needs="full_render",
+        metavar="FILE.py:FUNCTION",
+    )
+    save: Path | None = option(
+        None, "Write the edited scene as well.", kind="file", metavar="SCENE2"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,14 +175,26 @@ class Learning(OperationOptions):
 
     batch: int | None = option(None, "Samples a step; default: the recipe's.", kind="whole")
     side: int | None = option(
-        None, "Side of all crops, pixels; default: the recipe's, small ones first.", kind="whole", flag="--size")
+        None,
+        "Side of all crops, pixels; default: the recipe's, small ones first.",
+        kind="whole",
+        flag="--size",
+    )
     rate: float | None = option(None, "Peak learning rate; default: the recipe's.")
     bfloat16: bool | None = option(
-        None, "Half as long on processors that have it; default: the recipe's.", kind="switch",
-        flag="--bfloat16/--no-bfloat16")
+        None,
+        "Half as long on processors that have it; default: the recipe's.",
+        kind="switch",
+        flag="--bfloat16/--no-bfloat16",
+    )
     init: Path | None = option(
-        None, "Weights to begin from: those of a run; matnet --config paper: Depth Anything or DINOv2.", kind="file")
+        None,
+        "Weights to begin from: those of a run; matnet --config paper: Depth Anything or DINOv2.",
+        kind="file",
+    )
 
     def recipe(self, usual: Any) -> Any:
         """The recipe `usual` with what was given."""
-        return usual.changed(batch=self.batch, side=self.side, rate=self.rate, bfloat16=self.bfloat16)
+        return usual.changed(
+            batch=self.batch, side=self.side, rate=self.rate, bfloat16=self.bfloat16
+        )

@@ -20,7 +20,10 @@ import typer
 from materialist.errors import MaterialistError
 from materialist.plain import plain
 
-OK, BUG, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+OK = 0
+BUG = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
 KEEPING = frozenset({"train", "batch", "bench", "models", "studio"})
 """Commands that write as they go; the others write whole results, or nothing."""
 GRACE = 5.0
@@ -43,7 +46,11 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     except MaterialistError as error:
         return _fail(type(error).__name__, with_flags(str(error)), error.exit_code, wants_json)
     except (KeyboardInterrupt, typer.Abort):
-        done = "what was finished is kept" if KEEPING.intersection(arguments[:1]) else "nothing was written"
+        done = (
+            "what was finished is kept"
+            if KEEPING.intersection(arguments[:1])
+            else "nothing was written"
+        )
         return _fail("Interrupted", f"Interrupted; {done}.", INTERRUPTED, wants_json)
     except _Terminated:
         os.kill(os.getpid(), signal.SIGTERM)
@@ -57,8 +64,15 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
         said = f"The system refused {error.filename or 'it'}: {(error.strerror or str(error)).lower()}."
         return _fail("OSError", said, BAD_INPUT, wants_json)
     except Exception as error:
-        if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith("materialist"):
-            return _fail("SetupError", f"{error.name} is not installed; see: materialist doctor", BAD_INPUT, wants_json)
+        if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(
+            "materialist"
+        ):
+            return _fail(
+                "SetupError",
+                f"{error.name} is not installed; see: materialist doctor",
+                BAD_INPUT,
+                wants_json,
+            )
         if _is_usage_error(error):
             return _usage(error, wants_json)
         traceback.print_exc()
@@ -76,7 +90,9 @@ def _tidy_when_terminated() -> Iterator[None]:
 
     def stop(number: int, frame: Any) -> None:
         signal.signal(number, signal.SIG_DFL)
-        last = threading.Timer(GRACE, os.kill, (os.getpid(), number))  # a renderer deep in its work hears nothing
+        last = threading.Timer(
+            GRACE, os.kill, (os.getpid(), number)
+        )  # a renderer deep in its work hears nothing
         last.daemon = True
         last.start()
         raise _Terminated

@@ -16,7 +16,9 @@ def chosen_region(scene: Any, region: Place, device: str) -> Any:
     """[H, W] bool from the flags of the command line."""
     method = region.method if isinstance(region, Region) else "network"
     click = list(region.click) or None
-    return mt.select(scene, click=click, box=region.box, mask=region.mask, method=method, device=device)
+    return mt.select(
+        scene, click=click, box=region.box, mask=region.mask, method=method, device=device
+    )
 
 
 def opened(scene: Path, output: Path, region: Place, how: Rendering) -> tuple[Any, Any]:
@@ -43,11 +45,15 @@ def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
                 "one of them out."
             )
         if output.resolve().is_relative_to(save.resolve()):
-            raise InputError(f"{output} would lie in the scene {save}, which is written whole; put it beside.")
+            raise InputError(
+                f"{output} would lie in the scene {save}, which is written whole; put it beside."
+            )
         ensure_writable(save, how.force)
     if video:
         if how.quality is not None or how.bits is not None or how.exr_layers:
-            raise InputError("--quality, --bits and --exr-layers are of pictures; leave them out for a film.")
+            raise InputError(
+                "--quality, --bits and --exr-layers are of pictures; leave them out for a film."
+            )
         ensure_video_writable(output, force=how.force)
     else:
         check_picture(output, how)
@@ -65,24 +71,41 @@ def check_picture(output: Path, how: PictureFile) -> None:
 
     check_image_output(output, **how.encoding)
     if how.exr_layers and output.suffix.lower() != ".exr":
-        raise InputError(f"--exr-layers writes an .exr, not {output}; give another name, or leave it out.")
+        raise InputError(
+            f"--exr-layers writes an .exr, not {output}; give another name, or leave it out."
+        )
 
 
 def write_result(
-    command: str, scene: Any, edited: Any, output: Path, how: Rendering, *, lines: Sequence[str] = ()
-) -> None:  # fmt: skip
+    command: str,
+    scene: Any,
+    edited: Any,
+    output: Path,
+    how: Rendering,
+    *,
+    lines: Sequence[str] = (),
+) -> None:
     start = time.monotonic()
     with stage_progress(quiet=how.as_json) as progress:
         picture = mt.composite(
-            scene, edited, spp=how.spp, seed=how.seed, full_render=how.full_render,
-            upscale=how.upscale, denoise=how.denoise is not False, device=how.device, progress=progress,
-        )  # fmt: skip
+            scene,
+            edited,
+            spp=how.spp,
+            seed=how.seed,
+            full_render=how.full_render,
+            upscale=how.upscale,
+            denoise=how.denoise is not False,
+            device=how.device,
+            progress=progress,
+        )
     notes = write_picture(output, picture, scene, edited, how)
     told = {"image": str(output), "spp": how.spp, "seconds": time.monotonic() - start}
     finish(command, scene, edited, picture, how, [*lines, f"Look at {output}"], told, notes=notes)
 
 
-def write_picture(output: Path, picture: Any, scene: Any, shown: Any, how: PictureFile) -> tuple[str, ...]:
+def write_picture(
+    output: Path, picture: Any, scene: Any, shown: Any, how: PictureFile
+) -> tuple[str, ...]:
     """Write a picture of the scene `shown`, made of the photo of `scene`; returns notes."""
     if not how.exr_layers:
         return mt.save_image(output, picture, scene, **how.encoding)
@@ -92,15 +115,23 @@ def write_picture(output: Path, picture: Any, scene: Any, shown: Any, how: Pictu
 
 
 def write_film(
-    command: str, scene: Any, film: Iterable[Any], output: Path, how: Rendering, *, frames: int,
+    command: str,
+    scene: Any,
+    film: Iterable[Any],
+    output: Path,
+    how: Rendering,
+    *,
+    frames: int,
     fps: int,
-) -> None:  # fmt: skip
+) -> None:
     """Render and write a film, one scene in memory at a time; report."""
     from materialist.edits.composite.composite import pictures
     from materialist.edits.core.notes import mean_change
     from materialist.io.video import write_frames
 
-    start, last, change = time.monotonic(), {"scene": scene}, 0.0
+    start = time.monotonic()
+    last = {"scene": scene}
+    change = 0.0
 
     def kept(name: str, items: Iterable[Any]) -> Iterator[Any]:
         nonlocal change
@@ -112,18 +143,33 @@ def write_film(
 
     with stage_progress(quiet=how.as_json) as progress:
         made = pictures(
-            scene, kept("scene", film), spp=how.spp, seed=how.seed, denoise=how.denoise is not False, device=how.device,
-            full_render=how.full_render, upscale=how.upscale, progress=progress, count=frames,
-        )  # fmt: skip
+            scene,
+            kept("scene", film),
+            spp=how.spp,
+            seed=how.seed,
+            denoise=how.denoise is not False,
+            device=how.device,
+            full_render=how.full_render,
+            upscale=how.upscale,
+            progress=progress,
+            count=frames,
+        )
         write_frames(output, kept("picture", made), fps=fps, force=how.force)
     told = {"video": str(output), "frames": frames, "fps": fps, "seconds": time.monotonic() - start}
     finish(command, scene, last["scene"], last["picture"], how, [f"Look at {output}"], told, change)
 
 
 def finish(
-    command: str, scene: Any, edited: Any, picture: Any, how: Rendering, lines: list[str],
-    told: dict[str, Any], change: float | None = None, notes: Sequence[str] = (),
-) -> None:  # fmt: skip
+    command: str,
+    scene: Any,
+    edited: Any,
+    picture: Any,
+    how: Rendering,
+    lines: list[str],
+    told: dict[str, Any],
+    change: float | None = None,
+    notes: Sequence[str] = (),
+) -> None:
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
     from materialist.edits.core.notes import effect_notes, mean_change, noise_notes, warnings_since
@@ -132,7 +178,9 @@ def finish(
     grainy = noise_notes(how.denoise is not False)
     warnings = [*warnings_since(scene, edited), *grainy, *notes]
     if not how.full_render:
-        warnings += effect_notes(scene, edited, mean_change(scene, picture) if change is None else change)
+        warnings += effect_notes(
+            scene, edited, mean_change(scene, picture) if change is None else change
+        )
     if save is not None:
         saved = developed(scene, edited, picture, seed=how.seed, device=how.device)
         mt.save_scene(saved, save, force=how.force)
@@ -141,5 +189,9 @@ def finish(
     last = -2 if save is not None else -1
     lines[last:last] = [f"Note: {note}" for note in warnings]
     told["denoised"] = how.denoise is not False and not grainy
-    told |= {"scene": str(save) if save else None, "edits": edited.provenance.get("edits", []), "warnings": warnings}
+    told |= {
+        "scene": str(save) if save else None,
+        "edits": edited.provenance.get("edits", []),
+        "warnings": warnings,
+    }
     report_success(command, how.as_json, lines, **told)

@@ -15,8 +15,10 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
     from rich import progress as rich
     from rich.console import Console
 
-    console, tasks = Console(stderr=True), dict[str, rich.TaskID]()
-    name, left = rich.TextColumn("{task.description:<24}"), rich.TimeRemainingColumn(elapsed_when_finished=True)
+    console = Console(stderr=True)
+    tasks = dict[str, rich.TaskID]()
+    name = rich.TextColumn("{task.description:<24}")
+    left = rich.TimeRemainingColumn(elapsed_when_finished=True)
     columns = name, rich.BarColumn(bar_width=32), rich.MofNCompleteColumn(), left
     with rich.Progress(*columns, console=console, disable=quiet or not console.is_terminal) as bars:
 
@@ -24,7 +26,9 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
             if stage not in tasks:
                 for task in bars.tasks:  # one that stopped early shows what it did as its total
                     if not task.finished:
-                        bars.update(task.id, total=max(task.completed, 1), completed=max(task.completed, 1))
+                        bars.update(
+                            task.id, total=max(task.completed, 1), completed=max(task.completed, 1)
+                        )
                 tasks[stage] = bars.add_task(stage, total=max(total, 1))
             bars.update(tasks[stage], completed=done, total=max(total, 1))
 

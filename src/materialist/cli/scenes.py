@@ -15,7 +15,10 @@ from materialist.options import ExportOptions, InvertOptions
 
 
 def invert(
-    photo: Annotated[str, typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...).")],
+    photo: Annotated[
+        str,
+        typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...)."),
+    ],
     output: Annotated[Path, output_option("SCENE", "The scene package, a folder.")],
     options: InvertOptions,
     run: Run,
@@ -51,8 +54,12 @@ def render(
     output: PictureOutput,
     run: PictureFile,
     spp: Annotated[int, typer.Option(min=1, max=1_000_000, help="Samples per pixel.")] = 64,
-    denoise: Annotated[bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")] = False,
-    photo: Annotated[bool, typer.Option("--photo", help="With --exr-layers: the photo, not a rendering.")] = False,
+    denoise: Annotated[
+        bool, typer.Option("--denoise/--no-denoise", help="Remove noise (needs pyoidn).")
+    ] = False,
+    photo: Annotated[
+        bool, typer.Option("--photo", help="With --exr-layers: the photo, not a rendering.")
+    ] = False,
 ) -> None:
     """Path-trace a scene package."""
     from rich.console import Console
@@ -65,14 +72,20 @@ def render(
     if denoise:
         require_denoiser()
     if photo and not run.exr_layers:
-        raise InputError("--photo says nothing without --exr-layers; give that, too, or leave --photo out.")
+        raise InputError(
+            "--photo says nothing without --exr-layers; give that, too, or leave --photo out."
+        )
     loaded = mt.load_scene(scene)
-    notes = [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) and not photo else []
+    notes = (
+        [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) and not photo else []
+    )
     if photo:
         image = loaded.photo.original
     else:
         with Console(stderr=True).status(f"Rendering {spp} samples per pixel"):
-            image = mt.render_scene(loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device)
+            image = mt.render_scene(
+                loaded, spp=spp, denoise=denoise, seed=run.seed, device=run.device
+            )
     notes += write_picture(output, image, loaded, loaded, run)
     shown = [*(f"Note: {note}" for note in notes), f"Look at {output}"]
     facts = {"image": str(output), "spp": spp, "denoised": denoise, "warnings": notes}
@@ -82,7 +95,10 @@ def render(
 def export(
     scene: SceneArgument,
     output: Annotated[
-        Path, output_option("OUT", "NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba).")
+        Path,
+        output_option(
+            "OUT", "NAME.glb, .blend, .usdz or .html; or a folder (blend, usd, mitsuba)."
+        ),
     ],
     options: ExportOptions,
     run: Run,
@@ -100,6 +116,10 @@ def export(
         done = mt.export(mt.load_scene(scene), output, options, force=run.force)
     files = [str(done.path), *map(str, done.beside)]
     report_success(
-        "export", run.as_json, [f"Wrote {', '.join(files)}", *done.notes], output=str(done.path), beside=files[1:],
+        "export",
+        run.as_json,
+        [f"Wrote {', '.join(files)}", *done.notes],
+        output=str(done.path),
+        beside=files[1:],
         notes=list(done.notes),
-    )  # fmt: skip
+    )

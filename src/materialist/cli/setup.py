@@ -21,14 +21,24 @@ def doctor(computing: Computing) -> None:
     """Say what works here, what does not, and the one command that mends it; with --device cuda a GPU must be there."""
     from materialist.doctor import examine
 
-    findings, as_json = examine(computing.device), computing.as_json
+    findings = examine(computing.device)
+    as_json = computing.as_json
     broken = [finding for finding in findings if finding.state == "broken"]
     verdict = (
-        "The main job cannot run yet; run the commands above." if broken else "Ready: materialist invert PHOTO -o SCENE"
+        "The main job cannot run yet; run the commands above."
+        if broken
+        else "Ready: materialist invert PHOTO -o SCENE"
     )
     found = [vars(finding) for finding in findings]
     lines = [*map(_line, findings), verdict]
-    report_success("doctor", as_json, lines, ok=not broken, findings=found, exit_code=BAD_INPUT if broken else 0)
+    report_success(
+        "doctor",
+        as_json,
+        lines,
+        ok=not broken,
+        findings=found,
+        exit_code=BAD_INPUT if broken else 0,
+    )
     if broken:
         raise typer.Exit(BAD_INPUT)
 
@@ -37,7 +47,9 @@ def _line(finding: Finding) -> str:
     """A line of the table, and under it the command that mends what fails."""
     mark, colour = _MARK[finding.state]
     line = f"{typer.style(f'{mark:>3}', fg=colour, bold=True)} {finding.name:<22}{finding.detail}"
-    return line + (f"\n{'mend with: ':>37}{typer.style(finding.remedy, bold=True)}" if finding.remedy else "")
+    return line + (
+        f"\n{'mend with: ':>37}{typer.style(finding.remedy, bold=True)}" if finding.remedy else ""
+    )
 
 
 def list_models(as_json: Json = False) -> None:
@@ -54,10 +66,13 @@ def list_models(as_json: Json = False) -> None:
 
 
 def download_model(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="A name of the list, or a hub id as owner/name.")],
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="A name of the list, or a hub id as owner/name.")
+    ],
     force: Annotated[bool, typer.Option("--force", help="Fetch every file again.")] = False,
     source: Annotated[
-        Path | None, typer.Option("--from", metavar="FOLDER", help="Take files that were fetched elsewhere.")
+        Path | None,
+        typer.Option("--from", metavar="FOLDER", help="Take files that were fetched elsewhere."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -67,13 +82,17 @@ def download_model(
     model = hub_model(name)
     folder = adopt(model, source) if source is not None else download(model, force=force)
     report_success(
-        "models download", as_json, [f"{name} lies in {folder}; its checksums are written"], folder=str(folder)
+        "models download",
+        as_json,
+        [f"{name} lies in {folder}; its checksums are written"],
+        folder=str(folder),
     )
 
 
 def verify_model(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Models; all that are here when none is named.")
+        list[str] | None,
+        typer.Argument(metavar="[NAME]...", help="Models; all that are here when none is named."),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -83,8 +102,11 @@ def verify_model(
 
     folders = {name: require(hub_model(name)) for name in names} if names else downloaded()
     if not folders:
-        raise InputError(f"No model is in {models_folder()}; fetch one with: materialist models download NAME")
-    damaged, digests = [], {}
+        raise InputError(
+            f"No model is in {models_folder()}; fetch one with: materialist models download NAME"
+        )
+    damaged = []
+    digests = {}
     for name, folder in folders.items():
         try:
             digests[name] = verify_folder(folder)
@@ -92,5 +114,7 @@ def verify_model(
             damaged.append(str(error))
     if damaged:
         raise WeightsError(" ".join(damaged))
-    lines = [f"{name}: whole (sha256 of its list {digest[:16]})" for name, digest in digests.items()]
+    lines = [
+        f"{name}: whole (sha256 of its list {digest[:16]})" for name, digest in digests.items()
+    ]
     report_success("models verify", as_json, lines, digests=digests)

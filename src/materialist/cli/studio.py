@@ -11,42 +11,61 @@ from materialist.cli.options import Computing
 from materialist.cli.outcome import report_success
 from materialist.option_kinds import option
 
-# fmt: off
-
 
 @dataclass(frozen=True, kw_only=True)
 class Serving(Computing):
     """Who can reach the studio, and what it works with."""
 
     host: str = option(
-        "127.0.0.1", "Address to serve on; other than this machine needs a password or --open.", kind="name")
+        "127.0.0.1",
+        "Address to serve on; other than this machine needs a password or --open.",
+        kind="name",
+    )
     port: int = option(7860, "Port.", kind="whole", low=1, high=65535, called="--port")
-    work: Path = option(Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR")
+    work: Path = option(
+        Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR"
+    )
     password: str | None = option(
-        None, "Ask everyone for it; `ps` shows an argument, so MATERIALIST_PASSWORD may hold it.", kind="name",
-        metavar="WORD")
-    password_file: Path | None = option(None, "Its first line is the password.", kind="file", metavar="FILE")
+        None,
+        "Ask everyone for it; `ps` shows an argument, so MATERIALIST_PASSWORD may hold it.",
+        kind="name",
+        metavar="WORD",
+    )
+    password_file: Path | None = option(
+        None, "Its first line is the password.", kind="file", metavar="FILE"
+    )
     behind_proxy: str | None = option(
-        None, "The name that people ask a proxy before the studio for.", kind="name", metavar="HOST")
-    everyone: bool = option(False, "Let everybody in who can reach --host.", kind="switch", flag="--open")
+        None, "The name that people ask a proxy before the studio for.", kind="name", metavar="HOST"
+    )
+    everyone: bool = option(
+        False, "Let everybody in who can reach --host.", kind="switch", flag="--open"
+    )
     workers: int = option(
-        1, "How many fits and renderings may run at once.", kind="whole", low=1, high=64, called="--workers",
-        metavar="N")
-
-
-# fmt: on
+        1,
+        "How many fits and renderings may run at once.",
+        kind="whole",
+        low=1,
+        high=64,
+        called="--workers",
+        metavar="N",
+    )
 
 
 def studio(
     how: Serving,
     target: Annotated[
-        str | None, typer.Argument(metavar="[PHOTO|SCENE]", help="What to open first: a photo, or a scene package.")
+        str | None,
+        typer.Argument(
+            metavar="[PHOTO|SCENE]", help="What to open first: a photo, or a scene package."
+        ),
     ] = None,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.studio import server
 
-    password = server.password_of(how.password or os.environ.get("MATERIALIST_PASSWORD"), how.password_file)
+    password = server.password_of(
+        how.password or os.environ.get("MATERIALIST_PASSWORD"), how.password_file
+    )
     single_user = server.check_host(how.host, password, how.everyone, how.behind_proxy)
     server.check_port(how.host, how.port)
     if how.device != "auto":
@@ -54,7 +73,9 @@ def studio(
 
         setup(how.device)
     first = None if target is None else server.checked_target(target)
-    made = server.new_studio(how.work, single_user=single_user, workers=how.workers, seed=how.seed, device=how.device)
+    made = server.new_studio(
+        how.work, single_user=single_user, workers=how.workers, seed=how.seed, device=how.device
+    )
     made.start = None if first is None else server.first_shown(made.work, first)
     if not how.as_json:
         typer.echo(f"Scenes and edits are kept in {made.work.root}")
@@ -63,4 +84,11 @@ def studio(
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
         report_success("studio", how.as_json, lines, address=address, work=str(made.work.root))
 
-    server.serve(made, host=how.host, port=how.port, password=password, proxy=how.behind_proxy, on_ready=on_ready)
+    server.serve(
+        made,
+        host=how.host,
+        port=how.port,
+        password=password,
+        proxy=how.behind_proxy,
+        on_ready=on_ready,
+    )

@@ -15,15 +15,19 @@ from materialist.errors import Interrupted
 from materialist.option_kinds import OperationOptions, option
 from materialist.procedural.options import DataSetOptions
 
-SETS = "A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
-
-# fmt: off
+SETS = (
+    "A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapsLearning(Learning):
     config: str = option(
-        "bundled", "The network that ships, or the paper's.", kind="word", choices=("bundled", "paper"))
+        "bundled",
+        "The network that ships, or the paper's.",
+        kind="word",
+        choices=("bundled", "paper"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,13 +35,11 @@ class Views(OperationOptions):
     """The views that RefractionNet learns from."""
 
     data: Path | None = option(
-        None, "Folder for the views, used again by later runs; default: RUN/views.", kind="file")
+        None, "Folder for the views, used again by later runs; default: RUN/views.", kind="file"
+    )
     shapes: int = option(640, "Shapes to learn from.", kind="whole", low=1)
     views: int = option(24, "Views of each.", kind="whole", low=1)
     heldout: int = option(64, "Shapes kept aside for the figures.", kind="whole", low=1)
-
-
-# fmt: on
 
 
 def data(
@@ -46,11 +48,16 @@ def data(
     computing: Computing,
     count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
     workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
-    resume: Annotated[bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")] = False,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Make the missing samples of a set begun before.")
+    ] = False,
     sheet: Annotated[
-        Path | None, typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR.")
+        Path | None,
+        typer.Option(metavar="PNG", help="Only draw a contact sheet of the set in DIR."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="With --sheet: replace PNG when it exists.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="With --sheet: replace PNG when it exists.")
+    ] = False,
 ) -> None:
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
     if sheet is not None:
@@ -59,7 +66,9 @@ def data(
 
         ensure_image_writable(sheet, force=force)
         shown = write_data_sheet(output, sheet, seed=computing.seed)
-        report_success("train data", computing.as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown)
+        report_success(
+            "train data", computing.as_json, [f"Look at {sheet}"], sheet=str(sheet), samples=shown
+        )
         return
     from materialist.io.atomic import require_parent
     from materialist.procedural.catalog.packages import missing
@@ -71,8 +80,15 @@ def data(
     if note and not computing.as_json:
         typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
-        made = produce(output, wanted, count=count, workers=workers, resume=resume, progress=progress)
-    facts = {"output": str(output), "rendered": made, "existing": count - made, "seconds": time.monotonic() - start}
+        made = produce(
+            output, wanted, count=count, workers=workers, resume=resume, progress=progress
+        )
+    facts = {
+        "output": str(output),
+        "rendered": made,
+        "existing": count - made,
+        "seconds": time.monotonic() - start,
+    }
     lines = [f"{count} samples in {output} ({made} new, {facts['seconds']:.0f} s)"]
     report_success("train data", computing.as_json, lines, **facts)
 
@@ -82,7 +98,9 @@ def matnet(
     output: Annotated[Path, output_option("RUN", "Folder of the run.")],
     learning: MapsLearning,
     training: Training = Training(every=300),  # noqa: B008
-    score_samples: Annotated[int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")] = 12,
+    score_samples: Annotated[
+        int, typer.Option(help="Samples kept aside that each checkpoint is scored on.")
+    ] = 12,
     workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,
 ) -> None:
     """Train a network of all maps; RUN/weights.safetensors holds it, ready to use."""
@@ -92,10 +110,14 @@ def matnet(
 
     make: Any
     make, base = {
-        "bundled": (bundled.BundledTask, bundled.RECIPE), "paper": (paper.PaperTask, paper.RECIPE)
-    }[learning.config]  # fmt: skip
+        "bundled": (bundled.BundledTask, bundled.RECIPE),
+        "paper": (paper.PaperTask, paper.RECIPE),
+    }[learning.config]
     recipe = learning.recipe(base)
-    task = lambda begin, _: make(open_sources(data), recipe, init=begin, score_samples=score_samples)  # noqa: E731
+
+    def task(begin, _):
+        return make(open_sources(data), recipe, init=begin, score_samples=score_samples)
+
     _train("matnet", task, output, training, init=learning.init, workers=workers)
 
 
@@ -111,7 +133,8 @@ def refraction(
     from materialist.train.refraction import RECIPE, RefractionTask
 
     folder = views.data or output / "views"
-    lessons, aside = folder / "train", folder / "heldout"
+    lessons = folder / "train"
+    aside = folder / "heldout"
     plans = {
         aside: ViewPlan(views.heldout, min(views.views, 8), "heldout", training.seed),
         lessons: ViewPlan(views.shapes, views.views, "train", training.seed),
@@ -130,11 +153,16 @@ def refraction(
 
 def clicks(
     output: Annotated[Path, output_option("RUN", "Folder of the run and its views.")],
-    data: Annotated[Path, typer.Option(metavar="SET", help="A data set of: materialist train data.")],
+    data: Annotated[
+        Path, typer.Option(metavar="SET", help="A data set of: materialist train data.")
+    ],
     training: Training,
     learning: Learning,
     cutouts: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder of .png and .webp things cut out, to be pasted in.")
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder of .png and .webp things cut out, to be pasted in."
+        ),
     ] = None,
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
@@ -150,9 +178,15 @@ def clicks(
 
 
 def _train(
-    kind: str, make_task: Callable[[Path | None, Progress], Any], output: Path, training: Training, *,
-    init: Path | None, minutes: float | None = None, workers: int = 0,
-) -> None:  # fmt: skip
+    kind: str,
+    make_task: Callable[[Path | None, Progress], Any],
+    output: Path,
+    training: Training,
+    *,
+    init: Path | None,
+    minutes: float | None = None,
+    workers: int = 0,
+) -> None:
     """Train the task that `make_task` makes of (weights to begin from, progress), in the folder `output`.
 
     `minutes` are those of a run that names neither steps nor minutes. Errors that make a run impossible are raised
@@ -173,14 +207,23 @@ def _train(
     checkpoint.load(output, kind, resume=training.resume)
     with stage_progress(quiet=training.as_json) as progress:
         trainer = Trainer(
-            make_task(init, progress), output, budget=budget, options=options, device=device, resume=training.resume,
+            make_task(init, progress),
+            output,
+            budget=budget,
+            options=options,
+            device=device,
+            resume=training.resume,
             note=note,
-        )  # fmt: skip
+        )
         scores = trainer.fit(progress)
-    step, sheet = trainer.schedule.step, output / "sheet.png"
+    step = trainer.schedule.step
+    sheet = output / "sheet.png"
     if trainer.interrupted:
         raise Interrupted(f"Interrupted at step {step}; the same command with --resume goes on.")
-    lines = [f"{output / checkpoint.WEIGHTS}: step {step}.", *([f"Look at {sheet}"] if sheet.is_file() else [])]
+    lines = [
+        f"{output / checkpoint.WEIGHTS}: step {step}.",
+        *([f"Look at {sheet}"] if sheet.is_file() else []),
+    ]
     if "of" in scores:
         lines.insert(1, f"The figures are of {scores['of']}.")
     facts = {"run": str(output), "step": step, "scored_on": scores.pop("of", None)}

@@ -18,7 +18,12 @@ RAYS = (48, 12)
 
 
 def save_layers(
-    path: str | Path, scene: Scene, picture: Array | None = None, *, device: str = "auto", force: bool = False
+    path: str | Path,
+    scene: Scene,
+    picture: Array | None = None,
+    *,
+    device: str = "auto",
+    force: bool = False,
 ) -> tuple[str, ...]:
     """Write PATH.exr of several parts: a picture of a scene, and what is known of each of its pixels.
 
@@ -56,7 +61,9 @@ def save_layers(
     write_layers(path, layers, _things(scene, size, device), force=force)
     if not scene.bodies and not scene.lamps:
         return ()
-    return ("Light by lobe is that of the photo's surface; what bodies and lamps add is in the residual.",)
+    return (
+        "Light by lobe is that of the photo's surface; what bodies and lamps add is in the residual.",
+    )
 
 
 def _lobes(scene: Scene, picture: Array, device: str) -> tuple[Array, Array]:
@@ -72,18 +79,29 @@ def _lobes(scene: Scene, picture: Array, device: str) -> tuple[Array, Array]:
     from materialist.transport.cache import CacheSettings
     from materialist.transport.shading import specular_at
 
-    shape, materials = scene.depth.shape, scene.materials
+    shape = scene.depth.shape
+    materials = scene.materials
     passed_on = cv2.resize(np.maximum(picture, 0), shape[::-1], interpolation=cv2.INTER_AREA)
-    engine = TransportEngine(scene.geometry, scene.camera, passed_on, seed=0, cache=CacheSettings(*RAYS))
-    tables, pixels = engine.tables(scene.envmap), engine.cache.pixels
-    maps = (materials.albedo.reshape(-1, 3), materials.roughness.ravel(), materials.metallic.ravel())
+    engine = TransportEngine(
+        scene.geometry, scene.camera, passed_on, seed=0, cache=CacheSettings(*RAYS)
+    )
+    tables = engine.tables(scene.envmap)
+    pixels = engine.cache.pixels
+    maps = (
+        materials.albedo.reshape(-1, 3),
+        materials.roughness.ravel(),
+        materials.metallic.ravel(),
+    )
     albedo, roughness, metallic = (placed(np.ascontiguousarray(values[pixels])) for values in maps)
     with torch.no_grad():
-        metal, rough = metallic[:, None], roughness[:, None]
+        metal = metallic[:, None]
+        rough = roughness[:, None]
         diffuse = albedo * (1 - metal) * quadratic(tables.diffuse.split(3, -1), rough)
         s0, s1 = specular_at(tables, roughness).split(3, -1)
         specular = base_reflectance(albedo, metal) * s0 + s1
-    return _spread(diffuse.cpu().numpy(), pixels, shape), _spread(specular.cpu().numpy(), pixels, shape)
+    return _spread(diffuse.cpu().numpy(), pixels, shape), _spread(
+        specular.cpu().numpy(), pixels, shape
+    )
 
 
 def _spread(values: Array, pixels: Array, shape: tuple[int, ...]) -> Array:
@@ -104,7 +122,8 @@ def _large(values: Array, size: tuple[int, ...], nearest: bool = False) -> Array
 def _surface(scene: Scene, size: tuple[int, int], device: str) -> dict[str, Array]:
     """Albedo, normals, depth and places of what is seen first, of the photo's surface or a body."""
     albedo = _large(scene.materials.albedo, size)
-    normal, depth = _large(scene.normal, size, nearest=True), _large(scene.depth, size, nearest=True)
+    normal = _large(scene.normal, size, nearest=True)
+    depth = _large(scene.depth, size, nearest=True)
     if scene.bodies:
         from materialist.render.pixels import first_hits
 
@@ -133,4 +152,8 @@ def _things(scene: Scene, size: tuple[int, int], device: str) -> dict[str, Array
 
 def _built(scene: Scene, device: str):
     """The Mitsuba scene of the surface and the bodies."""
-    return EditRenderer(replace(scene, lamps=()), device=device).render_scene(replace(scene, lamps=())).mi_scene
+    return (
+        EditRenderer(replace(scene, lamps=()), device=device)
+        .render_scene(replace(scene, lamps=()))
+        .mi_scene
+    )

@@ -49,12 +49,16 @@ class Preview:
         from materialist.render.variant import setup
 
         setup()
-        self.scene, self._file, self._key = scene, file, _key(scene)
+        self.scene = scene
+        self._file = file
+        self._key = _key(scene)
         self._other: tuple[Array, Tables] | None = None
         self._passed_on = scene.rerender
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
-        self._use(kept or _stored(self._quick, self._filtered(self._quick, scene.envmap, scene.rerender)))
+        self._use(
+            kept or _stored(self._quick, self._filtered(self._quick, scene.envmap, scene.rerender))
+        )
 
     def _use(self, kept: dict[str, Any]) -> None:
         """Shade with stored tables of the fitted light from now on."""
@@ -62,15 +66,20 @@ class Preview:
 
         self._pixels = kept["pixels"].astype(np.int64)
         self._skies = np.setdiff1d(np.arange(self.scene.depth.size), self._pixels)
-        self._tables = Tables(*(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular")))
-        self._base = self._image(self._shaded(self.scene.materials, self._tables), self._sky(self.scene.envmap))
+        self._tables = Tables(
+            *(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular"))
+        )
+        self._base = self._image(
+            self._shaded(self.scene.materials, self._tables), self._sky(self.scene.envmap)
+        )
 
     @cached_property
     def _engine(self):
         from materialist.fit.engine import TransportEngine
         from materialist.transport.cache import CacheSettings
 
-        scene, rays = self.scene, CacheSettings(*RAYS)
+        scene = self.scene
+        rays = CacheSettings(*RAYS)
         return TransportEngine(scene.geometry, scene.camera, scene.rerender, seed=0, cache=rays)
 
     @cached_property
@@ -85,7 +94,8 @@ class Preview:
         if self._quick.trace_next() or self._engine.cache.trace_next():
             return True
         if self._coarse:
-            kept, self._coarse = _stored(self._engine.cache, self._engine.tables(self.scene.envmap)), False
+            kept = _stored(self._engine.cache, self._engine.tables(self.scene.envmap))
+            self._coarse = False
             self._use(kept)
             if self._file is not None:
                 with suppress(OutputError), whole_file(self._file, force=True) as whole:
@@ -99,7 +109,9 @@ class Preview:
         Raises InputError when its geometry is not that of the scene this preview was built for.
         """
         if edited.geometry is not self.scene.geometry:
-            raise InputError("The preview was built for another geometry; build one for this scene.")
+            raise InputError(
+                "The preview was built for another geometry; build one for this scene."
+            )
         edited = self._seen(edited)
         fitted = np.array_equal(edited.envmap, self.scene.envmap)
         tables = self._tables if fitted else self._tables_under(edited, coarse)
@@ -107,19 +119,26 @@ class Preview:
 
     def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""
-        picture, base = self.render(edited, coarse=coarse), self._base
+        picture = self.render(edited, coarse=coarse)
+        base = self._base
         differs = (picture != base).any(-1)
         changed = changed_pixels(self.scene, edited) & differs
-        relit, left = is_relit(self.scene, edited), diffuse_left(self.scene, edited)
-        return onto_working(self.scene.photo, Layers(base, picture, differs, changed, relit, diffuse=left))
+        relit = is_relit(self.scene, edited)
+        left = diffuse_left(self.scene, edited)
+        return onto_working(
+            self.scene.photo, Layers(base, picture, differs, changed, relit, diffuse=left)
+        )
 
     def _seen(self, edited: Scene) -> Scene:
         """The scene as it is shaded: in-photo emitters are not shown, and their light comes from the map, as fitted."""
         found = dimmed_emitters(self.scene, edited)
         if found is None:
             return edited
-        ambient, lights = float(found["ambient"]), float(found["share"])
-        brought = (ambient + lights * found["dim"]) / max(ambient + lights, 1e-6)  # relative to the photo's light
+        ambient = float(found["ambient"])
+        lights = float(found["share"])
+        brought = (ambient + lights * found["dim"]) / max(
+            ambient + lights, 1e-6
+        )  # relative to the photo's light
         # Without its lights the map may have nothing left to be scaled.
         light = edited.envmap / ambient if ambient > LEAST_AMBIENT else self.scene.envmap
         return replace(edited, envmap=(light * brought).astype(np.float32))
@@ -129,7 +148,9 @@ class Preview:
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
             return self._other[1]
         tables = self._filtered(self._quick, edited.envmap, self._passed_on if coarse else None)
-        self._passed_on = self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
+        self._passed_on = self._image(
+            self._shaded(edited.materials, tables), self._sky(edited.envmap)
+        )
         if not coarse:
             tables = self._filtered(self._engine.cache, edited.envmap, self._passed_on)
             self._other = (edited.envmap, tables)
@@ -147,7 +168,11 @@ class Preview:
 
         from materialist.transport.shading import shade
 
-        maps = (materials.albedo.reshape(-1, 3), materials.roughness.ravel(), materials.metallic.ravel())
+        maps = (
+            materials.albedo.reshape(-1, 3),
+            materials.roughness.ravel(),
+            materials.metallic.ravel(),
+        )
         with torch.no_grad():
             return shade(tables, *(placed(values[self._pixels]) for values in maps))
 
@@ -165,7 +190,8 @@ class Preview:
 
 def _key(scene: Scene) -> str:
     """What the tables of a scene depend on, as a text."""
-    mesh, total = scene.geometry.mesh, 0
+    mesh = scene.geometry.mesh
+    total = 0
     for values in (*vars(mesh).values(), scene.rerender, scene.envmap):
         total = zlib.crc32(values.tobytes(), total)
     return f"{VERSION} {RAYS} {scene.camera} {total:08x}"
@@ -173,13 +199,19 @@ def _key(scene: Scene) -> str:
 
 def _stored(cache: TransportCache, tables: Tables) -> dict[str, Any]:
     """Tables and the pixels of their rows as a file holds them, so that a scene opened again looks the same."""
-    halves = {name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16) for name, v in vars(tables).items()}
+    halves = {
+        name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16)
+        for name, v in vars(tables).items()
+    }
     return halves | {"pixels": cache.pixels}
 
 
 def _read(file: Path, key: str) -> dict[str, Any] | None:
     """The arrays of a file that were written under this key; None where there are none."""
-    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error), np.load(file) as kept:
+    with (
+        suppress(OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error),
+        np.load(file) as kept,
+    ):
         if str(kept["key"]) == key:
             return {name: kept[name] for name in ("pixels", "diffuse", "specular")}
     return None

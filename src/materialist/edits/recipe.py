@@ -15,7 +15,15 @@ from materialist.edits.remove.remove import remove
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole
-from materialist.option_kinds import OFF, ON, OperationOptions, beside, declarations, numbers, several
+from materialist.option_kinds import (
+    OFF,
+    ON,
+    OperationOptions,
+    beside,
+    declarations,
+    numbers,
+    several,
+)
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 from materialist.types import Array, Scene
 
@@ -23,11 +31,15 @@ OPTIONS: dict[str, type[OperationOptions]] = {
     kind.operation: kind for kind in (MaterialEdit, Relight, Insertion, Drop, Glass, Removal)
 }
 """Kind of step -> its options."""
-REGION, PLACE = ("mask", "click", "box", "with"), ("mesh", "at")
+REGION = ("mask", "click", "box", "with")
+PLACE = ("mesh", "at")
 WHERE = {"insert": PLACE, "drop": PLACE}
 """Kind of step -> what says where it acts; a region for the others."""
 KINDS = {
-    name: (*WHERE.get(name, REGION), *(key for key, (told, _) in declarations(kind).items() if told.written))
+    name: (
+        *WHERE.get(name, REGION),
+        *(key for key, (told, _) in declarations(kind).items() if told.written),
+    )
     for name, kind in OPTIONS.items()
 }
 """Kind of step -> what it may say."""
@@ -71,7 +83,9 @@ def read_recipe(path: str | Path) -> list[Step]:
         raise InputError(f"{path} says '{unknown[0]}' beside its edits; it knows edits alone.")
     entries = content.get("edits") if isinstance(content, dict) else content
     if not isinstance(entries, list) or not entries:
-        raise InputError(f"{path} holds no list of edits; begin each with '- edit:' or '- relight:'.")
+        raise InputError(
+            f"{path} holds no list of edits; begin each with '- edit:' or '- relight:'."
+        )
     return [_step(entry, number, path) for number, entry in enumerate(entries, 1)]
 
 
@@ -97,7 +111,9 @@ def _loader() -> Any:
             names = Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
             twice = [name for name, count in names.items() if count > 1]
             if twice:
-                raise yaml.constructor.ConstructorError(None, None, f"'{twice[0]}' is given twice", node.start_mark)
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"'{twice[0]}' is given twice", node.start_mark
+                )
             return super().construct_mapping(node, deep)
 
     return Texts
@@ -105,24 +121,39 @@ def _loader() -> Any:
 
 def _step(entry: Any, number: int, path: Path) -> Step:
     if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KINDS:
-        said = f"'{next(iter(entry))}'" if isinstance(entry, dict) and len(entry) == 1 else "not one kind of edit"
+        said = (
+            f"'{next(iter(entry))}'"
+            if isinstance(entry, dict) and len(entry) == 1
+            else "not one kind of edit"
+        )
         known = ", ".join(KINDS)
-        raise InputError(f"Step {number} of {path} is {said}; it must be one of {known} with its options below it.")
+        raise InputError(
+            f"Step {number} of {path} is {said}; it must be one of {known} with its options below it."
+        )
     kind, options = next(iter(entry.items()))
     if not isinstance(options, dict):
-        raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}.")
+        raise InputError(
+            f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}."
+        )
     unknown = sorted(set(options) - {*KINDS[kind], "skip"})
     if unknown:
-        raise InputError(f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}.")
+        raise InputError(
+            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}."
+        )
     if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
-        raise InputError(f"Step {number} of {path}: The skip must be true or false, not {options['skip']!r}.")
+        raise InputError(
+            f"Step {number} of {path}: The skip must be true or false, not {options['skip']!r}."
+        )
     return Step(kind, options, path.parent)
 
 
 def with_files(step: Step, use: Callable[[str, Any], Any]) -> Step:
     """The step with `use(option, value)` in place of each file that it names; words such as `auto` stay."""
     known = declarations(OPTIONS[step.kind])
-    words = {name: told.choices for name, (told, _) in known.items() if told.kind == "file"} | {"mask": (), "mesh": ()}
+    words = {name: told.choices for name, (told, _) in known.items() if told.kind == "file"} | {
+        "mask": (),
+        "mesh": (),
+    }
     options = dict(step.options)
     for name in words.keys() & options:
         put = [one if one in words[name] else use(name, one) for one in _listed(options[name])]
@@ -140,13 +171,29 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
         yaml_implicit_resolvers: dict[Any, Any] = {}
 
     for kind in (bool, int, float):
-        Unquoted.add_representer(kind, lambda dumper, value: dumper.represent_str(str(value).lower()))
+        Unquoted.add_representer(
+            kind, lambda dumper, value: dumper.represent_str(str(value).lower())
+        )
     entries = [{step.kind: step.options} for step in steps]
-    text = yaml.dump(entries, Dumper=Unquoted, default_flow_style=None, sort_keys=False, width=200, allow_unicode=True)
+    text = yaml.dump(
+        entries,
+        Dumper=Unquoted,
+        default_flow_style=None,
+        sort_keys=False,
+        width=200,
+        allow_unicode=True,
+    )
     write_whole(path, text)
 
 
-def apply(scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto", onto: Scene | None = None) -> Scene:
+def apply(
+    scene: Scene,
+    steps: list[Step],
+    *,
+    seed: int = 0,
+    device: str = "auto",
+    onto: Scene | None = None,
+) -> Scene:
     """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before.
 
     `seed` is that of the steps that name none, where chance has a part in them; `onto` the scene after earlier steps.
@@ -156,7 +203,9 @@ def apply(scene: Scene, steps: list[Step], *, seed: int = 0, device: str = "auto
         if step.skipped:
             continue
         try:
-            edited = _MAKERS.get(step.kind, _in_region)(scene, edited, replace(step, seed=seed, device=device))
+            edited = _MAKERS.get(step.kind, _in_region)(
+                scene, edited, replace(step, seed=seed, device=device)
+            )
         except InputError as error:
             raise InputError(f"Step {number} ({step.kind}): {error}") from error
     return edited
@@ -166,7 +215,9 @@ def region_of(scene: Scene, step: Step) -> Array:
     """[H, W] bool of the step's mask, click or box. Raises InputError."""
     given = step.options
     where: dict[str, Any] = {
-        "click": [numbers(c, 2, "click") for c in several(given["click"])] if "click" in given else None,
+        "click": [numbers(c, 2, "click") for c in several(given["click"])]
+        if "click" in given
+        else None,
         "box": numbers(given["box"], 4, "box") if "box" in given else None,
         "mask": beside(step.folder, "mask", given["mask"]) if "mask" in given else None,
     }
@@ -194,10 +245,14 @@ def options_of(step: Step) -> Any:
 
 def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
     if not step.options:
-        raise InputError("A relight changes nothing; give envmap, rotate, sun, lamps, ambient or dim.")
+        raise InputError(
+            "A relight changes nothing; give envmap, rotate, sun, lamps, ambient or dim."
+        )
     region = [name for name in REGION if name in step.options]
     if region and "dim" not in step.options:
-        raise InputError(f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out.")
+        raise InputError(
+            f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out."
+        )
     wanted = options_of(step)
     return relight(edited, wanted, lights=region_of(scene, step) if region else None, fitted=scene)
 
@@ -205,18 +260,24 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
 def _put(scene: Scene, edited: Scene, step: Step) -> Scene:
     for name in PLACE:
         if name not in step.options:
-            raise InputError(f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}.")
-    wanted, mesh = options_of(step), step.options["mesh"]
+            raise InputError(
+                f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}."
+            )
+    wanted = options_of(step)
+    mesh = step.options["mesh"]
     places: list[Any] = [numbers(one, 2, "at") for one in several(step.options["at"])]
     if step.kind == "drop":
-        return settle(edited, [beside(step.folder, "mesh", one) for one in _listed(mesh)], places, wanted)
+        return settle(
+            edited, [beside(step.folder, "mesh", one) for one in _listed(mesh)], places, wanted
+        )
     for place in places:
         edited = insert(edited, beside(step.folder, "mesh", mesh), place, wanted)
     return edited
 
 
 def _in_region(scene: Scene, edited: Scene, step: Step) -> Scene:
-    region, options = _left(scene, edited, region_of(scene, step)), options_of(step)
+    region = _left(scene, edited, region_of(scene, step))
+    options = options_of(step)
     if step.kind == "edit":
         return edit(edited, region, options)
     return (glass if step.kind == "glass" else remove)(edited, region, options, fitted=scene)

@@ -27,7 +27,13 @@ _MINUTES = 20
 
 
 def export_blend(
-    path: Path, scene: Scene, parts: list[Part], force: bool, *, blender: str | None, options: list[str]
+    path: Path,
+    scene: Scene,
+    parts: list[Part],
+    force: bool,
+    *,
+    blender: str | None,
+    options: list[str],
 ) -> Exported:
     """PATH.blend with everything packed where Blender is found; else, or for a folder PATH, the script and its files.
 
@@ -52,7 +58,10 @@ def export_blend(
     file = path if wants_file else path.with_name(f"{path.name}.blend")
     command = shlex.join(_command(["blender"], folder / "build.py", file, options))
     if wants_file:
-        return Exported(folder, notes=(f"No Blender was found; {folder} has a script: make {path} with: {command}",))
+        return Exported(
+            folder,
+            notes=(f"No Blender was found; {folder} has a script: make {path} with: {command}",),
+        )
     return Exported(folder, notes=(f"Make the .blend with: {command}",))
 
 
@@ -69,15 +78,24 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     write_exr(folder / "envmap.exr", scene.envmap)
     write_png(folder / "photo.png", scene.photo.original)
     reach = farthest(parts)
-    camera, native = scene.camera, scene.photo.original.shape
+    camera = scene.camera
+    native = scene.photo.original.shape
     facts = {
-        "width": camera.width, "height": camera.height, "fov": camera.fov, "near": reach * 1e-5, "far": reach * 4,
-        "photo_width": native[1], "photo_height": native[0],
+        "width": camera.width,
+        "height": camera.height,
+        "fov": camera.fov,
+        "near": reach * 1e-5,
+        "far": reach * 4,
+        "photo_width": native[1],
+        "photo_height": native[0],
         "parts": {part.name: _look(part) for part in parts},
         "bounces": path_depth(scene) - 2,
-        "in_photo": [*(p.name for p in parts if p.surface is None), *(f"body{k}" for k in range(_in_photo(scene)))],
+        "in_photo": [
+            *(p.name for p in parts if p.surface is None),
+            *(f"body{k}" for k in range(_in_photo(scene))),
+        ],
         "lamps": [asdict(lamp) for lamp in scene.lamps],
-    }  # fmt: skip
+    }
     (folder / "scene.json").write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
     shutil.copyfile(Path(__file__).with_name("blender_build.py"), folder / "build.py")
 
@@ -97,10 +115,11 @@ def _look(part: Part) -> dict:
     if surface is not None and is_transparent(surface):
         roughness = surface.interface_roughness
         look["glass"] = {
-            "share": float(surface.transmission), "ior": max(float(surface.ior), LEAST_IOR),
+            "share": float(surface.transmission),
+            "ior": max(float(surface.ior), LEAST_IOR),
             "roughness": 0.0 if roughness < SMOOTH else roughness,
             "tint": [float(c) for c in surface.tint],
-        }  # fmt: skip
+        }
     return look
 
 
@@ -108,7 +127,9 @@ def find_blender(named: str | None) -> list[str] | None:
     """The start of a command that runs a script in Blender, or None. Raises SetupError where `named` is no program."""
     found = shutil.which(named or "blender")
     if found is None and named is not None:
-        raise SetupError(f"There is no program {named}; give the path of blender, or of a Python that has bpy.")
+        raise SetupError(
+            f"There is no program {named}; give the path of blender, or of a Python that has bpy."
+        )
     if found is None:
         return [sys.executable] if importlib.util.find_spec("bpy") else None
     return [found]
@@ -133,4 +154,6 @@ def run_script(program: list[str], script: Path, result: Path, options: list[str
     if done.returncode != 0 or not result.is_file():
         lines = [line for line in (done.stderr + done.stdout).splitlines() if line.strip()]
         last = lines[-1].strip() if lines else f"exit code {done.returncode}"
-        raise SetupError(f"{command[0]} did not build the file ({last}); Blender 4.2 or later is needed.")
+        raise SetupError(
+            f"{command[0]} did not build the file ({last}); Blender 4.2 or later is needed."
+        )

@@ -75,7 +75,8 @@ def material(name, look, additive):
     """Material of a part: its maps; glass over them, and what it gives off."""
     made = bpy.data.materials.new(name)
     made.use_nodes = True
-    nodes, links = made.node_tree.nodes, made.node_tree.links
+    nodes = made.node_tree.nodes
+    links = made.node_tree.links
     nodes.clear()
     output = nodes.new("ShaderNodeOutputMaterial")
     output.location = (600, 0)
@@ -119,22 +120,40 @@ def add_lobes(nodes, links):
     Principled takes from the diffuse lobe what the specular one reflects, so it is darker, most of all at grazing
     angles; the fit does not. The metallic node with a white edge tint is Schlick's formula.
     """
-    diffuse, specular = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeBsdfMetallic")
-    specular.distribution, specular.fresnel_type = "GGX", "F82"
+    diffuse = nodes.new("ShaderNodeBsdfDiffuse")
+    specular = nodes.new("ShaderNodeBsdfMetallic")
+    specular.distribution = "GGX"
+    specular.fresnel_type = "F82"
     specular.inputs["Edge Tint"].default_value = (1, 1, 1, 1)
-    colours, shares = [], []
+    colours = []
+    shares = []
     # Each lobe's colour goes from metallic 0 to 1: one end is the albedo, the other a grey.
-    for lobe, slot, albedo_at, grey in ((diffuse, "Color", 0, 0.0), (specular, "Base Color", 1, 0.04)):
+    for lobe, slot, albedo_at, grey in (
+        (diffuse, "Color", 0, 0.0),
+        (specular, "Base Color", 1, 0.04),
+    ):
         mix = nodes.new("ShaderNodeMix")
         mix.data_type = "RGBA"
         ends = [socket for socket in mix.inputs if socket.type == "RGBA"]
         ends[1 - albedo_at].default_value = (grey, grey, grey, 1)
         colours.append(ends[albedo_at])
-        shares.append(next(socket for socket in mix.inputs if socket.name == "Factor" and socket.type == "VALUE"))
-        links.new(next(socket for socket in mix.outputs if socket.type == "RGBA"), lobe.inputs[slot])
+        shares.append(
+            next(
+                socket
+                for socket in mix.inputs
+                if socket.name == "Factor" and socket.type == "VALUE"
+            )
+        )
+        links.new(
+            next(socket for socket in mix.outputs if socket.type == "RGBA"), lobe.inputs[slot]
+        )
         mix.location = (-300, 200 - 300 * len(shares))
     both = added(nodes, links, diffuse.outputs["BSDF"], specular.outputs["BSDF"])
-    return both, {"albedo": colours, "metallic": shares, "roughness": [specular.inputs["Roughness"]]}
+    return both, {
+        "albedo": colours,
+        "metallic": shares,
+        "roughness": [specular.inputs["Roughness"]],
+    }
 
 
 def add_glass(nodes, links, glass, opaque):
@@ -144,13 +163,19 @@ def add_glass(nodes, links, glass, opaque):
     """
     interface = nodes.new("ShaderNodeBsdfPrincipled")
     interface.distribution = "MULTI_GGX"  # loses no light among its facets, as ours
-    values = {"Base Color": (*glass["tint"], 1), "Roughness": glass["roughness"], "IOR": glass["ior"]}
+    values = {
+        "Base Color": (*glass["tint"], 1),
+        "Roughness": glass["roughness"],
+        "IOR": glass["ior"],
+    }
     for slot, value in {**values, "Transmission Weight": 1, "Metallic": 0}.items():
         interface.inputs[slot].default_value = value
     interface.location = (0, -300)
     if glass["share"] >= 1:
         return interface.outputs[0]
-    side, share, mixed = (nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "Math", "MixShader"))
+    side, share, mixed = (
+        nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "Math", "MixShader")
+    )
     share.operation = "MAXIMUM"
     share.inputs[1].default_value = glass["share"]
     links.new(side.outputs["Backfacing"], share.inputs[0])
@@ -167,8 +192,12 @@ def add_texture(nodes, look, key, location):
     """The output of a map. The photo's are looked up without filtering: neighbours may lie on different surfaces."""
     texture = nodes.new("ShaderNodeTexImage")
     texture.location = location
-    texture.image = image(f"{look['maps']}{key}.exr", "Linear Rec.709" if key == "albedo" else "Non-Color")
-    texture.interpolation, texture.extension = ("Linear", "REPEAT") if look["repeat"] else ("Closest", "EXTEND")
+    texture.image = image(
+        f"{look['maps']}{key}.exr", "Linear Rec.709" if key == "albedo" else "Non-Color"
+    )
+    texture.interpolation, texture.extension = (
+        ("Linear", "REPEAT") if look["repeat"] else ("Closest", "EXTEND")
+    )
     return texture.outputs["Color"]
 
 
@@ -184,16 +213,19 @@ def add_camera(scene, facts) -> None:
     camera = bpy.data.cameras.new("Photo")
     camera.sensor_fit = "HORIZONTAL"
     camera.angle = math.radians(facts["fov"])
-    camera.clip_start, camera.clip_end = facts["near"], facts["far"]
+    camera.clip_start = facts["near"]
+    camera.clip_end = facts["far"]
     camera.show_background_images = True
     background = camera.background_images.new()
     background.image = image("photo.png", "sRGB")
-    background.alpha, background.display_depth = 1.0, "BACK"
+    background.alpha = 1.0
+    background.display_depth = "BACK"
     placed = bpy.data.objects.new("Photo", camera)
     placed.rotation_euler = (math.pi / 2, 0, 0)
     scene.collection.objects.link(placed)
     scene.camera = placed
-    scene.render.resolution_x, scene.render.resolution_y = facts["width"], facts["height"]
+    scene.render.resolution_x = facts["width"]
+    scene.render.resolution_y = facts["height"]
     scene.render.resolution_percentage = 100
 
 
@@ -202,13 +234,16 @@ def add_light(scene) -> None:
     world = bpy.data.worlds.new("Light")
     scene.world = world
     world.use_nodes = True
-    nodes, links = world.node_tree.nodes, world.node_tree.links
+    nodes = world.node_tree.nodes
+    links = world.node_tree.links
     nodes.clear()
-    where, turn = nodes.new("ShaderNodeTexCoord"), nodes.new("ShaderNodeMapping")
+    where = nodes.new("ShaderNodeTexCoord")
+    turn = nodes.new("ShaderNodeMapping")
     turn.inputs["Rotation"].default_value = (0, 0, -math.pi / 2)
     texture = nodes.new("ShaderNodeTexEnvironment")
     texture.image = image("envmap.exr", "Linear Rec.709")
-    light, output = nodes.new("ShaderNodeBackground"), nodes.new("ShaderNodeOutputWorld")
+    light = nodes.new("ShaderNodeBackground")
+    output = nodes.new("ShaderNodeOutputWorld")
     links.new(where.outputs["Generated"], turn.inputs["Vector"])
     links.new(turn.outputs["Vector"], texture.inputs["Vector"])
     links.new(texture.outputs["Color"], light.inputs["Color"])
@@ -222,7 +257,8 @@ def add_lamps(scene, facts) -> None:
     for number, lamp in enumerate(facts["lamps"]):
         most = max(lamp["power"])
         light = bpy.data.lights.new(f"lamp{number}", "POINT")
-        light.energy, light.shadow_soft_size = most, lamp["radius"]
+        light.energy = most
+        light.shadow_soft_size = lamp["radius"]
         light.color = [part / most for part in lamp["power"]]
         if hasattr(light, "use_soft_falloff"):  # a disc that faces what it lights, else
             light.use_soft_falloff = False
@@ -237,20 +273,27 @@ def set_rendering(scene, samples, bounces) -> None:
     """Cycles as our renderer: light by way of up to three surfaces (more with glass), a box filter, plain sRGB."""
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
-    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = samples, False, False
+    cycles.samples = samples
+    cycles.use_denoising = False
+    cycles.use_adaptive_sampling = False
     cycles.pixel_filter_type = "BOX"
     cycles.diffuse_bounces = cycles.glossy_bounces = bounces
     cycles.max_bounces = cycles.transmission_bounces = max(12, bounces)
     cycles.sample_clamp_indirect = cycles.blur_glossy = 0
-    scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
+    scene.view_settings.view_transform = "Standard"
+    scene.view_settings.look = "None"
 
 
 def catch_shadows(scene, facts) -> None:
     """Shadow-catching proxy over the photo, at the photo's own resolution. Bodies that it lacks are seen."""
     for thing in bpy.data.collections["Reconstruction"].objects:
         thing.is_shadow_catcher = thing.name in facts["in_photo"]
-    scene.render.film_transparent, scene.render.dither_intensity = True, 0  # the photo stays as it is
-    scene.render.resolution_x, scene.render.resolution_y = facts["photo_width"], facts["photo_height"]
+    scene.render.film_transparent, scene.render.dither_intensity = (
+        True,
+        0,
+    )  # the photo stays as it is
+    scene.render.resolution_x = facts["photo_width"]
+    scene.render.resolution_y = facts["photo_height"]
     if hasattr(scene, "compositing_node_group"):  # Blender 5
         tree = bpy.data.node_groups.new("Over the photo", "CompositorNodeTree")
         scene.compositing_node_group = tree
@@ -261,7 +304,8 @@ def catch_shadows(scene, facts) -> None:
         tree = scene.node_tree
         tree.nodes.clear()
         output = tree.nodes.new("CompositorNodeComposite")
-    photo, layers = tree.nodes.new("CompositorNodeImage"), tree.nodes.new("CompositorNodeRLayers")
+    photo = tree.nodes.new("CompositorNodeImage")
+    layers = tree.nodes.new("CompositorNodeRLayers")
     photo.image = scene.camera.data.background_images[0].image
     fit = tree.nodes.new("CompositorNodeScale")  # renders of another size take the photo along
     if hasattr(fit, "space"):

@@ -25,8 +25,12 @@ from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import to_bytes
 from materialist.types import Array, Camera, Lamp, Materials, Scene
 
-_NEAREST, _NEAREST_MIPMAP_LINEAR, _CLAMP = 9728, 9986, 33071
-_LINEAR, _LINEAR_MIPMAP_LINEAR, _REPEAT = 9729, 9987, 10497
+_NEAREST = 9728
+_NEAREST_MIPMAP_LINEAR = 9986
+_CLAMP = 33071
+_LINEAR = 9729
+_LINEAR_MIPMAP_LINEAR = 9987
+_REPEAT = 10497
 _SAMPLERS = (
     {"magFilter": _NEAREST, "minFilter": _NEAREST_MIPMAP_LINEAR, "wrapS": _CLAMP, "wrapT": _CLAMP},
     {"magFilter": _LINEAR, "minFilter": _LINEAR_MIPMAP_LINEAR, "wrapS": _REPEAT, "wrapT": _REPEAT},
@@ -40,15 +44,23 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
     made = trimesh.Scene()
     for part in parts:
         mesh = part.mesh
-        visual = trimesh.visual.TextureVisuals(mesh.uv * [1, -1] + [0, 1], material=_material(part))  # its v runs up
-        body = trimesh.Trimesh(mesh.vertices, mesh.faces, vertex_normals=mesh.normals, visual=visual, process=False)
+        visual = trimesh.visual.TextureVisuals(
+            mesh.uv * [1, -1] + [0, 1], material=_material(part)
+        )  # its v runs up
+        body = trimesh.Trimesh(
+            mesh.vertices, mesh.faces, vertex_normals=mesh.normals, visual=visual, process=False
+        )
         made.add_geometry(body, part.name, part.name)
-    return export_glb(made, include_normals=True, tree_postprocessor=lambda tree: _complete(tree, scene, parts))
+    return export_glb(
+        made, include_normals=True, tree_postprocessor=lambda tree: _complete(tree, scene, parts)
+    )
 
 
 def write_hdr(path: Path, envmap: Array) -> None:
     """The light [h, 2h, 3] as a Radiance picture (8 bits of mantissa and a shared exponent), rows and columns as is."""
-    path.write_bytes(cv2.imencode(".hdr", np.ascontiguousarray(envmap[..., ::-1], np.float32))[1].tobytes())
+    path.write_bytes(
+        cv2.imencode(".hdr", np.ascontiguousarray(envmap[..., ::-1], np.float32))[1].tobytes()
+    )
 
 
 def _material(part: Part) -> Any:
@@ -57,7 +69,11 @@ def _material(part: Part) -> Any:
     packed = to_bytes(np.stack([np.zeros_like(m.roughness), m.roughness, m.metallic], -1))
     textures = {"baseColorTexture": srgb_levels(m.albedo), "metallicRoughnessTexture": packed}
     pictures = {name: Image.fromarray(pixels) for name, pixels in textures.items()}
-    glow = None if part.surface is None else np.array(part.surface.emission) / max(*part.surface.emission, 1e-30)
+    glow = (
+        None
+        if part.surface is None
+        else np.array(part.surface.emission) / max(*part.surface.emission, 1e-30)
+    )
     return PBRMaterial(part.name, glow, doubleSided=_thickness(part) == 0, **pictures)
 
 
@@ -73,7 +89,8 @@ def _complete(tree: dict[str, Any], scene: Scene, parts: list[Part]) -> None:
     used = {name for material in tree["materials"] for name in material.get("extensions", ())}
     tree["cameras"], nodes = [_camera(scene.camera, parts)], [{"name": "camera", "camera": 0}]
     for k, lamp in enumerate(scene.lamps):
-        place, which = [float(c) for c in lamp.position], {_LAMPS: {"light": k}}
+        place = [float(c) for c in lamp.position]
+        which = {_LAMPS: {"light": k}}
         nodes.append({"name": f"lamp{k}", "translation": place, "extensions": which})
     tree["scenes"][0]["nodes"] += range(len(tree["nodes"]), len(tree["nodes"]) + len(nodes))
     tree["nodes"] += nodes
@@ -95,9 +112,12 @@ def _light(lamp: Lamp) -> dict:
 
 def _extensions(part: Part) -> dict[str, dict]:
     """Of the material of a body: glow and glass, whose base colour tints what passes, see `passing`."""
-    surface, found = part.surface, {}
+    surface = part.surface
+    found = {}
     if surface is not None and max(surface.emission) > 0:
-        found["KHR_materials_emissive_strength"] = {"emissiveStrength": float(max(surface.emission))}
+        found["KHR_materials_emissive_strength"] = {
+            "emissiveStrength": float(max(surface.emission))
+        }
     if surface is not None and surface.transmission > 0:
         found["KHR_materials_transmission"] = {"transmissionFactor": float(surface.transmission)}
         found["KHR_materials_ior"] = {"ior": float(surface.ior)}
@@ -131,8 +151,14 @@ def _thickness(part: Part) -> float:
 
 def passing(part: Part) -> Materials:
     """The maps of a part; one colour of glTF is for what glass reflects diffusely and what passes: their mean."""
-    m, surface = one_roughness(part), part.surface
+    m = one_roughness(part)
+    surface = part.surface
     if surface is None or surface.transmission == 0:
         return m
     share = np.float32(surface.transmission)
-    return replace(m, albedo=((1 - share) * m.albedo + share * np.array(surface.tint, np.float32)).astype(np.float32))
+    return replace(
+        m,
+        albedo=((1 - share) * m.albedo + share * np.array(surface.tint, np.float32)).astype(
+            np.float32
+        ),
+    )

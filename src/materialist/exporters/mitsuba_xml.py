@@ -36,15 +36,23 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
         seen_shape(mi, part.mesh, {"type": "diffuse"}).write_ply(str(folder / f"{part.name}.ply"))
         if part.surface is None or part.surface.transmission < 1:
             for key in MAPS.values():
-                write_exr(folder / f"{part.name}_{key}.exr", at_least_2x2(getattr(part.materials, key)))
+                write_exr(
+                    folder / f"{part.name}_{key}.exr", at_least_2x2(getattr(part.materials, key))
+                )
     for name, own in FILES.items():
-        (folder / name).write_text(_xml(mi, _description(mi, scene, parts, own), path_depth(scene)), "utf-8")
+        (folder / name).write_text(
+            _xml(mi, _description(mi, scene, parts, own), path_depth(scene)), "utf-8"
+        )
 
 
 def _xml(mi, description: dict, depth: int) -> str:
     """The text of a description; what `spp` and `max_depth` stand for can be chosen: mi.load_file(path, spp=256)."""
     state = mi.parser.parse_dict(mi.parser.ParserConfig(mi.variant()), description)
-    kinds = {PLUGIN: mi.ObjectType.BSDF, FROSTED: mi.ObjectType.BSDF, OUTSIDE: mi.ObjectType.Texture}
+    kinds = {
+        PLUGIN: mi.ObjectType.BSDF,
+        FROSTED: mi.ObjectType.BSDF,
+        OUTSIDE: mi.ObjectType.Texture,
+    }
     for node in state.nodes:  # Mitsuba knows the kinds of its own plugins alone
         node.type = kinds.get(node.props.plugin_name(), node.type)
     text = mi.parser.write_string(state)  # with `spp` as such a parameter
@@ -76,7 +84,13 @@ def _bsdf(part: Part, own: bool) -> dict:
     opaque: dict = {"type": PLUGIN}
     for name, key in MAPS.items():
         file = f"{part.name}_{key}.exr"
-        opaque[name] = {"type": "bitmap", "filename": file, "raw": True, "filter_type": how[0], "wrap_mode": how[1]}
+        opaque[name] = {
+            "type": "bitmap",
+            "filename": file,
+            "raw": True,
+            "filter_type": how[0],
+            "wrap_mode": how[1],
+        }
     bsdf = opaque if part.surface is None else body_bsdf(part.surface, opaque)
     if own:
         return bsdf

@@ -17,7 +17,9 @@ from materialist.geometry.boundary import joined_faces
 from materialist.io import display
 from materialist.types import Array, Camera, Scene
 
-_VERTEX = np.dtype([("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2), ("colour", "u1", 4)])
+_VERTEX = np.dtype(
+    [("position", "<f4", 3), ("normal", "i1", 4), ("uv", "<u2", 2), ("colour", "u1", 4)]
+)
 """A vertex as page.js reads it; colour with alpha 0 means the texture."""
 _NAMES = {
     "rerender_psnr_path": ("Re-rendering, PSNR", "{:.2f} dB"),
@@ -39,7 +41,8 @@ def page(scene: Scene, parts: list[Part]) -> str:
     The template escapes whatever came from outside, and a policy in it forbids any request.
     """
     assets = files("materialist.exporters") / "assets"
-    camera, native = scene.camera, scene.photo.original.shape
+    camera = scene.camera
+    native = scene.photo.original.shape
     template = Template((assets / "page.html").read_text("utf-8"), autoescape=True)
     return template.render(
         title=scene.photo.name,
@@ -55,7 +58,10 @@ def page(scene: Scene, parts: list[Part]) -> str:
         envmap=_image(display.light(scene.envmap)),
         light_note=f"The centre looks along the view; brightest {scene.envmap.max():.3g}.",
         metrics=[_figure(key, value) for key, value in scene.report.metrics.items()],
-        stages=[(s.get("name", ""), f"{s['seconds']:.1f} s" if "seconds" in s else "–") for s in scene.report.stages],
+        stages=[
+            (s.get("name", ""), f"{s['seconds']:.1f} s" if "seconds" in s else "–")
+            for s in scene.report.stages
+        ],
         provenance=_options(scene),
         scene=json.dumps(_packed(camera, scene.depth, parts)),
         style=(assets / "page.css").read_text("utf-8"),
@@ -107,11 +113,16 @@ def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
     indices = joined_faces([part.mesh for part in parts])[1].astype("<u4")
     seen = depth[depth > 0]
     return {
-        "vertices": _deflated(vertices), "indices": _deflated(indices),
-        "surface": 3 * sum(len(part.mesh.faces) for part in shown), "all": indices.size,
-        "tangent": math.tan(math.radians(camera.fov) / 2), "aspect": camera.width / camera.height,
-        "pivot": float(np.median(seen)), "near": float(seen.min()) * 0.05, "far": farthest(parts) * 4,
-    }  # fmt: skip
+        "vertices": _deflated(vertices),
+        "indices": _deflated(indices),
+        "surface": 3 * sum(len(part.mesh.faces) for part in shown),
+        "all": indices.size,
+        "tangent": math.tan(math.radians(camera.fov) / 2),
+        "aspect": camera.width / camera.height,
+        "pivot": float(np.median(seen)),
+        "near": float(seen.min()) * 0.05,
+        "far": farthest(parts) * 4,
+    }
 
 
 def _vertices(part: Part) -> Array:

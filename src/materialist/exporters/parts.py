@@ -46,18 +46,26 @@ def scene_parts(scene: Scene, max_triangles: int | None = None) -> list[Part]:
     """
     geometry = scene.geometry
     if not (geometry.mesh.face_plane == -1).any():
-        raise InputError("The mesh has no depth surface to export; give a depth map with some values above 0.")
+        raise InputError(
+            "The mesh has no depth surface to export; give a depth map with some values above 0."
+        )
     materials = scene.materials
     if max_triangles is not None and len(geometry.mesh.faces) > max_triangles:
         geometry, materials = _reduced(scene, max_triangles)
     planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
-    constants = [Part(f"plane{k}", part(geometry.mesh, k), _mean(materials, geometry.plane_label == k)) for k in planes]
+    constants = [
+        Part(f"plane{k}", part(geometry.mesh, k), _mean(materials, geometry.plane_label == k))
+        for k in planes
+    ]
     return [Part("surface", part(geometry.mesh, -1), scene.materials), *constants]
 
 
 def body_parts(scene: Scene) -> list[Part]:
     """A part for every body of the scene, named `body0`, `body1`, ..."""
-    return [Part(f"body{k}", body.mesh, _one_size(body.surface), body.surface) for k, body in enumerate(scene.bodies)]
+    return [
+        Part(f"body{k}", body.mesh, _one_size(body.surface), body.surface)
+        for k, body in enumerate(scene.bodies)
+    ]
 
 
 def farthest(parts: list[Part]) -> float:
@@ -98,7 +106,8 @@ def _mean(materials: Materials, members: Array) -> Materials:
 
 def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
     """Geometry of a coarser depth map with at most `most` triangles, and the maps at its size."""
-    camera, factor = scene.camera, np.sqrt(most / len(scene.geometry.mesh.faces))
+    camera = scene.camera
+    factor = np.sqrt(most / len(scene.geometry.mesh.faces))
     for _ in range(12):
         width, height = (max(2, round(size * factor)) for size in (camera.width, camera.height))
         rows = ((np.arange(height) + 0.5) * camera.height / height).astype(int)
@@ -112,7 +121,9 @@ def _reduced(scene: Scene, most: int) -> tuple[Geometry, Materials]:
             m = scene.materials
             maps = Materials(m.albedo[pick], m.roughness[pick], m.metallic[pick])
             # On the photo's frame: the coarse picture's sides are rounded, so its pixels are not quite square.
-            stretch = np.array([1, (camera.height / camera.width) / (height / width), 1], np.float32)
+            stretch = np.array(
+                [1, (camera.height / camera.width) / (height / width), 1], np.float32
+            )
             mesh = replace(geometry.mesh, vertices=geometry.mesh.vertices * stretch)
             return replace(geometry, mesh=mesh), maps
         factor *= 0.95 * np.sqrt(min(1.0, most / len(geometry.mesh.faces)))

@@ -28,9 +28,13 @@ PAGE_TRIANGLES = 60_000
 
 @documented(ExportOptions)
 def export(
-    scene: Scene, path: str | Path, options: ExportOptions | None = None, *, force: bool = False,
+    scene: Scene,
+    path: str | Path,
+    options: ExportOptions | None = None,
+    *,
+    force: bool = False,
     **values: Unpack[ExportKeywords],
-) -> Exported:  # fmt: skip
+) -> Exported:
     """Write a scene for another program, whole or not at all. The camera is exact: renders line up with the photo.
 
     Args:
@@ -42,9 +46,15 @@ def export(
         InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
         SetupError: the extra for the format is missing, or `blender` does not work.
     """
-    wanted, path = ExportOptions.given(options, **values), Path(path)
-    to, most = check_format(path, wanted.to), wanted.max_triangles
-    flags = [f"--{name.replace('_', '-')}" for name in ("shadow_catcher", "fitted_material") if getattr(wanted, name)]
+    wanted = ExportOptions.given(options, **values)
+    path = Path(path)
+    to = check_format(path, wanted.to)
+    most = wanted.max_triangles
+    flags = [
+        f"--{name.replace('_', '-')}"
+        for name in ("shadow_catcher", "fitted_material")
+        if getattr(wanted, name)
+    ]
     if to != "blend" and (wanted.blender is not None or flags):
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and most is None:
@@ -56,7 +66,12 @@ def export(
 
         made = export_blend(path, scene, parts, force, blender=wanted.blender, options=flags)
     else:
-        writers: dict[str, Callable[..., Exported]] = {"glb": _glb, "usd": _usd, "mitsuba": _mitsuba, "html": _html}
+        writers: dict[str, Callable[..., Exported]] = {
+            "glb": _glb,
+            "usd": _usd,
+            "mitsuba": _mitsuba,
+            "html": _html,
+        }
         made = writers[to](path, scene, parts, force)
     return replace(made, notes=(*made.notes, *_losses(scene, bodies, to)))
 
@@ -69,7 +84,9 @@ def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:
     if to == "usd" and clear:
         absent = ["refraction and tint of glass"]
     if to == "html":
-        absent = ["textures but for their colours at the vertices"] * any(not p.constant for p in bodies)
+        absent = ["textures but for their colours at the vertices"] * any(
+            not p.constant for p in bodies
+        )
         absent += ["glass"] * clear + ["glow"] * any(max(s.emission) > 0 for s in surfaces)
     if absent:
         yield f"{to} shows bodies without {' and '.join(absent)}; glb, blend and mitsuba have all of it."
@@ -97,7 +114,9 @@ def check_format(path: Path, to: str | None) -> str:
     if not folder and suffix != SUFFIX.get(to):
         expected = [f"NAME{SUFFIX[to]}"] if to in SUFFIX else []
         expected += ["a folder name"] if to in FOLDERS else []
-        raise InputError(f"The output {path} does not fit the format {to}; give {' or '.join(expected)}.")
+        raise InputError(
+            f"The output {path} does not fit the format {to}; give {' or '.join(expected)}."
+        )
     return to
 
 
@@ -115,7 +134,9 @@ def _mitsuba(path: Path, scene: Scene, parts: list[Part], force: bool) -> Export
 
     with export_folder(path, force, "mitsuba") as folder:
         write_mitsuba(folder, scene, parts)
-    return Exported(path / "scene.xml", (), (f"Render it with: mitsuba -m scalar_rgb {path / 'scene.xml'}",))
+    return Exported(
+        path / "scene.xml", (), (f"Render it with: mitsuba -m scalar_rgb {path / 'scene.xml'}",)
+    )
 
 
 def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:

@@ -42,8 +42,12 @@ def _mesh(stage: Any, part: Part, material: Any) -> None:
     points = np.ascontiguousarray(source.vertices, np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(source.faces), 3, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(source.faces.ravel(), np.int32)))
-    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(source.normals, np.float32)))
+    mesh.CreateFaceVertexIndicesAttr(
+        Vt.IntArray.FromNumpy(np.ascontiguousarray(source.faces.ravel(), np.int32))
+    )
+    mesh.CreateNormalsAttr(
+        Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(source.normals, np.float32))
+    )
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
@@ -70,12 +74,16 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
             made.CreateInput(socket, type_).Set(value)
         return made
 
-    body, m = part.surface, one_roughness(part)
+    body = part.surface
+    m = one_roughness(part)
     look: dict[str, tuple] = {"ior": (kinds.Float, 1.5)}
     if body is not None and is_glowing(body):
         look["emissiveColor"] = (kinds.Color3f, tuple(float(c) for c in body.emission))
     if body is not None and is_transparent(body):
-        look |= {"ior": (kinds.Float, float(body.ior)), "opacity": (kinds.Float, 1 - float(body.transmission))}
+        look |= {
+            "ior": (kinds.Float, float(body.ior)),
+            "opacity": (kinds.Float, 1 - float(body.transmission)),
+        }
     surface = shader("surface", "UsdPreviewSurface", **look)
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
     reader = shader("st", "UsdPrimvarReader_float2", varname=(kinds.String, "st"))
@@ -87,8 +95,11 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
     ):
         file = f"{part.prefix}{name}.png"
         (folder / file).write_bytes(encoded(pixels))
-        asset, where = (kinds.Asset, f"./{file}"), (kinds.Token, space)
-        texture = shader(name, "UsdUVTexture", file=asset, sourceColorSpace=where, wrapS=wrap, wrapT=wrap)
+        asset = (kinds.Asset, f"./{file}")
+        where = (kinds.Token, space)
+        texture = shader(
+            name, "UsdUVTexture", file=asset, sourceColorSpace=where, wrapS=wrap, wrapT=wrap
+        )
         texture.CreateInput("st", kinds.Float2).ConnectToSource(reader.ConnectableAPI(), "result")
         surface.CreateInput(socket, type_).ConnectToSource(texture.ConnectableAPI(), output)
     return material
@@ -96,8 +107,11 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
 
 def _camera(stage: Any, photo: Camera, parts: list[Part]) -> None:
     """The photo's pinhole at the origin, which looks down -Z in USD too."""
-    reach, camera = farthest(parts), Gf.Camera()
-    camera.SetPerspectiveFromAspectRatioAndFieldOfView(photo.width / photo.height, photo.fov, camera.FOVHorizontal)
+    reach = farthest(parts)
+    camera = Gf.Camera()
+    camera.SetPerspectiveFromAspectRatioAndFieldOfView(
+        photo.width / photo.height, photo.fov, camera.FOVHorizontal
+    )
     camera.clippingRange = Gf.Range1f(reach * 1e-5, reach * 4)
     UsdGeom.Camera.Define(stage, "/Scene/Photo").SetFromCamera(camera, Usd.TimeCode.Default())
 

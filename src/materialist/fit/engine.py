@@ -19,7 +19,8 @@ from materialist.transport.light import light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
 
-LIGHT_PIXELS, LEAST_PIXELS = 2048, 256
+LIGHT_PIXELS = 2048
+LEAST_PIXELS = 256
 """Pixels that the light is fitted to, shared by surfaces and sky by their area; surfaces get at least the second."""
 
 
@@ -48,11 +49,24 @@ class TransportEngine:
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, radiance: Array | None, *, roughness: Array | None = None,
-        seed: int = 0, light_height: int = 32, cache: CacheSettings | None = None, progress=None,
-    ):  # fmt: skip
-        self.cache = TransportCache(geometry, camera, cache, roughness=roughness, seed=seed, progress=progress)
-        self.camera, self.seed, self.light_height, self.radiance = camera, seed, light_height, radiance
+        self,
+        geometry: Geometry,
+        camera: Camera,
+        radiance: Array | None,
+        *,
+        roughness: Array | None = None,
+        seed: int = 0,
+        light_height: int = 32,
+        cache: CacheSettings | None = None,
+        progress=None,
+    ):
+        self.cache = TransportCache(
+            geometry, camera, cache, roughness=roughness, seed=seed, progress=progress
+        )
+        self.camera = camera
+        self.seed = seed
+        self.light_height = light_height
+        self.radiance = radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
         self.guide = _guide(self.cache, camera)
@@ -92,27 +106,47 @@ class PathEngine:
     """The paper's engine: Mitsuba's PRB integrator on a `RenderScene`, a fresh seed in every step."""
 
     def __init__(
-        self, scene, camera: Camera, pixels: Array, *, spp: int = 64, max_depth: int = 4, envmap_height: int = 256,
+        self,
+        scene,
+        camera: Camera,
+        pixels: Array,
+        *,
+        spp: int = 64,
+        max_depth: int = 4,
+        envmap_height: int = 256,
         seed: int = 0,
-    ):  # fmt: skip
-        self.scene, self.camera, self.spp, self.max_depth = scene, camera, spp, max_depth
+    ):
+        self.scene = scene
+        self.camera = camera
+        self.spp = spp
+        self.max_depth = max_depth
         self.pixels = torch.from_numpy(pixels.astype(np.int64))
-        self.envmap_height, self.seed, self._step = envmap_height, seed, 0
+        self.envmap_height = envmap_height
+        self.seed = seed
+        self._step = 0
 
     def _render(self, *maps_and_envmap: torch.Tensor) -> torch.Tensor:
         self._step += 1
         return self.scene.render_torch(
-            *maps_and_envmap, spp=self.spp, seed=self.seed + 2 * self._step, max_depth=self.max_depth
+            *maps_and_envmap,
+            spp=self.spp,
+            seed=self.seed + 2 * self._step,
+            max_depth=self.max_depth,
         )
 
     def light_problem(self, materials: Materials) -> LightProblem:
         maps = [placed(np.ascontiguousarray(values)) for values in vars(materials).values()]
         everything = torch.arange(self.camera.width * self.camera.height)
-        return LightProblem(everything, self.envmap_height, lambda envmap: self._render(*maps, envmap).reshape(-1, 3))
+        return LightProblem(
+            everything,
+            self.envmap_height,
+            lambda envmap: self._render(*maps, envmap).reshape(-1, 3),
+        )
 
     def material_problem(self, envmap: Array) -> MaterialProblem:
         light = placed(np.ascontiguousarray(envmap, dtype=np.float32))
-        h, w = self.camera.height, self.camera.width
+        h = self.camera.height
+        w = self.camera.width
 
         def render(maps: torch.Tensor) -> torch.Tensor:
             full = maps.new_zeros(h * w, 5).index_put((self.pixels,), maps).view(h, w, 5)
@@ -143,4 +177,6 @@ def _subset(rng, size: int, share: float) -> Array:
 def _guide(cache: TransportCache, camera: Camera) -> Guide:
     position = np.array(cache.position).T
     scale = cache.image(-position[:, 2:] / camera.focal)[..., 0]
-    return Guide(cache.image(position), cache.image(np.array(cache.normal).T), np.maximum(scale, 1e-9))
+    return Guide(
+        cache.image(position), cache.image(np.array(cache.normal).T), np.maximum(scale, 1e-9)
+    )

@@ -33,10 +33,15 @@ class EnvmapMLP(nn.Module):
     With `coordinates="uv"` the encoding is of (u, v) instead: the paper's ablation of coordinate systems.
     """
 
-    def __init__(self, *, coordinates: str = "direction", bands: int = 4, width: int = 128, layers: int = 3):
+    def __init__(
+        self, *, coordinates: str = "direction", bands: int = 4, width: int = 128, layers: int = 3
+    ):
         super().__init__()
-        self.coordinates, self.bands = coordinates, bands
-        self.net = mlp(2 * bands * (3 if coordinates == "direction" else 2), 3, width=width, layers=layers)
+        self.coordinates = coordinates
+        self.bands = bands
+        self.net = mlp(
+            2 * bands * (3 if coordinates == "direction" else 2), 3, width=width, layers=layers
+        )
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
         """Radiance [h, 2h, 3] at texel centres, or at random points of the texels when a generator is given."""
@@ -47,7 +52,8 @@ class EnvmapMLP(nn.Module):
         if self.coordinates == "uv":
             x = torch.stack([u, v], -1)
         else:
-            theta, phi = math.pi * v, 2 * math.pi * (u - 0.5)
+            theta = math.pi * v
+            phi = 2 * math.pi * (u - 0.5)
             x = torch.stack([theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()], -1)
         return functional.softplus(self.net(positional_encoding(x, self.bands)))
 
@@ -73,7 +79,9 @@ class EnvmapSH(nn.Module):
         self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
-        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree)).to(self.coefficients)
+        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree)).to(
+            self.coefficients
+        )
         return functional.softplus(basis @ self.coefficients)
 
 
@@ -86,12 +94,16 @@ def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:
         rows, columns = (_coverage(n, m).to(envmap) for n, m in ((height, h), (2 * height, 2 * h)))
         return torch.einsum("ij,jkc,lk->ilc", rows, envmap, columns)
     image = envmap.permute(2, 0, 1)[None]
-    image = functional.pad(functional.pad(image, (1, 1, 0, 0), mode="circular"), (0, 0, 1, 1), mode="replicate")
+    image = functional.pad(
+        functional.pad(image, (1, 1, 0, 0), mode="circular"), (0, 0, 1, 1), mode="replicate"
+    )
     # Centres of the new texels on the padded map, in [-1, 1].
     y = (2 * ((torch.arange(height) + 0.5) * h / height + 1) / (h + 2) - 1).to(image)
     x = (2 * ((torch.arange(2 * height) + 0.5) * h / height + 1) / (2 * h + 2) - 1).to(image)
     places = torch.stack(torch.meshgrid(y, x, indexing="ij")[::-1], -1)[None]
-    return functional.grid_sample(image, places, mode="bilinear", align_corners=False)[0].permute(1, 2, 0)
+    return functional.grid_sample(image, places, mode="bilinear", align_corners=False)[0].permute(
+        1, 2, 0
+    )
 
 
 def _coverage(count: int, of: int) -> torch.Tensor:
@@ -107,7 +119,15 @@ class MaterialMLP(nn.Module):
 
     prior: torch.Tensor
 
-    def __init__(self, prior: torch.Tensor, *, bands: int = 6, width: int = 128, layers: int = 3, zeta: float = 0.3):
+    def __init__(
+        self,
+        prior: torch.Tensor,
+        *,
+        bands: int = 6,
+        width: int = 128,
+        layers: int = 3,
+        zeta: float = 0.3,
+    ):
         """prior: [P, 5] albedo, roughness, metallic."""
         super().__init__()
         self.register_buffer("prior", prior)
@@ -136,19 +156,31 @@ class MaterialUNet(nn.Module):
 
     prior: torch.Tensor
 
-    def __init__(self, prior: torch.Tensor, pixels: torch.Tensor, height: int, width: int, *, channels: int = 32):
+    def __init__(
+        self,
+        prior: torch.Tensor,
+        pixels: torch.Tensor,
+        height: int,
+        width: int,
+        *,
+        channels: int = 32,
+    ):
         super().__init__()
         grid = prior.new_zeros(height * width, 5)
         grid[pixels] = prior
-        pad_h, pad_w = -height % 4, -width % 4
+        pad_h = -height % 4
+        pad_w = -width % 4
         image = grid.view(1, height, width, 5).permute(0, 3, 1, 2)
-        self.size, self.pixels = (height, width), pixels
+        self.size = (height, width)
+        self.pixels = pixels
         self.register_buffer("image", functional.pad(image, (0, pad_w, 0, pad_h), mode="replicate"))
         self.register_buffer("prior", prior)
         c = channels
-        self.down1, self.down2 = _double_conv(5, c), _double_conv(c, 2 * c)
+        self.down1 = _double_conv(5, c)
+        self.down2 = _double_conv(c, 2 * c)
         self.middle = _double_conv(2 * c, 2 * c)
-        self.up2, self.up1 = _double_conv(4 * c, c), _double_conv(2 * c, c)
+        self.up2 = _double_conv(4 * c, c)
+        self.up1 = _double_conv(2 * c, c)
         self.head = nn.Conv2d(c, 5, 1)
         _silence(self.head)
         self.zeta = nn.Parameter(torch.tensor(0.3))
@@ -171,7 +203,10 @@ def _silence(layer: nn.Module) -> None:
 
 def _double_conv(inputs: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(
-        nn.Conv2d(inputs, outputs, 3, padding=1), nn.ReLU(), nn.Conv2d(outputs, outputs, 3, padding=1), nn.ReLU()
+        nn.Conv2d(inputs, outputs, 3, padding=1),
+        nn.ReLU(),
+        nn.Conv2d(outputs, outputs, 3, padding=1),
+        nn.ReLU(),
     )
 
 
@@ -181,7 +216,8 @@ class Unified(nn.Module):
     def __init__(self, field: nn.Module, inside: torch.Tensor):
         """inside: [P] bool."""
         super().__init__()
-        self.field, self.inside = field, inside
+        self.field = field
+        self.inside = inside
 
     def forward(self) -> torch.Tensor:
         maps = self.field()

@@ -77,7 +77,8 @@ class Fit:
 
     def run(self) -> FitState:
         """Fit; returns maps and light."""
-        setup, state = self.setup, self.start()
+        setup = self.setup
+        state = self.start()
         if setup.strategy == "white-light-first":
             return self._white_light_first(state)
         settings = setup.settings.materials
@@ -90,11 +91,16 @@ class Fit:
 
     def fit_light(self, state: FitState, materials: Materials) -> None:
         """Find the state's light, under which these materials look like the photo."""
-        start, setup, photo = time.perf_counter(), self.setup, self._photo()
-        settings, problem = setup.settings.light, self.engine.light_problem(materials)
+        start = time.perf_counter()
+        setup = self.setup
+        photo = self._photo()
+        settings = setup.settings.light
+        problem = self.engine.light_problem(materials)
         begin = start_light(photo, settings, setup.prior.light, problem)
         light = envmap_field(settings, begin.radiance, seed=setup.seed)
-        result = fit_light(problem, photo, light, settings, begin, seed=setup.seed, progress=self.progress)
+        result = fit_light(
+            problem, photo, light, settings, begin, seed=setup.seed, progress=self.progress
+        )
         state.envmap = self.prepared_light(light(max(settings.height, 16)))
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 
@@ -107,19 +113,29 @@ class Fit:
         surface = np.zeros(setup.photo.linear.shape[:2], bool)
         surface.reshape(-1)[self.engine.pixels.numpy()] = True
         white = setup.settings.light.white
-        return paste_visible_sky(envmap, setup.photo.linear, surface, setup.photo.camera, white=white)
+        return paste_visible_sky(
+            envmap, setup.photo.linear, surface, setup.photo.camera, white=white
+        )
 
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
         """From the state's maps, which L_cons holds on to."""
-        start, setup = time.perf_counter(), self.setup
-        problem, pixels = self.engine.material_problem(state.envmap), self.engine.pixels
+        start = time.perf_counter()
+        setup = self.setup
+        problem = self.engine.material_problem(state.envmap)
+        pixels = self.engine.pixels
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
-        model = material_field(held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed)
-        results = fit_materials(problem, self._photo()[pixels], model, held, settings, progress=self.progress)
+        model = material_field(
+            held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed
+        )
+        results = fit_materials(
+            problem, self._photo()[pixels], model, held, settings, progress=self.progress
+        )
         summaries = [r.summary() for r in results]
         for first in summaries[:1]:  # the tables are its
-            first["seconds"] += round(time.perf_counter() - start - sum(r.seconds for r in results), 3)
+            first["seconds"] += round(
+                time.perf_counter() - start - sum(r.seconds for r in results), 3
+            )
         state.stages += summaries
         state.maps = model().detach()
 
@@ -128,9 +144,13 @@ class Fit:
         settings = replace(self.setup.settings.materials, remap=False)
         schedule = settings.stages[0].schedule
         state.maps[:, 3:] = 0.5
-        self._fit_materials(state, replace(settings, stages=(MaterialStage(("roughness", "metallic"), schedule),)))
+        self._fit_materials(
+            state, replace(settings, stages=(MaterialStage(("roughness", "metallic"), schedule),))
+        )
         self.fit_light(state, self.materials(state))
-        self._fit_materials(state, replace(settings, stages=(MaterialStage(("albedo",), schedule),)))
+        self._fit_materials(
+            state, replace(settings, stages=(MaterialStage(("albedo",), schedule),))
+        )
         return state
 
     def materials(self, state: FitState) -> Materials:
@@ -183,26 +203,43 @@ class FitResult:
 
 def prepare(setup: FitSetup, progress: Progress | None = None) -> Fit:
     """The mesh, and what renders it."""
-    tick, stages = progress or (lambda *_: None), list[dict]()
-    photo, prior = setup.photo, setup.prior
+    tick = progress or (lambda *_: None)
+    stages = list[dict]()
+    photo = setup.photo
+    prior = setup.prior
     tick("geometry", 0, 1)
-    geometry = timed(stages, "geometry", lambda: build_geometry(
-        prior.depth, prior.normal, photo.camera, tau=setup.tau, completion=setup.completion, seed=setup.seed
-    ))  # fmt: skip
-    renderer = timed(stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device))
+    geometry = timed(
+        stages,
+        "geometry",
+        lambda: build_geometry(
+            prior.depth,
+            prior.normal,
+            photo.camera,
+            tau=setup.tau,
+            completion=setup.completion,
+            seed=setup.seed,
+        ),
+    )
+    renderer = timed(
+        stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device)
+    )
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
     return Fit(setup, geometry, renderer, engine, tuple(stages), progress)
 
 
 def invert(
-    setup: FitSetup, *, progress: Progress | None = None, found: Callable[[str, Any], Any] = lambda *_: None
+    setup: FitSetup,
+    *,
+    progress: Progress | None = None,
+    found: Callable[[str, Any], Any] = lambda *_: None,
 ) -> FitResult:
     """Geometry, light, materials and the path-traced re-rendering of one photo.
 
     found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
     """
     fit = prepare(setup, progress)
-    stages, seed = list(fit.stages), setup.seed
+    stages = list(fit.stages)
+    seed = setup.seed
     if isinstance(fit.engine, TransportEngine):
         timed(stages, "trace", fit.engine.cache.trace)
     state = fit.run()
@@ -212,17 +249,25 @@ def invert(
     found("materials", materials)
     if progress is not None:
         progress("rerender", 0, 1)
-    settings, pixels = setup.settings, setup.photo.linear.shape[0] * setup.photo.linear.shape[1]
+    settings = setup.settings
+    pixels = setup.photo.linear.shape[0] * setup.photo.linear.shape[1]
     fewer = min(1.0, settings.rerender_pixels / pixels)
     each = max(1, (setup.spp or max(8, round(settings.rerender_spp * fewer))) // 2)
-    first, second = timed(stages, "rerender", lambda: [
-        fit.render(materials, state.envmap, each, seed + k) for k in (1, 2)
-    ])  # fmt: skip
-    return FitResult(fit.geometry, materials, state.envmap, (first, second), 2 * each, tuple(stages))
+    first, second = timed(
+        stages,
+        "rerender",
+        lambda: [fit.render(materials, state.envmap, each, seed + k) for k in (1, 2)],
+    )
+    return FitResult(
+        fit.geometry, materials, state.envmap, (first, second), 2 * each, tuple(stages)
+    )
 
 
-def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress: Progress | None) -> Engine:
-    camera, seed = setup.photo.camera, setup.seed
+def _engine(
+    setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress: Progress | None
+) -> Engine:
+    camera = setup.photo.camera
+    seed = setup.seed
     if setup.engine == "path":
         surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
         return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
@@ -231,9 +276,14 @@ def _engine(setup: FitSetup, renderer: RenderScene, geometry: Geometry, progress
     stays = setup.mask is None and setup.strategy == "default" and not settings.remap
     stays &= all("roughness" not in stage.targets for stage in settings.stages)
     return TransportEngine(
-        geometry, camera, radiance, roughness=setup.prior.materials.roughness if stays else None, seed=seed,
-        light_height=setup.settings.light_grid, progress=progress,
-    )  # fmt: skip
+        geometry,
+        camera,
+        radiance,
+        roughness=setup.prior.materials.roughness if stays else None,
+        seed=seed,
+        light_height=setup.settings.light_grid,
+        progress=progress,
+    )
 
 
 def timed(stages: list[dict], name: str, work: Callable[[], Any]) -> Any:

@@ -28,7 +28,9 @@ class LightStart:
     """[h, 2h, 1] scale of the error of its logarithm (Laplace); None where nothing is known of it."""
 
 
-def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | None, problem: LightProblem) -> LightStart:
+def start_light(
+    photo: torch.Tensor, settings: LightSettings, prior: Array | None, problem: LightProblem
+) -> LightStart:
     """Where the light begins, and how far it is trusted.
 
     Without a prior it is grey: as bright as the photo [P, 3] linear demands of an ordinary albedo, since texels that
@@ -38,7 +40,8 @@ def start_light(photo: torch.Tensor, settings: LightSettings, prior: Array | Non
     if prior is None or settings.field != "texels":
         grey = float(min(max(float(photo.mean()) / settings.start_albedo, 1e-3), settings.start))
         return LightStart(photo.new_full((settings.height, 2 * settings.height, 3), grey), None)
-    light, scale = placed(np.ascontiguousarray(prior[..., :3])), placed(prior[..., 3:].copy())
+    light = placed(np.ascontiguousarray(prior[..., :3]))
+    scale = placed(prior[..., 3:].copy())
     radiance = resize_envmap(light, settings.height).clamp_min(1e-3)
     target = photo[problem.pixels]
     with torch.no_grad():
@@ -52,24 +55,33 @@ def envmap_field(settings: LightSettings, start: torch.Tensor, *, seed: int = 0)
     """A fresh field of the kind the settings name; texels begin at `start`, a map [h, 2h, 3]."""
     torch.manual_seed(seed)
     fresh: dict[str, Callable[[], nn.Module]] = {
-        "mlp": EnvmapMLP, "mlp-uv": lambda: EnvmapMLP(coordinates="uv"),
-        "texels": lambda: EnvmapTexels(resize_envmap(start, settings.height)), "sh": EnvmapSH,
-    }  # fmt: skip
+        "mlp": EnvmapMLP,
+        "mlp-uv": lambda: EnvmapMLP(coordinates="uv"),
+        "texels": lambda: EnvmapTexels(resize_envmap(start, settings.height)),
+        "sh": EnvmapSH,
+    }
     if settings.field not in fresh:
         raise InputError(f"Light field is '{settings.field}'; choose mlp, mlp-uv, texels or sh.")
     return fresh[settings.field]().to(torch_device())
 
 
 def fit_light(
-    problem: LightProblem, photo: torch.Tensor, field: nn.Module, settings: LightSettings, start: LightStart, *,
-    seed: int = 0, progress: Progress | None = None,
-) -> StageResult:  # fmt: skip
+    problem: LightProblem,
+    photo: torch.Tensor,
+    field: nn.Module,
+    settings: LightSettings,
+    start: LightStart,
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> StageResult:
     """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
 
     Beyond the paper, what the light differs from `start` by is kept smooth, white and small. photo: [H * W, 3] linear.
     """
     target = photo[problem.pixels]
-    before, trust = resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log(), None
+    before = resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log()
+    trust = None
     angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
     if start.scale is not None:
         trust = angle / angle.mean() / resize_envmap(start.scale, problem.height)
@@ -91,7 +103,9 @@ def fit_light(
     return optimise("light", field.parameters(), loss, settings.schedule, progress=progress)
 
 
-def _at_height(field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator) -> torch.Tensor:
+def _at_height(
+    field: nn.Module, settings: LightSettings, height: int, jitter: torch.Generator
+) -> torch.Tensor:
     """[height, 2 height, 3] of a field of `settings.height` rows: enlarged, or at random points of finer texels."""
     if settings.height <= height:
         return resize_envmap(field(settings.height), height)

@@ -12,12 +12,14 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     x = radiance.clamp_min(0)
     if encoding == "log1p":
         return torch.log1p(x)
-    return torch.where(x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055)
+    return torch.where(
+        x <= 0.0031308, 12.92 * x, 1.055 * x.clamp_min(0.0031308) ** (1 / 2.4) - 0.055
+    )
 
 
 def residual(
     radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, white: float
-) -> torch.Tensor:  # fmt: skip
+) -> torch.Tensor:
     """Encoded rendering minus encoded photo, [..., 3]; no error where it is brighter than a channel of `white`."""
     error = encode(radiance, encoding) - encode(photo, encoding)
     return torch.where(photo >= white, error.clamp_max(0), error)
@@ -30,7 +32,9 @@ def rendering_loss(error: torch.Tensor, loss: Loss = "l1+l2") -> torch.Tensor:
     return error.abs().mean() + error.square().mean()
 
 
-def consistency(maps: torch.Tensor, prior: torch.Tensor, settings: MaterialSettings) -> torch.Tensor:
+def consistency(
+    maps: torch.Tensor, prior: torch.Tensor, settings: MaterialSettings
+) -> torch.Tensor:
     """delta L_cons: mean over pixels of the weighted distance of maps [P, 5] to the prior [P, 5].
 
     It is L1 (paper), or with an `l2` loss the square of the encoded albedo's, roughness's and metallic's change.
@@ -52,4 +56,6 @@ def log_total_variation(log_map: torch.Tensor) -> torch.Tensor:
 
 def log_chroma(log_map: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
     """Mean colourfulness of log radiance [..., 3]: most lights are white. share: [...] what each counts, mean 1."""
-    return (share * ((log_map - log_map.mean(-1, keepdim=True)).square().sum(-1) + 1e-8).sqrt()).mean()
+    return (
+        share * ((log_map - log_map.mean(-1, keepdim=True)).square().sum(-1) + 1e-8).sqrt()
+    ).mean()

@@ -22,15 +22,21 @@ def remapped(prior: torch.Tensor) -> torch.Tensor:
 
 
 def material_field(
-    start: torch.Tensor, settings: MaterialSettings, pixels: torch.Tensor, camera: Camera, *,
-    inside: torch.Tensor | None = None, seed: int = 0,
-) -> nn.Module:  # fmt: skip
+    start: torch.Tensor,
+    settings: MaterialSettings,
+    pixels: torch.Tensor,
+    camera: Camera,
+    *,
+    inside: torch.Tensor | None = None,
+    seed: int = 0,
+) -> nn.Module:
     """A fresh field around `start` [P, 5]; with `inside` [P] bool, roughness and metallic are one value there."""
     torch.manual_seed(seed)
     fresh: dict[str, Callable[[], nn.Module]] = {
-        "mlp": lambda: MaterialMLP(start), "maps": lambda: MaterialMaps(start),
+        "mlp": lambda: MaterialMLP(start),
+        "maps": lambda: MaterialMaps(start),
         "unet": lambda: MaterialUNet(start, pixels, camera.height, camera.width),
-    }  # fmt: skip
+    }
     if settings.field not in fresh:
         raise InputError(f"Material field is '{settings.field}'; choose mlp, maps or unet.")
     field = fresh[settings.field]().to(start.device)
@@ -38,16 +44,23 @@ def material_field(
 
 
 def fit_materials(
-    problem: MaterialProblem, photo: torch.Tensor, field: nn.Module, prior: torch.Tensor, settings: MaterialSettings,
-    *, progress: Progress | None = None,
-) -> list[StageResult]:  # fmt: skip
+    problem: MaterialProblem,
+    photo: torch.Tensor,
+    field: nn.Module,
+    prior: torch.Tensor,
+    settings: MaterialSettings,
+    *,
+    progress: Progress | None = None,
+) -> list[StageResult]:
     """Move `field` stage by stage: argmin L_re + delta L_cons.
 
     photo: [P, 3] linear. prior: [P, 5] maps that L_cons holds on to.
     """
     results = []
     for stage in settings.stages:
-        held = {name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets}
+        held = {
+            name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets
+        }
 
         def loss(_: int, held=held) -> torch.Tensor:
             values = field()
@@ -61,6 +74,8 @@ def fit_materials(
                 base.maps.clamp_(0, 1)
 
         name = "+".join(stage.targets) if held else "materials"
-        run = optimise(name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress)
+        run = optimise(
+            name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress
+        )
         results.append(run)
     return results

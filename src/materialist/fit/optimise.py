@@ -36,8 +36,16 @@ class StageResult:
 class Adam:
     """Adam (Kingma and Ba 2015), step for step `torch.optim.Adam`, which first imports a compiler for seconds."""
 
-    def __init__(self, tensors: list[torch.Tensor], betas: tuple[float, float] = (0.9, 0.999), eps: float = 1e-8):
-        self.tensors, self.betas, self.eps, self.steps = tensors, betas, eps, 0
+    def __init__(
+        self,
+        tensors: list[torch.Tensor],
+        betas: tuple[float, float] = (0.9, 0.999),
+        eps: float = 1e-8,
+    ):
+        self.tensors = tensors
+        self.betas = betas
+        self.eps = eps
+        self.steps = 0
         self.means, self.squares = ([torch.zeros_like(t) for t in tensors] for _ in range(2))
 
     @torch.no_grad()
@@ -45,7 +53,8 @@ class Adam:
         """Move the tensors along their gradients, and forget those."""
         self.steps += 1
         first, second = self.betas
-        rate, root = rate / (1 - first**self.steps), math.sqrt(1 - second**self.steps)
+        rate = rate / (1 - first**self.steps)
+        root = math.sqrt(1 - second**self.steps)
         for tensor, mean, square in zip(self.tensors, self.means, self.squares, strict=True):
             if tensor.grad is None:
                 continue
@@ -56,22 +65,30 @@ class Adam:
 
 
 def optimise(
-    name: str, parameters: Iterable[torch.Tensor], loss: Callable[[int], torch.Tensor], schedule: Schedule, *,
-    after_step: Callable[[], None] | None = None, progress: Progress | None = None,
-) -> StageResult:  # fmt: skip
+    name: str,
+    parameters: Iterable[torch.Tensor],
+    loss: Callable[[int], torch.Tensor],
+    schedule: Schedule,
+    *,
+    after_step: Callable[[], None] | None = None,
+    progress: Progress | None = None,
+) -> StageResult:
     """Minimise `loss(step)` over the tensors `parameters` in place.
 
     It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
     """
     tensors = list(parameters)
     adam = Adam(tensors)
-    best, kept = float("inf"), [t.detach().clone() for t in tensors] if schedule.keep_best else []
-    start, losses = time.perf_counter(), []
+    best = float("inf")
+    kept = [t.detach().clone() for t in tensors] if schedule.keep_best else []
+    start = time.perf_counter()
+    losses = []
     for step in range(schedule.max_steps):
         value = loss(step)
         value.backward()
         if schedule.keep_best and value.item() < best:
-            best, kept = value.item(), [t.detach().clone() for t in tensors]
+            best = value.item()
+            kept = [t.detach().clone() for t in tensors]
         adam.step(schedule.learning_rate * schedule.decay ** (step // schedule.decay_every))
         if after_step is not None:
             with torch.no_grad():
@@ -91,5 +108,6 @@ def _stalled(losses: list[float], schedule: Schedule) -> bool:
     n = schedule.patience
     if n == 0 or len(losses) <= n or len(losses) % 10:
         return False
-    before, recent = min(losses[:-n]), min(losses[-n:])
+    before = min(losses[:-n])
+    recent = min(losses[-n:])
     return recent > before * (1 - schedule.min_improvement)

@@ -22,9 +22,13 @@ from materialist.types import Array, Camera, Mesh
 class BoundarySettings:
     """How far depth is carried on to the corners of pixels, and under the foreground; tuned by eye."""
 
-    extrapolation: float = 2.0  # inverse depth at a pixel's corner stays within this factor of the pixel's own
+    extrapolation: float = (
+        2.0  # inverse depth at a pixel's corner stays within this factor of the pixel's own
+    )
     behind: float = 1e-3  # part of the depth by which a continued background lies behind the foreground, at least
-    overlap: float = 0.02  # pixels by which a tuck that had to leave the background's vertex reaches under it
+    overlap: float = (
+        0.02  # pixels by which a tuck that had to leave the background's vertex reaches under it
+    )
     least_facing: float = 0.02  # least n . v of shading normals (89 degrees), so that every visible point can be shaded
 
 
@@ -45,7 +49,9 @@ def grid_faces(rows: int, columns: int) -> Array:
 def joined_faces(parts: Sequence[Any]) -> tuple[Array, Array]:
     """Vertices [V, 3] and faces [F, 3] int32 of several meshes or bodies as one; faces keep their order."""
     first = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32)
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(
+        np.int32
+    )
     return np.concatenate([part.vertices for part in parts]), faces
 
 
@@ -62,31 +68,50 @@ def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6
     """
     depth, normal = check_maps(depth, normal, camera)
     if not 0 < tau < 90:
-        raise InputError(f"The grazing angle tau is {tau} degrees; choose one between 0 and 90 (the paper uses 6).")
+        raise InputError(
+            f"The grazing angle tau is {tau} degrees; choose one between 0 and 90 (the paper uses 6)."
+        )
     cuts = find_cuts(depth, camera, tau, normal)
-    inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)  # [H, W] 1 / scene unit
-    vertex = corner_vertices(depth > 0, cuts)  # [H, W, 4] vertex of each pixel's corners, -1 without surface
+    inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(
+        np.float64
+    )  # [H, W] 1 / scene unit
+    vertex = corner_vertices(
+        depth > 0, cuts
+    )  # [H, W, 4] vertex of each pixel's corners, -1 without surface
     reach = corner_inverse_depth(inverse, cuts)  # [H, W, 4] 1 / scene unit
     return _assemble(inverse, normal, camera, cuts, vertex, reach)
 
 
 def check_maps(depth: Array, normal: Array, camera: Camera) -> tuple[Array, Array]:
     """Validate depth [H, W] (scene units) and normal [H, W, 3]: float64 and float32 copies, or InputError."""
-    depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float32)
+    depth = np.asarray(depth, np.float64)
+    normal = np.asarray(normal, np.float32)
     size = (camera.height, camera.width)
     if depth.shape != size:
-        raise InputError(f"The depth map is {depth.shape} but the camera is {size} (H, W); make them the same.")
+        raise InputError(
+            f"The depth map is {depth.shape} but the camera is {size} (H, W); make them the same."
+        )
     if normal.shape != (*size, 3):
-        raise InputError(f"The normal map is {normal.shape} but the camera needs {(*size, 3)}; make them the same.")
+        raise InputError(
+            f"The normal map is {normal.shape} but the camera needs {(*size, 3)}; make them the same."
+        )
     if not np.isfinite(depth).all():
         bad = np.count_nonzero(~np.isfinite(depth))
-        raise InputError(f"The depth map has {bad} NaN or infinite values; set them to 0 (no surface).")
+        raise InputError(
+            f"The depth map has {bad} NaN or infinite values; set them to 0 (no surface)."
+        )
     if depth.min() < 0:
-        raise InputError(f"The depth map goes down to {depth.min():g}; depth must be >= 0, with 0 for no surface.")
+        raise InputError(
+            f"The depth map goes down to {depth.min():g}; depth must be >= 0, with 0 for no surface."
+        )
     if not depth.any():
-        raise InputError("The depth map is 0 everywhere, so there is no surface to build; check the depth prediction.")
+        raise InputError(
+            "The depth map is 0 everywhere, so there is no surface to build; check the depth prediction."
+        )
     if not np.isfinite(normal[depth > 0]).all():
-        raise InputError("The normal map has NaN or infinite values on the surface; replace them by unit vectors.")
+        raise InputError(
+            "The normal map has NaN or infinite values on the surface; replace them by unit vectors."
+        )
     return depth, normal
 
 
@@ -97,7 +122,9 @@ def corner_vertices(surface: Array, cuts: Cuts) -> Array:
     component has its own vertex. surface: [H, W] bool.
     """
     # Which of a corner's four pixels have a surface, and which pairs of them are linked: [H+1, W+1] each.
-    before, after, both = (1, 0), (0, 1), (1, 1)
+    before = (1, 0)
+    after = (0, 1)
+    both = (1, 1)
     pixels = np.stack([np.pad(surface, sides) for sides in product((before, after), repeat=2)], -1)
     linked = [
         (TOP_LEFT, TOP_RIGHT, np.pad(cuts.link_x, (before, both))),
@@ -105,7 +132,9 @@ def corner_vertices(surface: Array, cuts: Cuts) -> Array:
         (TOP_LEFT, BOTTOM_LEFT, np.pad(cuts.link_y, (both, before))),
         (TOP_RIGHT, BOTTOM_RIGHT, np.pad(cuts.link_y, (both, after))),
     ]
-    component = np.broadcast_to(np.arange(4), pixels.shape).copy()  # smallest slot of each slot's component
+    component = np.broadcast_to(
+        np.arange(4), pixels.shape
+    ).copy()  # smallest slot of each slot's component
     for _ in range(3):  # the longest chain has three links
         for a, b, link in linked:
             pair = component[..., [a, b]]
@@ -125,8 +154,15 @@ def corner_inverse_depth(inverse: Array, cuts: Cuts) -> Array:
     """
     half_x = _half_step(inverse, cuts.link_x)  # [H, W] change over half a pixel to the right
     half_y = _half_step(inverse.T, cuts.link_y.T).T  # [H, W] ... downwards
-    corners = np.stack([-half_x - half_y, half_x - half_y, half_y - half_x, half_x + half_y], -1) + inverse[..., None]
-    return np.clip(corners, inverse[..., None] / SETTINGS.extrapolation, inverse[..., None] * SETTINGS.extrapolation)
+    corners = (
+        np.stack([-half_x - half_y, half_x - half_y, half_y - half_x, half_x + half_y], -1)
+        + inverse[..., None]
+    )
+    return np.clip(
+        corners,
+        inverse[..., None] / SETTINGS.extrapolation,
+        inverse[..., None] * SETTINGS.extrapolation,
+    )
 
 
 def _half_step(inverse: Array, link: Array) -> Array:
@@ -143,7 +179,9 @@ def _half_step(inverse: Array, link: Array) -> Array:
     return 0.5 * np.where(count == 2, np.clip(mean, -2 * least, 2 * least), mean)
 
 
-def _assemble(inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex: Array, reach: Array) -> Mesh:
+def _assemble(
+    inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex: Array, reach: Array
+) -> Mesh:
     """Front faces and tucks as one Mesh; arrays as in `depth_to_mesh`."""
     height, width = inverse.shape
     surface = inverse > 0
@@ -157,14 +195,20 @@ def _assemble(inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex:
         screen[ids[:, slot], 0] = columns + slot % 2
         screen[ids[:, slot], 1] = rows + slot // 2
     points = rays_through(screen, camera) / mean_inverse[:, None]  # [V, 3]
-    normals = np.stack([np.bincount(ids.ravel(), np.repeat(normal[surface][:, k], 4), count) for k in range(3)], -1)
+    normals = np.stack(
+        [np.bincount(ids.ravel(), np.repeat(normal[surface][:, k], 4), count) for k in range(3)], -1
+    )
     faces = ids[:, QUAD].reshape(-1, 3)  # [2P, 3]
     pixel = np.repeat(rows * width + columns, 2)
 
-    tuck_screen, tuck_inverse, back = _tucks(surface, cuts, vertex, reach, mean_inverse)  # [T, 4, 2], [T, 4], [T]
+    tuck_screen, tuck_inverse, back = _tucks(
+        surface, cuts, vertex, reach, mean_inverse
+    )  # [T, 4, 2], [T, 4], [T]
     tuck_points = (rays_through(tuck_screen, camera) / tuck_inverse[..., None]).reshape(-1, 3)
     tuck_normals = np.repeat(normal.reshape(-1, 3)[back], 4, axis=0)
-    tuck_uv = np.repeat(np.stack([(back % width + 0.5) / width, (back // width + 0.5) / height], -1), 4, axis=0)
+    tuck_uv = np.repeat(
+        np.stack([(back % width + 0.5) / width, (back // width + 0.5) / height], -1), 4, axis=0
+    )
     tuck_faces = (count + np.arange(len(back))[:, None, None] * 4 + QUAD).reshape(-1, 3)
     points = np.concatenate([points, tuck_points])
     return Mesh(
@@ -177,7 +221,9 @@ def _assemble(inverse: Array, normal: Array, camera: Camera, cuts: Cuts, vertex:
     )
 
 
-def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse: Array) -> tuple[Array, Array, Array]:
+def _tucks(
+    surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse: Array
+) -> tuple[Array, Array, Array]:
     """Continue the farther surface of every cut pair under the nearer pixel, over the whole of that pixel.
 
     Returns screen corners [T, 4, 2] (column, row), inverse depth there [T, 4], and the row-major background pixel [T].
@@ -185,14 +231,17 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     """
     width = surface.shape[1]
     front, back, offset = _parted_pairs(surface, cuts, reach.mean(-1))
-    flat_vertex, flat_reach = vertex.reshape(-1, 4), reach.reshape(-1, 4)
+    flat_vertex = vertex.reshape(-1, 4)
+    flat_reach = reach.reshape(-1, 4)
     corner = np.arange(4)
     # Corner c of the front pixel lies at this corner of the back pixel when it is shared, else beyond it.
     column = corner % 2 + offset[:, :1]  # [T, 4] 0 or 1 inside the back pixel
     row = corner // 2 + offset[:, 1:]
     shared = (column >= 0) & (column <= 1) & (row >= 0) & (row <= 1)  # [T, 4]
     slot = np.where(shared, 2 * np.clip(row, 0, 1) + np.clip(column, 0, 1), 0)
-    joint = np.take_along_axis(flat_vertex[back], slot, 1)  # [T, 4] background vertex at shared corners
+    joint = np.take_along_axis(
+        flat_vertex[back], slot, 1
+    )  # [T, 4] background vertex at shared corners
     # Beyond the back pixel its corner values go on linearly: in x the far side is 2 * near - opposite, and so in y.
     grid = flat_reach[back].reshape(-1, 2, 2)
     slope_x = (grid[:, :, 1] - grid[:, :, 0]).mean(1, keepdims=True)  # [T, 1] per pixel
@@ -204,13 +253,21 @@ def _tucks(surface: Array, cuts: Cuts, vertex: Array, reach: Array, mean_inverse
     front_vertex = flat_vertex[front]  # [T, 4]
     tip = shared & (joint == front_vertex)  # the cut ends here: both surfaces share this vertex
     limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - SETTINGS.behind)
-    loose = shared & (inverse > limit)  # the background comes in front at this corner: pass under it
+    loose = shared & (
+        inverse > limit
+    )  # the background comes in front at this corner: pass under it
     # So moved, such a corner must stay behind the front face carried on to there, whose slope is at most this.
     slope = np.ptp(mean_inverse[front_vertex], axis=1, keepdims=True)
     inverse = np.minimum(inverse, limit - 2 * SETTINGS.overlap * slope * loose)
-    torn = (shared & ~tip).any(1)  # a cut whose both ends are tips has not opened, so there is no gap to close
-    screen = np.stack([front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1)
-    straight = (offset == 0).any(1)  # diagonally, such a corner would come out beside the front pixel
+    torn = (shared & ~tip).any(
+        1
+    )  # a cut whose both ends are tips has not opened, so there is no gap to close
+    screen = np.stack(
+        [front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1
+    )
+    straight = (offset == 0).any(
+        1
+    )  # diagonally, such a corner would come out beside the front pixel
     screen = screen - SETTINGS.overlap * (loose & straight[:, None])[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
@@ -235,7 +292,8 @@ def _parted_pairs(surface: Array, cuts: Cuts, inverse: Array) -> tuple[Array, Ar
     first, second = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
     step = np.concatenate([np.tile(pair[2], (len(pair[0]), 1)) for pair in pairs])
     nearer = inverse.ravel()[second] > inverse.ravel()[first]
-    front, back = np.where(nearer, second, first), np.where(nearer, first, second)
+    front = np.where(nearer, second, first)
+    back = np.where(nearer, first, second)
     return front, back, np.where(nearer[:, None], step, -step)
 
 
@@ -250,9 +308,9 @@ def face_camera(normals: Array, points: Array) -> Array:
     facing = (unit * view).sum(-1, keepdims=True)
     aside = unit - facing * view
     aside_length = np.linalg.norm(aside, axis=-1, keepdims=True)
-    turned = SETTINGS.least_facing * view + np.sqrt(1 - SETTINGS.least_facing**2) * aside / np.maximum(
-        aside_length, 1e-6
-    )
+    turned = SETTINGS.least_facing * view + np.sqrt(
+        1 - SETTINGS.least_facing**2
+    ) * aside / np.maximum(aside_length, 1e-6)
     # A normal that points straight away has no nearest turn; it is taken as flipped.
     turned = np.where(aside_length > 1e-6, turned, view)
     unit = np.where(facing < SETTINGS.least_facing, turned, unit)

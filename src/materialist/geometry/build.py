@@ -19,8 +19,14 @@ CREASE = 40.0
 
 
 def build_geometry(
-    depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0, completion: str = "floors", seed: int = 0
-) -> Geometry:  # fmt: skip
+    depth: Array,
+    normal: Array,
+    camera: Camera,
+    *,
+    tau: float = 6.0,
+    completion: str = "floors",
+    seed: int = 0,
+) -> Geometry:
     """Mesh of the depth map (paper, Mesh Reconstruction), with the dominant planes continued where nothing is seen.
 
     depth: [H, W] planar scene units, 0 = none. normal: [H, W, 3] unit, camera frame. tau: degrees in (0, 90).
@@ -29,7 +35,9 @@ def build_geometry(
     """
     completion = "floors" if completion == "auto" else completion
     if completion not in COMPLETIONS:
-        raise InputError(f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}.")
+        raise InputError(
+            f"Completion is '{completion}'; choose one of {', '.join(map(repr, COMPLETIONS))}."
+        )
     mesh = depth_to_mesh(depth, normal, camera, tau=tau)
     label = np.full((camera.height, camera.width), -1, np.int8)  # [H, W] plane of each pixel
     if completion != "none":
@@ -47,22 +55,33 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
     if told.get("completion") in COMPLETIONS:
         completion = told["completion"]
     return build_geometry(
-        depth, normal, camera, tau=float(told.get("tau", 6.0)), completion=completion,
+        depth,
+        normal,
+        camera,
+        tau=float(told.get("tau", 6.0)),
+        completion=completion,
         seed=int(told.get("seed", 0) or 0),
-    )  # fmt: skip
+    )
 
 
 def continued_as(geometry: Geometry, other: Geometry) -> Geometry:
     """The depth surface of one geometry with the continued planes of another, of the same picture size."""
-    own, far = geometry.mesh, other.mesh
-    surface, planes = own.face_plane == -1, far.face_plane >= 0
-    both = lambda a, b: np.concatenate([a, b])  # noqa: E731
+    own = geometry.mesh
+    far = other.mesh
+    surface = own.face_plane == -1
+    planes = far.face_plane >= 0
+
+    def both(a, b):
+        return np.concatenate([a, b])
+
     mesh = Mesh(
-        vertices=both(own.vertices, far.vertices), normals=both(own.normals, far.normals), uv=both(own.uv, far.uv),
+        vertices=both(own.vertices, far.vertices),
+        normals=both(own.normals, far.normals),
+        uv=both(own.uv, far.uv),
         faces=both(own.faces[surface], far.faces[planes] + len(own.vertices)).astype(np.int32),
         face_pixel=both(own.face_pixel[surface], far.face_pixel[planes]),
         face_plane=both(own.face_plane[surface], far.face_plane[planes]),
-    )  # fmt: skip
+    )
     return Geometry(_tidy(mesh), other.plane_label)
 
 
@@ -96,18 +115,26 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     alike = (near >= 0) & (np.einsum("njk,nk->nj", own[near], own[corner // 4]) > cosine)
     alike[np.arange(len(corner)), place[corner]] = True
     # Pixels with the same company share a vertex.
-    key, first, number = np.unique(at * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True)
-    shading = np.where(alike[first][..., None], own[near[first]], 0).sum(1, dtype=np.float64)  # [K, 3]
+    key, first, number = np.unique(
+        at * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True
+    )
+    shading = np.where(alike[first][..., None], own[near[first]], 0).sum(
+        1, dtype=np.float64
+    )  # [K, 3]
     new = vertex.copy()
     new[corner] = len(mesh.vertices) + number  # after the vertices there were
     points = mesh.vertices[key // 16]
-    return _tidy(replace(
-        mesh,
-        vertices=np.concatenate([mesh.vertices, points]),
-        normals=np.concatenate([mesh.normals, face_camera(shading, points)]),
-        uv=np.concatenate([mesh.uv, mesh.uv[key // 16]]),
-        faces=np.concatenate([new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(own) :]]).astype(np.int32),
-    ))  # fmt: skip
+    return _tidy(
+        replace(
+            mesh,
+            vertices=np.concatenate([mesh.vertices, points]),
+            normals=np.concatenate([mesh.normals, face_camera(shading, points)]),
+            uv=np.concatenate([mesh.uv, mesh.uv[key // 16]]),
+            faces=np.concatenate(
+                [new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(own) :]]
+            ).astype(np.int32),
+        )
+    )
 
 
 def pixel_corners(mesh: Mesh, surface: Array) -> Array:

@@ -24,15 +24,27 @@ class CompletionSettings:
     behind: float = 0.01  # part of the depth by which a continuation lies behind the observed surface; tuned by eye
     extent: float = 2.0  # from the plane's visible middle: under the camera and somewhat behind it; tuned by eye
     ground_extent: float = 20.0  # the same for ground under open sky; tuned by eye
-    sky_share: float = 0.05  # share of the picture without a surface from which a scene counts as outdoors
+    sky_share: float = (
+        0.05  # share of the picture without a surface from which a scene counts as outdoors
+    )
     upward: float = 0.5  # least Y of the normal of a floor, as of `drop`: a table seen from above has 0.6; by eye
-    wall_reach: float = 0.8  # extent of a wall in its own seen size, beyond the picture; tuned on 8 scenes
-    wall_behind: float = 1.2  # the same for what lies behind things that the picture shows; tuned on 8 scenes
+    wall_reach: float = (
+        0.8  # extent of a wall in its own seen size, beyond the picture; tuned on 8 scenes
+    )
+    wall_behind: float = (
+        1.2  # the same for what lies behind things that the picture shows; tuned on 8 scenes
+    )
     bounding: float = 0.9  # share of the other points in front of a plane from which it bounds the scene (floor, wall)
     touch: float = 0.2  # share of a frame side that a plane must cover to go on across it
-    one_side: float = 0.9  # share of a plane's pixels on one side of another for the planes to stop at each other
-    cells: int = 256  # cells of a continuation along the picture's longer side; at least a pixel each
-    rim: float = 0.01  # pixels by which the part beyond the frame keeps clear of it, against round-off
+    one_side: float = (
+        0.9  # share of a plane's pixels on one side of another for the planes to stop at each other
+    )
+    cells: int = (
+        256  # cells of a continuation along the picture's longer side; at least a pixel each
+    )
+    rim: float = (
+        0.01  # pixels by which the part beyond the frame keeps clear of it, against round-off
+    )
     cell: float = 0.2  # size of a continuation's cells beyond the frame, part of the distance from its middle; by eye
 
 
@@ -58,7 +70,9 @@ class _Sheet:
     """Radius about its middle within which it goes on behind what the picture shows, scene units."""
 
 
-def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, walls: bool = False) -> Mesh:
+def complete(
+    mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, walls: bool = False
+) -> Mesh:
     """Append the continuations of the planes to the mesh of the depth map.
 
     mesh: from `depth_to_mesh`, whose faces come first. depth: [H, W] planar scene units, 0 = none.
@@ -71,7 +85,9 @@ def complete(mesh: Mesh, planes: list[Plane], depth: Array, camera: Camera, *, w
     depth = np.asarray(depth, np.float64)
     sheets = _sheets(planes, depth, camera)
     parts = [mesh]
-    farthest = _farthest_shown(mesh, depth)  # [H, W] smallest inverse depth of each pixel's front faces
+    farthest = _farthest_shown(
+        mesh, depth
+    )  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
         stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
         found = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
@@ -93,7 +109,10 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
     found = []
     for index, plane in enumerate(planes):
         others = points[surface & ~plane.mask]
-        bounding = not len(others) or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > SETTINGS.bounding
+        bounding = (
+            not len(others)
+            or np.mean(others @ plane.normal - plane.offset > -0.02 * radius) > SETTINGS.bounding
+        )
         sides = plane.mask[-1], plane.mask[:, 0], plane.mask[:, -1], plane.mask[0]
         touches = tuple(bool(side.mean() > SETTINGS.touch) for side in sides)
         # A plane through the camera would cut the view open.
@@ -106,7 +125,8 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
         outdoors = np.mean(~surface) > SETTINGS.sky_share and plane.normal[1] > SETTINGS.upward
         half = behind = (SETTINGS.ground_extent if outdoors else SETTINGS.extent) * radius
         if plane.normal[1] < SETTINGS.upward:
-            half, behind = min(half, SETTINGS.wall_reach * _size(own)), min(behind, SETTINGS.wall_behind * _size(own))
+            half = min(half, SETTINGS.wall_reach * _size(own))
+            behind = min(behind, SETTINGS.wall_behind * _size(own))
         found.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, half, behind))
     return found
 
@@ -148,16 +168,25 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
     height, width = farthest.shape
     cell = max(1, max(height, width) // SETTINGS.cells)
     xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
-    rays = rays_through(np.stack(np.meshgrid(xs, ys), -1), camera)  # [h+1, w+1, 3] through the cell corners
-    reach = rays @ (sheet.plane.normal / sheet.plane.offset)  # [h+1, w+1] inverse depth of the plane; <= 0: never
+    rays = rays_through(
+        np.stack(np.meshgrid(xs, ys), -1), camera
+    )  # [h+1, w+1, 3] through the cell corners
+    reach = rays @ (
+        sheet.plane.normal / sheet.plane.offset
+    )  # [h+1, w+1] inverse depth of the plane; <= 0: never
     points = rays / np.maximum(reach, 1e-9)[..., None]
     allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)
     close = (reach > 0) & (np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.behind)
     reach4, allowed4, close4, points4 = (  # [h, w, 4, ...] counter-clockwise seen from the camera
-        np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2) for g in (reach, allowed, close, points)
+        np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2)
+        for g in (reach, allowed, close, points)
     )
-    hidden = np.where(sheet.plane.mask, 0, farthest)  # on the plane's own pixels there is nothing to add
-    hidden = np.minimum.reduceat(np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1)  # [h, w] farthest in the cell
+    hidden = np.where(
+        sheet.plane.mask, 0, farthest
+    )  # on the plane's own pixels there is nothing to add
+    hidden = np.minimum.reduceat(
+        np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1
+    )  # [h, w] farthest in the cell
     # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
     keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - SETTINGS.behind) * hidden)
     if not sheet.bounding:
@@ -172,14 +201,19 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
     reach = np.arcsinh(sheet.half / spread)
     # Cells grow with the distance from the middle, from as far away as the visible points are in the mean.
-    along = spread * np.sinh(np.linspace(-reach, reach, 2 * int(np.ceil(reach / SETTINGS.cell)) + 1))
+    along = spread * np.sinh(
+        np.linspace(-reach, reach, 2 * int(np.ceil(reach / SETTINGS.cell)) + 1)
+    )
     places = np.stack(np.meshgrid(along, -along), -1).reshape(-1, 2)
     rest = origin + places @ axes(sheet.plane.normal), grid_faces(len(along), len(along))
     for wall in walls:
         rest = _cut(rest, wall)
-    side_x, side_y = (camera.width / 2 + SETTINGS.rim) / camera.focal, (camera.height / 2 + SETTINGS.rim) / camera.focal
+    side_x = (camera.width / 2 + SETTINGS.rim) / camera.focal
+    side_y = (camera.height / 2 + SETTINGS.rim) / camera.focal
     # a . p >= 0 inside the frustum: bottom, left, right, top
-    frustum = np.array([[0.0, 1, -side_y, 0], [1, 0, -side_x, 0], [-1, 0, -side_x, 0], [0, -1, -side_y, 0]])
+    frustum = np.array(
+        [[0.0, 1, -side_y, 0], [1, 0, -side_x, 0], [-1, 0, -side_x, 0], [0, -1, -side_y, 0]]
+    )
     pieces = [np.zeros((0, 3, 3))]
     for inward, touched in zip(frustum, sheet.touches):
         if sheet.bounding or touched:
@@ -191,7 +225,8 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
 
 def _cut(surface: tuple[Array, Array], half_space: Array) -> tuple[Array, Array]:
     """The part of a surface (points [V, 3], faces [F, 3]) in a half-space [4], a . p + b >= 0."""
-    normal, offset = half_space[:3], half_space[3]
+    normal = half_space[:3]
+    offset = half_space[3]
     points, faces, _ = slice_faces_plane(*surface, normal, -offset / (normal @ normal) * normal)
     return points, faces
 
@@ -201,7 +236,13 @@ def _patch(sheet: _Sheet, corners: Array, camera: Camera) -> Mesh:
     count, sides = corners.shape[:2]
     triangles = np.array([[0, 1, 2], [0, 2, 3]][: sides - 2])
     nearest = sheet.pixels[cKDTree(sheet.points).query(corners.mean(1))[1]]  # [N]
-    uv = np.stack([(nearest % camera.width + 0.5) / camera.width, (nearest // camera.width + 0.5) / camera.height], -1)
+    uv = np.stack(
+        [
+            (nearest % camera.width + 0.5) / camera.width,
+            (nearest // camera.width + 0.5) / camera.height,
+        ],
+        -1,
+    )
     vertices = corners.reshape(-1, 3).astype(np.float32)
     return Mesh(
         vertices=vertices,

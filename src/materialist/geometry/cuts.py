@@ -12,7 +12,9 @@ from materialist.types import Array, Camera
 class CutSettings:
     """Which steps in depth are the surface's own; tuned by eye unless derived."""
 
-    support: int = 3  # pixels beside a pair over which a slope must hold to count as the surface's own
+    support: int = (
+        3  # pixels beside a pair over which a slope must hold to count as the surface's own
+    )
     slanted: float = 25.0  # degrees from grazing: where normals face the camera more, a steep slope is a smeared edge
     steady: float = 2.0  # factor by which a step may exceed a steady slope, as on a plane
     bending: float = 3.0  # what a slope that grows towards the pair adds to that factor, times the share it grows by
@@ -51,14 +53,19 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     points = unproject(depth, camera).astype(np.float64)  # [H, W, 3] scene units
     inverse = np.where(surface, 1.0 / np.where(surface, depth, 1.0), 0.0)  # [H, W] 1 / scene unit
     grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
-    slanted = np.ones(depth.shape, bool)  # [H, W] whether the normals are near enough to grazing for a slope
+    slanted = np.ones(
+        depth.shape, bool
+    )  # [H, W] whether the normals are near enough to grazing for a slope
     if normal is not None:
-        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(np.radians(SETTINGS.slanted))
+        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(
+            np.radians(SETTINGS.slanted)
+        )
     steep_x = _exceeds_slope(inverse, surface) | ~(slanted[:, :-1] | slanted[:, 1:])
     steep_y = _exceeds_slope(inverse.T, surface.T).T | ~(slanted[:-1] | slanted[1:])
     pair_x = surface[:, :-1] & surface[:, 1:]
     pair_y = surface[:-1] & surface[1:]
-    cut_x, cut_y = pair_x & grazing_x & steep_x, pair_y & grazing_y & steep_y
+    cut_x = pair_x & grazing_x & steep_x
+    cut_y = pair_y & grazing_y & steep_y
     return Cuts(pair_x & ~cut_x, pair_y & ~cut_y, cut_x, cut_y)
 
 
@@ -72,14 +79,21 @@ def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Ar
     # Both diagonals of every 2x2 block, so that the result does not depend on how the block is split.
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
         corner = _block(points, row, column)  # the right-angled vertex; [H-1, W-1, 3]
-        along_x, along_y = _block(points, row, 1 - column), _block(points, 1 - row, column)
-        whole = _block(surface, row, column) & _block(surface, row, 1 - column) & _block(surface, 1 - row, column)
+        along_x = _block(points, row, 1 - column)
+        along_y = _block(points, 1 - row, column)
+        whole = (
+            _block(surface, row, column)
+            & _block(surface, row, 1 - column)
+            & _block(surface, 1 - row, column)
+        )
         grazing = whole & (_triangle_angle(corner, along_x, along_y) < tau)  # [H-1, W-1]
         near_x[row : row + height - 1] |= grazing
         near_y[:, column : column + width - 1] |= grazing
     # A pair below tau by itself is cut even where a thin structure leaves no whole triangle.
     wide = np.sqrt(2) * tau
-    return (angle_x < tau) | (near_x & (angle_x < wide)), (angle_y < tau) | (near_y & (angle_y < wide))
+    return (angle_x < tau) | (near_x & (angle_x < wide)), (angle_y < tau) | (
+        near_y & (angle_y < wide)
+    )
 
 
 def _block(grid: Array, row: int, column: int) -> Array:
@@ -92,12 +106,15 @@ def _triangle_angle(a: Array, b: Array, c: Array) -> Array:
     normal = np.cross(b - a, c - a)
     centroid = a + b + c
     length = np.linalg.norm(normal, axis=-1) * np.linalg.norm(centroid, axis=-1)
-    return np.arcsin(np.minimum(np.abs((normal * centroid).sum(-1)) / np.maximum(length, 1e-300), 1))
+    return np.arcsin(
+        np.minimum(np.abs((normal * centroid).sum(-1)) / np.maximum(length, 1e-300), 1)
+    )
 
 
 def _edge_angle(a: Array, b: Array) -> Array:
     """Angle [...] in radians, [0, pi/2], between the segment a-b [..., 3] and the view ray through its middle."""
-    edge, view = b - a, a + b
+    edge = b - a
+    view = a + b
     cross = np.linalg.norm(np.cross(edge, view), axis=-1)
     return np.arctan2(cross, np.abs((edge * view).sum(-1)))
 
@@ -109,7 +126,10 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
     step = np.where(pair, inverse[:, 1:] - inverse[:, :-1], 0.0)  # [H, W-1] 1 / (scene unit pixel)
     allowed = np.zeros_like(step)
     for side in (-1, 1):
-        least, first = np.full_like(step, np.inf), np.zeros_like(step)  # smallest slope, and the one next to the pair
+        least, first = (
+            np.full_like(step, np.inf),
+            np.zeros_like(step),
+        )  # smallest slope, and the one next to the pair
         held = np.ones(step.shape, bool)  # no hole and no picture rim met so far
         for reach in range(1, min(SETTINGS.support, width - 2) + 1):
             here, there = (slice(reach, None), slice(None, -reach))[::side]
@@ -123,5 +143,7 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
         steady = np.isfinite(least) & (least > 0)
         least = np.where(steady, least, 1)
         bending = first * (SETTINGS.steady + SETTINGS.bending * (first / least - 1))
-        allowed = np.maximum(allowed, np.where(steady, np.minimum(bending, SETTINGS.most * least), 0))
+        allowed = np.maximum(
+            allowed, np.where(steady, np.minimum(bending, SETTINGS.most * least), 0)
+        )
     return np.abs(step) > allowed

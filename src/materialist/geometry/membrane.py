@@ -51,7 +51,8 @@ def _halved(values: Array) -> Array:
 def _relaxed(values: Array, known: Array) -> Array:
     """Each unknown place becomes the mean of its four neighbours, over and over; only around the unknown ones."""
     around = window(~known, margin=1)
-    part, free = values[around].copy(), ~known[around]
+    part = values[around].copy()
+    free = ~known[around]
     for _ in range(_SWEEPS):
         framed = np.pad(part, ((1, 1), (1, 1), (0, 0)), mode="edge")
         mean = (framed[:-2, 1:-1] + framed[2:, 1:-1] + framed[1:-1, :-2] + framed[1:-1, 2:]) / 4

@@ -20,12 +20,22 @@ class PlaneSettings:
     samples: int = 12_000  # points that take part in the search; labels are made for every pixel
     hypotheses: int = 400  # planes that are tried
     tolerance: float = 0.025  # error of a pixel on a plane; networks bend planes by about this much
-    bent: float = 0.08  # error up to which a plane grows, where connected: a bent table top stays one plane
-    step: float = 0.01  # change of the error between neighbours that ends the growth: the rim of a book
+    bent: float = (
+        0.08  # error up to which a plane grows, where connected: a bent table top stays one plane
+    )
+    step: float = (
+        0.01  # change of the error between neighbours that ends the growth: the rim of a book
+    )
     small_picture: int = 150  # pixels along the longer side below which `step` grows in proportion
-    same_normal: float = np.cos(np.radians(25.0))  # normals of a plane's pixels agree with their mean
-    flat: float = np.cos(np.radians(10.0))  # half of them even so: on a ball they spread evenly up to the bound above
-    like_geometry: float = np.cos(np.radians(55.0))  # the mean agrees with the plane: networks' relief is not metric
+    same_normal: float = np.cos(
+        np.radians(25.0)
+    )  # normals of a plane's pixels agree with their mean
+    flat: float = np.cos(
+        np.radians(10.0)
+    )  # half of them even so: on a ball they spread evenly up to the bound above
+    like_geometry: float = np.cos(
+        np.radians(55.0)
+    )  # the mean agrees with the plane: networks' relief is not metric
     most: int = 4  # planes that are reported
     least: float = 0.05  # least share of the pixels with a surface
     speck: float = 0.004  # connected patches below this share of the picture are chance agreement
@@ -69,7 +79,9 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
     found: list[_Fit] = []
     free = small.depth > 0  # [h, w]
     least = SETTINGS.least * free.sum()
-    for _ in range(2 * SETTINGS.most):  # some of the candidates are unsound and only use up their pixels
+    for _ in range(
+        2 * SETTINGS.most
+    ):  # some of the candidates are unsound and only use up their pixels
         if len(found) == SETTINGS.most or free.sum() < max(3.0, least):
             break
         fit = _best_fit(small, free, rng)
@@ -130,9 +142,14 @@ class _Fit:
 
 def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None:
     """The plane that most of the free pixels [H, W] agree with, or None if there is no such thing."""
-    rays, facing, depth = maps.rays[free], maps.normal[free], maps.depth[free]  # [N, 3], [N, 3], [N]
+    rays, facing, depth = (
+        maps.rays[free],
+        maps.normal[free],
+        maps.depth[free],
+    )  # [N, 3], [N, 3], [N]
     count = len(depth)
-    best, best_score = None, 2
+    best = None
+    best_score = 2
     for _ in range(SETTINGS.hypotheses):
         seed = facing[rng.integers(count)]
         draw = rng.integers(count, size=12)
@@ -143,11 +160,14 @@ def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None
         close = np.abs(depth * (rays @ coefficients) - 1) < SETTINGS.tolerance
         score = int(np.count_nonzero(close & (facing @ seed > SETTINGS.same_normal)))
         if score > best_score:
-            best, best_score = _Fit(coefficients, seed), score
+            best = _Fit(coefficients, seed)
+            best_score = score
     for _ in range(5):
         if best is None:
             return None
-        best = _refit(maps, free & maps.alike(best) & (np.abs(maps.error(best)) < SETTINGS.tolerance))
+        best = _refit(
+            maps, free & maps.alike(best) & (np.abs(maps.error(best)) < SETTINGS.tolerance)
+        )
     return best
 
 
@@ -185,7 +205,8 @@ def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
     core = alike & (np.abs(error) < SETTINGS.tolerance)
     wide = alike & (np.abs(error) < SETTINGS.bent)
     step = SETTINGS.step * max(1.0, SETTINGS.small_picture / max(error.shape))
-    jump_x, jump_y = np.abs(np.diff(error, axis=1)) > step, np.abs(np.diff(error, axis=0)) > step
+    jump_x = np.abs(np.diff(error, axis=1)) > step
+    jump_y = np.abs(np.diff(error, axis=0)) > step
     calm = wide.copy()
     calm[:, 1:] &= ~jump_x
     calm[1:] &= ~jump_y
@@ -202,7 +223,9 @@ def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
         label = np.where(error < nearest, k, label)
         nearest = np.minimum(nearest, error)
     planes = []
-    speck = int(np.ceil(SETTINGS.speck * surface.size)) - 1  # pixels of the largest patch that is chance
+    speck = (
+        int(np.ceil(SETTINGS.speck * surface.size)) - 1
+    )  # pixels of the largest patch that is chance
     for k, fit in enumerate(found):
         mask = remove_small_objects(label == k, max_size=speck)
         if mask.sum() < SETTINGS.least * surface.sum():

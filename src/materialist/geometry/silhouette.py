@@ -12,22 +12,29 @@ def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
     """[H, W] bool: pixels of the mask that have a surface. Raises InputError for other sizes or when none is left."""
     size = (camera.height, camera.width)
     if np.shape(mask) != size or np.shape(depth) != size:
-        raise InputError(f"The mask is {np.shape(mask)} and the depth {np.shape(depth)}; the camera needs {size}.")
+        raise InputError(
+            f"The mask is {np.shape(mask)} and the depth {np.shape(depth)}; the camera needs {size}."
+        )
     inside = (np.asarray(mask) > 0.5) & (np.asarray(depth) > 0)
     if not inside.any():
         raise InputError("The mask covers no surface; mark an object.")
     return inside
 
 
-def window(mask: Array, native: tuple[int, ...] | None = None, margin: int = 0) -> tuple[slice, slice]:
+def window(
+    mask: Array, native: tuple[int, ...] | None = None, margin: int = 0
+) -> tuple[slice, slice]:
     """Rows and columns of the pixels of a mask [H, W] bool that is not empty, and of `margin` around them.
 
     native: size of a larger picture whose rows and columns they are; None: those of the mask.
     """
     sides = []
     for axis in (0, 1):
-        where, count = np.flatnonzero(mask.any(1 - axis)), mask.shape[axis]
-        first, last, size = max(where[0] - margin, 0), min(where[-1] + 1 + margin, count), (native or mask.shape)[axis]
+        where = np.flatnonzero(mask.any(1 - axis))
+        count = mask.shape[axis]
+        first = max(where[0] - margin, 0)
+        last = min(where[-1] + 1 + margin, count)
+        size = (native or mask.shape)[axis]
         sides.append(slice(int(first * size // count), int(-(-last * size // count))))
     return sides[0], sides[1]
 
@@ -60,7 +67,9 @@ def silhouette_field(inside: Array) -> Array:
     """[H, W] pixels to the silhouette, > 0 inside: the pixels' stairs are smoothed, straight edges keep their place."""
     framed = np.pad(inside, 1)
     signed = distance_transform_edt(framed) - distance_transform_edt(~framed)
-    signed = signed - 0.5 * np.sign(signed)  # pixel centres lie half a pixel from the border between pixels
+    signed = signed - 0.5 * np.sign(
+        signed
+    )  # pixel centres lie half a pixel from the border between pixels
     return gaussian_filter(np.clip(signed, -6, 6), 0.8)[1:-1, 1:-1]
 
 

@@ -22,15 +22,23 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
     weight = np.exp(-(x**2 + y**2) / (2 * max(sigma, SHARP) ** 2))
     basis = np.ones_like(x), x, y
-    total = lambda a, kernel: correlate(a, kernel * weight, mode="constant")  # noqa: E731
+
+    def total(a, kernel):
+        return correlate(a, kernel * weight, mode="constant")
+
     # Numbers near 1 keep the sums exact.
-    mean, spread = values[known].mean(), max(float(values[known].std()), 1e-30)
+    mean = values[known].mean()
+    spread = max(float(values[known].std()), 1e-30)
     own = np.where(known, (values - mean) / spread, 0)
     inside = known.astype(np.float64)
-    moments = np.stack([np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2)  # [H, W, 3, 3]
+    moments = np.stack(
+        [np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2
+    )  # [H, W, 3, 3]
     # A window without a spread in some direction says that the map is level along it.
     moments = moments + np.diag([1e-9, 1e-6, 1e-6]) + np.eye(3) * ~known[..., None, None]
-    found = np.linalg.solve(moments, np.stack([total(own, a) for a in basis], -1)[..., None])[..., 0]
+    found = np.linalg.solve(moments, np.stack([total(own, a) for a in basis], -1)[..., None])[
+        ..., 0
+    ]
     return found[..., 1] * spread, found[..., 2] * spread
 
 
@@ -50,7 +58,9 @@ def back_normals(back: Array, known: Array, rays: Array, sigma: float = SHARP) -
     back: [H, W] planar depth, scene units. known: [H, W] bool. sigma: of the window of `depth_slopes`, pixels.
     rays: [H, W, 3] through the pixels at z = -1, evenly spaced.
     """
-    depth = np.where(known, back, 1).astype(np.float64)  # 1/z of a plane is linear: its slopes are exact
+    depth = np.where(known, back, 1).astype(
+        np.float64
+    )  # 1/z of a plane is linear: its slopes are exact
     right, down = depth_slopes(1 / depth, known, sigma)
     step = spacing(rays)
     # d log z = -z d(1/z); the tangents of z r are z (r d log z + dr).
@@ -72,5 +82,8 @@ def blurred_normals(normal: Array, inside: Array, sigma: float) -> Array:
 def sampled(values: Array, place: Array, order: int = 3) -> Array:
     """[V, ...] of a map [H, W, ...] at places [V, 2] (x, y), by splines: with cubic ones normals turn evenly."""
     flat = np.asarray(values, np.float64).reshape(*values.shape[:2], -1)
-    read = [map_coordinates(flat[..., k], place.T[::-1], order=order, mode="nearest") for k in range(flat.shape[-1])]
+    read = [
+        map_coordinates(flat[..., k], place.T[::-1], order=order, mode="nearest")
+        for k in range(flat.shape[-1])
+    ]
     return np.stack(read, -1).reshape(len(place), *values.shape[2:])

@@ -55,7 +55,9 @@ def _is_scene_file(folder: Path, name: str) -> bool:
 
 
 SCENE = FolderKind("a scene package", MARKER, _is_scene_file)
-FRAMES = FolderKind("a folder of frames", None, lambda _, name: re.fullmatch(r"\d+\.png", name) is not None)
+FRAMES = FolderKind(
+    "a folder of frames", None, lambda _, name: re.fullmatch(r"\d+\.png", name) is not None
+)
 
 
 def make_folder(folder: Path) -> None:
@@ -70,7 +72,9 @@ def make_folder(folder: Path) -> None:
 def partial(path: Path, suffix: str | None = None) -> Path:
     """Where this thread writes PATH until it is whole; the suffix is PATH's, in small letters, unless one is given."""
     suffix = path.suffix.lower() if suffix is None else suffix
-    return path.with_name(f"{_stem(path)}partial-{os.getpid()}-{_MARK}{threading.get_ident():x}{suffix}")
+    return path.with_name(
+        f"{_stem(path)}partial-{os.getpid()}-{_MARK}{threading.get_ident():x}{suffix}"
+    )
 
 
 @contextmanager
@@ -79,7 +83,9 @@ def writing(path: str | Path, temporary: Path | None = None) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(f"{path} cannot be written: {(error.strerror or str(error)).lower()}.") from error
+        raise OutputError(
+            f"{path} cannot be written: {(error.strerror or str(error)).lower()}."
+        ) from error
     except OutputError as error:
         raise OutputError(str(error).replace(str(temporary), str(path))) from error
 
@@ -88,7 +94,9 @@ def require_parent(path: str | Path) -> None:
     """Raise OutputError where the folder that PATH lies in is not there: its name may be misspelt."""
     parent = _absolute(path).parent
     if not os.path.lexists(parent):
-        raise OutputError(f"There is no folder {parent} for {Path(path).name}; correct the name, or: mkdir -p {parent}")
+        raise OutputError(
+            f"There is no folder {parent} for {Path(path).name}; correct the name, or: mkdir -p {parent}"
+        )
 
 
 def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | None = SCENE) -> None:
@@ -108,18 +116,26 @@ def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | No
         probe.unlink()
 
 
-def _require_replaceable(path: str | Path, target: Path, force: bool, kind: FolderKind | None) -> None:
+def _require_replaceable(
+    path: str | Path, target: Path, force: bool, kind: FolderKind | None
+) -> None:
     if kind is None and target.is_dir():
         raise OutputError(f"{path} is a folder; give a file's name.")
     if not force:
         raise OutputError(f"{path} exists; give `force=True` to replace it, or another name.")
     if target.is_symlink():
-        raise OutputError(f"{path} is a link, which `force=True` will not replace; give what it leads to.")
+        raise OutputError(
+            f"{path} is a link, which `force=True` will not replace; give what it leads to."
+        )
     if kind is None:
         return
-    marked = target.is_dir() and (kind.marker is None or (target / kind.marker).is_file() or not any(target.iterdir()))
+    marked = target.is_dir() and (
+        kind.marker is None or (target / kind.marker).is_file() or not any(target.iterdir())
+    )
     if not marked:
-        raise OutputError(f"{path} is not {kind.called}, so `force=True` will not replace it; give another name.")
+        raise OutputError(
+            f"{path} is not {kind.called}, so `force=True` will not replace it; give another name."
+        )
     for name in files_below(target):
         if not kind.is_member(target, name):
             raise OutputError(
@@ -174,7 +190,9 @@ def whole_folder(path: str | Path, force: bool = False, kind: FolderKind = SCENE
 def files_below(folder: Path) -> list[str]:
     """Names of the files in and below a folder, without those that file managers leave."""
     files = (file for file in folder.rglob("*") if file.is_symlink() or not file.is_dir())
-    return sorted(file.relative_to(folder).as_posix() for file in files if file.name not in FILE_MANAGER_FILES)
+    return sorted(
+        file.relative_to(folder).as_posix() for file in files if file.name not in FILE_MANAGER_FILES
+    )
 
 
 def interrupted_replacement(path: str | Path) -> Path | None:
@@ -182,7 +200,14 @@ def interrupted_replacement(path: str | Path) -> Path | None:
     target = _absolute(path)
     if target.exists() or not target.parent.is_dir():
         return None
-    return next((p for p in sorted(target.parent.iterdir()) if p.name.startswith(_stem(target) + "replaced-")), None)
+    return next(
+        (
+            p
+            for p in sorted(target.parent.iterdir())
+            if p.name.startswith(_stem(target) + "replaced-")
+        ),
+        None,
+    )
 
 
 def _put_in_place(temporary: Path, target: Path) -> None:
@@ -203,7 +228,9 @@ def _put_in_place(temporary: Path, target: Path) -> None:
 def _sweep(target: Path) -> None:
     """Remove what killed runs left; an old folder moved aside goes back when nothing has taken its place."""
     for leftover in sorted(target.parent.iterdir()):
-        name = re.fullmatch(re.escape(_stem(target)) + r"(partial|replaced)-(\d+)\b.*", leftover.name)
+        name = re.fullmatch(
+            re.escape(_stem(target)) + r"(partial|replaced)-(\d+)\b.*", leftover.name
+        )
         if name is None or (psutil.pid_exists(int(name[2])) and int(name[2]) != os.getpid()):
             continue
         if name[1] == "replaced" and not target.exists():

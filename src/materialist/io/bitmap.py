@@ -68,17 +68,25 @@ def check_size(width: int, height: int, name: object) -> None:
             f"{MAX_PIXELS / 1e6:.0f}: shrink it first."
         )
     if min(width, height) < MIN_SIDE:
-        raise InputError(f"{name} is {width} x {height} pixels; at least {MIN_SIDE} on each side are needed.")
+        raise InputError(
+            f"{name} is {width} x {height} pixels; at least {MIN_SIDE} on each side are needed."
+        )
     if max(width, height) > MAX_ASPECT * min(width, height):
-        raise InputError(f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to what matters.")
+        raise InputError(
+            f"{name} is {width} x {height} pixels, longer than {MAX_ASPECT}:1; crop it to what matters."
+        )
 
 
-def light_and_alpha(light: Array, alpha: Array | None, warnings: list[str] | None = None) -> Decoded:
+def light_and_alpha(
+    light: Array, alpha: Array | None, warnings: list[str] | None = None
+) -> Decoded:
     """A scene-linear file of [H, W, 3] light with [H, W, 1] alpha, which is dropped where it is opaque."""
     notes = warnings or []
     if alpha is None or bool(np.all(alpha >= 1)):
         return Decoded(light, True, warnings=notes)
-    return Decoded(light, True, warnings=[*notes, OVER_WHITE], alpha=np.clip(alpha.astype(np.float32), 0, 1))
+    return Decoded(
+        light, True, warnings=[*notes, OVER_WHITE], alpha=np.clip(alpha.astype(np.float32), 0, 1)
+    )
 
 
 def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
@@ -87,7 +95,9 @@ def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
     A shape that no camera or film has is not believed, with a warning. Raises InputError for what becomes too large.
     """
     if not 1 / _PIXEL_SHAPE <= shape <= _PIXEL_SHAPE:
-        decoded.warnings.append(f"The file states pixels of {shape:g}:1, which are taken as square.")
+        decoded.warnings.append(
+            f"The file states pixels of {shape:g}:1, which are taken as square."
+        )
         return decoded
     if abs(shape - 1) < 1e-3:
         return decoded
@@ -97,7 +107,9 @@ def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
     decoded.linear = np.asarray(cv2.resize(decoded.linear, size, interpolation=cv2.INTER_LINEAR))
     if decoded.alpha is not None:
         decoded.alpha = cv2.resize(decoded.alpha, size, interpolation=cv2.INTER_LINEAR)[..., None]
-    decoded.warnings.append(f"The file's pixels are {shape:.4g}:1; the photo is stretched to square ones.")
+    decoded.warnings.append(
+        f"The file's pixels are {shape:.4g}:1; the photo is stretched to square ones."
+    )
     return decoded
 
 
@@ -116,14 +128,22 @@ def read_bitmap(path: Path) -> Decoded:
         bits = int(image.info.get("bit_depth", 8)) if image.format == "HEIF" else 8
         if bits > 8:
             image.close()
-            levels = (*_heif_levels(path, bits), deep_space(profile, warnings) if profile else space)
+            levels = (
+                *_heif_levels(path, bits),
+                deep_space(profile, warnings) if profile else space,
+            )
         elif image.mode[0] in "IF" or chunks.get(b"IHDR", b"")[8:9] == b"\x10":
             image.close()
-            levels = (*_deep_levels(path, chunks.get(b"tRNS")), deep_space(profile, warnings) if profile else space)
+            levels = (
+                *_deep_levels(path, chunks.get(b"tRNS")),
+                deep_space(profile, warnings) if profile else space,
+            )
         else:
             levels = _shallow(image, profile, space, warnings)
     colour, alpha, space = levels
-    decoded = flattened(upright(colour, tags), None if alpha is None else upright(alpha, tags), space, warnings)
+    decoded = flattened(
+        upright(colour, tags), None if alpha is None else upright(alpha, tags), space, warnings
+    )
     decoded.tags = tags
     return decoded
 
@@ -133,7 +153,9 @@ def frames_note(frames: int) -> list[str]:
     return [f"The file holds {frames} pictures; the first is used."] if frames > 1 else []
 
 
-def flattened(colour: Array, alpha: Array | None, space: ColourSpace | None, warnings: list[str]) -> Decoded:
+def flattened(
+    colour: Array, alpha: Array | None, space: ColourSpace | None, warnings: list[str]
+) -> Decoded:
     """Levels [H, W, 3] and straight alpha [H, W, 1], linear by a space or as sRGB, over white where transparent.
 
     `warnings` become those of the result, and grow.
@@ -149,7 +171,9 @@ def flattened(colour: Array, alpha: Array | None, space: ColourSpace | None, war
         linear[start : start + ROWS] *= share
         if not is_light:
             linear[start : start + ROWS] += 1 - share
-    return Decoded(linear, is_light, warnings=warnings, alpha=alpha / np.float32(top) if is_light else None)
+    return Decoded(
+        linear, is_light, warnings=warnings, alpha=alpha / np.float32(top) if is_light else None
+    )
 
 
 def deep_space(profile: bytes, warnings: list[str]) -> ColourSpace | None:
@@ -172,7 +196,9 @@ Levels = tuple[Array, Array | None, ColourSpace | None]
 """[H, W, 3] whole levels, straight alpha [H, W, 1] of the same type, and what they mean."""
 
 
-def _shallow(image: Image.Image, profile: bytes | None, space: ColourSpace | None, warnings: list[str]) -> Levels:
+def _shallow(
+    image: Image.Image, profile: bytes | None, space: ColourSpace | None, warnings: list[str]
+) -> Levels:
     """8 bits a channel, any Pillow mode."""
     alpha = None
     if image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info:
@@ -182,7 +208,11 @@ def _shallow(image: Image.Image, profile: bytes | None, space: ColourSpace | Non
     matrix = matrix_profile(profile) if profile and image.mode != "CMYK" else None
     if matrix is None:
         image = _through_lcms(image, profile, warnings)
-    return np.asarray(image if image.mode == "RGB" else image.convert("RGB")), alpha, matrix or space
+    return (
+        np.asarray(image if image.mode == "RGB" else image.convert("RGB")),
+        alpha,
+        matrix or space,
+    )
 
 
 def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]) -> Image.Image:
@@ -192,9 +222,13 @@ def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]
             source = ImageCms.ImageCmsProfile(io.BytesIO(profile))
             base = {"GRAY": "L", "RGB ": "RGB", "CMYK": "CMYK"}[source.profile.xcolor_space]
             flat = image if image.mode == base else image.convert(base)
-            return ImageCms.profileToProfile(flat, source, ImageCms.createProfile("sRGB"), outputMode="RGB")  # type: ignore[return-value]
+            return ImageCms.profileToProfile(
+                flat, source, ImageCms.createProfile("sRGB"), outputMode="RGB"
+            )  # type: ignore[return-value]
         except (ImageCms.PyCMSError, KeyError, OSError, ValueError):
-            warnings.append("The embedded colour profile cannot be used; the photo is taken as sRGB.")
+            warnings.append(
+                "The embedded colour profile cannot be used; the photo is taken as sRGB."
+            )
     if image.mode == "CMYK":
         warnings.append("CMYK without a usable profile: colours are approximate.")
     return image
@@ -215,7 +249,9 @@ def _heif_levels(path: Path, bits: int) -> tuple[Array, Array | None]:
 
     heif: Any = open_heif(path, convert_hdr_to_8bit=False)
     if heif.premultiplied_alpha:
-        raise InputError(f"{path} has premultiplied alpha at {bits} bits; save it as plain 16-bit PNG.")
+        raise InputError(
+            f"{path} has premultiplied alpha at {bits} bits; save it as plain 16-bit PNG."
+        )
     pixels = np.atleast_3d(np.asarray(heif))
     pixels = pixels | pixels >> bits  # white is 65535
     colour = pixels[..., :3] if pixels.shape[2] > 2 else np.repeat(pixels[..., :1], 3, -1)
@@ -264,7 +300,8 @@ def upright(pixels: Array, tags: dict[str, Any]) -> Array:
 def pixel_limit_lifted() -> Iterator[None]:
     """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
     with _LIMIT:  # all threads share Pillow's
-        before, Image.MAX_IMAGE_PIXELS = Image.MAX_IMAGE_PIXELS, None
+        before = Image.MAX_IMAGE_PIXELS
+        Image.MAX_IMAGE_PIXELS = None
         try:
             yield
         finally:

@@ -23,7 +23,14 @@ def nclx(path: Path) -> tuple[int, int] | None:
 def jp2_profile(path: Path) -> bytes | None:
     """The ICC profile of a JPEG 2000 file, or None."""
     header = dict(boxes(_head(path))).get(b"jp2h", b"")
-    return next((data[3:] for kind, data in boxes(header) if kind == b"colr" and data[:1] in (b"\2", b"\3")), None)
+    return next(
+        (
+            data[3:]
+            for kind, data in boxes(header)
+            if kind == b"colr" and data[:1] in (b"\2", b"\3")
+        ),
+        None,
+    )
 
 
 def boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
@@ -49,10 +56,12 @@ def _head(path: Path) -> bytes:
 
 def _properties_of_primary(meta: dict[bytes, bytes]) -> list[int]:
     """Numbers, from 1, of the properties of the main picture (ISO 23008-12, `pitm` and `ipma`)."""
-    primary_box, association = meta.get(b"pitm", b""), dict(boxes(meta.get(b"iprp", b""))).get(b"ipma", b"")
+    primary_box = meta.get(b"pitm", b"")
+    association = dict(boxes(meta.get(b"iprp", b""))).get(b"ipma", b"")
     try:
         (primary,) = struct.unpack_from(">I" if primary_box[0] else ">H", primary_box, 4)
-        wide_ids, wide_indices = association[0] > 0, association[3] & 1
+        wide_ids = association[0] > 0
+        wide_indices = association[3] & 1
         (entries,) = struct.unpack_from(">I", association, 4)
         at = 8
         for _ in range(entries):

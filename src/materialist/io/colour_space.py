@@ -26,7 +26,9 @@ CIE_XYZ: Primaries = (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1 / 3, 1 / 3)
 
 HDR_WHITE = 203.0
 """Luminance of white in an HDR picture, cd/m2 (ITU-R BT.2408)."""
-_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+_BRADFORD = np.array(
+    [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
+)
 _D50_WHITE = np.array([0.9642029, 1.0, 0.8249054])
 """XYZ of the white of ICC profiles and of CIELab in TIFF."""
 
@@ -46,7 +48,9 @@ class ColourSpace:
     def is_srgb(self) -> bool:
         """Whether it is sRGB to within what an 8-bit file can tell apart."""
         levels = np.linspace(0, 1, 4096)
-        curve_error = max(float(np.abs(curve(levels) - srgb_curve(levels)).max()) for curve in self.curves)
+        curve_error = max(
+            float(np.abs(curve(levels) - srgb_curve(levels)).max()) for curve in self.curves
+        )
         return bool(np.abs(self.matrix - np.eye(3)).max() < 3e-3) and curve_error < 2e-3
 
     def linear(self, encoded: Array) -> Array:
@@ -58,10 +62,13 @@ class ColourSpace:
         out: Array = np.empty(encoded.shape, np.float32)
         tables = self._tables(encoded.dtype) if levels else None
         for start in range(0, len(encoded), ROWS):  # bounds the memory
-            rows, block = encoded[start : start + ROWS], out[start : start + ROWS]
+            rows = encoded[start : start + ROWS]
+            block = out[start : start + ROWS]
             for channel, curve in enumerate(self.curves):
                 values = rows[..., channel]
-                block[..., channel] = curve(values.astype(float)) if tables is None else tables[channel][values]
+                block[..., channel] = (
+                    curve(values.astype(float)) if tables is None else tables[channel][values]
+                )
         transformed(out, self.matrix)
         return np.clip(out, 0, 1, out=out) if levels and not self.is_light else out
 
@@ -82,7 +89,9 @@ def transformed(pixels: Array, matrix: Array) -> Array:
     return pixels
 
 
-def space(name: str, primaries: Sequence[float], curve: Curve, *, is_light: bool = False) -> ColourSpace:
+def space(
+    name: str, primaries: Sequence[float], curve: Curve, *, is_light: bool = False
+) -> ColourSpace:
     """A space of one curve for all channels. Raises ValueError for primaries that span no colours."""
     return ColourSpace(name, (curve,) * 3, to_rec709(primaries), is_light)
 
@@ -93,7 +102,9 @@ def rgb_to_xyz(primaries: Sequence[float]) -> Array:
     xyz = np.column_stack([xy, 1 - xy.sum(1)])
     colours = xyz[:3].T
     if not np.isfinite(xyz).all() or xy[3, 1] < 1e-3 or abs(np.linalg.det(colours)) < 1e-4:
-        raise ValueError(f"the primaries {', '.join(f'{value:g}' for value in xy.ravel())} span no colours")
+        raise ValueError(
+            f"the primaries {', '.join(f'{value:g}' for value in xy.ravel())} span no colours"
+        )
     return colours * np.linalg.solve(colours, xyz[3] / xyz[3, 1])
 
 
@@ -105,7 +116,8 @@ def adapted(white: Array, new_white: Array) -> Array:
 
 def to_rec709(primaries: Sequence[float]) -> Array:
     """[3, 3] float64: linear RGB of these primaries to linear Rec.709; white becomes white. Raises ValueError."""
-    source, target = rgb_to_xyz(primaries), rgb_to_xyz(REC709)
+    source = rgb_to_xyz(primaries)
+    target = rgb_to_xyz(REC709)
     return np.linalg.inv(target) @ adapted(source.sum(1), target.sum(1)) @ source
 
 
@@ -167,5 +179,7 @@ def hlg_curve(encoded: Array) -> Array:
 
 
 def _hlg(encoded: Array) -> Array:
-    a, b, c = 0.17883277, 0.28466892, 0.55991073
+    a = 0.17883277
+    b = 0.28466892
+    c = 0.55991073
     return np.where(encoded <= 0.5, encoded**2 / 3, (np.exp((encoded - c) / a) + b) / 12)

@@ -38,7 +38,8 @@ _TRANSFERS: dict[int, tuple[str, Curve]] = {
 }
 """TransferCharacteristics of ITU-T H.273."""
 _UNSPECIFIED = 2
-_VIDEO_TRANSFERS, _VIDEO_PRIMARIES = (1, 6, 11, 14, 15), (5, 6, 7)
+_VIDEO_TRANSFERS = (1, 6, 11, 14, 15)
+_VIDEO_PRIMARIES = (5, 6, 7)
 """The camera curve of BT.709, BT.601 and BT.2020, and the primaries of BT.601: encoders of stills have written them for
 years over plain sRGB (libheif 1.17, libultrahdr, Android)."""
 HDR_NOTES = {
@@ -47,7 +48,9 @@ HDR_NOTES = {
 }
 
 
-def stated_space(path: Path, kind: str | None, tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
+def stated_space(
+    path: Path, kind: str | None, tags: Mapping[str, Any], notes: list[str]
+) -> ColourSpace | None:
     """What a picture of Pillow's format `kind` says of its colours beside ICC; None for sRGB or nothing.
 
     What cannot be used is added to `notes`.
@@ -56,7 +59,8 @@ def stated_space(path: Path, kind: str | None, tags: Mapping[str, Any], notes: l
         stated, colours = _png_space(path, notes)
     else:
         codes = nclx(path) if kind in ("AVIF", "HEIF") else None
-        stated, colours = codes is not None, cicp_space(*codes, notes) if codes else None
+        stated = codes is not None
+        colours = cicp_space(*codes, notes) if codes else None
     return colours if stated else exif_space(tags, notes)
 
 
@@ -77,7 +81,9 @@ def png_chunks(path: Path) -> dict[bytes, bytes]:
     return chunks
 
 
-def cicp_space(primaries: int, transfer: int, notes: list[str], *, full_range: bool = True) -> ColourSpace | None:
+def cicp_space(
+    primaries: int, transfer: int, notes: list[str], *, full_range: bool = True
+) -> ColourSpace | None:
     """The space of two codes of ITU-T H.273, with a note of what is not known; None for sRGB.
 
     Without `full_range`, black and white are the levels 16 and 235 of 255.
@@ -86,9 +92,14 @@ def cicp_space(primaries: int, transfer: int, notes: list[str], *, full_range: b
         notes.append(
             f"The file states the curve of video cameras (code {transfer}, ITU-T H.273); it is taken as sRGB's."
         )
-        primaries, transfer = 1 if primaries in _VIDEO_PRIMARIES else primaries, 13
+        primaries = 1 if primaries in _VIDEO_PRIMARIES else primaries
+        transfer = 13
     name, curve = _TRANSFERS.get(transfer, _TRANSFERS[13])
-    if primaries not in (0, _UNSPECIFIED, *_PRIMARIES) or transfer not in (0, _UNSPECIFIED, *_TRANSFERS):
+    if primaries not in (0, _UNSPECIFIED, *_PRIMARIES) or transfer not in (
+        0,
+        _UNSPECIFIED,
+        *_TRANSFERS,
+    ):
         notes.append(
             f"The file states colours by the codes {primaries} and {transfer} (ITU-T H.273), which are not all known; "
             f"they are taken as {name} with the primaries of {'the code' if primaries in _PRIMARIES else 'Rec.709'}."
@@ -97,7 +108,9 @@ def cicp_space(primaries: int, transfer: int, notes: list[str], *, full_range: b
         notes.append(HDR_NOTES[name])
     if not full_range:
         curve = spaces.narrow(curve)
-    stated = space(name, _PRIMARIES.get(primaries, spaces.REC709), curve, is_light=name in HDR_NOTES)
+    stated = space(
+        name, _PRIMARIES.get(primaries, spaces.REC709), curve, is_light=name in HDR_NOTES
+    )
     return None if stated.is_srgb else stated
 
 
@@ -107,7 +120,8 @@ def exif_space(tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
     index = str(tags.get("InteropIndex", "")).strip("\0 ")
     if stated == _ADOBE_RGB or (index == "R03" and stated != 1):
         return space("Adobe RGB", spaces.ADOBE_RGB, spaces.power_curve(563 / 256))
-    primaries, white = tags.get("PrimaryChromaticities"), tags.get("WhitePoint")
+    primaries = tags.get("PrimaryChromaticities")
+    white = tags.get("WhitePoint")
     if stated != 1 and primaries is not None and white is not None:
         gamma = tags.get("Gamma")
         try:
@@ -118,7 +132,9 @@ def exif_space(tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
             notes.append("The primaries in EXIF cannot be used; the photo is taken as sRGB.")
             return None
     if stated == _UNCALIBRATED:
-        notes.append("EXIF says that the colours are not sRGB, but not which; the photo is taken as sRGB.")
+        notes.append(
+            "EXIF says that the colours are not sRGB, but not which; the photo is taken as sRGB."
+        )
     return None
 
 
@@ -133,7 +149,9 @@ def _png_space(path: Path, notes: list[str]) -> tuple[bool, ColourSpace | None]:
             return b"sRGB" in chunks, None
         return True, _of_gamma(chunks)
     except (struct.error, ValueError, ZeroDivisionError) as error:
-        notes.append(f"The colours that the PNG states cannot be used ({error}); the photo is taken as sRGB.")
+        notes.append(
+            f"The colours that the PNG states cannot be used ({error}); the photo is taken as sRGB."
+        )
         return True, None
 
 
@@ -141,7 +159,9 @@ def _of_gamma(chunks: Mapping[bytes, bytes]) -> ColourSpace | None:
     """The space of gAMA and cHRM chunks; None for sRGB. Raises struct.error, ValueError or ZeroDivisionError."""
     primaries: Sequence[float] = spaces.REC709
     if b"cHRM" in chunks:
-        white_x, white_y, *colours = (value / 1e5 for value in struct.unpack(">8I", chunks[b"cHRM"]))
+        white_x, white_y, *colours = (
+            value / 1e5 for value in struct.unpack(">8I", chunks[b"cHRM"])
+        )
         primaries = (*colours, white_x, white_y)
     curve: Curve = spaces.srgb_curve
     if b"gAMA" in chunks:

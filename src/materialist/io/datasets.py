@@ -46,7 +46,9 @@ def open_sources(folders: Sequence[Path], *, split: str = "train") -> Source:
     """
     for folder in folders:
         if not folder.is_dir():
-            raise InputError(f"There is no data folder {folder}; make one with: materialist train data -o {folder}.")
+            raise InputError(
+                f"There is no data folder {folder}; make one with: materialist train data -o {folder}."
+            )
         if (folder / "samples").is_dir():
             continue
         if not parts(folder):
@@ -54,7 +56,9 @@ def open_sources(folders: Sequence[Path], *, split: str = "train") -> Source:
                 f"{folder} holds neither 'samples' (materialist train data) nor InteriorVerse scenes; check the path."
             )
         if len(folders) > 1:
-            raise InputError(f"{folder} is InteriorVerse; only sets of materialist train data can be put together.")
+            raise InputError(
+                f"{folder} is InteriorVerse; only sets of materialist train data can be put together."
+            )
         return InteriorVerse(folder, split)
     return SampleFolder(*folders)
 
@@ -65,20 +69,31 @@ class InteriorVerse(Source):
     def __init__(self, folder: str | Path, split: str = "train"):
         """Open FOLDER, or its dataset_85 and dataset_120. Raises InputError for an unknown split or another layout."""
         if split not in SPLITS:
-            raise InputError(f"InteriorVerse has no split '{split}'; choose one of {', '.join(SPLITS)}.")
-        self.folder, self.split, scenes = Path(folder), split, {}
+            raise InputError(
+                f"InteriorVerse has no split '{split}'; choose one of {', '.join(SPLITS)}."
+            )
+        self.folder = Path(folder)
+        self.split = split
+        scenes = {}
         for part in parts(self.folder):
             listed = part / f"{split}.txt"
             for scene in listed.read_text("utf-8").split() if listed.is_file() else ():
                 scenes[f"{part.name}/{scene}"] = sorted((part / scene).glob("*_im.exr"))
         pictures = list(chain.from_iterable(scenes.values()))
-        self.paths = [path for path in pictures if all(_sibling(path, name).is_file() for name in MAPS)]
+        self.paths = [
+            path for path in pictures if all(_sibling(path, name).is_file() for name in MAPS)
+        ]
         if not self.paths:
-            raise InputError(f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path.")
-        lost, bare = [name for name, found in scenes.items() if not found], len(pictures) - len(self.paths)
+            raise InputError(
+                f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path."
+            )
+        lost = [name for name, found in scenes.items() if not found]
+        bare = len(pictures) - len(self.paths)
         if lost:
             names = ", ".join(lost[:3])
-            self.notes += (f"{len(lost)} scenes of the split '{split}' are not there ({names} ...).",)
+            self.notes += (
+                f"{len(lost)} scenes of the split '{split}' are not there ({names} ...).",
+            )
         if bare:
             self.notes += (f"{bare} pictures of the split '{split}' lack a map, and are left out.",)
 
@@ -92,11 +107,17 @@ class InteriorVerse(Source):
     def read(self, index: int) -> Sample:
         """Picture number `index`; depth in metres. Raises InputError naming a file that is missing or misshapen."""
         path = self.paths[index]
-        maps = {name: _map(path, name) for name in (*MAPS, "mask") if name in MAPS or _sibling(path, name).is_file()}
+        maps = {
+            name: _map(path, name)
+            for name in (*MAPS, "mask")
+            if name in MAPS or _sibling(path, name).is_file()
+        }
         height, width = maps["im"].shape[:2]
         for name, values in maps.items():
             if values.shape[:2] != (height, width):
-                raise InputError(f"{_sibling(path, name)} is {values.shape[:2]}, but its picture is {(height, width)}.")
+                raise InputError(
+                    f"{_sibling(path, name)} is {values.shape[:2]}, but its picture is {(height, width)}."
+                )
         return _sample(maps, Camera(width, height, field_of_view(path)))
 
 
@@ -119,19 +140,30 @@ def _sample(maps: dict[str, Array], camera: Camera) -> Sample:
     surface = np.isfinite(depth) & (depth > 0) & np.isfinite(length) & (length > 0.5)
     if "mask" in maps:
         surface &= maps["mask"][..., 0] > 0.5
-    normal = np.where(surface[..., None], maps["normal"][..., :3] / np.maximum(length, 1e-6)[..., None], 0)
+    normal = np.where(
+        surface[..., None], maps["normal"][..., :3] / np.maximum(length, 1e-6)[..., None], 0
+    )
     rays = pixel_rays(camera)
     # Sheets that are modelled without a back show some normals from behind.
     normal *= np.where((normal * rays).sum(-1, keepdims=True) > 0, -1, 1)
     image = np.maximum(np.nan_to_num(maps["im"][..., :3], posinf=6e4), 0)
     bright = float(np.percentile(image.max(-1), 97))
-    unit = lambda a: np.clip(np.nan_to_num(a), 0, 1).astype(np.float32)  # noqa: E731
-    exposed, material = (image * (WHITE / max(bright, 1e-6))).astype(np.float32), maps["material"]
+
+    def unit(a):
+        return np.clip(np.nan_to_num(a), 0, 1).astype(np.float32)
+
+    exposed = (image * (WHITE / max(bright, 1e-6))).astype(np.float32)
+    material = maps["material"]
     return Sample(
-        exposed, unit(maps["albedo"][..., :3]), unit(material[..., 0]), unit(material[..., 1]),
-        normal.astype(np.float32), np.where(surface, depth, 0).astype(np.float32), surface.astype(np.float32),
+        exposed,
+        unit(maps["albedo"][..., :3]),
+        unit(material[..., 0]),
+        unit(material[..., 1]),
+        normal.astype(np.float32),
+        np.where(surface, depth, 0).astype(np.float32),
+        surface.astype(np.float32),
         rays[..., :2].copy(),
-    )  # fmt: skip
+    )
 
 
 def _map(path: Path, name: str) -> Array:

@@ -22,8 +22,38 @@ from materialist.types import Array
 RAW_SUFFIXES = frozenset(
     f".{name}"
     for name in (
-        *("3fr", "ari", "arw", "cr2", "cr3", "crw", "dcr", "dng", "erf", "fff", "iiq", "k25", "kdc", "mef", "mos"),
-        *("mrw", "nef", "nrw", "orf", "pef", "raf", "raw", "rw2", "rwl", "sr2", "srf", "srw", "x3f"),
+        *(
+            "3fr",
+            "ari",
+            "arw",
+            "cr2",
+            "cr3",
+            "crw",
+            "dcr",
+            "dng",
+            "erf",
+            "fff",
+            "iiq",
+            "k25",
+            "kdc",
+            "mef",
+            "mos",
+        ),
+        *(
+            "mrw",
+            "nef",
+            "nrw",
+            "orf",
+            "pef",
+            "raf",
+            "raw",
+            "rw2",
+            "rwl",
+            "sr2",
+            "srf",
+            "srw",
+            "x3f",
+        ),
     )
 )
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
@@ -47,7 +77,21 @@ SUFFIXES = RAW_SUFFIXES | {
             "bmp",
             "dib",
         ),
-        *("gif", "tif", "tiff", "jp2", "j2k", "jpx", "jpf", "exr", "hdr", "tga", "ppm", "pgm", "pnm"),
+        *(
+            "gif",
+            "tif",
+            "tiff",
+            "jp2",
+            "j2k",
+            "jpx",
+            "jpf",
+            "exr",
+            "hdr",
+            "tga",
+            "ppm",
+            "pgm",
+            "pnm",
+        ),
     )
 }
 """Usual file names of photos; `decode` reads others, too."""
@@ -79,7 +123,9 @@ def image_size(path: Path) -> tuple[int, int]:
         with bitmap.pixel_limit_lifted(), Image.open(path) as image:
             return image.size
     except UnidentifiedImageError as error:
-        raise InputError(f"{path} is not an image this program can read; give it a {bitmap.FORMATS} file.") from error
+        raise InputError(
+            f"{path} is not an image this program can read; give it a {bitmap.FORMATS} file."
+        ) from error
 
 
 def decoded_bytes(path: Path) -> int:
@@ -112,7 +158,9 @@ def decode(path: Path, layer: str | None = None) -> Decoded:
     except (FileNotFoundError, NotADirectoryError, ValueError) as error:
         raise InputError(f"There is no picture at {path}.") from error
     except OSError as error:  # a folder one may not enter, a name that is too long
-        raise InputError(f"{path} cannot be read: {(error.strerror or str(error)).lower()}.") from error
+        raise InputError(
+            f"{path} cannot be read: {(error.strerror or str(error)).lower()}."
+        ) from error
     if not head:
         raise InputError(f"{path} is empty (0 bytes); copy it again.")
     if layer is not None and not head.startswith(_EXR):
@@ -130,7 +178,9 @@ def decode(path: Path, layer: str | None = None) -> Decoded:
         return bitmap.read_bitmap(path)
     except (MaterialistError, MemoryError):
         raise
-    except Exception as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
+    except (
+        Exception
+    ) as error:  # decoders raise anything: OSError, SyntaxError, struct.error, EOFError, cv2.error
         raise InputError(f"{path} is damaged or truncated ({error}); export it again.") from error
 
 
@@ -142,15 +192,21 @@ def _raw(path: Path) -> Decoded:
     try:
         import rawpy
     except ImportError as error:
-        raise SetupError(f"Camera RAW needs one more package to read {path.name}: {extra_command('raw')}") from error
+        raise SetupError(
+            f"Camera RAW needs one more package to read {path.name}: {extra_command('raw')}"
+        ) from error
     tags = file_tags(path)
     try:
         with rawpy.imread(str(path)) as raw:
             bitmap.check_size(raw.sizes.width, raw.sizes.height, path)
-            pixels = raw.postprocess(gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16)
+            pixels = raw.postprocess(
+                gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16
+            )
             pixels = _cropped(pixels, raw.sizes) if "DNGVersion" in tags else pixels
     except rawpy.LibRawError as error:
-        raise InputError(f"{path} is not a RAW file this program can read ({error}); export it as TIFF.") from error
+        raise InputError(
+            f"{path} is not a RAW file this program can read ({error}); export it as TIFF."
+        ) from error
     bitmap.check_size(pixels.shape[1], pixels.shape[0], path)
     linear = np.empty(pixels.shape, np.float32)
     np.divide(pixels, np.float32(65535), out=linear)
@@ -162,10 +218,14 @@ def _cropped(pixels: Array, sizes: Any) -> Array:
 
     `sizes` are LibRaw's, of the picture before it was turned by `flip` (3: half, 5: left, 6: right).
     """
-    left, top = sizes.crop_left_margin - sizes.left_margin, sizes.crop_top_margin - sizes.top_margin
-    right, bottom = sizes.width - left - sizes.crop_width, sizes.height - top - sizes.crop_height
+    left = sizes.crop_left_margin - sizes.left_margin
+    top = sizes.crop_top_margin - sizes.top_margin
+    right = sizes.width - left - sizes.crop_width
+    bottom = sizes.height - top - sizes.crop_height
     is_whole = pixels.shape[:2] in ((sizes.height, sizes.width), (sizes.width, sizes.height))
-    if not (sizes.crop_width and sizes.crop_height and is_whole and min(left, top, right, bottom) >= 0):
+    if not (
+        sizes.crop_width and sizes.crop_height and is_whole and min(left, top, right, bottom) >= 0
+    ):
         return pixels
     sides = [left, top, right, bottom]
     turns = {3: 2, 5: 3, 6: 1}.get(sizes.flip, 0)  # quarters to the right

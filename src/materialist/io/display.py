@@ -34,7 +34,9 @@ def ramp(values: Array) -> Array:
 
 def normals(normal: Array) -> Array:
     """Usual colours of camera-frame normals [H, W, 3]; black where there is none."""
-    return np.where(np.any(normal != 0, -1, keepdims=True), to_bytes(normal * 0.5 + 0.5), 0).astype(np.uint8)
+    return np.where(np.any(normal != 0, -1, keepdims=True), to_bytes(normal * 0.5 + 0.5), 0).astype(
+        np.uint8
+    )
 
 
 def light(envmap: Array) -> Array:
@@ -53,7 +55,9 @@ def depths(depth: Array) -> Array:
         return ramp(np.zeros_like(depth))
     inverse = np.where(known, 1 / np.where(known, depth, 1), 0)
     low, high = np.percentile(inverse[known], [1, 99])
-    return ramp(np.where(known, 0.1 + 0.9 * np.clip((inverse - low) / max(high - low, 1e-9), 0, 1), 0))
+    return ramp(
+        np.where(known, 0.1 + 0.9 * np.clip((inverse - low) / max(high - low, 1e-9), 0, 1), 0)
+    )
 
 
 def error(photo: Array, rerender: Array) -> Array:
@@ -68,8 +72,14 @@ def factor(values: Array) -> Array:
 
 def maps(of: Prediction | Scene) -> dict[str, Array]:
     """Each map of a prediction or a scene by its name."""
-    m, geometry = of.materials, {"normal": normals(of.normal), "depth": depths(of.depth)}
-    return {"albedo": srgb_levels(m.albedo), "roughness": grey(m.roughness), "metallic": grey(m.metallic), **geometry}
+    m = of.materials
+    geometry = {"normal": normals(of.normal), "depth": depths(of.depth)}
+    return {
+        "albedo": srgb_levels(m.albedo),
+        "roughness": grey(m.roughness),
+        "metallic": grey(m.metallic),
+        **geometry,
+    }
 
 
 def strip(image: Array, *predictions: Prediction) -> Array:

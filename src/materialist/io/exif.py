@@ -27,7 +27,10 @@ def image_tags(image: Image.Image) -> dict[str, Any]:
 def file_tags(path: Path) -> dict[str, Any]:
     """EXIF of a RAW file; most are TIFF inside, the others give none."""
     exif = Image.Exif()
-    with suppress(Exception), path.open("rb") as file:  # no EXIF is no error: the field of view then falls back
+    with (
+        suppress(Exception),
+        path.open("rb") as file,
+    ):  # no EXIF is no error: the field of view then falls back
         exif.load_from_fp(file)
         return _named(exif)
     return {}
@@ -41,7 +44,9 @@ def horizontal_fov(tags: Mapping[str, Any], width: int, height: int) -> float | 
     Values that lead outside (1, 170) degrees are not believed.
     """
     film = _number(tags.get("FocalLengthIn35mmFilm"))
-    focal = film / FILM_WIDTH * max(width, height) if film else _from_focal_plane(tags, width, height)
+    focal = (
+        film / FILM_WIDTH * max(width, height) if film else _from_focal_plane(tags, width, height)
+    )
     if not focal:
         return None
     fov = math.degrees(2 * math.atan(0.5 * width / focal))

@@ -20,20 +20,125 @@ LARGEST_BYTES = 12 * MAX_PIXELS
 GREY = ("Y", "V", "L", "Z", "depth")
 """Channels that are a grey map."""
 _PICTURES = (
-    *("rgba", "rgb", "beauty", "combined", "composite", "final", "image", "main", "c", "ci", "color", "colour"),
+    *(
+        "rgba",
+        "rgb",
+        "beauty",
+        "combined",
+        "composite",
+        "final",
+        "image",
+        "main",
+        "c",
+        "ci",
+        "color",
+        "colour",
+    ),
     *("render", "default"),
 )
 """Words in the name of the layer that is the picture, where there are several; the first are the surest."""
 _DATA = frozenset(
     (
-        *("albedo", "normal", "normals", "n", "ns", "ng", "position", "positions", "p", "pworld", "pref", "point"),
-        *("depth", "z", "zdepth", "distance", "vector", "vectors", "motion", "velocity", "speed", "uv", "st", "mist"),
-        *("ao", "occlusion", "id", "ids", "index", "mask", "matte", "object", "objects", "holdout", "tangent"),
-        *("diff", "diffuse", "gloss", "glossy", "spec", "specular", "reflection", "reflect", "refraction", "refract"),
-        *("trans", "transmission", "sss", "subsurface", "volume", "sheen", "coat", "emission", "emit", "emissive"),
-        *("env", "environment", "background", "shadow", "shadows", "direct", "indirect", "dir", "ind", "gi", "col"),
-        *("lighting", "illumination", "filter", "roughness", "metallic", "metalness", "variance", "samples", "noise"),
-        *("basecolor", "base", "debug", "facing", "wire", "wireframe", "thickness", "curvature", "light"),
+        *(
+            "albedo",
+            "normal",
+            "normals",
+            "n",
+            "ns",
+            "ng",
+            "position",
+            "positions",
+            "p",
+            "pworld",
+            "pref",
+            "point",
+        ),
+        *(
+            "depth",
+            "z",
+            "zdepth",
+            "distance",
+            "vector",
+            "vectors",
+            "motion",
+            "velocity",
+            "speed",
+            "uv",
+            "st",
+            "mist",
+        ),
+        *(
+            "ao",
+            "occlusion",
+            "id",
+            "ids",
+            "index",
+            "mask",
+            "matte",
+            "object",
+            "objects",
+            "holdout",
+            "tangent",
+        ),
+        *(
+            "diff",
+            "diffuse",
+            "gloss",
+            "glossy",
+            "spec",
+            "specular",
+            "reflection",
+            "reflect",
+            "refraction",
+            "refract",
+        ),
+        *(
+            "trans",
+            "transmission",
+            "sss",
+            "subsurface",
+            "volume",
+            "sheen",
+            "coat",
+            "emission",
+            "emit",
+            "emissive",
+        ),
+        *(
+            "env",
+            "environment",
+            "background",
+            "shadow",
+            "shadows",
+            "direct",
+            "indirect",
+            "dir",
+            "ind",
+            "gi",
+            "col",
+        ),
+        *(
+            "lighting",
+            "illumination",
+            "filter",
+            "roughness",
+            "metallic",
+            "metalness",
+            "variance",
+            "samples",
+            "noise",
+        ),
+        *(
+            "basecolor",
+            "base",
+            "debug",
+            "facing",
+            "wire",
+            "wireframe",
+            "thickness",
+            "curvature",
+            "light",
+        ),
     )
 )
 """Words in the names of layers that are no picture, though they have colours."""
@@ -61,12 +166,16 @@ def opened_exr(path: Path, **settings: bool) -> Iterator[Any]:
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
     if not is_utf8(str(path)):
-        raise InputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it.")
+        raise InputError(
+            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it."
+        )
     try:
         with OpenEXR.File(str(path), **settings) as file:
             yield file
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
-        raise InputError(f"{path} is no readable EXR file (truncated or damaged): {str(error).rstrip('.')}.") from error
+        raise InputError(
+            f"{path} is no readable EXR file (truncated or damaged): {str(error).rstrip('.')}."
+        ) from error
 
 
 def exr_headers(path: Path) -> list[dict[str, Any]]:
@@ -83,7 +192,9 @@ def window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
 
 def exr_size(header: dict[str, Any]) -> tuple[int, int]:
     """(width, height) of a part's picture: of its display window, or of its data where they are more."""
-    return max((window(header, name)[2:] for name in ("displayWindow", "dataWindow")), key=math.prod)
+    return max(
+        (window(header, name)[2:] for name in ("displayWindow", "dataWindow")), key=math.prod
+    )
 
 
 def exr_bytes(path: Path) -> int:
@@ -110,8 +221,10 @@ def displayed(pixels: Array, header: dict[str, Any], path: Path) -> Array:
     """
     left, top, wide, high = window(header, "displayWindow")
     data_left, data_top, data_wide, data_high = window(header, "dataWindow")
-    x0, x1 = max(left, data_left), min(left + wide, data_left + data_wide)
-    y0, y1 = max(top, data_top), min(top + high, data_top + data_high)
+    x0 = max(left, data_left)
+    x1 = min(left + wide, data_left + data_wide)
+    y0 = max(top, data_top)
+    y1 = min(top + high, data_top + data_high)
     if x0 >= x1 or y0 >= y1:
         raise InputError(f"{path} has no data in its display window; export it again.")
     inside = pixels[y0 - data_top : y1 - data_top, x0 - data_left : x1 - data_left]
@@ -128,12 +241,18 @@ def write_exr(path: str | Path, array: Array) -> None:
     Raises InputError for another shape, OutputError when the file cannot be written.
     """
     array = np.asarray(array)
-    names = {2: "Y"}.get(array.ndim) or {(3, 3): "RGB", (3, 4): "RGBA"}.get((array.ndim, array.shape[-1]))
+    names = {2: "Y"}.get(array.ndim) or {(3, 3): "RGB", (3, 4): "RGBA"}.get(
+        (array.ndim, array.shape[-1])
+    )
     if names is None:
-        raise InputError(f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}.")
+        raise InputError(
+            f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}."
+        )
     pixels = np.ascontiguousarray(array, np.float32)
     if not is_utf8(str(path)):
-        raise OutputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another.")
+        raise OutputError(
+            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
+        )
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
         with OpenEXR.File(header, {names: pixels}) as file:
@@ -163,10 +282,16 @@ def stacked(parts: dict[str, Array], names: str) -> Array:
 
 def no_picture(channels: dict[str, Array], path: Path) -> InputError:
     """The error of a file without a picture."""
-    odd = [str(pixels.dtype) for pixels in channels.values() if pixels.dtype not in (np.float16, np.float32)]
+    odd = [
+        str(pixels.dtype)
+        for pixels in channels.values()
+        if pixels.dtype not in (np.float16, np.float32)
+    ]
     if odd:
         return InputError(f"{path} holds {odd[0]} pixels; save it as half or float.")
-    return InputError(f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed.")
+    return InputError(
+        f"{path} has the channels {', '.join(sorted(channels)) or 'none'}; RGB or Y is needed."
+    )
 
 
 def picture_rank(name: str) -> tuple[bool, int]:
@@ -187,7 +312,9 @@ def _pick(channels: dict[str, Array], path: Path) -> Array:
     coloured = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
     grey = [name for name in GREY if name in plain]
     if coloured and ("" in coloured or not grey):
-        return stacked(layers[min(coloured, key=lambda layer: (layer != "", picture_rank(layer)))], "RGB")
+        return stacked(
+            layers[min(coloured, key=lambda layer: (layer != "", picture_rank(layer)))], "RGB"
+        )
     if grey:
         return plain[grey[0]]
     known = [pixels for parts in layers.values() for pixels in parts.values()]

@@ -62,19 +62,30 @@ def read_exr_photo(path: Path, wished: str | None = None) -> Decoded:
     with opened_exr(path, separate_channels=True) as file:
         headers = [dict(part.header) for part in file.parts]
         names = [str(part.name() or "") for part in file.parts]
-        parts = [{name: channel.pixels for name, channel in file.channels(k).items()} for k in range(len(names))]
+        parts = [
+            {name: channel.pixels for name, channel in file.channels(k).items()}
+            for k in range(len(names))
+        ]
     if not any(parts):  # the library says so on stderr alone
         raise InputError(f"{path} is no readable EXR file (truncated or damaged); export it again.")
-    layers = [layer for k in range(len(parts)) for layer in _layers(names[k], k, parts[k], len(parts))]
+    layers = [
+        layer for k in range(len(parts)) for layer in _layers(names[k], k, parts[k], len(parts))
+    ]
     if not layers:
-        raise no_picture({name: pixels for channels in parts for name, pixels in channels.items()}, path)
-    chosen = min(layers, key=lambda one: one.rank) if wished is None else _named(layers, wished, path)
+        raise no_picture(
+            {name: pixels for channels in parts for name, pixels in channels.items()}, path
+        )
+    chosen = (
+        min(layers, key=lambda one: one.rank) if wished is None else _named(layers, wished, path)
+    )
     several = len(layers) > 1
     notes = [_choice(layers, chosen)] if several else []
     header = headers[chosen.part]
     check_size(*window(header, "displayWindow")[2:], path)
     del parts, layers  # the pixels of the others
-    decoded = square_pixels(_light(chosen, header, path, notes), float(header.get("pixelAspectRatio", 1)), path)
+    decoded = square_pixels(
+        _light(chosen, header, path, notes), float(header.get("pixelAspectRatio", 1)), path
+    )
     decoded.layer = chosen.name if several else None
     return decoded
 
@@ -108,7 +119,9 @@ def _named(layers: Sequence[_Layer], name: str, path: Path) -> _Layer:
     ending = [layer for layer in layers if layer.name.casefold().endswith(f".{small}")]
     if same or len(ending) == 1:
         return [*same, *ending][0]
-    raise InputError(f"{path} has no layer '{name}'; choose one of {', '.join(layer.name for layer in layers)}.")
+    raise InputError(
+        f"{path} has no layer '{name}'; choose one of {', '.join(layer.name for layer in layers)}."
+    )
 
 
 def _choice(layers: Sequence[_Layer], chosen: _Layer) -> str:
@@ -145,22 +158,29 @@ def _primaries(header: dict[str, Any], notes: list[str]) -> Primaries:
         convert = getattr(OpenEXR, "colorInteropIDToChromaticities", None)  # of OpenEXR 3.5
         stated = convert(identity) if convert and identity.startswith("lin_") else None
         if stated is None and identity not in ("unknown", "data"):
-            notes.append(f"The EXR states the colour space {identity}, which is not known; it is taken as Rec.709.")
+            notes.append(
+                f"The EXR states the colour space {identity}, which is not known; it is taken as Rec.709."
+            )
     if stated is None:
         return REC709
     try:
         primaries = tuple(float(value) for value in stated)
         rgb_to_xyz(primaries)
     except (TypeError, ValueError) as error:
-        notes.append(f"The chromaticities of the EXR cannot be used ({error}); it is taken as Rec.709.")
+        notes.append(
+            f"The chromaticities of the EXR cannot be used ({error}); it is taken as Rec.709."
+        )
         return REC709
     return primaries
 
 
-def _from_luminance(channels: dict[str, Array], primaries: Primaries, size: tuple[int, int]) -> Array:
+def _from_luminance(
+    channels: dict[str, Array], primaries: Primaries, size: tuple[int, int]
+) -> Array:
     """[H, W, 3 or 4] float32 RGB of luminance Y and chroma RY = (R - Y) / Y, BY = (B - Y) / Y (OpenEXR, ImfRgbaYca)."""
     y, ry, by = (_full(channels[name], size) for name in ("Y", "RY", "BY"))
-    red, blue = (ry + 1) * y, (by + 1) * y
+    red = (ry + 1) * y
+    blue = (by + 1) * y
     weights = rgb_to_xyz(primaries)[1].astype(np.float32)
     green = (y - red * weights[0] - blue * weights[2]) / weights[1]
     alpha = [_full(channels["A"], size)] if "A" in channels else []
@@ -175,7 +195,9 @@ def _full(channel: Array, size: tuple[int, int]) -> Array:
     steps = (math.ceil(size[0] / values.shape[1]), math.ceil(size[1] / values.shape[0]))
     between = np.array([[1 / steps[0], 0, 0], [0, 1 / steps[1], 0]], np.float32)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    return np.asarray(cv2.warpAffine(values, between, size, flags=flags, borderMode=cv2.BORDER_REPLICATE))
+    return np.asarray(
+        cv2.warpAffine(values, between, size, flags=flags, borderMode=cv2.BORDER_REPLICATE)
+    )
 
 
 def _note_border(header: dict[str, Any], notes: list[str]) -> None:
@@ -184,4 +206,6 @@ def _note_border(header: dict[str, Any], notes: list[str]) -> None:
     data_left, data_top, data_wide, data_high = window(header, "dataWindow")
     covers = data_left <= left and data_top <= top
     if not (covers and data_left + data_wide >= left + wide and data_top + data_high >= top + high):
-        notes.append("The EXR's data does not fill its display window; the rest of the photo is black.")
+        notes.append(
+            "The EXR's data does not fill its display window; the rest of the photo is black."
+        )

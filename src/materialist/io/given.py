@@ -43,7 +43,9 @@ def photo_of(photo: Any, *, encoded: bool | None = None, **settings: Any) -> Pho
 
 def _refuse_encoded(encoded: bool | None, kind: str) -> None:
     if encoded is not None:
-        raise InputError(f"encoded says what an array holds; leave it out for {kind}, which says so itself.")
+        raise InputError(
+            f"encoded says what an array holds; leave it out for {kind}, which says so itself."
+        )
 
 
 def _name(source: Any, attribute: str) -> str | None:
@@ -67,7 +69,9 @@ def _content(file: Any) -> bytes:
     """The rest of an open file. Raises InputError for one of text."""
     content = file.read()
     if not isinstance(content, bytes):
-        raise InputError("The open file gives text; open photos in binary mode, as in open(path, 'rb').")
+        raise InputError(
+            "The open file gives text; open photos in binary mode, as in open(path, 'rb')."
+        )
     return content
 
 
@@ -78,9 +82,15 @@ def _picture_bytes(picture: Image.Image) -> bytes:
     buffer = io.BytesIO()
     kept = {"icc_profile": picture.info.get("icc_profile"), "exif": picture.getexif().tobytes()}
     try:
-        picture.save(buffer, "PNG" if picture.mode in _AS_PNG else "TIFF", **{k: v for k, v in kept.items() if v})
+        picture.save(
+            buffer,
+            "PNG" if picture.mode in _AS_PNG else "TIFF",
+            **{k: v for k, v in kept.items() if v},
+        )
     except (OSError, ValueError) as error:
-        raise InputError(f"A picture of mode {picture.mode} cannot be read; convert it to RGB.") from error
+        raise InputError(
+            f"A picture of mode {picture.mode} cannot be read; convert it to RGB."
+        ) from error
     return buffer.getvalue()
 
 
@@ -96,7 +106,9 @@ def _array(photo: Any) -> Array:
             f"this is {type(photo).__name__} of {array.dtype}."
         )
     if array.ndim not in (2, 3) or array.shape[2:] not in ((), (1,), (3,), (4,)):
-        raise InputError(f"The array is {list(array.shape)}; a photo is [H, W, 3], [H, W, 4] or [H, W].")
+        raise InputError(
+            f"The array is {list(array.shape)}; a photo is [H, W, 3], [H, W, 4] or [H, W]."
+        )
     return array[..., 0] if array.shape[2:] == (1,) else array
 
 

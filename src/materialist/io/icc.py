@@ -25,7 +25,9 @@ def matrix_profile(profile: bytes) -> ColourSpace | None:
         red, green, blue = (_curve(tags[name]) for name in (b"rTRC", b"gTRC", b"bTRC"))
     except (KeyError, ValueError, IndexError, struct.error):
         return None
-    return ColourSpace("ICC profile", (red, green, blue), d50_to_rec709() @ np.array(columns).T / 65536)
+    return ColourSpace(
+        "ICC profile", (red, green, blue), d50_to_rec709() @ np.array(columns).T / 65536
+    )
 
 
 def _tags(profile: bytes) -> dict[bytes, bytes]:
@@ -42,12 +44,18 @@ def _curve(data: bytes) -> Curve:
         if count == 0:
             return identity
         values = np.frombuffer(data, ">u2", count, 12).astype(float)
-        return power_curve(float(values[0]) / 256) if count == 1 else partial(_sampled, samples=values / 65535)
+        return (
+            power_curve(float(values[0]) / 256)
+            if count == 1
+            else partial(_sampled, samples=values / 65535)
+        )
     if data[:4] != b"para":
         raise ValueError("not a curve")
     (kind,) = struct.unpack_from(">H", data, 8)
     number = {0: 1, 1: 3, 2: 4, 3: 5, 4: 7}[kind]
-    g, a, b, c, d, e, f = [v / 65536 for v in struct.unpack_from(f">{number}i", data, 12)] + [0.0] * (7 - number)
+    g, a, b, c, d, e, f = [v / 65536 for v in struct.unpack_from(f">{number}i", data, 12)] + [
+        0.0
+    ] * (7 - number)
     if kind == 0:
         a = 1.0
     elif kind < 3:  # without a line below the curve, and c is added to it

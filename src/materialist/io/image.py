@@ -16,7 +16,8 @@ from materialist.types import Array
 
 COLOURED = 0.2
 """Share of coloured pixels, neither black nor bright, from which a picture is a photo and no mask."""
-BLACK, WHITE = 0.1, 0.9
+BLACK = 0.1
+WHITE = 0.9
 """Brightness up to which a pixel of a mask is black, and from which it is white."""
 
 
@@ -26,10 +27,14 @@ def write_png(path: str | Path, picture: Array) -> None:
     Raises OutputError when the file cannot be written.
     """
     with writing(path):
-        Image.fromarray(picture if picture.dtype == np.uint8 else srgb_levels(picture)).save(path, format="PNG")
+        Image.fromarray(picture if picture.dtype == np.uint8 else srgb_levels(picture)).save(
+            path, format="PNG"
+        )
 
 
-def write_image(path: str | Path, linear: Array, *, deep: bool = False, force: bool = False) -> None:
+def write_image(
+    path: str | Path, linear: Array, *, deep: bool = False, force: bool = False
+) -> None:
     """Write linear RGB [H, W, 3] to PATH.png (sRGB) or PATH.exr (linear float32), whole or not at all.
 
     `deep` PNG have 16 bits a channel, others 8. Raises OutputError when the file exists and `force` is not given, or
@@ -38,7 +43,9 @@ def write_image(path: str | Path, linear: Array, *, deep: bool = False, force: b
     ensure_image_writable(path, force=force)
     with whole_file(path, force) as temporary:
         if deep and temporary.suffix == ".png":
-            temporary.write_bytes(cv2.imencode(".png", srgb_levels(linear, np.uint16)[..., ::-1])[1].tobytes())
+            temporary.write_bytes(
+                cv2.imencode(".png", srgb_levels(linear, np.uint16)[..., ::-1])[1].tobytes()
+            )
         else:
             (write_exr if temporary.suffix == ".exr" else write_png)(temporary, linear)
 
@@ -46,7 +53,9 @@ def write_image(path: str | Path, linear: Array, *, deep: bool = False, force: b
 def ensure_image_writable(path: str | Path, *, force: bool = False) -> None:
     """Check, before hours of work, that write_image will accept PATH; raises OutputError or InputError."""
     if Path(path).suffix.lower() not in (".png", ".exr"):
-        raise InputError(f"The output {path} must end in .png (for looking) or .exr (linear, for further work).")
+        raise InputError(
+            f"The output {path} must end in .png (for looking) or .exr (linear, for further work)."
+        )
     ensure_writable(path, force, None)
 
 
@@ -70,7 +79,9 @@ def _with_alpha(path: str | Path) -> tuple[Array, Array | None]:
     _check_pixels(path)
     colour, alpha = stored_pixels(path)
     scale = np.float32({"uint8": 255, "uint16": 65535}.get(colour.dtype.name, 1))
-    array = np.ascontiguousarray(colour if colour.shape[2] == 3 else colour[..., 0], np.float32) / scale
+    array = (
+        np.ascontiguousarray(colour if colour.shape[2] == 3 else colour[..., 0], np.float32) / scale
+    )
     return array, None if alpha is None else alpha[..., 0] / scale
 
 
@@ -94,7 +105,9 @@ def same_aspect(a: tuple[int, ...], b: tuple[int, ...]) -> bool:
     return abs(a[1] / a[0] - b[1] / b[0]) <= 1.5 * b[1] / b[0] / min(b[:2])
 
 
-def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] | None = None) -> Array:
+def read_mask(
+    path: str | Path, shape: tuple[int, int], native: tuple[int, int] | None = None
+) -> Array:
     """A region as [H, W] bool of `shape` = (H, W): white (> 0.5) is inside, what is transparent is outside.
 
     Of an object that was cut out, with transparency around it, all that is opaque is inside, whatever its colours.
@@ -105,11 +118,15 @@ def read_mask(path: str | Path, shape: tuple[int, int], native: tuple[int, int] 
     if mask.shape != shape:
         sizes = f"{shape[1]} x {shape[0]}" + (f" or {native[1]} x {native[0]}" if native else "")
         if not same_aspect(mask.shape, shape):
-            raise InputError(f"The mask {path} is {mask.shape[1]} x {mask.shape[0]} pixels, the photo {sizes}.")
+            raise InputError(
+                f"The mask {path} is {mask.shape[1]} x {mask.shape[0]} pixels, the photo {sizes}."
+            )
         mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_AREA)
     inside = mask > 0.5
     if not inside.any():
-        raise InputError(f"The mask {path} is empty: no pixel is brighter than half at working size.")
+        raise InputError(
+            f"The mask {path} is empty: no pixel is brighter than half at working size."
+        )
     return inside
 
 
@@ -120,9 +137,13 @@ def _marked(values: Array, alpha: Array | None, path: str | Path) -> Array:
     shown = None if alpha is None else alpha > 0.5
     if alpha is None or shown is None or shown.all() or not shown.any():
         if values.ndim == 3 and ((np.ptp(values, axis=-1) > 0.05) & between).mean() > COLOURED:
-            raise InputError(f"{path} is a colour picture, not a mask; paint what is inside white, and all else black.")
+            raise InputError(
+                f"{path} is a colour picture, not a mask; paint what is inside white, and all else black."
+            )
         return np.asarray(brightness if alpha is None else brightness * alpha, np.float32)
     # What is shown is a mask itself where it is black and white; else it is the object.
     opaque = brightness[shown]
-    is_painted = (opaque <= BLACK).any() and (opaque >= WHITE).any() and between[shown].mean() <= COLOURED
+    is_painted = (
+        (opaque <= BLACK).any() and (opaque >= WHITE).any() and between[shown].mean() <= COLOURED
+    )
     return np.asarray(brightness * alpha if is_painted else alpha, np.float32)

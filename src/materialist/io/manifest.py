@@ -51,7 +51,9 @@ def package_map(path: Path, shape: tuple[int, ...] | None = None) -> Array:
     """A map of a known shape, or of any. Raises SceneError for another one, and for NaN, InputError for none."""
     array = read_exr(path) if path.suffix == ".exr" else stored_pixels(path)[0][..., 0]
     if shape is not None and array.shape != shape:
-        raise SceneError(f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged.")
+        raise SceneError(
+            f"{path} is {list(array.shape)}, the scene needs {list(shape)}; the package is damaged."
+        )
     if not np.isfinite(array).all():
         raise SceneError(f"{path} has values that are NaN or infinite; the package is damaged.")
     return array
@@ -65,19 +67,27 @@ def _exr_bytes(file: Path) -> int:
 
 def _photo_bytes(file: Path) -> int:
     """Bytes of a photo once decoded."""
-    return RAW_GROWS * file.stat().st_size if file.suffix.lower() in RAW_SUFFIXES else decoded_bytes(file)
+    return (
+        RAW_GROWS * file.stat().st_size
+        if file.suffix.lower() in RAW_SUFFIXES
+        else decoded_bytes(file)
+    )
 
 
 def _check_size(file: Path, found: tuple[int, int]) -> None:
     if not 1 <= min(found) <= max(found) <= LONGEST and file.stem != "original":
-        raise SceneError(f"{file} is {found[0]} x {found[1]} pixels; {LONGEST} on a side is the limit.")
+        raise SceneError(
+            f"{file} is {found[0]} x {found[1]} pixels; {LONGEST} on a side is the limit."
+        )
 
 
 def inside(folder: Path, name: str) -> Path:
     """A file of the package. Raises SceneError where it is missing, or a link leads out of the folder."""
     file = folder / name
     if not file.resolve().is_relative_to(folder.resolve()):
-        raise SceneError(f"{file} leads out of the scene package, which is never followed; copy the file there.")
+        raise SceneError(
+            f"{file} leads out of the scene package, which is never followed; copy the file there."
+        )
     if not file.is_file():
         raise SceneError(f"{file} is missing; this is not a whole scene package.")
     return file

@@ -17,7 +17,9 @@ from materialist.io.exr import write_exr
 from materialist.io.manifest import MAPS, package_map
 from materialist.types import Body, Mesh, Surface
 
-_FACE = np.dtype([("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")])
+_FACE = np.dtype(
+    [("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")]
+)
 
 _OF_GLASS = ("transmission", "ior", "tint", "emission", "glass_roughness")
 """What scene.json says of the surface of a body."""
@@ -62,8 +64,13 @@ def read_ply(path: str | Path, pixels: int | None = None) -> Mesh:
         head, mark, _ = file.read(2048).partition(b"end_header\n")
         found = re.findall(rb"^element \w+ (\d{1,10})$", head, re.MULTILINE)
         counts = [int(count) for count in found]
-        if len(counts) != 2 or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode():
-            raise SceneError(f"The mesh {path} was not written by this program; the scene package is damaged.")
+        if (
+            len(counts) != 2
+            or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode()
+        ):
+            raise SceneError(
+                f"The mesh {path} was not written by this program; the scene package is damaged."
+            )
         split = counts[0] * 32  # bytes of eight floats
         if path.stat().st_size != len(head + mark) + split + counts[1] * _FACE.itemsize:
             raise SceneError(f"The mesh {path} is truncated; save the scene again.")
@@ -72,14 +79,25 @@ def read_ply(path: str | Path, pixels: int | None = None) -> Mesh:
         faces = np.frombuffer(file.read(), _FACE)
     corners = faces["vertex_indices"]
     if (faces["count"] != 3).any() or not np.isfinite(vertices).all():
-        raise SceneError(f"The mesh {path} has faces that are no triangles, or vertices that are NaN; it is damaged.")
+        raise SceneError(
+            f"The mesh {path} has faces that are no triangles, or vertices that are NaN; it is damaged."
+        )
     if corners.size and not 0 <= corners.min() <= corners.max() < len(vertices):
         raise SceneError(f"The mesh {path} has faces of vertices that do not exist; it is damaged.")
     pixel = faces["pixel"]
     if pixels is not None and pixel.size and not 0 <= pixel.min() <= pixel.max() < pixels:
         raise SceneError(f"The mesh {path} has faces of pixels that do not exist; it is damaged.")
-    place, normals, uv = (np.array(part, np.float32, order="C") for part in np.split(vertices, [3, 6], axis=1))
-    return Mesh(place, corners.astype(np.int32), normals, uv, pixel.astype(np.int32), faces["plane"].astype(np.int16))
+    place, normals, uv = (
+        np.array(part, np.float32, order="C") for part in np.split(vertices, [3, 6], axis=1)
+    )
+    return Mesh(
+        place,
+        corners.astype(np.int32),
+        normals,
+        uv,
+        pixel.astype(np.int32),
+        faces["plane"].astype(np.int16),
+    )
 
 
 def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
@@ -100,12 +118,20 @@ def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, 
     bodies = []
     for k, entry in enumerate(entries):
         mesh = read_ply(folder / f"bodies/{k}.ply")
-        albedo, roughness, metallic = (package_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3])
+        albedo, roughness, metallic = (
+            package_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3]
+        )
         if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
-            raise SceneError(f"The maps of body {k} have other channels than they need; the package is damaged.")
-        told: dict[str, Any] = {key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None}
+            raise SceneError(
+                f"The maps of body {k} have other channels than they need; the package is damaged."
+            )
+        told: dict[str, Any] = {
+            key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None
+        }
         surface = Surface(albedo, roughness, metallic, **told)
-        bodies.append(Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"])))
+        bodies.append(
+            Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))
+        )
     return tuple(bodies)
 
 

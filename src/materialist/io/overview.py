@@ -14,9 +14,18 @@ from materialist.types import Array, Scene
 
 _WIDTH = 1600
 """Width of the sheet, pixels; its height follows from the photo's shape."""
-_MARGIN, _GAP, _CAPTION, _HEADER, _LINE = 40, 14, 30, 74, 24
-_INK, _DIM, _PAPER, _FRAME, _AMBER = (236, 236, 238), (150, 152, 158), (24, 25, 28), (36, 38, 42), (232, 178, 92)
-_MOST_WARNINGS, _NAME = 6, 44
+_MARGIN = 40
+_GAP = 14
+_CAPTION = 30
+_HEADER = 74
+_LINE = 24
+_INK = (236, 236, 238)
+_DIM = (150, 152, 158)
+_PAPER = (24, 25, 28)
+_FRAME = (36, 38, 42)
+_AMBER = (232, 178, 92)
+_MOST_WARNINGS = 6
+_NAME = 44
 """How many are shown, and letters of the file's name."""
 
 
@@ -31,10 +40,15 @@ class _Tile(NamedTuple):
 
 def overview(scene: Scene) -> Array:
     """[h, 1600, 3] uint8 sRGB: photo, re-rendering, error; the maps; light and geometry; and how it was made."""
-    rows, footer = _rows(scene), _footer(scene)
+    rows = _rows(scene)
+    footer = _footer(scene)
     inner = _WIDTH - 2 * _MARGIN
-    heights = [round((inner - _GAP * (len(row) - 1)) / sum(tile.aspect for tile in row)) for row in rows]
-    height = 2 * _MARGIN + _HEADER + sum(h + _CAPTION + _GAP for h in heights) + _LINE * len(footer) + 20
+    heights = [
+        round((inner - _GAP * (len(row) - 1)) / sum(tile.aspect for tile in row)) for row in rows
+    ]
+    height = (
+        2 * _MARGIN + _HEADER + sum(h + _CAPTION + _GAP for h in heights) + _LINE * len(footer) + 20
+    )
     sheet = Image.new("RGB", (_WIDTH, height), _PAPER)
     draw = ImageDraw.Draw(sheet)
     _header(draw, scene)
@@ -43,7 +57,10 @@ def overview(scene: Scene) -> Array:
         x = float(_MARGIN)
         for tile in row:
             right = x + tile_height * tile.aspect
-            sheet.paste(_drawn(tile, min(round(right), _WIDTH - _MARGIN) - round(x), tile_height), (round(x), y))
+            sheet.paste(
+                _drawn(tile, min(round(right), _WIDTH - _MARGIN) - round(x), tile_height),
+                (round(x), y),
+            )
             x = right + _GAP
         y += tile_height + _CAPTION + _GAP
     draw.line([(_MARGIN, y + 2), (_WIDTH - _MARGIN, y + 2)], fill=_FRAME, width=2)
@@ -55,7 +72,9 @@ def overview(scene: Scene) -> Array:
 def _rows(scene: Scene) -> list[list[_Tile]]:
     """Tiles by row; each row is stretched to the full width, so any photo shape fills the sheet."""
     aspect = float(np.clip(scene.camera.width / scene.camera.height, 0.4, 4))
-    m, photo, geometry = scene.materials, scene.photo, scene.geometry
+    m = scene.materials
+    photo = scene.photo
+    geometry = scene.geometry
     quality = scene.report.metrics.get("rerender_psnr_path")
     score = "path traced" if quality is None else f"path traced, {quality:.1f} dB"
     known = scene.depth[scene.depth > 0]
@@ -72,10 +91,17 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
     ]
     notes = {name: f"mean {values.mean():.2f}" for name, values in vars(m).items()}
     notes |= {"normal": "camera frame", "depth": span}
-    maps = [(name.capitalize(), notes[name], pixels) for name, pixels in display.maps(scene).items()]
+    maps = [
+        (name.capitalize(), notes[name], pixels) for name, pixels in display.maps(scene).items()
+    ]
     planes = f"{continued or 'none'} continued, {len(geometry.mesh.faces):,} triangles"
     last = [
-        _Tile("Environment map", f"brightest {scene.envmap.max():.3g}", display.light(scene.envmap), 2.0),
+        _Tile(
+            "Environment map",
+            f"brightest {scene.envmap.max():.3g}",
+            display.light(scene.envmap),
+            2.0,
+        ),
         _Tile("Planes", planes, _labels(geometry.plane_label, photo.linear), aspect),
     ]
     rows = [[*pictures, *maps]] if aspect < 0.6 else [pictures, maps]
@@ -84,13 +110,18 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
 
 def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
     """Lines of text under the pictures: how it was made, how good it is, what to beware of."""
-    metrics, options = scene.report.metrics, scene.provenance
+    metrics = scene.report.metrics
+    options = scene.provenance
     parts = [f"Predictor {scene.prior.predictor}"]
-    parts += [f"{key} {options[key]}" for key in ("engine", "preset", "completion") if key in options]
+    parts += [
+        f"{key} {options[key]}" for key in ("engine", "preset", "completion") if key in options
+    ]
     figures = {
-        "rerender_psnr_path": "PSNR {:.2f} dB", "rerender_ssim_path": "SSIM {:.3f}", "total_seconds": "{:.0f} s",
+        "rerender_psnr_path": "PSNR {:.2f} dB",
+        "rerender_ssim_path": "SSIM {:.3f}",
+        "total_seconds": "{:.0f} s",
         "peak_rss_mb": "peak {:.0f} MB",
-    }  # fmt: skip
+    }
     parts += [text.format(metrics[key]) for key, text in figures.items() if key in metrics]
     lines = [("   ·   ".join(parts), _INK)]
     for warning in scene.warnings[:_MOST_WARNINGS]:
@@ -101,7 +132,8 @@ def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
 
 
 def _header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
-    camera, photo = scene.camera, scene.photo
+    camera = scene.camera
+    photo = scene.photo
     draw.text((_MARGIN, _MARGIN - 10), photo.name[:_NAME], font=_font(34), fill=_INK)
     note = (
         f"{photo.original.shape[1]} x {photo.original.shape[0]} photo  ·  worked at {camera.width} x {camera.height}"
@@ -131,6 +163,8 @@ def _font(size: int) -> ImageFont.FreeTypeFont:
 def _labels(label: Array, linear: Array) -> Array:
     """Each plane [H, W] in a colour of its own over a dim grey photo [H, W, 3]."""
     hue = (label.astype(np.int32) * 67 + 100) % 180
-    colour = cv2.cvtColor(np.stack([hue, hue * 0 + 130, hue * 0 + 255], -1).astype(np.uint8), cv2.COLOR_HSV2RGB)
+    colour = cv2.cvtColor(
+        np.stack([hue, hue * 0 + 130, hue * 0 + 255], -1).astype(np.uint8), cv2.COLOR_HSV2RGB
+    )
     dim = 0.25 + 0.6 * srgb_levels(linear).mean(-1, keepdims=True) / 255
     return display.to_bytes(np.where(label[..., None] >= 0, colour / 255 * dim, 0.6 * dim))

@@ -20,7 +20,17 @@ from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
 from materialist.metrics.residual import shading_residual
 from materialist.plain import plain
-from materialist.types import Array, Camera, FitReport, Geometry, Lamp, Materials, Photo, Prediction, Scene
+from materialist.types import (
+    Array,
+    Camera,
+    FitReport,
+    Geometry,
+    Lamp,
+    Materials,
+    Photo,
+    Prediction,
+    Scene,
+)
 
 FORMAT = "materialist-scene"
 VERSION = 1
@@ -47,33 +57,54 @@ def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
     except (SceneError, MemoryError):
         raise
     except Exception as error:  # readers of damaged files raise anything
-        raise SceneError(f"The scene package {path} cannot be read: {' '.join(str(error).split())}") from error
+        raise SceneError(
+            f"The scene package {path} cannot be read: {' '.join(str(error).split())}"
+        ) from error
 
 
 def _read(folder: Path, most: float) -> Scene:
     meta = _read_meta(folder)
-    camera, photo, prior = Camera(**meta["camera"]), meta["photo"], meta["prior"]
+    camera = Camera(**meta["camera"])
+    photo = meta["photo"]
+    prior = meta["prior"]
     check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
     shape = (camera.height, camera.width)
-    before, (materials, normal, depth) = (_read_maps(folder / name, shape) for name in ("prior", "maps"))
+    before, (materials, normal, depth) = (
+        _read_maps(folder / name, shape) for name in ("prior", "maps")
+    )
     light = package_map(folder / LIGHT) if (folder / LIGHT).exists() else None
     if light is not None and light.shape[2:] != (4,):
-        raise SceneError(f"{folder / LIGHT} is {list(light.shape)}, and needs 4 channels; the package is damaged.")
+        raise SceneError(
+            f"{folder / LIGHT} is {list(light.shape)}, and needs 4 channels; the package is damaged."
+        )
     spread = {
-        key: package_map(folder / spread_file(key), shape) for key in MAPS if (folder / spread_file(key)).exists()
+        key: package_map(folder / spread_file(key), shape)
+        for key in MAPS
+        if (folder / spread_file(key)).exists()
     }
     label = package_map(folder / "plane_label.png", shape).astype(np.int16) - 1
     return Scene(
-        camera=camera, photo=_read_photo(folder, photo, shape), materials=materials, normal=normal, depth=depth,
+        camera=camera,
+        photo=_read_photo(folder, photo, shape),
+        materials=materials,
+        normal=normal,
+        depth=depth,
         prior=Prediction(
-            *before, prior["predictor"], tuple(prior["warnings"]), prior.get("sources", {}), light, spread
+            *before,
+            prior["predictor"],
+            tuple(prior["warnings"]),
+            prior.get("sources", {}),
+            light,
+            spread,
         ),
         geometry=Geometry(read_ply(folder / "mesh.ply", math.prod(shape)), label.astype(np.int8)),
-        envmap=package_map(folder / "envmap.exr"), rerender=package_map(folder / "rerender.exr", (*shape, 3)),
-        report=_read_report(folder), provenance=meta["provenance"],
+        envmap=package_map(folder / "envmap.exr"),
+        rerender=package_map(folder / "rerender.exr", (*shape, 3)),
+        report=_read_report(folder),
+        provenance=meta["provenance"],
         lamps=tuple(Lamp(**entry) for entry in meta.get("lamps", ())),
         bodies=read_bodies(folder, meta.get("bodies", [])),
-    )  # fmt: skip
+    )
 
 
 def _write(scene: Scene, folder: Path) -> None:
@@ -83,7 +114,11 @@ def _write(scene: Scene, folder: Path) -> None:
     original = _write_original(photo, folder)
     for name, maps in (("prior", scene.prior), ("maps", scene)):
         (folder / name).mkdir()
-        for key, array in {**vars(maps.materials), "normal": maps.normal, "depth": maps.depth}.items():
+        for key, array in {
+            **vars(maps.materials),
+            "normal": maps.normal,
+            "depth": maps.depth,
+        }.items():
             write_exr(folder / name / f"{key}.exr", array)
     for key, array in scene.prior.spread.items():
         write_exr(folder / spread_file(key), array)
@@ -93,13 +128,19 @@ def _write(scene: Scene, folder: Path) -> None:
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)
     # Labels -1 .. 126 become 0 .. 127, so that an image viewer shows them as grey levels.
-    write_png(folder / "plane_label.png", (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8))
+    write_png(
+        folder / "plane_label.png",
+        (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8),
+    )
     write_exr(folder / "rerender.exr", scene.rerender)
     write_png(folder / "rerender.png", scene.rerender)
     write_png(folder / "overview.png", overview(scene))
     report = scene.report  # its metrics lie flat beside `stages` and `warnings`
     warnings = list(dict.fromkeys(report.warnings))
-    _write_json(folder / "report.json", {**report.metrics, "stages": list(report.stages), "warnings": warnings})
+    _write_json(
+        folder / "report.json",
+        {**report.metrics, "stages": list(report.stages), "warnings": warnings},
+    )
     meta = _meta(scene, original)
     if scene.bodies:
         meta["bodies"] = write_bodies(folder, scene.bodies)
@@ -117,11 +158,17 @@ def _meta(scene: Scene, original: str) -> dict[str, Any]:
             "original": original,
             "has_source": photo.source is not None,
             "camera": asdict(photo.camera),
-            **{key: getattr(photo, key) for key in ("hdr", "fov_source", "path", "deep", "stops", "layer", "warnings")},
+            **{
+                key: getattr(photo, key)
+                for key in ("hdr", "fov_source", "path", "deep", "stops", "layer", "warnings")
+            },
             "exif": None if photo.exif is None else base64.b64encode(photo.exif).decode("ascii"),
         },
         "prior": {key: getattr(scene.prior, key) for key in ("predictor", "warnings", "sources")},
-        "provenance": {"tool_version": __version__, **scene.provenance},  # one that was read keeps its own
+        "provenance": {
+            "tool_version": __version__,
+            **scene.provenance,
+        },  # one that was read keeps its own
         **({"lamps": [asdict(lamp) for lamp in scene.lamps]} if scene.lamps else {}),
     }
 
@@ -138,36 +185,61 @@ def _write_original(photo: Photo, folder: Path) -> str:
 
 def _suffix_of(source: bytes) -> str:
     """File suffix by content, for photos without a file name."""
-    known = {b"\x89PNG": ".png", b"\xff\xd8": ".jpg", b"\x76\x2f\x31\x01": ".exr", b"#?RA": ".hdr", b"RIFF": ".webp"}
+    known = {
+        b"\x89PNG": ".png",
+        b"\xff\xd8": ".jpg",
+        b"\x76\x2f\x31\x01": ".exr",
+        b"#?RA": ".hdr",
+        b"RIFF": ".webp",
+    }
     return next((suffix for mark, suffix in known.items() if source.startswith(mark)), ".img")
 
 
 def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> Photo:
     """The Photo; its native pixels are decoded again from the original file."""
-    file, stops = folder / Path(meta["original"]).name, int(meta.get("stops", 0))
+    file = folder / Path(meta["original"]).name
+    stops = int(meta.get("stops", 0))
     if meta["has_source"]:
-        original, source = decode_photo(file, meta.get("layer")).exposed(stops), file.read_bytes()
+        original = decode_photo(file, meta.get("layer")).exposed(stops)
+        source = file.read_bytes()
     else:
-        original, source = read_exr(file), None
+        original = read_exr(file)
+        source = None
     exif = meta.get("exif")
     return Photo(
-        package_map(folder / "photo.exr", (*shape, 3)), Camera(**meta["camera"]), original, meta["hdr"],
-        meta["fov_source"], meta["path"], source, tuple(meta["warnings"]), bool(meta.get("deep", False)), stops,
-        meta.get("layer"), None if exif is None else base64.b64decode(exif, validate=True),
-    )  # fmt: skip
+        package_map(folder / "photo.exr", (*shape, 3)),
+        Camera(**meta["camera"]),
+        original,
+        meta["hdr"],
+        meta["fov_source"],
+        meta["path"],
+        source,
+        tuple(meta["warnings"]),
+        bool(meta.get("deep", False)),
+        stops,
+        meta.get("layer"),
+        None if exif is None else base64.b64decode(exif, validate=True),
+    )
 
 
 def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
-    maps = [package_map(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape) for k in MAPS]
+    maps = [
+        package_map(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape)
+        for k in MAPS
+    ]
     return Materials(*maps[:3]), maps[3], maps[4]
 
 
 def _read_meta(folder: Path) -> dict[str, Any]:
     """scene.json, checked for kind and version."""
     if (aside := interrupted_replacement(folder)) is not None:
-        raise SceneError(f"An interrupted save left {folder} without its scene; get it back: mv {aside} {folder}")
+        raise SceneError(
+            f"An interrupted save left {folder} without its scene; get it back: mv {aside} {folder}"
+        )
     if not folder.is_dir():
-        raise SceneError(f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}")
+        raise SceneError(
+            f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}"
+        )
     meta = _read_json(folder, MARKER)
     if meta.get("format") != FORMAT:
         raise SceneError(f"{folder / MARKER} does not describe a scene of this program.")
@@ -182,7 +254,9 @@ def _read_meta(folder: Path) -> dict[str, Any]:
 def _read_json(folder: Path, name: str) -> dict[str, Any]:
     path = inside(folder, name)
     if path.stat().st_size > _JSON_BYTES:
-        raise SceneError(f"{path} has more than {_JSON_BYTES / 1e6:g} MB; the scene package is damaged.")
+        raise SceneError(
+            f"{path} has more than {_JSON_BYTES / 1e6:g} MB; the scene package is damaged."
+        )
     try:
         content = json.loads(path.read_text("utf-8"), parse_float=_finite, parse_constant=_finite)
     except (ValueError, RecursionError) as error:
@@ -201,10 +275,16 @@ def _finite(text: str) -> float:
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n"
-    path.write_text(text, "utf-8", "backslashreplace")  # bytes of a name that are no UTF-8 become JSON's own escapes
+    path.write_text(
+        text, "utf-8", "backslashreplace"
+    )  # bytes of a name that are no UTF-8 become JSON's own escapes
 
 
 def _read_report(folder: Path) -> FitReport:
     content = _read_json(folder, "report.json")
-    metrics = {k: math.nan if v is None else v for k, v in content.items() if k not in ("stages", "warnings")}
+    metrics = {
+        k: math.nan if v is None else v
+        for k, v in content.items()
+        if k not in ("stages", "warnings")
+    }
     return FitReport(tuple(content.get("stages", ())), metrics, tuple(content.get("warnings", ())))

@@ -38,7 +38,9 @@ EXAMPLES = {
 PREFIX = "example:"
 
 
-def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = None, layer: str | None = None) -> Photo:
+def read_photo(
+    path: str | Path, *, size: int = 512, fov: float | str | None = None, layer: str | None = None
+) -> Photo:
     """Read PATH (or `example:NAME`) as a Photo whose longer side is `size` pixels, or fewer where the file has fewer.
 
     `fov` is the horizontal field of view in degrees, in (1, 170); None or "auto" takes it from EXIF, else 35.
@@ -66,18 +68,30 @@ def read_photo(path: str | Path, *, size: int = 512, fov: float | str | None = N
             "The picture is 2:1 like a 360-degree panorama; it is treated as an ordinary photo, so crop a view from it."
         )
     if stops:
-        warnings.append(f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit.")
+        warnings.append(
+            f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit."
+        )
     _require_content(linear, name)
     if hdr and float(linear.max()) > HDR_CLIP:
-        warnings.append(f"HDR values above {HDR_CLIP * 2.0**-stops:.3g} are clipped at working size.")
+        warnings.append(
+            f"HDR values above {HDR_CLIP * 2.0**-stops:.3g} are clipped at working size."
+        )
         linear = np.minimum(linear, np.float32(HDR_CLIP))
     from_exif = horizontal_fov(decoded.tags, width, height)
     source = "option" if angle else "exif" if from_exif else "default"
     camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
     return Photo(
-        linear, camera, original, hdr, source, name, file.read_bytes(), tuple(warnings), stops=stops,
+        linear,
+        camera,
+        original,
+        hdr,
+        source,
+        name,
+        file.read_bytes(),
+        tuple(warnings),
+        stops=stops,
         layer=decoded.layer,
-    )  # fmt: skip
+    )
 
 
 def exposed(photo: Photo) -> Photo:
@@ -102,7 +116,9 @@ def _stops(linear: Array) -> int:
     The 97th percentile of what is not black comes near BRIGHT, or the median near MIDDLE where that asks for more.
     """
     value = linear.max(-1)
-    value = np.minimum(value, HDR_CLIP * float(np.percentile(value, 99)) or value.max())  # suns set no scale
+    value = np.minimum(
+        value, HDR_CLIP * float(np.percentile(value, 99)) or value.max()
+    )  # suns set no scale
     bright, middle = np.percentile(value[value >= BLACK * value.max()], (97, 50))
     if bright <= 0:
         return 0
@@ -144,7 +160,8 @@ def _working(original: Array, size: int) -> Array:
 
 
 def _require_content(linear: Array, name: str) -> None:
-    low, high = float(linear.min()), float(linear.max())
+    low = float(linear.min())
+    high = float(linear.max())
     if high <= 1e-4:
         raise InputError(f"{name} is entirely black; there is no light in it to explain.")
     if np.ptp(linear.reshape(-1, 3), axis=0).max() <= 1e-3 * high or high - low <= 1e-4:

@@ -48,7 +48,11 @@ def radiance_header(path: Path) -> RadianceHeader:
     if size is None or size[2] == size[5]:
         raise InputError(f"{path} has no size in its Radiance header; export it again.")
     lines = head[: size.start()].decode("latin-1").split("\n")
-    pairs = [(name.strip(), value.strip()) for name, mark, value in (line.partition("=") for line in lines) if mark]
+    pairs = [
+        (name.strip(), value.strip())
+        for name, mark, value in (line.partition("=") for line in lines)
+        if mark
+    ]
     axes = ((size[1] + size[2]).decode(), (size[4] + size[5]).decode())
     return RadianceHeader(pairs, axes, (int(size[3]), int(size[6])), size.end())
 
@@ -59,10 +63,16 @@ def read_radiance(path: Path) -> Decoded:
     lines, length = header.counts
     # OpenCV knows one orientation and one format; the pixels of all are packed in the same way.
     plain = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {lines} +X {length}\n".encode()
-    content = np.concatenate([np.frombuffer(plain, np.uint8), np.fromfile(path, np.uint8, offset=header.bytes)])
+    content = np.concatenate(
+        [np.frombuffer(plain, np.uint8), np.fromfile(path, np.uint8, offset=header.bytes)]
+    )
     scratch = os.environ.get("OPENCV_TEMP_PATH", "/tmp")
-    if os.path.isdir(scratch) and not os.access(scratch, os.W_OK):  # where OpenCV puts the file before it decodes it
-        raise InputError(f"{path} cannot be decoded: {scratch} is read-only; set OPENCV_TEMP_PATH to another folder.")
+    if os.path.isdir(scratch) and not os.access(
+        scratch, os.W_OK
+    ):  # where OpenCV puts the file before it decodes it
+        raise InputError(
+            f"{path} cannot be decoded: {scratch} is read-only; set OPENCV_TEMP_PATH to another folder."
+        )
     light = levels_of(content, path)[0]
     if light.dtype != np.float32:
         raise InputError(f"{path} is no Radiance picture that can be read; export it as EXR.")
@@ -95,7 +105,12 @@ def _primaries(header: RadianceHeader, notes: list[str]) -> Primaries:
 
 
 def _checked(
-    name: str, text: str, count: int, default: np.ndarray, notes: list[str], is_valid: Callable[[np.ndarray], bool]
+    name: str,
+    text: str,
+    count: int,
+    default: np.ndarray,
+    notes: list[str],
+    is_valid: Callable[[np.ndarray], bool],
 ) -> np.ndarray:
     """`count` numbers of a header's line, or the default and a note."""
     try:
@@ -104,7 +119,9 @@ def _checked(
             return numbers
     except ValueError:
         pass
-    notes.append(f"The line {name}={text[:60]} of the Radiance header cannot be used; it is left out.")
+    notes.append(
+        f"The line {name}={text[:60]} of the Radiance header cannot be used; it is left out."
+    )
     return default
 
 

@@ -56,7 +56,9 @@ class Sample:
     camera frame, in the units of `image`; last the share of the surfaces that each direction reaches."""
 
     def truth(self) -> Prediction:
-        return Prediction(Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, "truth")
+        return Prediction(
+            Materials(self.albedo, self.roughness, self.metallic), self.normal, self.depth, "truth"
+        )
 
 
 class Source(ABC):
@@ -111,7 +113,9 @@ class SampleFolder(Source):
         found = [sorted((folder / "samples").glob("[0-9]*.npz")) for folder in self.folders]
         for folder, paths in zip(self.folders, found, strict=True):
             if not paths:
-                raise InputError(f"{folder} holds no samples yet; make some with: materialist train data.")
+                raise InputError(
+                    f"{folder} holds no samples yet; make some with: materialist train data."
+                )
         self.paths = list(chain.from_iterable(found))
 
     def seed(self) -> list[int | None]:
@@ -122,8 +126,13 @@ class SampleFolder(Source):
 
 def read_sample(path: Path) -> Sample:
     """The sample in an .npz file; raises InputError naming the file when it is damaged or lacks an array."""
-    arrays = read_arrays(path, "image", "albedo", "roughness", "metallic", "normal", "depth", "mask", "fov")
-    as_light = lambda values: np.nan_to_num(values.astype(np.float32), posinf=6e4)  # noqa: E731
+    arrays = read_arrays(
+        path, "image", "albedo", "roughness", "metallic", "normal", "depth", "mask", "fov"
+    )
+
+    def as_light(values):
+        return np.nan_to_num(values.astype(np.float32), posinf=6e4)
+
     try:
         surface = (arrays["mask"] > 0) & (arrays["depth"] > 0)
         height, width = arrays["image"].shape[:2]
@@ -141,7 +150,9 @@ def read_sample(path: Path) -> Sample:
             **{name: as_light(arrays[name]) for name in ("shading", "light") if name in arrays},
         )
     except (IndexError, ValueError) as error:
-        raise InputError(f"The arrays of {path} do not fit together ({error}); make it again.") from error
+        raise InputError(
+            f"The arrays of {path} do not fit together ({error}); make it again."
+        ) from error
 
 
 def read_arrays(path: Path, *needed: str) -> dict[str, Array]:
@@ -150,7 +161,9 @@ def read_arrays(path: Path, *needed: str) -> dict[str, Array]:
         with np.load(path, allow_pickle=False) as stored:
             arrays = dict(stored)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(f"{path} cannot be read ({error}); delete it and make it again.") from error
+        raise InputError(
+            f"{path} cannot be read ({error}); delete it and make it again."
+        ) from error
     for name in needed:
         if name not in arrays:
             raise InputError(f"{path} has no array {name!r}; delete it and make it again.")
@@ -158,7 +171,11 @@ def read_arrays(path: Path, *needed: str) -> dict[str, Array]:
 
 
 def complete(
-    paths: Sequence[Path], make: Callable[[int], dict[str, Array]], what: str, progress: Progress, workers: int = 1
+    paths: Sequence[Path],
+    make: Callable[[int], dict[str, Array]],
+    what: str,
+    progress: Progress,
+    workers: int = 1,
 ) -> int:
     """Write those of the files of a folder that are missing, each whole or not at all; returns how many.
 
@@ -171,8 +188,12 @@ def complete(
     missing = [k for k, path in enumerate(paths) if not path.exists()]
     # Fresh processes: a renderer that has started does not survive a fork.
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, spawn, _start_worker) if workers > 1 else nullcontext() as pool:
-        written = (pool.map if pool else map)(_write, [paths[k] for k in missing], repeat(make), missing)
+    with (
+        ProcessPoolExecutor(workers, spawn, _start_worker) if workers > 1 else nullcontext() as pool
+    ):
+        written = (pool.map if pool else map)(
+            _write, [paths[k] for k in missing], repeat(make), missing
+        )
         for done, _ in enumerate(written, len(paths) - len(missing) + 1):
             progress(what, done, len(paths))
     return len(missing)
@@ -214,7 +235,9 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
         if folder.is_dir() and any(folder.iterdir()):
             old = described(folder / name)
             if old is None:
-                raise InputError(f"{folder} holds other things than such a set; name another folder.")
+                raise InputError(
+                    f"{folder} holds other things than such a set; name another folder."
+                )
             for key in keys:
                 if old.get(key) != description[key]:
                     raise InputError(

@@ -25,9 +25,14 @@ from materialist.io.exif import file_tags
 from materialist.io.icc import matrix_profile
 from materialist.types import Array
 
-_UNSPECIFIED, _PREMULTIPLIED = 0, 1
+_UNSPECIFIED = 0
+_PREMULTIPLIED = 1
 """What the channel beyond colour may be, of ExtraSamples."""
-_INVERTED, _GREY, _RGB, _CIELAB, _ICCLAB = 0, 1, 2, 8, 9
+_INVERTED = 0
+_GREY = 1
+_RGB = 2
+_CIELAB = 8
+_ICCLAB = 9
 """What values mean, of PhotometricInterpretation."""
 FOURTH = "The file says of its last channel that it is no transparency; it is left out."
 
@@ -76,12 +81,15 @@ def read_tiff(path: Path) -> Decoded:
         return _shallow(path, layout)
     _require_known(layout, path)
     colour, alpha = rgb_levels(path)
-    tags, warnings = file_tags(path), frames_note(layout.frames)
+    tags = file_tags(path)
+    warnings = frames_note(layout.frames)
     if layout.extra[0] == _UNSPECIFIED:
         warnings.append(FOURTH)
         alpha = None
     elif layout.samples == 2 and alpha is None:  # OpenCV reads the grey channel alone, at 8 bits
-        warnings.append("The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it.")
+        warnings.append(
+            "The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it."
+        )
     space = _space(layout, tags, warnings, is_float=colour.dtype.kind == "f")
     premultiplied = _PREMULTIPLIED in layout.extra
     if colour.dtype.kind == "f":
@@ -104,7 +112,9 @@ def _shallow(path: Path, layout: _Layout) -> Decoded:
 def _require_known(layout: _Layout, path: Path) -> None:
     """Refuse what OpenCV would read as something else."""
     if layout.planar == 2:
-        raise InputError(f"{path} has its channels one after the other; save it with interleaved channels.")
+        raise InputError(
+            f"{path} has its channels one after the other; save it with interleaved channels."
+        )
     if layout.meaning == _INVERTED:
         raise InputError(f"{path} has inverted values; save it as plain 16-bit RGB.")
     if layout.meaning not in (_GREY, _RGB):
@@ -114,7 +124,9 @@ def _require_known(layout: _Layout, path: Path) -> None:
         )
 
 
-def _space(layout: _Layout, tags: dict[str, Any], warnings: list[str], *, is_float: bool) -> ColourSpace | None:
+def _space(
+    layout: _Layout, tags: dict[str, Any], warnings: list[str], *, is_float: bool
+) -> ColourSpace | None:
     """What the values mean; None for sRGB, and for floats that are linear Rec.709."""
     if layout.profile is None:
         return None if is_float else exif_space(tags, warnings)
@@ -122,12 +134,18 @@ def _space(layout: _Layout, tags: dict[str, Any], warnings: list[str], *, is_flo
         return deep_space(layout.profile, warnings)
     space = matrix_profile(layout.profile)
     if space is None:
-        warnings.append("The colour profile of a float TIFF is used only where it is a matrix: taken as linear.")
+        warnings.append(
+            "The colour profile of a float TIFF is used only where it is a matrix: taken as linear."
+        )
     return space
 
 
 def _light(
-    colour: Array, alpha: Array | None, space: ColourSpace | None, premultiplied: bool, warnings: list[str]
+    colour: Array,
+    alpha: Array | None,
+    space: ColourSpace | None,
+    premultiplied: bool,
+    warnings: list[str],
 ) -> Decoded:
     """A float TIFF: light, by its profile or as it is."""
     light = np.array(colour, np.float32, order="C") if space is None else space.linear(colour)
@@ -145,7 +163,9 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
         )
     stored = page.asarray()
     if stored.ndim != 3 or stored.shape[-1] != 3:
-        raise InputError(f"{path} holds CIELab of another shape than three channels; save it as RGB.")
+        raise InputError(
+            f"{path} holds CIELab of another shape than three channels; save it as RGB."
+        )
     linear: Array = np.empty(stored.shape, np.float32)
     for start in range(0, len(stored), ROWS):  # bounds the memory
         rows = slice(start, start + ROWS)

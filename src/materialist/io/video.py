@@ -15,9 +15,15 @@ from materialist.io.image import write_png
 from materialist.types import Array
 
 BT709 = (
-    "-vf", "scale=out_color_matrix=bt709:out_range=tv", "-colorspace", "bt709", "-color_primaries", "bt709",
-    "-color_trc", "bt709",
-)  # fmt: skip
+    "-vf",
+    "scale=out_color_matrix=bt709:out_range=tv",
+    "-colorspace",
+    "bt709",
+    "-color_primaries",
+    "bt709",
+    "-color_trc",
+    "bt709",
+)
 """ffmpeg's options for the colours that players expect of a video; its default is standard-definition television."""
 MAX_FRAMES = 3600
 
@@ -26,7 +32,9 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
     """Check before the work that `write_frames` will accept PATH. Raises OutputError, InputError or SetupError."""
     path = Path(path)
     if path.suffix.lower() not in (".mp4", ""):
-        raise InputError(f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames.")
+        raise InputError(
+            f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames."
+        )
     if path.suffix and find_spec("imageio_ffmpeg") is None:
         raise SetupError(
             f"Video needs one more package: {extra_command('video')}; or give -o a name without "
@@ -35,7 +43,9 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
     ensure_writable(path, force, None if path.suffix else FRAMES)
 
 
-def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, force: bool = False) -> int:
+def write_frames(
+    path: str | Path, pictures: Iterable[Array], *, fps: int = 24, force: bool = False
+) -> int:
     """Write linear pictures [H, W, 3] to PATH.mp4 (H.264), or to a folder as 0000.png, 0001.png, ...; returns how many.
 
     Whole or not at all. An odd row or column is left out of a video, which needs even sizes.
@@ -55,8 +65,14 @@ def write_frames(path: str | Path, pictures: Iterable[Array], *, fps: int = 24, 
 def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
     count = 0
     writer: Any = get_writer(
-        path, "FFMPEG", fps=fps, codec="libx264", quality=8, macro_block_size=2, output_params=list(BT709)
-    )  # fmt: skip
+        path,
+        "FFMPEG",
+        fps=fps,
+        codec="libx264",
+        quality=8,
+        macro_block_size=2,
+        output_params=list(BT709),
+    )
     with writer:
         for picture in pictures:
             height, width = (n - n % 2 for n in picture.shape[:2])

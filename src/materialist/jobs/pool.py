@@ -35,13 +35,17 @@ class LocalPool:
         try:
             place.worker = place.worker or Worker(environment=place.environment, keep_errors=True)
         except OSError as error:
-            raise SetupError(f"A worker process cannot be started: {error}; give fewer workers.") from error
+            raise SetupError(
+                f"A worker process cannot be started: {error}; give fewer workers."
+            ) from error
         place.key = key
         place.worker.begin(task, arguments)
 
     def wait(self, seconds: float) -> list[tuple[Any, Message]]:
         """(key of the task, message): as soon as there is one, and none after `seconds`."""
-        begun = {place.worker.connection: place for place in self._places if place.worker is not None}
+        begun = {
+            place.worker.connection: place for place in self._places if place.worker is not None
+        }
         found = []
         for connection in wait(list(begun), seconds):
             place = begun[connection]  # type: ignore[index]
@@ -73,21 +77,35 @@ class RayPool:
     installed or does not answer.
     """
 
-    def __init__(self, address: str, environment: dict[str, str], *, workers: int | None = None, gpu: bool = True):
+    def __init__(
+        self,
+        address: str,
+        environment: dict[str, str],
+        *,
+        workers: int | None = None,
+        gpu: bool = True,
+    ):
         try:
             import ray
         except ModuleNotFoundError as error:
-            raise SetupError(f"Workers on Ray need Ray; install it with: {extra_command('ray')}") from error
+            raise SetupError(
+                f"Workers on Ray need Ray; install it with: {extra_command('ray')}"
+            ) from error
         self._ray = ray
         local = address == "local"  # a cluster of this machine alone, which ends with the pool
         _check_reachable(address)
         try:
             # 'local', not the address of a cluster that happens to run on this machine: it was not asked for.
-            place: dict[str, Any] = {"address": "local", "num_cpus": workers} if local else {"address": address}
+            place: dict[str, Any] = (
+                {"address": "local", "num_cpus": workers} if local else {"address": address}
+            )
             ray.init(
-                **place, log_to_driver=False, configure_logging=False, include_dashboard=False if local else None,
+                **place,
+                log_to_driver=False,
+                configure_logging=False,
+                include_dashboard=False if local else None,
                 runtime_env={"env_vars": environment},
-            )  # fmt: skip
+            )
         except Exception as error:
             reason = " ".join(str(error).split())
             raise SetupError(

@@ -51,9 +51,13 @@ class Worker:
         try:
             # A new program, not a fork: a renderer that has started does not survive one.
             self._process = subprocess.Popen(
-                words, stdin=subprocess.DEVNULL, stderr=self._errors, env={**os.environ, **(environment or {})},
-                pass_fds=(theirs.fileno(),), start_new_session=True,
-            )  # fmt: skip
+                words,
+                stdin=subprocess.DEVNULL,
+                stderr=self._errors,
+                env={**os.environ, **(environment or {})},
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
         except OSError:
             self.connection.close()
             raise

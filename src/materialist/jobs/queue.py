@@ -12,7 +12,9 @@ from typing import Any
 from materialist.jobs.process import LOST, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
 
-QUEUED, RUNNING, STOPPED = "queued", "running", "stopped"
+QUEUED = "queued"
+RUNNING = "running"
+STOPPED = "stopped"
 """States of a job, beside DONE and FAILED."""
 NICENESS = 5
 """Of the processes: live previews go before."""
@@ -51,7 +53,9 @@ class Job:
     def end(self, state: str, message: str = "") -> None:
         """Set the final state, unless it has one."""
         if not self.over:
-            self.state, self.message, self.ended = state, message, time.monotonic()
+            self.state = state
+            self.message = message
+            self.ended = time.monotonic()
 
 
 class JobQueue:
@@ -59,7 +63,8 @@ class JobQueue:
 
     def __init__(self, limit: int = 1, memory: int = 0, seconds: float = 0.0):
         """limit: jobs at a time. memory: bytes of data of each. seconds: how long each may run. 0: no limit."""
-        self._memory, self._seconds = memory, seconds
+        self._memory = memory
+        self._seconds = seconds
         self._threads = ThreadPoolExecutor(limit, thread_name_prefix="job")
         self._lock = threading.Lock()
         self._jobs: list[Job] = []
@@ -78,7 +83,11 @@ class JobQueue:
     def unfinished(self, owner: str | None = None, kind: str | None = None) -> list[Job]:
         """The jobs that wait or run: all, or those of a person, or of a kind."""
         with self._lock:
-            return [j for j in self._jobs if owner in (None, j.owner) and kind in (None, j.kind) and not j.over]
+            return [
+                j
+                for j in self._jobs
+                if owner in (None, j.owner) and kind in (None, j.kind) and not j.over
+            ]
 
     def stop(self, job: Job) -> None:
         """End a job, in the queue or in the middle; nothing half-written stays."""
@@ -97,7 +106,9 @@ class JobQueue:
         with self._lock:
             if job.over:
                 return
-            job.state, job.stage, job.began = RUNNING, "start", time.monotonic()
+            job.state = RUNNING
+            job.stage = "start"
+            job.began = time.monotonic()
             try:
                 job.worker = worker = Worker(niceness=NICENESS, memory=self._memory)
             except OSError as error:
@@ -114,7 +125,9 @@ class JobQueue:
                     worker.kill()
                     break
                 if message.kind == PROGRESS:
-                    job.stage, job.done, job.total = (message.facts[name] for name in ("stage", "done", "total"))
+                    job.stage, job.done, job.total = (
+                        message.facts[name] for name in ("stage", "done", "total")
+                    )
                 elif message.kind == FOUND:
                     job.found = [*job.found, message.facts]
         finally:

@@ -21,10 +21,18 @@ from typing import Any
 
 from materialist.errors import MaterialistError
 
-PROGRESS, FOUND, DONE, FAILED = "progress", "found", "done", "failed"
+PROGRESS = "progress"
+FOUND = "found"
+DONE = "done"
+FAILED = "failed"
 """Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Reporter.found`; of
 DONE: what the task returned; of FAILED: see `failure`."""
-_NO_MEMORY = ("Insufficient memory", "Failed to allocate", "std::bad_alloc", "Cannot allocate memory")
+_NO_MEMORY = (
+    "Insufficient memory",
+    "Failed to allocate",
+    "std::bad_alloc",
+    "Cannot allocate memory",
+)
 """Words of libraries for which no MemoryError is raised where memory runs out."""
 INTERVAL = 0.1
 """Seconds between two messages about the progress of one stage."""
@@ -33,14 +41,19 @@ INTERVAL = 0.1
 class Reporter:
     """Callback of a task: `report(stage, done, total)` tells progress, `report.found(...)` an intermediate result."""
 
-    def __init__(self, send: Callable[[str, Any], None], waiting: Callable[[], bool] = lambda: False):
-        self._send, self._waiting, self._last = send, waiting, 0.0
+    def __init__(
+        self, send: Callable[[str, Any], None], waiting: Callable[[], bool] = lambda: False
+    ):
+        self._send = send
+        self._waiting = waiting
+        self._last = 0.0
         self.stage = "read"
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         now = time.monotonic()
         if stage != self.stage or now - self._last > INTERVAL or done >= total:
-            self.stage, self._last = stage, now
+            self.stage = stage
+            self._last = now
             self._send(PROGRESS, {"stage": stage, "done": int(done), "total": int(total)})
 
     def found(self, **facts: Any) -> None:
@@ -87,7 +100,9 @@ def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
         while not tasks.empty():
             content = tasks.get()
         number, task = pickle.loads(content)
-        report = Reporter(lambda *message, number=number: send((*message, number)), lambda: not tasks.empty())
+        report = Reporter(
+            lambda *message, number=number: send((*message, number)), lambda: not tasks.empty()
+        )
         send((*run(task, report), number))
 
 
@@ -113,7 +128,13 @@ def failure(error: BaseException, stage: str) -> dict[str, Any]:
     if isinstance(error, MemoryError):
         reason = "There is not enough memory for this; take a smaller size, or fewer workers."
     trace = "".join(traceback.format_exception(error))[-4000:] if bug else None
-    facts = {"error": type(error).__name__, "reason": reason, "stage": stage, "bug": bug, "trace": trace}
+    facts = {
+        "error": type(error).__name__,
+        "reason": reason,
+        "stage": stage,
+        "bug": bug,
+        "trace": trace,
+    }
     return {**getattr(error, "facts", {}), **facts, "out_of_memory": out_of_memory}
 
 

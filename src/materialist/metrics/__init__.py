@@ -61,23 +61,40 @@ def ssim_without_noise(first: Array, second: Array, b: Array) -> float:
 
     Their variance in a window is their covariance, to which the noise of neither adds.
     """
-    one, other, b = (linear_to_srgb(v).astype(np.float64) for v in (_checked(first, b), _checked(second, b), b))
-    smooth = lambda v: gaussian_filter(v, (1.5, 1.5, 0), truncate=3.5)  # noqa: E731
-    mean_one, mean_other, mean_b = smooth(one), smooth(other), smooth(b)
+    one, other, b = (
+        linear_to_srgb(v).astype(np.float64) for v in (_checked(first, b), _checked(second, b), b)
+    )
+
+    def smooth(v):
+        return gaussian_filter(v, (1.5, 1.5, 0), truncate=3.5)
+
+    mean_one = smooth(one)
+    mean_other = smooth(other)
+    mean_b = smooth(b)
     mean = (mean_one + mean_other) / 2
-    variance = np.maximum(smooth(one * other) - mean_one * mean_other, 0) + smooth(b * b) - mean_b**2
+    variance = (
+        np.maximum(smooth(one * other) - mean_one * mean_other, 0) + smooth(b * b) - mean_b**2
+    )
     covariance = smooth((one + other) / 2 * b) - mean * mean_b
     level, contrast = 0.01**2, 0.03**2  # the constants of Wang et al. for values in [0, 1]
     similar = (2 * mean * mean_b + level) * (2 * covariance + contrast)
-    return float((similar / ((mean_one * mean_other + mean_b**2 + level) * (variance + contrast))).mean())
+    return float(
+        (similar / ((mean_one * mean_other + mean_b**2 + level) * (variance + contrast))).mean()
+    )
 
 
 def ssim_of_values(a: Array, b: Array, *, mask: Array | None = None) -> float:
     """As `ssim`, of maps [H, W] or [H, W, C] in [0, 1] as they are, without encoding."""
     smallest = min(a.shape[:2])
     if smallest < 3:
-        raise InputError(f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}.")
-    window = {"gaussian_weights": True, "sigma": 1.5} if smallest >= 11 else {"win_size": smallest - 1 + smallest % 2}
+        raise InputError(
+            f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}."
+        )
+    window = (
+        {"gaussian_weights": True, "sigma": 1.5}
+        if smallest >= 11
+        else {"win_size": smallest - 1 + smallest % 2}
+    )
     a, b, channel = a.astype(np.float64), b.astype(np.float64), -1 if a.ndim == 3 else None
     how = {"data_range": 1, "channel_axis": channel, "use_sample_covariance": False, **window}
     if mask is None:
@@ -93,14 +110,18 @@ def sh_coefficients(envmap: Array) -> Array:
     """
     envmap = np.asarray(envmap, np.float64)
     if envmap.ndim != 3 or envmap.shape[2] != 3 or envmap.shape[1] != 2 * envmap.shape[0]:
-        raise InputError(f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}.")
+        raise InputError(
+            f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}."
+        )
     return np.tensordot(_weighted_basis(len(envmap)), envmap, ([0, 1], [0, 1]))
 
 
 @lru_cache(maxsize=4)
 def _weighted_basis(height: int) -> Array:
     """[h, 2h, 16] spherical harmonics at the texels of a map, times their solid angles."""
-    return sh_basis(texel_directions(height, 2 * height), 3) * row_solid_angle(height)[:, None, None]
+    return (
+        sh_basis(texel_directions(height, 2 * height), 3) * row_solid_angle(height)[:, None, None]
+    )
 
 
 def sh_error(a: Array, b: Array) -> float:
@@ -110,7 +131,8 @@ def sh_error(a: Array, b: Array) -> float:
 
 def sh_error_relative(estimate: Array, truth: Array) -> float:
     """`sh_error` divided by the same norm of the true envmap: 0 is perfect, 1 is as bad as darkness."""
-    norm, error = _rms_norm(sh_coefficients(truth)), sh_error(estimate, truth)
+    norm = _rms_norm(sh_coefficients(truth))
+    error = sh_error(estimate, truth)
     return error / norm if norm > 0 else (0.0 if error == 0 else float("inf"))
 
 
@@ -149,5 +171,7 @@ def _mean_square(a: Array, b: Array, mask: Array | None = None) -> float:
 def _checked(a: Array, b: Array) -> Array:
     """Array a as float32, after checking that b has its shape."""
     if np.shape(a) != np.shape(b):
-        raise InputError(f"Two images of one size are compared, but these are {np.shape(a)} and {np.shape(b)}.")
+        raise InputError(
+            f"Two images of one size are compared, but these are {np.shape(a)} and {np.shape(b)}."
+        )
     return np.asarray(a, np.float32)

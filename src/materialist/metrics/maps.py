@@ -11,7 +11,8 @@ from materialist.types import Array, Prediction
 
 LEAST_SURFACE = 0.01
 """A picture with less surface than this part of it is not scored."""
-PAIRS, ORDERED = 50_000, 0.02
+PAIRS = 50_000
+ORDERED = 0.02
 """Pixel pairs whose order in depth is compared, and the relative difference from which a pair has one."""
 
 
@@ -28,14 +29,16 @@ def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
         return {}
     found = _albedo(predicted.materials.albedo, true.materials.albedo, surface)
     for name in ("roughness", "metallic"):
-        p, t = getattr(predicted.materials, name), getattr(true.materials, name)
+        p = getattr(predicted.materials, name)
+        t = getattr(true.materials, name)
         found[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
         found[f"{name}_psnr"] = decibel(found[f"{name}_mse"])
         found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
     found |= depth_figures(predicted.depth, true.depth, surface)
     found["normal_angle"] = mean_angle(predicted.normal, true.normal, surface)
     found |= spread_calibration(predicted, true, surface)
-    p, t = predicted.depth > 0, true.depth > 0
+    p = predicted.depth > 0
+    t = true.depth > 0
     return {**found, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
 
 
@@ -75,7 +78,8 @@ def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, fl
     found = {"depth_coverage": float(both.sum() / max(surface.sum(), 1))}
     if both.sum() < 2:
         return found
-    p, t = predicted[both].astype(np.float64), true[both].astype(np.float64)
+    p = predicted[both].astype(np.float64)
+    t = true[both].astype(np.float64)
     scale = (p * t).sum() / (p * p).sum()
     for suffix, estimate in (("", p * scale), ("_raw", p)):
         found[f"depth_mae{suffix}"] = float(np.abs(estimate - t).mean())
@@ -89,7 +93,8 @@ def depth_abs_rel(predicted: Array, true: Array) -> float:
 
     Pixels without true depth are left out; a pixel that is predicted to have none counts as an error of 1.
     """
-    surface, both = true > 0, (true > 0) & (predicted > 0)
+    surface = true > 0
+    both = (true > 0) & (predicted > 0)
     if not both.any():
         return 1.0 if surface.any() else float("nan")
     factor = np.median(true[both] / predicted[both])
@@ -121,12 +126,15 @@ def ordinal_accuracy(predicted: Array, true: Array) -> float:
     A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out; what is
     predicted to have none (0) is sky, behind everything.
     """
-    rng, known = np.random.default_rng(0), np.flatnonzero(true > 0)
-    first, second = rng.choice(known, PAIRS), rng.choice(known, PAIRS)
+    rng = np.random.default_rng(0)
+    known = np.flatnonzero(true > 0)
+    first = rng.choice(known, PAIRS)
+    second = rng.choice(known, PAIRS)
     t = np.log(true.ravel()[first]) - np.log(true.ravel()[second])
     clear = np.abs(t) > np.log1p(ORDERED)
     found = np.where(predicted > 0, predicted, np.inf).ravel()
-    a, b = found[first], found[second]
+    a = found[first]
+    b = found[second]
     right = np.where(a == b, 0.5, (a > b) == (t > 0))
     return float(right[clear].mean()) if clear.any() else float("nan")
 
@@ -153,7 +161,8 @@ def decibel(square_error: float) -> float:
 
 def best_scale(predicted: Array, true: Array, surface: Array) -> float:
     """The factor that brings linear values nearest to the true ones over `surface` [H, W] (least squares)."""
-    p, t = predicted[surface].astype(np.float64), true[surface].astype(np.float64)
+    p = predicted[surface].astype(np.float64)
+    t = true[surface].astype(np.float64)
     return float((p * t).sum() / max((p * p).sum(), 1e-12))
 
 
@@ -161,9 +170,13 @@ def _albedo(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
     scale = best_scale(predicted, true, surface)
     found = {"albedo_scale": scale}
     for suffix, estimate in (("", predicted * np.float32(scale)), ("_raw", predicted)):
-        difference = linear_to_srgb(estimate)[surface].astype(np.float64) - linear_to_srgb(true)[surface]
+        difference = (
+            linear_to_srgb(estimate)[surface].astype(np.float64) - linear_to_srgb(true)[surface]
+        )
         found[f"albedo{suffix}_mse"] = float(np.square(difference).mean())
         found[f"albedo_psnr{suffix}"] = decibel(found[f"albedo{suffix}_mse"])
-        filled = np.where(surface[..., None], estimate, true)  # windows at the border see no difference beyond it
+        filled = np.where(
+            surface[..., None], estimate, true
+        )  # windows at the border see no difference beyond it
         found[f"albedo_ssim{suffix}"] = ssim(filled, true, mask=surface)
     return found

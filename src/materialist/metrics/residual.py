@@ -22,4 +22,6 @@ def shading_residual(photo: Array, rerender: Array) -> Array:
     ratio = np.log((np.maximum(photo, 0) + FLOOR) / (np.maximum(rerender, 0) + FLOOR))
     known = np.isfinite(ratio)
     smooth = gaussian_filter(np.where(known, ratio, 0), (SIGMA, SIGMA, 0))
-    return np.exp(np.clip(np.where(known, smooth, 0), -np.log(LIMIT), np.log(LIMIT))).astype(np.float32)
+    return np.exp(np.clip(np.where(known, smooth, 0), -np.log(LIMIT), np.log(LIMIT))).astype(
+        np.float32
+    )

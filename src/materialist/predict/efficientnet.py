@@ -30,7 +30,8 @@ STAGES = (
 )
 OUTPUTS = (1, 2, 4, 6)
 """Stages whose results are the features: those at 1/4, 1/8, 1/16 and 1/32 of the resolution."""
-MEAN, SCALE = 127 / 255, 128 / 255
+MEAN = 127 / 255
+SCALE = 128 / 255
 """Of sRGB-encoded values in [0, 1], as the classifier was trained."""
 
 
@@ -46,7 +47,15 @@ class EfficientNetLite(nn.Module):
         for number, (repeats, kernel, stride, expansion, inputs, outputs) in enumerate(STAGES):
             for k in range(repeats):
                 first = k == 0
-                blocks.append(_MBConv(inputs if first else outputs, outputs, kernel, stride if first else 1, expansion))
+                blocks.append(
+                    _MBConv(
+                        inputs if first else outputs,
+                        outputs,
+                        kernel,
+                        stride if first else 1,
+                        expansion,
+                    )
+                )
             if number in OUTPUTS:
                 self.last_blocks.append(len(blocks) - 1)
         self.blocks = nn.ModuleList(blocks)
@@ -83,7 +92,8 @@ class _MBConv(nn.Module):
 
 def _same_padding(conv: nn.Conv2d, x: Tensor) -> Tensor:
     """The convolution with TensorFlow's "same" padding: an odd pixel goes to the right and the bottom."""
-    kernel, stride = conv.kernel_size[0], conv.stride[0]
+    kernel = conv.kernel_size[0]
+    stride = conv.stride[0]
     sides = []
     for length in (x.shape[-1], x.shape[-2]):
         missing = max((math.ceil(length / stride) - 1) * stride + kernel - length, 0)
@@ -113,4 +123,6 @@ def zero_convolutions(channels: Iterable[int], widths: Iterable[int]) -> nn.Modu
 
 def unit_power(features: Tensor) -> Tensor:
     """Features [B, C, h, w] with a mean square of 1 in each picture."""
-    return features * features.float().square().mean((1, 2, 3), keepdim=True).add(1e-6).rsqrt().to(features.dtype)
+    return features * features.float().square().mean((1, 2, 3), keepdim=True).add(1e-6).rsqrt().to(
+        features.dtype
+    )

@@ -30,7 +30,8 @@ GIVES = {
 """Pipeline class, as model_index.json names it -> the maps it gives."""
 MODELS = ("marigold-appearance", "marigold-normals", "marigold-depth")
 """The published models, in the order of `GIVES`."""
-MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+MEAN = (0.485, 0.456, 0.406)
+DEVIATION = (0.229, 0.224, 0.225)
 """Of sRGB values in [0, 1], as the network was trained."""
 
 
@@ -64,7 +65,8 @@ class HubPredictor(Predictor):
     libraries: ClassVar[tuple[str, ...]]
 
     def __init__(self, where: str = "", *, device: str = "auto"):
-        self.where, self.device = where or self.default, device
+        self.where = where or self.default
+        self.device = device
 
     @property
     def folder(self) -> Path:
@@ -82,8 +84,12 @@ def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
     """The Marigold model in a folder or of a hub id, else WeightsError; "": all maps from the three published ones."""
     if where:
         return Marigold(where, GIVES[_pipeline_class(locate(where, ""))], device=device)
-    parts = {model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())}
-    return MixedPredictor({name: model for model, part in parts.items() for name in part.gives}, parts)
+    parts = {
+        model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())
+    }
+    return MixedPredictor(
+        {name: model for model, part in parts.items() for name in part.gives}, parts
+    )
 
 
 class Marigold(HubPredictor):
@@ -93,31 +99,46 @@ class Marigold(HubPredictor):
 
     def __init__(self, where: str, gives: tuple[str, ...], *, device: str = "auto"):
         super().__init__(where, device=device)
-        self.gives, self.name = gives, f"marigold ({where})"
+        self.gives = gives
+        self.name = f"marigold ({where})"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
         import torch
 
         folder = self.folder
         source = f"marigold ({folder.name.replace('--', '/')}){checked(folder)}"
-        kind, gpu = _pipeline_class(folder), on_gpu(self.device)
+        kind = _pipeline_class(folder)
+        gpu = on_gpu(self.device)
         made = pipeline(kind, folder, gpu)
         generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
-        output = made(linear_to_srgb(photo.linear)[None], generator=generator, output_type="np").prediction
+        output = made(
+            linear_to_srgb(photo.linear)[None], generator=generator, output_type="np"
+        ).prediction
         notes: tuple[str, ...] = ()
         if kind == "MarigoldIntrinsicsPipeline":
             maps = appearance(output, made.target_properties or {})
         elif kind == "MarigoldNormalsPipeline":
             normal = unit(output[0])  # in our frame already; interpolation shortens
-            maps = {"normal": np.where(normal.any(-1, keepdims=True), normal, [0, 0, 1]).astype(np.float32)}
+            maps = {
+                "normal": np.where(normal.any(-1, keepdims=True), normal, [0, 0, 1]).astype(
+                    np.float32
+                )
+            }
         else:
             inverse = made.config.prediction_type == "disparity"
-            depth, note, notes = planar(output[0, ..., 0], photo.camera, normal, inverse=inverse, name=self.name)
-            maps, source = {"depth": depth}, source + note
+            depth, note, notes = planar(
+                output[0, ..., 0], photo.camera, normal, inverse=inverse, name=self.name
+            )
+            maps = {"depth": depth}
+            source = source + note
         lacking = [name for name in wanted if name not in maps]
         if lacking:
-            raise WeightsError(f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it.")
+            raise WeightsError(
+                f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it."
+            )
         return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, source), notes)
 
 
@@ -135,8 +156,13 @@ def appearance(output: Array, properties: dict) -> dict[str, Array]:
         if channels:
             maps |= {ours[part]: picture[..., k] for k, part in enumerate(channels) if part in ours}
         elif name == "albedo":
-            maps[name] = picture if about.get("prediction_space") == "linear" else srgb_to_linear(picture)
-    return {name: np.ascontiguousarray(np.clip(values, 0, 1), np.float32) for name, values in maps.items()}
+            maps[name] = (
+                picture if about.get("prediction_space") == "linear" else srgb_to_linear(picture)
+            )
+    return {
+        name: np.ascontiguousarray(np.clip(values, 0, 1), np.float32)
+        for name, values in maps.items()
+    }
 
 
 def _pipeline_class(folder: Path) -> str:
@@ -144,7 +170,9 @@ def _pipeline_class(folder: Path) -> str:
     try:
         kind = json.loads((folder / "model_index.json").read_text("utf-8")).get("_class_name")
     except (OSError, ValueError, AttributeError) as error:
-        raise WeightsError(f"{folder} holds no readable model_index.json, as diffusers writes it ({error}).") from error
+        raise WeightsError(
+            f"{folder} holds no readable model_index.json, as diffusers writes it ({error})."
+        ) from error
     if kind not in GIVES:
         raise WeightsError(f"{folder} holds a {kind}; Marigold models are {', '.join(GIVES)}.")
     return kind
@@ -154,13 +182,16 @@ class DepthAnything(HubPredictor):
     """Gives depth alone; by default Depth Anything V2 Small."""
 
     gives = ("depth",)
-    default, libraries = "depth-anything", ("transformers",)
+    default = "depth-anything"
+    libraries = ("transformers",)
 
     def __init__(self, where: str = "", *, device: str = "auto"):
         super().__init__(where, device=device)
         self.name = f"depth-anything ({where or 'V2 Small'})"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """Planar depth. The network sees sRGB values; a metric model's depth is in metres and taken as it is, a
         relative one gives inverse depth without scale and shift, see `relative.from_relative`.
         """
@@ -169,7 +200,9 @@ class DepthAnything(HubPredictor):
         model = load(library("transformers").DepthAnythingForDepthEstimation, folder)
         values = _run(model, photo.linear, on_gpu(self.device))
         if model.config.depth_estimation_type == "metric":
-            return MapSet({"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"})
+            return MapSet(
+                {"depth": np.maximum(values, 1e-3)}, {"depth": f"{self.name}{digest}, metric"}
+            )
         depth, note, warnings = planar(values, photo.camera, normal, inverse=True, name=self.name)
         return MapSet({"depth": depth}, {"depth": f"{self.name}{digest}{note}"}, warnings)
 
@@ -179,7 +212,10 @@ def _run(model, linear: Array, gpu: bool) -> Array:
     from materialist.predict.matnet.predictor import at_network_size
 
     model = model.to("cuda" if gpu else "cpu").float().eval()
-    run = lambda image: {"depth": model(pixel_values=image).predicted_depth[:, None]}  # noqa: E731
+
+    def run(image):
+        return {"depth": model(pixel_values=image).predicted_depth[:, None]}
+
     pixels = ((linear_to_srgb(linear) - MEAN) / DEVIATION).astype(np.float32)
     return at_network_size(run, pixels, model.device)["depth"]
 
@@ -198,7 +234,9 @@ def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
     if subfolder:
         options["subfolder"] = subfolder
     try:
-        model, info = cls.from_pretrained(folder, local_files_only=True, output_loading_info=True, **options)
+        model, info = cls.from_pretrained(
+            folder, local_files_only=True, output_loading_info=True, **options
+        )
     except Exception as error:  # the libraries raise whatever their readers raise on damaged files
         raise WeightsError(
             f"{folder / subfolder} does not hold a {cls.__name__} that can be read ({reason(error)}); fetch it again "
@@ -220,18 +258,26 @@ def pipeline(name: str, folder: Path, gpu: bool, what: str = "", **options: Any)
     """
     import torch
 
-    diffusers, transformers = library("diffusers"), library("transformers")
+    diffusers = library("diffusers")
+    transformers = library("transformers")
     kinds = {
-        "unet": diffusers.UNet2DConditionModel, "vae": diffusers.AutoencoderKL,
+        "unet": diffusers.UNet2DConditionModel,
+        "vae": diffusers.AutoencoderKL,
         "text_encoder": transformers.CLIPTextModel,
-    }  # fmt: skip
+    }
     components = {}
     for part, cls in kinds.items():
         variant = {"variant": "fp16"} if any((folder / part).glob("*.fp16.*")) else {}
-        components[part] = load(cls, folder, part, **variant).to(torch.float16 if gpu else torch.float32)
+        components[part] = load(cls, folder, part, **variant).to(
+            torch.float16 if gpu else torch.float32
+        )
     try:
-        made = getattr(diffusers, name).from_pretrained(folder, local_files_only=True, **components, **options)
+        made = getattr(diffusers, name).from_pretrained(
+            folder, local_files_only=True, **components, **options
+        )
     except Exception as error:  # whatever its readers raise on a damaged configuration
-        raise WeightsError(f"{folder} holds no whole {what or name} ({reason(error)}); fetch it again.") from error
+        raise WeightsError(
+            f"{folder} holds no whole {what or name} ({reason(error)}); fetch it again."
+        ) from error
     made.set_progress_bar_config(disable=True)
     return made.to("cuda" if gpu else "cpu")

@@ -43,26 +43,35 @@ class MapsPredictor(Predictor):
             raise InputError(f"There is no folder {self.folder} to read maps from.")
         self.name = f"maps:{self.folder}"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted maps. A missing roughness or metallic is the paper's neutral start, a missing normal is unknown.
 
         Warnings tell both, and every resampling and clipping. Raises InputError when albedo or depth is missing, a map
         has another aspect ratio than the photo, or its values cannot be meant.
         """
-        size, maps = photo.linear.shape[:2], dict[str, Array]()
+        size = photo.linear.shape[:2]
+        maps = dict[str, Array]()
         warnings: list[str] = []
         for name in wanted:
-            path = next((p for s in ("exr", "png") if (p := self.folder / f"{name}.{s}").is_file()), None)
+            path = next(
+                (p for s in ("exr", "png") if (p := self.folder / f"{name}.{s}").is_file()), None
+            )
             if path is not None:
                 maps[name] = _fitted(self.read(name, path, warnings), name, size, path, warnings)
             elif name == "normal":
                 warnings.append("There is no normal map: the normals were derived from depth.")
                 maps[name] = np.zeros((*size, 3), np.float32)
             elif name in ("roughness", "metallic"):
-                warnings.append(f"There is no {name} map: the neutral {name} {CONSTANT[name]} was used everywhere.")
+                warnings.append(
+                    f"There is no {name} map: the neutral {name} {CONSTANT[name]} was used everywhere."
+                )
                 maps[name] = np.full(size, CONSTANT[name], np.float32)
             else:
-                raise InputError(f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed.")
+                raise InputError(
+                    f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed."
+                )
         return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
 
     def read(self, name: str, path: Path, warnings: list[str]) -> Array:
@@ -79,17 +88,27 @@ class ArraysPredictor(Predictor):
         self.known = prior.known
         self.gives = tuple(self.known)
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted maps. Raises InputError for another shape than the map has, and as `MapsPredictor.parts`."""
-        size, warnings = photo.linear.shape[:2], list[str]()
+        size = photo.linear.shape[:2]
+        warnings = list[str]()
         maps = {name: self._fitted(name, size, warnings) for name in wanted}
         return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
 
     def _fitted(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array:
-        values, called = np.asarray(self.known[name]), Path(f"The prior's {name}")
-        if values.dtype.kind not in "fiub" or values.ndim < 2 or values.shape[2:] != _CHANNELS.get(name, ()):
+        values = np.asarray(self.known[name])
+        called = Path(f"The prior's {name}")
+        if (
+            values.dtype.kind not in "fiub"
+            or values.ndim < 2
+            or values.shape[2:] != _CHANNELS.get(name, ())
+        ):
             form = "[H, W, 3]" if name in _CHANNELS else "[H, W]"
-            raise InputError(f"{called} is {values.dtype}{list(values.shape)}; give numbers of the shape {form}.")
+            raise InputError(
+                f"{called} is {values.dtype}{list(values.shape)}; give numbers of the shape {form}."
+            )
         checked = _CHECKS[name](np.ascontiguousarray(values, np.float32), called, warnings)
         return _fitted(np.asarray(checked, np.float32), name, size, called, warnings)
 
@@ -110,10 +129,15 @@ class MogeFolder(MapsPredictor):
         if not str(folder):
             raise InputError(f'moge: needs a folder, as in `depth="moge:DIR"`; {MOGE}')
         super().__init__(folder)
-        found = [path.parent for path in sorted((*self.folder.glob("depth.exr"), *self.folder.glob("*/depth.exr")))]
+        found = [
+            path.parent
+            for path in sorted((*self.folder.glob("depth.exr"), *self.folder.glob("*/depth.exr")))
+        ]
         if self.folder not in found and len(found) != 1:
             names = ", ".join(path.name for path in found[:3])
-            several = f"several results ({names}); name one of them" if found else f"no depth.exr; {MOGE}"
+            several = (
+                f"several results ({names}); name one of them" if found else f"no depth.exr; {MOGE}"
+            )
             raise InputError(f"{self.folder} holds {several}.")
         self.folder = self.folder if self.folder in found else found[0]
         self.field_of_view = _field_of_view(self.folder / "fov.json")
@@ -121,7 +145,8 @@ class MogeFolder(MapsPredictor):
 
     def read(self, name: str, path: Path, warnings: list[str]) -> Array:
         """The values of a map at their own size; depth is 0 where mask.png is."""
-        values, mask = super().read(name, path, warnings), self.folder / "mask.png"
+        values = super().read(name, path, warnings)
+        mask = self.folder / "mask.png"
         if name != "depth" or not mask.is_file():
             return values
         pixels = read_data(mask)
@@ -133,7 +158,9 @@ class MogeFolder(MapsPredictor):
         return values
 
 
-def _fitted(values: Array, name: str, size: tuple[int, int], path: Path, warnings: list[str]) -> Array:
+def _fitted(
+    values: Array, name: str, size: tuple[int, int], path: Path, warnings: list[str]
+) -> Array:
     """A map [h, w, ...] brought to the photo's size (H, W). Raises InputError for another aspect ratio."""
     (h, w), (height, width) = values.shape[:2], size
     if (h, w) == size:
@@ -144,7 +171,9 @@ def _fitted(values: Array, name: str, size: tuple[int, int], path: Path, warning
             f"{path} is {w}x{h} and the photo is {width}x{height}: give maps of the photo's aspect ratio (no cropping)."
         )
     warnings.append(f"{path.name} is {w}x{h} and was resampled to {width}x{height}.")
-    return {"normal": resample.normals, "depth": resample.depth}.get(name, resample.values)(values, size)
+    return {"normal": resample.normals, "depth": resample.depth}.get(name, resample.values)(
+        values, size
+    )
 
 
 def read_map(path: Path, name: str) -> Array:
@@ -155,7 +184,13 @@ def read_map(path: Path, name: str) -> Array:
     """
     values = read_data(path)
     if path.suffix != ".exr":
-        values = srgb_to_linear(values) if name == "albedo" else 2 * values - 1 if name == "normal" else values
+        values = (
+            srgb_to_linear(values)
+            if name == "albedo"
+            else 2 * values - 1
+            if name == "normal"
+            else values
+        )
     if name in ("albedo", "normal"):
         if values.ndim == 2 and name == "albedo":
             values = np.repeat(values[..., None], 3, -1)
@@ -164,7 +199,9 @@ def read_map(path: Path, name: str) -> Array:
         return np.ascontiguousarray(values)
     if values.ndim == 3:
         if np.nanmax(np.ptp(values, axis=-1)) > 0.01 * max(1.0, float(np.nanmax(np.abs(values)))):
-            raise InputError(f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey.")
+            raise InputError(
+                f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey."
+            )
         values = values[..., 0]
     return np.ascontiguousarray(values)
 
@@ -173,7 +210,9 @@ def _check_finite(values: Array, path: Path) -> None:
     """Raises InputError when there are NaN or infinite values."""
     bad = ~np.isfinite(values)
     if bad.any():
-        raise InputError(f"{path} has {int(bad.sum())} NaN or infinite values; replace them (depth 0: no surface).")
+        raise InputError(
+            f"{path} has {int(bad.sum())} NaN or infinite values; replace them (depth 0: no surface)."
+        )
 
 
 def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
@@ -186,7 +225,9 @@ def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
             "(divide by 255 or 65535 if it was written as integers)."
         )
     if values.min() < -1e-3 or values.max() > 1 + 1e-3:
-        warnings.append(f"{path.name} reaches from {values.min():.3f} to {values.max():.3f}: clipped to [0, 1].")
+        warnings.append(
+            f"{path.name} reaches from {values.min():.3f} to {values.max():.3f}: clipped to [0, 1]."
+        )
     return np.clip(values, 0, 1)
 
 
@@ -198,19 +239,29 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
     _check_finite(values, path)
     negative = values < 0
     if negative.mean() > SETTINGS.wild:
-        raise InputError(f"{path} has negative depths (to {values.min():.4g}); depth is a positive distance along -Z.")
+        raise InputError(
+            f"{path} has negative depths (to {values.min():.4g}); depth is a positive distance along -Z."
+        )
     if negative.any():
-        warnings.append(f"{path.name} has {int(negative.sum())} negative depths: taken as no surface.")
+        warnings.append(
+            f"{path.name} has {int(negative.sum())} negative depths: taken as no surface."
+        )
     values = np.maximum(values, 0)
     if (values > 0).any():
         far = values > SETTINGS.beyond * np.percentile(values[values > 0], 5)
         if far.any():
-            warnings.append(f"{path.name} has depths of up to {values.max():.3g}: taken as sky (no surface).")
+            warnings.append(
+                f"{path.name} has depths of up to {values.max():.3g}: taken as sky (no surface)."
+            )
             values = np.where(far, 0, values).astype(np.float32)
     if not (values > 0).any():
-        raise InputError(f"{path} is 0 everywhere, so there is no surface to reconstruct; depth must be positive.")
+        raise InputError(
+            f"{path} is 0 everywhere, so there is no surface to reconstruct; depth must be positive."
+        )
     if path.suffix == ".png" and np.unique(values).size <= 256:
-        warnings.append(f"{path.name} has only {np.unique(values).size} depth steps; 16-bit PNG or EXR is smoother.")
+        warnings.append(
+            f"{path.name} has only {np.unique(values).size} depth steps; 16-bit PNG or EXR is smoother."
+        )
     return values
 
 
@@ -220,15 +271,28 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
     length = np.linalg.norm(values, axis=-1)
     known = length > SETTINGS.known_normal
     wrong = (np.abs(length[known] - 1) > SETTINGS.excess).mean() > 0.05 if known.any() else True
-    if wrong and path.suffix == ".exr" and values.min() >= 0 and values.max() <= 1 + SETTINGS.excess:
-        raise InputError(f"{path} has no negative value: it holds encoded normals; store 2 v - 1 in an EXR.")
+    if (
+        wrong
+        and path.suffix == ".exr"
+        and values.min() >= 0
+        and values.max() <= 1 + SETTINGS.excess
+    ):
+        raise InputError(
+            f"{path} has no negative value: it holds encoded normals; store 2 v - 1 in an EXR."
+        )
     if wrong:
-        raise InputError(f"{path} does not hold unit vectors (median length {np.median(length):.3g}).")
+        raise InputError(
+            f"{path} does not hold unit vectors (median length {np.median(length):.3g})."
+        )
     if (values[known][:, 2] < 0).mean() > 0.5:
-        raise InputError(f"{path} points away from the viewer; normals are in the camera frame with +Z to the viewer.")
+        raise InputError(
+            f"{path} points away from the viewer; normals are in the camera frame with +Z to the viewer."
+        )
     if (np.abs(length[known] - 1) > 0.02).any():
         warnings.append(f"{path.name} was normalised to unit length.")
-    return np.where(known[..., None], values / np.maximum(length, 1e-6)[..., None], 0).astype(np.float32)
+    return np.where(known[..., None], values / np.maximum(length, 1e-6)[..., None], 0).astype(
+        np.float32
+    )
 
 
 _CHECKS = dict.fromkeys(MAPS[:3], _unit_range) | {"depth": _depth_range, "normal": _unit_normals}
@@ -243,5 +307,7 @@ def _field_of_view(path: Path) -> float | None:
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path} does not say fov_x in degrees ({error}); {MOGE}") from error
     if not 1 < angle < 170:
-        raise InputError(f"{path} says a field of view of {angle:g} degrees; it must be between 1 and 170.")
+        raise InputError(
+            f"{path} says a field of view of {angle:g} degrees; it must be between 1 and 170."
+        )
     return angle

@@ -37,15 +37,55 @@ class HubModel:
 
 
 KNOWN = (
-    HubModel("matnet", "Lez/MatNet", "matnet_weights.pth", "the paper's network: all maps",
-             "not stated: ask its authors", 434),
-    HubModel("marigold-appearance", "prs-eth/marigold-iid-appearance-v1-1", "model_index.json",
-             "albedo, roughness, metallic", "OpenRAIL++", 2600),
-    HubModel("marigold-normals", "prs-eth/marigold-normals-v1-1", "model_index.json", "normals", "OpenRAIL++", 2600),
-    HubModel("marigold-depth", "prs-eth/marigold-depth-v1-1", "model_index.json", "depth", "OpenRAIL++", 2600),
-    HubModel("depth-anything", "depth-anything/Depth-Anything-V2-Small-hf", "config.json", "depth", "Apache-2.0", 100),
-    HubModel("sam2", "facebook/sam2.1-hiera-tiny", "config.json", "selections: --with sam2", "Apache-2.0", 160),
-)  # fmt: skip
+    HubModel(
+        "matnet",
+        "Lez/MatNet",
+        "matnet_weights.pth",
+        "the paper's network: all maps",
+        "not stated: ask its authors",
+        434,
+    ),
+    HubModel(
+        "marigold-appearance",
+        "prs-eth/marigold-iid-appearance-v1-1",
+        "model_index.json",
+        "albedo, roughness, metallic",
+        "OpenRAIL++",
+        2600,
+    ),
+    HubModel(
+        "marigold-normals",
+        "prs-eth/marigold-normals-v1-1",
+        "model_index.json",
+        "normals",
+        "OpenRAIL++",
+        2600,
+    ),
+    HubModel(
+        "marigold-depth",
+        "prs-eth/marigold-depth-v1-1",
+        "model_index.json",
+        "depth",
+        "OpenRAIL++",
+        2600,
+    ),
+    HubModel(
+        "depth-anything",
+        "depth-anything/Depth-Anything-V2-Small-hf",
+        "config.json",
+        "depth",
+        "Apache-2.0",
+        100,
+    ),
+    HubModel(
+        "sam2",
+        "facebook/sam2.1-hiera-tiny",
+        "config.json",
+        "selections: --with sam2",
+        "Apache-2.0",
+        160,
+    ),
+)
 """By name; any other repository of the same kind can be named by its id, owner/name."""
 
 
@@ -53,12 +93,18 @@ def models_folder() -> Path:
     """Where downloads lie: $MATERIALIST_MODELS, else materialist/models in the user's cache folder."""
     if own := os.environ.get("MATERIALIST_MODELS"):
         return Path(own)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "materialist" / "models"
+    return (
+        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "materialist" / "models"
+    )
 
 
 def is_hub_id(text: str) -> bool:
     """Whether `text` reads as owner/name and not as a file."""
-    return bool(re.fullmatch(r"[\w.-]+/[\w.-]+", text)) and not text.startswith(".") and not text.endswith(WEIGHTS)
+    return (
+        bool(re.fullmatch(r"[\w.-]+/[\w.-]+", text))
+        and not text.startswith(".")
+        and not text.endswith(WEIGHTS)
+    )
 
 
 def hub_model(name: str) -> HubModel:
@@ -69,7 +115,9 @@ def hub_model(name: str) -> HubModel:
     if is_hub_id(name):
         return HubModel(name, name, "", "given by its id", "see its page on the hub", 0)
     known = ", ".join(model.name for model in KNOWN)
-    raise InputError(f"There is no model '{name}'; choose one of {known}, or give a hub id as owner/name.")
+    raise InputError(
+        f"There is no model '{name}'; choose one of {known}, or give a hub id as owner/name."
+    )
 
 
 def folder_of(model: HubModel) -> Path:
@@ -84,7 +132,9 @@ def is_complete(model: HubModel) -> bool:
 
 def downloaded() -> dict[str, Path]:
     """The folders of all finished downloads here, by the model's name or hub id."""
-    found = {file.parent.name: file.parent for file in sorted(models_folder().glob(f"*/{CHECKSUMS}"))}
+    found = {
+        file.parent.name: file.parent for file in sorted(models_folder().glob(f"*/{CHECKSUMS}"))
+    }
     known = {folder_of(model).name: model.name for model in KNOWN}
     return {known.get(name, name.replace("--", "/", 1)): folder for name, folder in found.items()}
 
@@ -106,7 +156,8 @@ def locate(where: str, default: str) -> Path:
 
     Raises WeightsError when it is not there; nothing is downloaded.
     """
-    path, named = Path(where).expanduser(), any(where == model.name for model in KNOWN)
+    path = Path(where).expanduser()
+    named = any(where == model.name for model in KNOWN)
     if where and not named and path.exists():
         return path
     if where and not named and not is_hub_id(where):
@@ -119,9 +170,15 @@ def locate(where: str, default: str) -> Path:
 
 def weights_file(path: Path) -> Path:
     """The file itself, or the weights in a folder, safetensors before pickles. Raises WeightsError for none."""
-    found = [path] if path.is_file() else [file for end in WEIGHTS for file in sorted(path.glob(f"*{end}"))]
+    found = (
+        [path]
+        if path.is_file()
+        else [file for end in WEIGHTS for file in sorted(path.glob(f"*{end}"))]
+    )
     if not found:
-        raise WeightsError(f"{path} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}.")
+        raise WeightsError(
+            f"{path} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}."
+        )
     return found[0]
 
 
@@ -134,7 +191,8 @@ def download(model: HubModel, *, force: bool = False) -> Path:
     """
     from huggingface_hub import HfApi
 
-    api, folder = HfApi(os.environ.get("HF_ENDPOINT"), library_name="materialist"), folder_of(model)
+    api = HfApi(os.environ.get("HF_ENDPOINT"), library_name="materialist")
+    folder = folder_of(model)
     try:
         listing = api.model_info(model.repo, files_metadata=True, timeout=TIMEOUT).siblings or []
         promised = {file.rfilename: file.lfs.sha256 if file.lfs else None for file in listing}
@@ -145,7 +203,11 @@ def download(model: HubModel, *, force: bool = False) -> Path:
                 (folder / name).unlink()
                 raise ValueError(f"{name} came damaged: its sha256 is not {promised[name]}")
     except Exception as error:  # several HTTP libraries raise their own
-        if isinstance(error, OSError) and error.errno is not None and not isinstance(error, ConnectionError):
+        if (
+            isinstance(error, OSError)
+            and error.errno is not None
+            and not isinstance(error, ConnectionError)
+        ):
             raise _unwritable(folder, error) from error
         raise WeightsError(
             f"{model.repo} cannot be fetched from {api.endpoint} ({reason(error)}); run the same command again, or "
@@ -163,9 +225,13 @@ def adopt(model: HubModel, source: Path) -> Path:
 
     Raises InputError where the folder lacks the model's files, OutputError when the disk is full or read-only.
     """
-    wanted = chosen(path.relative_to(source).as_posix() for path in sorted(source.rglob("*")) if path.is_file())
+    wanted = chosen(
+        path.relative_to(source).as_posix() for path in sorted(source.rglob("*")) if path.is_file()
+    )
     if not any(name.endswith(WEIGHTS) for name in wanted) or model.main_file not in ("", *wanted):
-        raise InputError(f"{source} lacks {model.main_file or 'a file of weights'} of {model.repo}; fetch it again.")
+        raise InputError(
+            f"{source} lacks {model.main_file or 'a file of weights'} of {model.repo}; fetch it again."
+        )
     folder = folder_of(model)
     try:
         for name in wanted if source.resolve() != folder.resolve() else ():
@@ -188,7 +254,9 @@ def chosen(names: Iterable[str]) -> list[str]:
     for folder in dict.fromkeys(PurePosixPath(name).parent for name in weights):
         files = [name for name in weights if PurePosixPath(name).parent == folder]
         ends = (".fp16.safetensors", ".safetensors", ".fp16.bin", *WEIGHTS)
-        picked += next(group for end in ends if (group := [name for name in files if name.endswith(end)]))
+        picked += next(
+            group for end in ends if (group := [name for name in files if name.endswith(end)])
+        )
     return picked
 
 
@@ -199,4 +267,6 @@ def _write_checksums(folder: Path, names: Iterable[str]) -> None:
 
 
 def _unwritable(folder: Path, error: OSError) -> OutputError:
-    return OutputError(f"{folder} cannot be written ({error.strerror or error}); free space or set MATERIALIST_MODELS.")
+    return OutputError(
+        f"{folder} cannot be written ({error.strerror or error}); free space or set MATERIALIST_MODELS."
+    )

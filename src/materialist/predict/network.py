@@ -46,7 +46,11 @@ class StoredNetwork(nn.Module):
         """Write the network with `facts` (steps, data, scores), whole or not at all; without the shared encoder."""
         own = {k: v for k, v in self.state_dict().items() if not k.startswith(SHARED)}
         architecture = json.dumps(self.architecture.as_dict())
-        write_weights(path, own, {"format": self.FORMAT, "architecture": architecture, "facts": json.dumps(facts)})
+        write_weights(
+            path,
+            own,
+            {"format": self.FORMAT, "architecture": architecture, "facts": json.dumps(facts)},
+        )
 
     @classmethod
     def load(cls, path: Path) -> tuple[Self, dict[str, Any]]:
@@ -55,18 +59,25 @@ class StoredNetwork(nn.Module):
         Raises WeightsError where the file is missing, damaged, of another kind, or does not fit its architecture.
         """
         if not path.is_file():
-            raise WeightsError(f"There are no weights of {cls.__name__} at {path}; make some with: {cls.COMMAND}.")
-        tensors, header = read_state(path), metadata(path)
+            raise WeightsError(
+                f"There are no weights of {cls.__name__} at {path}; make some with: {cls.COMMAND}."
+            )
+        tensors = read_state(path)
+        header = metadata(path)
         if header.get("format") != cls.FORMAT:
             raise WeightsError(
                 f"{path} has format {header.get('format')!r}, not {cls.FORMAT!r}; make it with: {cls.COMMAND}."
             )
         try:
             stored = json.loads(header["architecture"]).items()
-            network = cls(cls.ARCHITECTURE(**{k: tuple(v) if isinstance(v, list) else v for k, v in stored}))
+            network = cls(
+                cls.ARCHITECTURE(**{k: tuple(v) if isinstance(v, list) else v for k, v in stored})
+            )
             facts = json.loads(header.get("facts", "{}"))
         except (KeyError, TypeError, ValueError, AttributeError, IndexError, RuntimeError) as error:
-            raise WeightsError(f"{path} describes no usable network ({error}); make it with: {cls.COMMAND}.") from error
+            raise WeightsError(
+                f"{path} describes no usable network ({error}); make it with: {cls.COMMAND}."
+            ) from error
         load_weights(network, tensors | shared_tensors(network), path)
         return network.eval().requires_grad_(False), facts
 
@@ -92,8 +103,11 @@ class ResidualBlock(nn.Module):
 
     def __init__(self, channels: int):
         super().__init__()
-        self.norm1, self.norm2 = group_norm(channels), group_norm(channels)
-        self.conv1, self.conv2 = (nn.Conv2d(channels, channels, 3, padding=1, bias=False) for _ in range(2))
+        self.norm1 = group_norm(channels)
+        self.norm2 = group_norm(channels)
+        self.conv1, self.conv2 = (
+            nn.Conv2d(channels, channels, 3, padding=1, bias=False) for _ in range(2)
+        )
         nn.init.zeros_(self.conv2.weight)
 
     def forward(self, x: Tensor) -> Tensor:
@@ -124,11 +138,17 @@ class UNet(StoredNetwork):
 
     def __init__(self, inputs: int, outputs: int, architecture: UNetArchitecture):
         super().__init__(architecture)
-        a, w = architecture, architecture.widths
+        a = architecture
+        w = architecture.widths
         self.stem = nn.Conv2d(4 * inputs, w[0], 3, padding=1)
-        blocks = [[ResidualBlock(channels) for _ in range(n)] for channels, n in zip(w, a.blocks, strict=True)]
+        blocks = [
+            [ResidualBlock(channels) for _ in range(n)]
+            for channels, n in zip(w, a.blocks, strict=True)
+        ]
         self.levels = nn.ModuleList(nn.Sequential(*level) for level in blocks)
-        self.downs = nn.ModuleList(nn.Conv2d(w[k], w[k + 1], 3, stride=2, padding=1) for k in range(len(w) - 1))
+        self.downs = nn.ModuleList(
+            nn.Conv2d(w[k], w[k + 1], 3, stride=2, padding=1) for k in range(len(w) - 1)
+        )
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(len(w) - 1))
         self.decoders = nn.ModuleList(ResidualBlock(w[k]) for k in range(len(w) - 1))
         self.head = nn.Conv2d(w[0], 4 * outputs, 3, padding=1)
@@ -146,6 +166,8 @@ class UNet(StoredNetwork):
         for down, level, more in zip(self.downs, self.levels[1:], told, strict=True):
             skips.append(x)
             x = level(down(x) + more)
-        for up, decoder, skip in zip(reversed(self.ups), reversed(self.decoders), reversed(skips), strict=True):
+        for up, decoder, skip in zip(
+            reversed(self.ups), reversed(self.decoders), reversed(skips), strict=True
+        ):
             x = decoder(F.interpolate(up(x), scale_factor=2, mode="nearest") + skip)
         return F.pixel_shuffle(self.head(F.silu(x)), 2).float()

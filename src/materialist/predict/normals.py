@@ -19,7 +19,8 @@ def normals_from_depth(depth: Array, camera: Camera, *, radius: int = 0) -> Arra
     a, b = _gradient(q, axis=1), _gradient(q, axis=0)  # per pixel, to the right and down
     if radius > 0:
         a, b = _average(q, a, b, radius)
-    a, b = a * camera.focal, -b * camera.focal
+    a = a * camera.focal
+    b = -b * camera.focal
     rays = pixel_rays(camera)
     c = np.where(known, q, 1) - a * rays[..., 0] - b * rays[..., 1]
     normal = np.stack([-a, -b, c], -1)
@@ -36,8 +37,12 @@ def _gradient(q: Array, axis: int) -> Array:
     q = np.moveaxis(q, axis, -1)
     n = q.shape[-1]
     padded = np.pad(q, [(0, 0), (2, 2)], constant_values=np.nan)
-    at = lambda k: padded[:, 2 + k : 2 + k + n]  # noqa: E731
-    total, weights = np.zeros_like(q), np.zeros_like(q)
+
+    def at(k):
+        return padded[:, 2 + k : 2 + k + n]
+
+    total = np.zeros_like(q)
+    weights = np.zeros_like(q)
     for side in (-1, 1):
         slope = (at(side) - q) * side
         error = np.abs(q - (2 * at(side) - at(2 * side))) / q
@@ -54,11 +59,15 @@ def _average(q: Array, a: Array, b: Array, radius: int) -> tuple[Array, Array]:
     h, w = q.shape
     pad = [(radius, radius)] * 2
     q_pad, a_pad, b_pad = (np.pad(x, pad, constant_values=np.nan) for x in (q, a, b))
-    sum_a, sum_b, total = np.zeros_like(q), np.zeros_like(q), np.zeros_like(q)
+    sum_a = np.zeros_like(q)
+    sum_b = np.zeros_like(q)
+    total = np.zeros_like(q)
     for dy in range(-radius, radius + 1):
         for dx in range(-radius, radius + 1):
-            rows, columns = slice(radius + dy, radius + dy + h), slice(radius + dx, radius + dx + w)
-            a_n, b_n = a_pad[rows, columns], b_pad[rows, columns]
+            rows = slice(radius + dy, radius + dy + h)
+            columns = slice(radius + dx, radius + dx + w)
+            a_n = a_pad[rows, columns]
+            b_n = b_pad[rows, columns]
             # Middle of both pixels' predictions: an off-centre error of either gradient counts half.
             step = q_pad[rows, columns] - q - 0.5 * ((a + a_n) * dx + (b + b_n) * dy)
             weight = np.nan_to_num(np.exp(-((step / (0.01 * q)) ** 2)))

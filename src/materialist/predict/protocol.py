@@ -44,7 +44,9 @@ class Predictor(ABC):
     """What the report calls it: name, file or folder, and the start of the weights' checksum."""
 
     @abstractmethod
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted maps at the photo's working size; equal seeds give equal maps, most predictors ignore them.
 
         `normal` [H, W, 3], where known, sets the scale of a relative depth (docs/predictors.md, "Relative depth").
@@ -56,15 +58,27 @@ class Predictor(ABC):
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
         """All five maps at the photo's working size. Normals that are unknown are derived from the depth."""
         part = self.parts(photo, MAPS, seed=seed)
-        maps, sources = part.maps, {name: part.sources[name] for name in MAPS}
+        maps = part.maps
+        sources = {name: part.sources[name] for name in MAPS}
         normal = maps["normal"]
         known = np.linalg.norm(normal, axis=-1, keepdims=True) > 0.5
         if not known.all():
-            normal = np.where(known, normal, normals_from_depth(maps["depth"], photo.camera, radius=2))
+            normal = np.where(
+                known, normal, normals_from_depth(maps["depth"], photo.camera, radius=2)
+            )
         if not known.any():
             sources["normal"] = f"derived from the depth of {sources['depth']}"
         materials = Materials(maps["albedo"], maps["roughness"], maps["metallic"])
-        return Prediction(materials, normal, maps["depth"], self.name, part.warnings, sources, part.light, part.spread)
+        return Prediction(
+            materials,
+            normal,
+            maps["depth"],
+            self.name,
+            part.warnings,
+            sources,
+            part.light,
+            part.spread,
+        )
 
 
 CONSTANT = {
@@ -82,11 +96,16 @@ class ConstantPredictor(Predictor):
 
     name = "constant"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted maps, with a warning that names them; the normals are unknown, and so follow from the depth."""
         size = photo.linear.shape[:2]
         values = {name: np.asarray(CONSTANT[name], np.float32) for name in wanted}
-        maps = {name: np.broadcast_to(value, (*size, *value.shape)).copy() for name, value in values.items()}
+        maps = {
+            name: np.broadcast_to(value, (*size, *value.shape)).copy()
+            for name, value in values.items()
+        }
         note = f"The constant predictor knows nothing of the photo: {', '.join(wanted)} are neutral everywhere."
         return MapSet(maps, dict.fromkeys(wanted, self.name), (note,))
 
@@ -101,14 +120,18 @@ class MixedPredictor(Predictor):
         self.depth_spec = chosen["depth"]
         self.field_of_view = sources[self.depth_spec].field_of_view
         # As in 'albedo: marigold; roughness, metallic, normal, depth: bundled'.
-        self.name = "; ".join(f"{', '.join(names)}: {sources[spec].name}" for spec, names in self.shares.items())
+        self.name = "; ".join(
+            f"{', '.join(names)}: {sources[spec].name}" for spec, names in self.shares.items()
+        )
 
     def prepare(self, wanted: Collection[str]) -> None:
         for spec, names in self.shares.items():
             if not set(names).isdisjoint(wanted):
                 self.sources[spec].prepare(names)
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted maps of all sources together. Each source runs once."""
         maps: dict[str, Array] = {}
         sources: dict[str, str] = {}
@@ -119,7 +142,9 @@ class MixedPredictor(Predictor):
         for spec in sorted(self.sources, key=lambda spec: spec == self.depth_spec):
             names = [name for name in self.shares[spec] if name in wanted]
             if names:
-                part = self.sources[spec].parts(photo, names, seed=seed, normal=maps.get("normal", normal))
+                part = self.sources[spec].parts(
+                    photo, names, seed=seed, normal=maps.get("normal", normal)
+                )
                 maps |= part.maps
                 sources |= part.sources
                 warnings += part.warnings

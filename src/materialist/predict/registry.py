@@ -6,7 +6,9 @@ from materialist.errors import InputError
 from materialist.predict.protocol import MAPS, MixedPredictor, Predictor
 from materialist.types import Prior
 
-CHOICES = "auto, bundled[:FILE], matnet[:FILE], marigold, depth-anything, moge:DIR, maps:DIR, constant"
+CHOICES = (
+    "auto, bundled[:FILE], matnet[:FILE], marigold, depth-anything, moge:DIR, maps:DIR, constant"
+)
 CLASSES = {
     "auto": "bundled.predictor:BundledPredictor",
     "bundled": "bundled.predictor:BundledPredictor",
@@ -37,10 +39,14 @@ def get_predictor(
     SetupError where an optional library is missing, WeightsError where weights are missing or damaged.
     """
     if unknown := [name for name in parts if name not in MAPS]:
-        raise InputError(f"There is no map '{unknown[0]}'; a predictor can be named for {', '.join(MAPS)}.")
+        raise InputError(
+            f"There is no map '{unknown[0]}'; a predictor can be named for {', '.join(MAPS)}."
+        )
     known = {} if prior is None else prior.known
     if twice := [name for name in known if parts.get(name)]:
-        raise InputError(f"The {twice[0]} is in the prior and has a predictor of its own; leave one of them out.")
+        raise InputError(
+            f"The {twice[0]} is in the prior and has a predictor of its own; leave one of them out."
+        )
     chosen = {name: ARRAYS if name in known else parts.get(name) or spec for name in MAPS}
     sources = {one: _source(one, device, prior) for one in dict.fromkeys(chosen.values())}
     for one, source in sources.items():

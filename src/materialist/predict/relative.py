@@ -16,7 +16,10 @@ class RelativeSettings:
     ratio: float = 4.0  # the ratio where no normal map tells more: a room seen from inside it
     range: tuple[float, float] = (1.1, 60.0)  # ratios tried against a normal map
     trials: int = 44  # ratios tried, evenly spaced in their logarithm
-    percentiles: tuple[float, float] = (0.5, 99.5)  # the nearest and the farthest surface; outliers lie beyond
+    percentiles: tuple[float, float] = (
+        0.5,
+        99.5,
+    )  # the nearest and the farthest surface; outliers lie beyond
     side: int = 96  # longer side of the copy on which ratios are tried, pixels
 
 
@@ -56,10 +59,13 @@ def from_relative(
         scale = min(1.0, SETTINGS.side / max(t.shape))
         size = (max(2, round(t.shape[1] * scale)), max(2, round(t.shape[0] * scale)))
         small_t = cv2.resize(t, size, interpolation=cv2.INTER_AREA)
-        small_normal = cv2.resize(np.ascontiguousarray(normal, np.float32), size, interpolation=cv2.INTER_AREA)
+        small_normal = cv2.resize(
+            np.ascontiguousarray(normal, np.float32), size, interpolation=cv2.INTER_AREA
+        )
         length = np.linalg.norm(small_normal, axis=-1)
         known = length > 0.9  # shorter: unknown, or an edge between two surfaces
-        target, view = small_normal[known] / length[known, None], Camera(*size, camera.fov)
+        target = small_normal[known] / length[known, None]
+        view = Camera(*size, camera.fov)
 
         def error(ratio: float) -> float:
             found = normals_from_depth(depth(ratio, small_t), view, radius=1)[known]

@@ -18,7 +18,9 @@ def with_longer_side(size: tuple[int, ...], side: int) -> tuple[int, int]:
 def values(array: Array, size: tuple[int, ...]) -> Array:
     """[H, W] or [H, W, 3] float32 brought to `size` (height, width): area means down, bilinear up."""
     shrinks = array.shape[0] > size[0] or array.shape[1] > size[1]
-    return cv2.resize(array, size[::-1], interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    return cv2.resize(
+        array, size[::-1], interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    )
 
 
 def normals(array: Array, size: tuple[int, int]) -> Array:
@@ -40,6 +42,8 @@ def depth(array: Array, size: tuple[int, int]) -> Array:
     # The neighbourhood that an area mean or a bilinear lookup may touch, at either size.
     reach = 2 * int(np.ceil(max(1.0, array.shape[0] / size[0], array.shape[1] / size[1]))) + 1
     kernel = np.ones((reach, reach), np.uint8)
-    near = cv2.resize(cv2.dilate(inverse, kernel), size[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
+    near = cv2.resize(
+        cv2.dilate(inverse, kernel), size[::-1], interpolation=cv2.INTER_NEAREST_EXACT
+    )
     far = cv2.resize(cv2.erode(inverse, kernel), size[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
     return np.where((far > 0) & (near <= EDGE_RATIO * far), smooth, nearest).astype(np.float32)

@@ -26,7 +26,9 @@ def sha256(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
-        raise WeightsError(f"{path} cannot be read ({error.strerror or error}); give a file of weights.") from error
+        raise WeightsError(
+            f"{path} cannot be read ({error.strerror or error}); give a file of weights."
+        ) from error
 
 
 def verify_file(path: Path, expected: str = "") -> str:
@@ -48,12 +50,18 @@ def verify_folder(folder: Path) -> str:
     """One sha256 for a whole download, after every file of its list was found and verified. Raises WeightsError."""
     listed = _listed(folder)
     if not listed:
-        raise WeightsError(f"{folder} has no list of checksums ({CHECKSUMS}); fetch the model again.")
+        raise WeightsError(
+            f"{folder} has no list of checksums ({CHECKSUMS}); fetch the model again."
+        )
     for name, digest in listed.items():
         if not (folder / name).is_file():
-            raise WeightsError(f"{folder} lacks {name}; fetch the model again (materialist models download).")
+            raise WeightsError(
+                f"{folder} lacks {name}; fetch the model again (materialist models download)."
+            )
         verify_file(folder / name, digest)
-    return hashlib.sha256("\n".join(f"{listed[n]} {n}" for n in sorted(listed)).encode()).hexdigest()
+    return hashlib.sha256(
+        "\n".join(f"{listed[n]} {n}" for n in sorted(listed)).encode()
+    ).hexdigest()
 
 
 def _listed(folder: Path) -> dict[str, str]:
@@ -76,11 +84,17 @@ def read_state(path: Path) -> dict[str, Tensor]:
     from safetensors.torch import load_file
 
     if not path.is_file() or path.stat().st_size == 0:
-        kind = "is empty" if path.is_file() else "is a folder" if path.is_dir() else "does not exist"
-        raise WeightsError(f"{path} {kind}; give a .safetensors or .pth file of weights, or {INSTEAD}.")
+        kind = (
+            "is empty" if path.is_file() else "is a folder" if path.is_dir() else "does not exist"
+        )
+        raise WeightsError(
+            f"{path} {kind}; give a .safetensors or .pth file of weights, or {INSTEAD}."
+        )
     try:
         safe = path.suffix == ".safetensors"
-        content = load_file(path) if safe else torch.load(path, map_location="cpu", weights_only=True)
+        content = (
+            load_file(path) if safe else torch.load(path, map_location="cpu", weights_only=True)
+        )
     except MemoryError:
         raise
     except Exception as error:  # damaged files fail in whatever part of the reader meets them first
@@ -93,7 +107,9 @@ def read_state(path: Path) -> dict[str, Tensor]:
     for key in ("state_dict", "model"):
         if isinstance(content, Mapping) and isinstance(content.get(key), Mapping):
             content = content[key]
-    if not isinstance(content, Mapping) or not all(isinstance(value, torch.Tensor) for value in content.values()):
+    if not isinstance(content, Mapping) or not all(
+        isinstance(value, torch.Tensor) for value in content.values()
+    ):
         raise WeightsError(f"{path} holds more than named tensors; it is no plain file of weights.")
     return {str(name).removeprefix("module."): tensor for name, tensor in content.items()}
 
@@ -113,10 +129,18 @@ def load_weights(network: nn.Module, state: Mapping[str, Tensor], path: Path) ->
         network.load_state_dict(state, strict=True)
     except RuntimeError as error:
         faults = " ".join(line.strip()[:200] for line in str(error).splitlines()[1:4])
-        raise WeightsError(f"{path} is not a checkpoint of {type(network).__name__}: {faults}") from error
-    broken = [name for name, tensor in state.items() if tensor.is_floating_point() and not tensor.isfinite().all()]
+        raise WeightsError(
+            f"{path} is not a checkpoint of {type(network).__name__}: {faults}"
+        ) from error
+    broken = [
+        name
+        for name, tensor in state.items()
+        if tensor.is_floating_point() and not tensor.isfinite().all()
+    ]
     if broken:
-        raise WeightsError(f"{path} has NaN or infinite values in {broken[0]}; fetch or train it again.")
+        raise WeightsError(
+            f"{path} has NaN or infinite values in {broken[0]}; fetch or train it again."
+        )
 
 
 def write_weights(path: Path, tensors: Mapping[str, Tensor], texts: dict[str, str]) -> None:
@@ -124,7 +148,10 @@ def write_weights(path: Path, tensors: Mapping[str, Tensor], texts: dict[str, st
     import torch
     from safetensors.torch import save_file
 
-    half = {name: tensor.detach().cpu().to(torch.float16).contiguous() for name, tensor in tensors.items()}
+    half = {
+        name: tensor.detach().cpu().to(torch.float16).contiguous()
+        for name, tensor in tensors.items()
+    }
     with whole_file(path, force=True) as file:
         save_file(half, str(file), texts)
 
@@ -133,7 +160,10 @@ def metadata(path: Path) -> dict[str, str]:
     """The texts in the header of a .safetensors file; empty for other files."""
     from safetensors import SafetensorError, safe_open
 
-    with suppress(SafetensorError, OSError, ValueError), safe_open(str(path), framework="pt") as file:
+    with (
+        suppress(SafetensorError, OSError, ValueError),
+        safe_open(str(path), framework="pt") as file,
+    ):
         return file.metadata() or {}
     return {}
 

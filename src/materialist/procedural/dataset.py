@@ -27,9 +27,14 @@ _IDENTITY = ("format", "size", "seed", "split", "options", "content")
 
 
 def produce(
-    folder: str | Path, options: DataSetOptions, *, count: int, workers: int = 1, resume: bool = False,
+    folder: str | Path,
+    options: DataSetOptions,
+    *,
+    count: int,
+    workers: int = 1,
+    resume: bool = False,
     progress: Progress = lambda *_: None,
-) -> int:  # fmt: skip
+) -> int:
     """Render the samples 0 .. count - 1 that `folder` lacks; sample i depends on the options and i alone.
 
     Raises InputError for bad numbers, a mesh that is damaged, a folder that holds something and no `resume`, or one
@@ -44,7 +49,9 @@ def produce(
         shapes.load(path)
     made_of = _listed(options, progress)
     if not resume and folder.is_dir() and any(folder.iterdir()):
-        raise InputError(f"{folder} exists and is not empty; add --resume to go on with it, or name another folder.")
+        raise InputError(
+            f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
+        )
     claim(folder, DESCRIPTION, _description(options), _IDENTITY)
     if made_of:
         write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
@@ -66,12 +73,26 @@ def sample_path(folder: Path, index: int) -> Path:
 
 def _description(options: DataSetOptions) -> dict[str, Any]:
     files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}
-    drawn: dict[str, Any] = {"spp": options.spp} | {name: [p.stem for p in paths] for name, paths in files.items()}
+    drawn: dict[str, Any] = {"spp": options.spp} | {
+        name: [p.stem for p in paths] for name, paths in files.items()
+    }
     if options.real_share:
         real = (*options.archives, *options.photographs)
-        drawn["real"] = {"share": options.real_share, "files": [f"{p.name} {p.stat().st_size}" for p in real]}
-    told = {"format": FORMAT, "size": options.size, "seed": options.seed, "split": options.split, "content": CONTENT}
-    return told | {"options": drawn | ({"only": options.only} if options.only else {}), "tool_version": __version__}
+        drawn["real"] = {
+            "share": options.real_share,
+            "files": [f"{p.name} {p.stat().st_size}" for p in real],
+        }
+    told = {
+        "format": FORMAT,
+        "size": options.size,
+        "seed": options.seed,
+        "split": options.split,
+        "content": CONTENT,
+    }
+    return told | {
+        "options": drawn | ({"only": options.only} if options.only else {}),
+        "tool_version": __version__,
+    }
 
 
 def identity(folder: str | Path) -> dict[str, Any]:
@@ -82,11 +103,15 @@ def identity(folder: str | Path) -> dict[str, Any]:
     file = Path(folder) / DESCRIPTION
     found = described(file)
     if found is None or found.get("format") != FORMAT:
-        raise InputError(f"{file} describes no data set of format {FORMAT}; make one: materialist train data.")
+        raise InputError(
+            f"{file} describes no data set of format {FORMAT}; make one: materialist train data."
+        )
     return {name: found.get(name) for name in _IDENTITY}
 
 
-def write_data_sheet(folder: str | Path, path: str | Path, *, count: int = 24, seed: int = 0) -> int:
+def write_data_sheet(
+    folder: str | Path, path: str | Path, *, count: int = 24, seed: int = 0
+) -> int:
     """Draw `count` samples of the set in `folder`, chosen by `seed`, as a PNG; returns how many.
 
     Each row shows picture, albedo, roughness, metallic, normal and depth. Raises InputError where there are no samples,

@@ -19,16 +19,22 @@ def defocused(image: Array, depth: Array, camera: Camera, aperture: float, focus
     depth: [H, W] planar, metres, 0 where there is no surface.
     """
     distance = np.where(depth > 0, depth, FAR)
-    blur = aperture * camera.focal * (1 / focus - 1 / distance)  # pixels across, signed: near negative
-    low, high = float(blur.min()), float(blur.max())
+    blur = (
+        aperture * camera.focal * (1 / focus - 1 / distance)
+    )  # pixels across, signed: near negative
+    low = float(blur.min())
+    high = float(blur.max())
     if max(-low, high) < LEAST:
         return image
     steps = np.linspace(high, low, LAYERS)
     spacing = max((high - low) / (LAYERS - 1), 1e-6)
-    total, cover = np.zeros_like(image, np.float32), np.zeros((*depth.shape, 1), np.float32)
+    total = np.zeros_like(image, np.float32)
+    cover = np.zeros((*depth.shape, 1), np.float32)
     for step in steps:  # far to near; each pixel belongs to the two nearest layers
         share = np.clip(1 - np.abs(blur - step) / spacing, 0, 1).astype(np.float32)[..., None]
-        layer = _blurred(np.concatenate([image * share, share], -1).astype(np.float32), abs(float(step)))
+        layer = _blurred(
+            np.concatenate([image * share, share], -1).astype(np.float32), abs(float(step))
+        )
         total = layer[..., :3] + total * (1 - layer[..., 3:])
         cover = layer[..., 3:] + cover * (1 - layer[..., 3:])
     return total / np.maximum(cover, 1e-4)

@@ -58,17 +58,41 @@ class Material:
 
         start: place of the picture's first pixel in the buffer of all pictures, in units of 64 pixels.
         """
-        c, s = np.cos(self.turn), np.sin(self.turn)
+        c = np.cos(self.turn)
+        s = np.sin(self.turn)
         (c0, c1, c2), (r0, r1), (m0, m1) = self.colours, self.roughness, self.metallic
         offset = shift if self.offset is None else self.offset
         height, width = (0, 0) if self.picture is None else self.picture.pixels.shape[:2]
         solid = [1.0, 1.0, 1.0, 0.0, 0.0] if self.relief is None else self.relief.row()
         return np.array(
-            [*c0, r0, *c1, r1, *c2, self.grain, m0, m1, c / self.repeat[0], s / self.repeat[0], -s / self.repeat[1],
-             c / self.repeat[1], offset[0], offset[1], *self.emission, float(self.tile),
-             start, width, height, self.emboss, *solid, 0, 0, 0],
+            [
+                *c0,
+                r0,
+                *c1,
+                r1,
+                *c2,
+                self.grain,
+                m0,
+                m1,
+                c / self.repeat[0],
+                s / self.repeat[0],
+                -s / self.repeat[1],
+                c / self.repeat[1],
+                offset[0],
+                offset[1],
+                *self.emission,
+                float(self.tile),
+                start,
+                width,
+                height,
+                self.emboss,
+                *solid,
+                0,
+                0,
+                0,
+            ],
             np.float32,
-        )  # fmt: skip
+        )
 
 
 def hsv(h: float, s: float, v: float) -> Colour:
@@ -83,15 +107,19 @@ def near(rng: np.random.Generator, colour: Colour, low: float, high: float) -> C
     return tuple(np.clip(np.array(colour) * factor, 0.015, 0.92).tolist())
 
 
-def uniform(colour: Colour, roughness: float, metallic: float = 0.0, grain: float = 0.0) -> Material:
+def uniform(
+    colour: Colour, roughness: float, metallic: float = 0.0, grain: float = 0.0
+) -> Material:
     return Material(0, (colour,) * 3, grain, (roughness, roughness), (metallic, metallic))
 
 
 ALL: Range = (0, 1)
 ANY_COLOUR: tuple[Shade, ...] = (
-    (0.4, (0.05, 0.15), (0, 0.12), (0.1, 0.95)), (0.3, (0.03, 0.13), (0.12, 0.6), (0.15, 0.9)),
-    (0.2, ALL, (0.05, 0.4), (0.15, 0.9)), (0.1, ALL, (0.4, 0.97), (0.2, 0.95)),
-)  # fmt: skip
+    (0.4, (0.05, 0.15), (0, 0.12), (0.1, 0.95)),
+    (0.3, (0.03, 0.13), (0.12, 0.6), (0.15, 0.9)),
+    (0.2, ALL, (0.05, 0.4), (0.15, 0.9)),
+    (0.1, ALL, (0.4, 0.97), (0.2, 0.95)),
+)
 """Greys and browns mostly, as in photographs; saturated colours often enough, dark to light."""
 PALE: Shade = (0.8, (0.05, 0.15), (0, 0.15), (0.5, 0.97))
 
@@ -136,14 +164,18 @@ class Finish:
 
     def __call__(self, rng: np.random.Generator) -> Material:
         first = shade(rng, self.base)
-        rough = rng.uniform(*pick(rng, tuple((share, (low, high)) for share, low, high in self.roughness)))
+        rough = rng.uniform(
+            *pick(rng, tuple((share, (low, high)) for share, low, high in self.roughness))
+        )
         size = float(np.exp(rng.uniform(*np.log(self.repeat))))
         return Material(
             tile(rng, str(rng.choice(self.tiles.split()))),
             (first, self._other(rng, first, self.second), self._other(rng, first, self.third)),
-            rng.uniform(*self.grain), (rough, float(np.clip(rough + rng.uniform(*self.rougher), 0.06, 1))),
-            repeat=(size * rng.uniform(*self.stretch), size), turn=rng.choice([0, np.pi / 2]) if self.quarter else 0.0,
-        )  # fmt: skip
+            rng.uniform(*self.grain),
+            (rough, float(np.clip(rough + rng.uniform(*self.rougher), 0.06, 1))),
+            repeat=(size * rng.uniform(*self.stretch), size),
+            turn=rng.choice([0, np.pi / 2]) if self.quarter else 0.0,
+        )
 
     def _other(self, rng: np.random.Generator, first: Colour, how: tuple) -> Colour:
         if isinstance(how[0], tuple):
@@ -164,64 +196,148 @@ MORTAR: tuple[Shade, ...] = ((1, (0.1, 0.1), (0, 0.15), (0.25, 0.85)),)
 
 wall_paint = Finish(
     "plain plain plain cloudy",
-    ((0.5, (0.05, 0.17), (0, 0.18), (0.6, 0.97)), (0.35, ALL, (0, 0.18), (0.6, 0.97)),
-     (0.15, ALL, (0.1, 0.5), (0.25, 0.85))),
-    (1, 0.85, 1.05), (1, 0.6, 0.95), (0, 0.12), ((1, 0.45, 0.95),), (0.1, 0.1), (0.8, 3),
-)  # fmt: skip
+    (
+        (0.5, (0.05, 0.17), (0, 0.18), (0.6, 0.97)),
+        (0.35, ALL, (0, 0.18), (0.6, 0.97)),
+        (0.15, ALL, (0.1, 0.5), (0.25, 0.85)),
+    ),
+    (1, 0.85, 1.05),
+    (1, 0.6, 0.95),
+    (0, 0.12),
+    ((1, 0.45, 0.95),),
+    (0.1, 0.1),
+    (0.8, 3),
+)
 wallpaper = Finish(
     "ornament ornament ornament stripes stripes spots plaid",
-    ((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))), (0.7, 0.5, 0.95),
-    rougher=(0.2, 0.2), repeat=(0.4, 1.5),
-)  # fmt: skip
-lacquer = Finish("plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),))
+    ((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))),
+    (0.7, 0.5, 0.95),
+    rougher=(0.2, 0.2),
+    repeat=(0.4, 1.5),
+)
+lacquer = Finish(
+    "plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),)
+)
 """Of any colour, dull or shiny."""
-skin = replace(lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),))
-white_paint = replace(lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),))
-plastic = replace(lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT)
+skin = replace(
+    lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),)
+)
+white_paint = replace(
+    lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),)
+)
+plastic = replace(
+    lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT
+)
 raw_wood = Finish(
-    "wood", TIMBER, (1, 0.35, 0.75), (1, 0.15, 0.4), (0.1, 0.5), ((1, 0.4, 0.8),), (0.2, 0.2), (0.5, 1.4), (1, 2)
+    "wood",
+    TIMBER,
+    (1, 0.35, 0.75),
+    (1, 0.15, 0.4),
+    (0.1, 0.5),
+    ((1, 0.4, 0.8),),
+    (0.2, 0.2),
+    (0.5, 1.4),
+    (1, 2),
 )
 wood = replace(raw_wood, roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)))
 """Pale, brown, red or nearly black timber, raw or varnished."""
 floor_boards = replace(wood, tiles="planks", repeat=(0.9, 2.2))
 tiled = Finish(
-    "tiling tiling tiling checker", (*ANY_COLOUR, PALE), (0.75, 0.75, 1.0), MORTAR, (0, 0.2), ((1, 0.06, 0.5),),
-    (0.2, 0.8), (0.6, 3),
-)  # fmt: skip
+    "tiling tiling tiling checker",
+    (*ANY_COLOUR, PALE),
+    (0.75, 0.75, 1.0),
+    MORTAR,
+    (0, 0.2),
+    ((1, 0.06, 0.5),),
+    (0.2, 0.8),
+    (0.6, 3),
+)
 stone = Finish(
-    "marble speckle cloudy", ((1, (0.03, 0.16), (0, 0.25), (0.2, 0.92)),), (0.7, 0.3, 0.8), (0.7, 0.3, 0.8), (0.1, 0.6),
-    ((0.5, 0.08, 0.4), (0.5, 0.5, 0.95)), (0.15, 0.15), (0.4, 2),
-)  # fmt: skip
+    "marble speckle cloudy",
+    ((1, (0.03, 0.16), (0, 0.25), (0.2, 0.92)),),
+    (0.7, 0.3, 0.8),
+    (0.7, 0.3, 0.8),
+    (0.1, 0.6),
+    ((0.5, 0.08, 0.4), (0.5, 0.5, 0.95)),
+    (0.15, 0.15),
+    (0.4, 2),
+)
 """Marble, granite, terrazzo, concrete."""
 brick = Finish(
-    "bricks", ((0.8, (0.0, 0.09), (0.15, 0.7), (0.3, 0.85)), (0.2, (0.1, 0.1), (0.03, 0.03), (0.7, 0.92))),
-    (1, 0.5, 1.0), MORTAR, (0.3, 0.9), ((1, 0.75, 0.75),), (0.2, 0.2), (0.6, 1.2),
-)  # fmt: skip
-woven = Finish("weave", second=(0.5, 0.4, 0.9), grain=(0.1, 0.7), roughness=((1, 0.6, 1.0),), repeat=(0.08, 0.3))
-printed_cloth = replace(woven, tiles="plain plain stripes plaid ornament spots cloudy", repeat=(0.2, 0.9))
+    "bricks",
+    ((0.8, (0.0, 0.09), (0.15, 0.7), (0.3, 0.85)), (0.2, (0.1, 0.1), (0.03, 0.03), (0.7, 0.92))),
+    (1, 0.5, 1.0),
+    MORTAR,
+    (0.3, 0.9),
+    ((1, 0.75, 0.75),),
+    (0.2, 0.2),
+    (0.6, 1.2),
+)
+woven = Finish(
+    "weave",
+    second=(0.5, 0.4, 0.9),
+    grain=(0.1, 0.7),
+    roughness=((1, 0.6, 1.0),),
+    repeat=(0.08, 0.3),
+)
+printed_cloth = replace(
+    woven, tiles="plain plain stripes plaid ornament spots cloudy", repeat=(0.2, 0.9)
+)
 ceramic = Finish(
-    "plain plain plain stripes ornament spots cloudy", (*ANY_COLOUR, PALE), grain=(0, 0.15),
-    roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)), repeat=(0.1, 0.5), quarter=True,
-)  # fmt: skip
+    "plain plain plain stripes ornament spots cloudy",
+    (*ANY_COLOUR, PALE),
+    grain=(0, 0.15),
+    roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)),
+    repeat=(0.1, 0.5),
+    quarter=True,
+)
 """Glazed pottery: white, coloured, decorated; matt clay now and then."""
 foliage = Finish(
-    "cloudy", ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))),
-    (1, 0.5, 1.3), (1, 1.0, 1.6), (0.2, 0.6), ((1, 0.35, 0.7),), repeat=(0.1, 0.3),
-)  # fmt: skip
+    "cloudy",
+    ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))),
+    (1, 0.5, 1.3),
+    (1, 1.0, 1.6),
+    (0.2, 0.6),
+    ((1, 0.35, 0.7),),
+    repeat=(0.1, 0.3),
+)
 """Leaves, fresh or autumnal."""
 paved = Finish(
-    "speckle speckle bricks bricks cloudy tiling tiling", EARTH, (1, 0.55, 1.1), (0.8, 0.35, 0.8), (0.3, 1.1),
-    ((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)), (0.1, 0.1), (1, 4),
-)  # fmt: skip
-grass = replace(paved, tiles="grass", base=((1, (0.14, 0.34), (0.3, 0.7), (0.25, 0.6)),), roughness=((1, 0.7, 1.0),))
+    "speckle speckle bricks bricks cloudy tiling tiling",
+    EARTH,
+    (1, 0.55, 1.1),
+    (0.8, 0.35, 0.8),
+    (0.3, 1.1),
+    ((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)),
+    (0.1, 0.1),
+    (1, 4),
+)
+grass = replace(
+    paved,
+    tiles="grass",
+    base=((1, (0.14, 0.34), (0.3, 0.7), (0.25, 0.6)),),
+    roughness=((1, 0.7, 1.0),),
+)
 facade = Finish(
-    "facade", ((0.85, (0.02, 0.16), (0, 0.5), (0.35, 0.95)), (0.15, ALL, (0, 0.9), (0.2, 0.9))), (0.5, 0.5, 1.5),
-    ((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),), (0.1, 0.5), ((1, 0.7, 0.95),), (-0.8, -0.5), (5, 12),
-)  # fmt: skip
+    "facade",
+    ((0.85, (0.02, 0.16), (0, 0.5), (0.35, 0.95)), (0.15, ALL, (0, 0.9), (0.2, 0.9))),
+    (0.5, 0.5, 1.5),
+    ((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),),
+    (0.1, 0.5),
+    ((1, 0.7, 0.95),),
+    (-0.8, -0.5),
+    (5, 12),
+)
 """House front with rows of dark or mirroring windows, which are smoother than the wall."""
 
-METALS = ((0.91, 0.90, 0.88), (0.62, 0.61, 0.60), (0.95, 0.78, 0.36), (0.93, 0.65, 0.52), (0.78, 0.68, 0.46),
-          (0.45, 0.44, 0.43))  # fmt: skip
+METALS = (
+    (0.91, 0.90, 0.88),
+    (0.62, 0.61, 0.60),
+    (0.95, 0.78, 0.36),
+    (0.93, 0.65, 0.52),
+    (0.78, 0.68, 0.46),
+    (0.45, 0.44, 0.43),
+)
 """Silver and aluminium, steel, gold, copper, brass, iron: linear reflectance at normal incidence."""
 
 
@@ -236,10 +352,19 @@ def ground(rng: np.random.Generator) -> Material:
 
 def metal(rng: np.random.Generator) -> Material:
     """Steel, aluminium, brass, copper, gold, iron: polished, brushed, or worn."""
-    colour = cast(Colour, tuple((np.array(METALS[rng.integers(len(METALS))]) * rng.uniform(0.85, 1, 3)).tolist()))
+    colour = cast(
+        Colour,
+        tuple((np.array(METALS[rng.integers(len(METALS))]) * rng.uniform(0.85, 1, 3)).tolist()),
+    )
     kind = str(rng.choice(["plain", "brushed", "rust"], p=[0.5, 0.35, 0.15]))
-    made = Finish(kind, grain=(0, 0.3), roughness=((0.5, 0.05, 0.25), (0.5, 0.25, 0.6)), rougher=(0.1, 0.2),
-                  repeat=(0.1, 0.5), quarter=True)(rng)  # fmt: skip
+    made = Finish(
+        kind,
+        grain=(0, 0.3),
+        roughness=((0.5, 0.05, 0.25), (0.5, 0.25, 0.6)),
+        rougher=(0.1, 0.2),
+        repeat=(0.1, 0.5),
+        quarter=True,
+    )(rng)
     if kind == "rust":  # corroded or painted over where the tile's first channel is 1
         return replace(made, colours=(colour, *made.colours[1:]), metallic=(1.0, 0.0))
     return replace(made, colours=(colour,) * 3, metallic=(1.0, 1.0))
@@ -247,7 +372,9 @@ def metal(rng: np.random.Generator) -> Material:
 
 def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
     """A carpet of that size in metres, its tile fitted once."""
-    made = Finish("carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),))(rng)
+    made = Finish("carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),))(
+        rng
+    )
     return replace(made, repeat=(width, depth), offset=(0.5, 0.5))
 
 
@@ -266,8 +393,14 @@ def light(rng: np.random.Generator, radiance: Colour) -> Material:
 
 Maker = Callable[[np.random.Generator], Material]
 OBJECTS: tuple[tuple[float, Maker], ...] = (
-    (0.2, ceramic), (0.2, plastic), (0.26, metal), (0.11, wood), (0.07, fabric), (0.07, stone), (0.09, wall_paint)
-)  # fmt: skip
+    (0.2, ceramic),
+    (0.2, plastic),
+    (0.26, metal),
+    (0.11, wood),
+    (0.07, fabric),
+    (0.07, stone),
+    (0.09, wall_paint),
+)
 
 
 def any_object(rng: np.random.Generator) -> Material:

@@ -17,11 +17,23 @@ REAL_SHARE = 0.75
 """Share of the latter where nothing else is said and their packages are installed."""
 SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
 """What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
-HELD_OUT = frozenset((
-    "binoculars", "capsule", "fandisk", "lightbulb", "spot_cow", "train",
-    "aristea_wreck_puresky", "brown_photostudio_06", "dikhololo_night", "kiara_dawn", "museum", "st_fagans_interior",
-    "venice_sunset",
-))  # fmt: skip
+HELD_OUT = frozenset(
+    (
+        "binoculars",
+        "capsule",
+        "fandisk",
+        "lightbulb",
+        "spot_cow",
+        "train",
+        "aristea_wreck_puresky",
+        "brown_photostudio_06",
+        "dikhololo_night",
+        "kiara_dawn",
+        "museum",
+        "st_fagans_interior",
+        "venice_sunset",
+    )
+)
 """Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
 
 
@@ -30,10 +42,18 @@ def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[P
 
     Raises InputError where there are none.
     """
-    found = sorted(p for p in folder.glob(pattern) if held_out is None or (p.stem in HELD_OUT) == held_out)
+    found = sorted(
+        p for p in folder.glob(pattern) if held_out is None or (p.stem in HELD_OUT) == held_out
+    )
     if not found:
-        which = "" if held_out is None else f" {'kept aside for testing' if held_out else 'to train on'}"
-        raise InputError(f"{folder} holds no {Path(pattern).suffix} files{which}; give another folder, or none.")
+        which = (
+            ""
+            if held_out is None
+            else f" {'kept aside for testing' if held_out else 'to train on'}"
+        )
+        raise InputError(
+            f"{folder} holds no {Path(pattern).suffix} files{which}; give another folder, or none."
+        )
     return found
 
 
@@ -51,31 +71,49 @@ class DataSetOptions(OperationOptions):
     meshes: Path | None = option(None, "Folder of .ply meshes to use as well.", kind="file")
     envmaps: Path | None = option(None, "Folder of .exr HDR captures to use as well.", kind="file")
     split: str = option(
-        "train", "heldout uses only the files kept aside for testing.", kind="word", choices=tuple(SPLITS)
+        "train",
+        "heldout uses only the files kept aside for testing.",
+        kind="word",
+        choices=tuple(SPLITS),
     )
     real: float | None = option(
-        None, f"Share of pictures of real things; default: {REAL_SHARE} where they are installed.", low=0, high=1
+        None,
+        f"Share of pictures of real things; default: {REAL_SHARE} where they are installed.",
+        low=0,
+        high=1,
     )
     furniture: Path | None = option(
-        None, "Folder of .sh3f catalogues; default: that of Debian's sweethome3d-furniture.", kind="file"
+        None,
+        "Folder of .sh3f catalogues; default: that of Debian's sweethome3d-furniture.",
+        kind="file",
     )
     cache: Path | None = option(
-        None, "Folder for models and photographs as they are read; default: in the user's cache.", kind="file"
+        None,
+        "Folder for models and photographs as they are read; default: in the user's cache.",
+        kind="file",
     )
-    only: str = option("", f"Only one kind of scenes: {', '.join(KINDS)}.", kind="name", metavar="KIND")
+    only: str = option(
+        "", f"Only one kind of scenes: {', '.join(KINDS)}.", kind="name", metavar="KIND"
+    )
     seed: int = option(0, "Same seed, same samples.", kind="whole", low=0, flag=None)
-    device: str = option("auto", "Where it renders.", kind="word", choices=("auto", "cpu", "cuda"), flag=None)
+    device: str = option(
+        "auto", "Where it renders.", kind="word", choices=("auto", "cpu", "cuda"), flag=None
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.size % 4:
             raise InputError(f"The size is {self.size}; give a multiple of 4.")
         if self.only and self.only not in KINDS:
-            raise InputError(f"There is no kind '{self.only}' of scene; give one of {', '.join(KINDS)}, or none.")
+            raise InputError(
+                f"There is no kind '{self.only}' of scene; give one of {', '.join(KINDS)}, or none."
+            )
         _ = self.mesh_files, self.envmap_files  # which raise where a folder cannot be used
         if (self.real or self.only in REAL_KINDS) and not self.archives:
             where = f"in {self.furniture}" if self.furniture else "installed"
-            raise InputError(f"No 3D models are {where}; install them with: {packages.INSTALL}, or give --real 0.")
+            raise InputError(
+                f"No 3D models are {where}; install them with: {packages.INSTALL}, or give --real 0."
+            )
 
     @cached_property
     def archives(self) -> tuple[Path, ...]:
@@ -109,6 +147,8 @@ class DataSetOptions(OperationOptions):
         if folder is None:
             return ()
         if not folder.is_dir():
-            raise InputError(f"There is no folder {folder} to take {ending} files from; give one that exists.")
+            raise InputError(
+                f"There is no folder {folder} to take {ending} files from; give one that exists."
+            )
         wanted = captures(folder, f"**/*{ending}", self.split == "heldout")
         return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))

@@ -13,7 +13,9 @@ from materialist.procedural.objects.shapes import face_normals
 from materialist.procedural.world import World
 from materialist.types import Array
 
-FACE, MATERIAL, PORTAL = 28, 36, 16
+FACE = 28
+MATERIAL = 36
+PORTAL = 16
 """Floats a row of each table: multiples of four, for wide gathers."""
 PICTURE_START = 64
 """Pictures begin at multiples of that many pixels, so that a float32 can hold the place of each."""
@@ -60,7 +62,8 @@ class Packed:
 
 def pack(world: World, rng: np.random.Generator) -> Packed:
     """Buffers of a world; `rng` shifts the tiles of materials."""
-    rotation, origin = world.view.to_scene, world.view.position
+    rotation = world.view.to_scene
+    origin = world.view.position
     place = [(p.solid.vertices - origin) @ rotation for p in world.parts]
     normal = [p.solid.normals @ rotation for p in world.parts]
     vertices = np.concatenate(place).astype(np.float32)
@@ -69,7 +72,9 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     faces = joined_faces([p.solid for p in world.parts])[1].astype(np.uint32)
     owner = np.repeat(np.arange(len(world.parts)), [len(p.solid.faces) for p in world.parts])
     pictures, starts = _pictures(world)
-    rows = [p.material.row(tuple(rng.random(2)), starts.get(p.material.picture, 0)) for p in world.parts]
+    rows = [
+        p.material.row(tuple(rng.random(2)), starts.get(p.material.picture, 0)) for p in world.parts
+    ]
     material = np.stack(rows).astype(np.float32)
     lamps, density = _lamps(vertices, faces, owner, material)
     extra = np.zeros((len(faces), 4), np.float32)
@@ -79,9 +84,20 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     portals = _portals(world)
     shares = _shares(world, bool(density.any()), sunny)
     return Packed(
-        vertices, faces, face, material, pictures, lamps, world.envmap, env_table, env_density, portals, shares,
-        rotation.astype(np.float32), float(np.abs(vertices).max()),
-    )  # fmt: skip
+        vertices,
+        faces,
+        face,
+        material,
+        pictures,
+        lamps,
+        world.envmap,
+        env_table,
+        env_density,
+        portals,
+        shares,
+        rotation.astype(np.float32),
+        float(np.abs(vertices).max()),
+    )
 
 
 def _pictures(world: World) -> tuple[Array, dict[ColourPicture | None, int]]:
@@ -110,7 +126,8 @@ def _lamps(vertices: Array, faces: Array, owner: Array, material: Array) -> tupl
     if not len(shining):
         return np.zeros(LIGHT_TABLE, np.uint32), density
     area = 0.5 * np.linalg.norm(face_normals(vertices, faces[shining]), axis=-1)
-    shining, area = shining[area > 1e-12], area[area > 1e-12]
+    shining = shining[area > 1e-12]
+    area = area[area > 1e-12]
     chosen, count = resample(glow[shining] * area, LIGHT_TABLE)
     density[shining] = count / LIGHT_TABLE / area
     return shining[chosen].astype(np.uint32), density
@@ -127,7 +144,9 @@ def resample(weight: Array, entries: int) -> tuple[Array, Array]:
 def _directions(world: World) -> tuple[Array, Array, bool]:
     """(table of texels, density per solid angle, whether a small part of the sky gives much of the light)."""
     size = (2 * ENV_ROWS, ENV_ROWS)
-    glow = cv2.resize(luminance(world.envmap), size, interpolation=cv2.INTER_AREA).astype(np.float64)
+    glow = cv2.resize(luminance(world.envmap), size, interpolation=cv2.INTER_AREA).astype(
+        np.float64
+    )
     angle = np.repeat(row_solid_angle(ENV_ROWS), 2 * ENV_ROWS)
     weight = np.maximum(glow.ravel(), 1e-6) * angle
     if world.portals:
@@ -149,12 +168,19 @@ def _entering(world: World) -> Array:
 def _portals(world: World) -> Array:
     table = np.zeros((MAX_PORTALS, PORTAL), np.float32)
     used = world.portals[:MAX_PORTALS]
-    rotation, origin = world.view.to_scene, world.view.position
+    rotation = world.view.to_scene
+    origin = world.view.position
     for k, portal in enumerate(used):
         normal = np.cross(portal.right, portal.up)
         area = np.linalg.norm(normal)
         sides = [(portal.corner - origin) @ rotation, portal.right @ rotation, portal.up @ rotation]
-        table[k] = [*np.concatenate([*sides, normal / area @ rotation]), 1 / (area * len(used)), 0, 0, 0]
+        table[k] = [
+            *np.concatenate([*sides, normal / area @ rotation]),
+            1 / (area * len(used)),
+            0,
+            0,
+            0,
+        ]
     return table
 
 

@@ -12,7 +12,9 @@ UNSATURATED = ANY_COLOUR[:3]
 """The shades of `natural` patterns."""
 
 
-def pattern(rng: np.random.Generator, kind: str, *, metal: bool = False, natural: bool = False) -> Array:
+def pattern(
+    rng: np.random.Generator, kind: str, *, metal: bool = False, natural: bool = False
+) -> Array:
     """A seamless picture [SIZE, SIZE, 3] float32 linear, albedo in [0.03, 0.9].
 
     `kind` is 'plain', 'checker', 'noise', 'stripes', 'wood' or 'spots'; metals are bright and weakly coloured.
@@ -28,11 +30,14 @@ def pattern(rng: np.random.Generator, kind: str, *, metal: bool = False, natural
 def _colour(rng: np.random.Generator, metal: bool, natural: bool) -> Array:
     """[3] linear colour of a dielectric (any hue) or of a metal (silver, gold, copper)."""
     if metal:
-        base = np.array([(0.9, 0.88, 0.86), (0.85, 0.64, 0.30), (0.82, 0.50, 0.36), (0.60, 0.60, 0.62)])
+        base = np.array(
+            [(0.9, 0.88, 0.86), (0.85, 0.64, 0.30), (0.82, 0.50, 0.36), (0.60, 0.60, 0.62)]
+        )
         return base[rng.integers(len(base))] * rng.uniform(0.85, 1)
     if natural:
         return np.array(shade(rng, UNSATURATED))
-    value, saturation = rng.uniform(0.12, 0.8), rng.choice([rng.uniform(0, 0.15), rng.uniform(0.3, 0.85)])
+    value = rng.uniform(0.12, 0.8)
+    saturation = rng.choice([rng.uniform(0, 0.15), rng.uniform(0.3, 0.85)])
     return np.array(colorsys.hsv_to_rgb(rng.random(), saturation, value))
 
 
@@ -42,27 +47,36 @@ def _checker(rng: np.random.Generator) -> Array:
 
 
 def _stripes(rng: np.random.Generator) -> Array:
-    n, m = int(rng.integers(3, 9)), int(rng.integers(0, 3))
+    n = int(rng.integers(3, 9))
+    m = int(rng.integers(0, 3))
     return np.clip(0.5 + 2 * np.sin(2 * np.pi * (n * Y + m * X)), 0, 1)
 
 
 def _wood(rng: np.random.Generator) -> Array:
     n = int(rng.integers(5, 10))
-    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * Y + 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * X)))
+    rings = 0.5 + 0.5 * np.sin(
+        2 * np.pi * (n * Y + 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * X))
+    )
     return np.clip(0.7 * rings**2 + 0.3 * noise(rng, 0.8), 0, 1)
 
 
 def _spots(rng: np.random.Generator) -> Array:
     mix = np.zeros((SIZE, SIZE))
     for _ in range(int(rng.integers(8, 24))):
-        cx, cy, radius = rng.random(), rng.random(), rng.uniform(0.03, 0.1)
+        cx = rng.random()
+        cy = rng.random()
+        radius = rng.uniform(0.03, 0.1)
         distance = np.hypot((X - cx + 0.5) % 1 - 0.5, (Y - cy + 0.5) % 1 - 0.5)
         mix = np.maximum(mix, np.clip((radius - distance) * SIZE / 2, 0, 1))
     return mix
 
 
 _KINDS = {
-    "plain": lambda rng: np.zeros((SIZE, SIZE)), "checker": _checker, "noise": lambda rng: noise(rng, 1.6),
-    "stripes": _stripes, "wood": _wood, "spots": _spots,
-}  # fmt: skip
+    "plain": lambda rng: np.zeros((SIZE, SIZE)),
+    "checker": _checker,
+    "noise": lambda rng: noise(rng, 1.6),
+    "stripes": _stripes,
+    "wood": _wood,
+    "spots": _spots,
+}
 KINDS = tuple(_KINDS)

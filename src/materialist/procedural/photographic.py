@@ -18,7 +18,9 @@ from materialist.types import Array
 def photographic(image: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """(photo, gains) of one picture [H, W, 3] of any size, as `developed`; [H, W, 3] and [3] float32."""
     random = torch.Generator().manual_seed(int(rng.integers(2**63)))
-    photo, gains = developed(torch.tensor(image, dtype=torch.float32).permute(2, 0, 1)[None], random)
+    photo, gains = developed(
+        torch.tensor(image, dtype=torch.float32).permute(2, 0, 1)[None], random
+    )
     return np.ascontiguousarray(photo[0].permute(1, 2, 0).numpy()), gains.view(3).numpy()
 
 
@@ -49,7 +51,9 @@ class _Draw:
     """Random numbers of pictures, [B, channels, 1, 1] or as large as pictures."""
 
     def __init__(self, count: int, device: torch.device, random: torch.Generator):
-        self.count, self.device, self.random = count, device, random
+        self.count = count
+        self.device = device
+        self.random = random
 
     def uniform(self, low: float = 0.0, high: float = 1.0, channels: int = 1) -> Tensor:
         shape = self.count, channels, 1, 1
@@ -67,7 +71,8 @@ def _gains(image: Tensor, draw: _Draw) -> Tensor:
     grey = image.clamp(max=1).square().mean((2, 3), keepdim=True).sqrt() + 1e-4
     gains = (grey.mean(1, keepdim=True) / grey) ** draw.uniform(0, 0.35)
     gains = gains.clamp(0.4, 2.5) * torch.exp(draw.normal(3) * 0.04)
-    warm, green = draw.normal() * 0.16, draw.normal() * 0.03
+    warm = draw.normal() * 0.16
+    green = draw.normal() * 0.03
     cast = torch.exp(torch.cat([warm, green, -warm], 1))
     gains = torch.where(draw.chance(0.35), gains * cast, gains)
     return gains * grey.sum(1, keepdim=True) / (gains * grey).sum(1, keepdim=True)
@@ -102,7 +107,8 @@ def _vignetted(image: Tensor, draw: _Draw) -> Tensor:
 
 
 def _noisy(image: Tensor, draw: _Draw) -> Tensor:
-    shot, read = 10 ** draw.uniform(-4.8, -2.9), 10 ** draw.uniform(-4, -2.2)
+    shot = 10 ** draw.uniform(-4.8, -2.9)
+    read = 10 ** draw.uniform(-4, -2.2)
     noise = draw.normal(*image.shape[1:])
     blotched = _smoothed(noise, draw.uniform(0.4, 0.8), 2) * 1.6
     noise = torch.where(draw.chance(0.4), blotched, noise)
@@ -112,14 +118,17 @@ def _noisy(image: Tensor, draw: _Draw) -> Tensor:
 
 def _tone(image: Tensor, draw: _Draw) -> Tensor:
     """sRGB-encoded values in [0, 1]: plain, with a shoulder for highlights, with contrast and saturation."""
-    kind, knee = draw.uniform(), draw.uniform(0.5, 0.9)
+    kind = draw.uniform()
+    knee = draw.uniform(0.5, 0.9)
     bent = knee + (1 - knee) * (1 - torch.exp(-(image - knee) / (1 - knee)))
     image = torch.where((kind >= 0.35) & (image > knee), bent, image)
     weight = image.new_tensor(LUMINANCE).view(1, 3, 1, 1)
     grey = (image * weight).sum(1, keepdim=True)
     encoded = srgb(grey + (image - grey) * draw.uniform(0.8, 1.3))
     curve = encoded * encoded * (3 - 2 * encoded)
-    encoded = torch.where(kind >= 0.5, encoded + draw.uniform(-0.25, 0.8) * (curve - encoded), encoded)
+    encoded = torch.where(
+        kind >= 0.5, encoded + draw.uniform(-0.25, 0.8) * (curve - encoded), encoded
+    )
     gamma = torch.exp(draw.normal() * 0.12)
     return torch.where(draw.chance(0.4), encoded.clamp(min=1e-6) ** gamma, encoded).clamp(0, 1)
 
@@ -127,11 +136,20 @@ def _tone(image: Tensor, draw: _Draw) -> Tensor:
 def _compressed(encoded: Tensor, draw: _Draw) -> Tensor:
     """8 bits and, mostly, JPEG with chroma at half resolution."""
     pixels = (encoded * 255).round().to(torch.uint8).permute(0, 2, 3, 1).cpu().numpy()
-    quality = torch.where(draw.chance(0.5), draw.uniform(55, 98), draw.uniform(85, 100)).flatten().tolist()
+    quality = (
+        torch.where(draw.chance(0.5), draw.uniform(55, 98), draw.uniform(85, 100))
+        .flatten()
+        .tolist()
+    )
     chosen = draw.chance(0.75).flatten().tolist()
     with ThreadPoolExecutor() as pool:
-        decoded = list(pool.map(lambda p, q, c: _jpeg(p, int(q)) if c else p, pixels, quality, chosen))
-    return torch.from_numpy(np.stack(decoded)).to(encoded.device).permute(0, 3, 1, 2).contiguous() / 255
+        decoded = list(
+            pool.map(lambda p, q, c: _jpeg(p, int(q)) if c else p, pixels, quality, chosen)
+        )
+    return (
+        torch.from_numpy(np.stack(decoded)).to(encoded.device).permute(0, 3, 1, 2).contiguous()
+        / 255
+    )
 
 
 def _jpeg(pixels: Array, quality: int) -> Array:

@@ -89,8 +89,13 @@ def _carved(rng):
 def _folds(rng):
     """Soft folds along x, bent by noise."""
     bent = _field(rng, _frequency() ** -2.5)
-    y, z = (np.broadcast_to(a, (SIDE,) * 3) for a in np.meshgrid(*[np.arange(SIDE) / SIDE] * 2, indexing="ij"))
-    return np.sin(2 * np.pi * (3 * y + 2 * z) + 1.6 * bent) + 0.3 * _field(rng, _frequency() ** -2.5)
+    y, z = (
+        np.broadcast_to(a, (SIDE,) * 3)
+        for a in np.meshgrid(*[np.arange(SIDE) / SIDE] * 2, indexing="ij")
+    )
+    return np.sin(2 * np.pi * (3 * y + 2 * z) + 1.6 * bent) + 0.3 * _field(
+        rng, _frequency() ** -2.5
+    )
 
 
 def _hair(rng):
@@ -99,9 +104,14 @@ def _hair(rng):
 
 
 _SOLID = {
-    "rough": _rough, "grain": _grain, "ridges": _ridges, "hammered": _hammered, "carved": _carved, "folds": _folds,
+    "rough": _rough,
+    "grain": _grain,
+    "ridges": _ridges,
+    "hammered": _hammered,
+    "carved": _carved,
+    "folds": _folds,
     "hair": _hair,
-}  # fmt: skip
+}
 SOLID = tuple(_SOLID)
 """Kinds of solid noise."""
 
@@ -109,8 +119,13 @@ SOLID = tuple(_SOLID)
 @lru_cache(maxsize=1)
 def heights() -> dict[str, Array]:
     """Kind -> [SIDE]*3 float32 heights along x, y, z, periodic, deviation 1; the same in every process."""
-    made = {kind: make(np.random.default_rng([43, k])) for k, (kind, make) in enumerate(_SOLID.items())}
-    return {kind: ((field - field.mean()) / field.std()).astype(np.float32) for kind, field in made.items()}
+    made = {
+        kind: make(np.random.default_rng([43, k])) for k, (kind, make) in enumerate(_SOLID.items())
+    }
+    return {
+        kind: ((field - field.mean()) / field.std()).astype(np.float32)
+        for kind, field in made.items()
+    }
 
 
 def height(kind: str, places: Array) -> Array:
@@ -126,7 +141,9 @@ def solid_bank() -> Array:
     """
     slabs = []
     for field in heights().values():
-        slope = np.stack([np.roll(field, -1, k) - np.roll(field, 1, k) for k in range(3)] + [0 * field], -1)
+        slope = np.stack(
+            [np.roll(field, -1, k) - np.roll(field, 1, k) for k in range(3)] + [0 * field], -1
+        )
         slope /= np.sqrt((slope**2).sum(-1).mean())
         slope = slope.transpose(2, 1, 0, 3)
         slabs.append(np.concatenate([slope[-1:], slope, slope[:1]]))
@@ -146,7 +163,12 @@ def tile_bank() -> Array:
     words = np.empty(bank.shape[:3], np.uint32)
     for k, tile in enumerate(bank):
         field = 0.3 * tile[..., 2] / 255.0 - depth[k] * tile[..., 1] / 255.0
-        right, down = ((np.roll(field, -1, axis) - np.roll(field, 1, axis)) * tiles.SIZE / 2 for axis in (1, 0))
-        steps = [np.clip(np.rint(s / FINE_SLOPE) + 32768, 0, 65535).astype(np.uint32) for s in (right, down)]
+        right, down = (
+            (np.roll(field, -1, axis) - np.roll(field, 1, axis)) * tiles.SIZE / 2 for axis in (1, 0)
+        )
+        steps = [
+            np.clip(np.rint(s / FINE_SLOPE) + 32768, 0, 65535).astype(np.uint32)
+            for s in (right, down)
+        ]
         words[k] = steps[0] | steps[1] << 16
     return words

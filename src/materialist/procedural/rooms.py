@@ -33,13 +33,16 @@ def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> wor
     (low, high), top = world.bounds(piece), world.bounds(piece[:1])[1][1]
     size = rng.uniform([2.6, 3.0, 2.3], [5.0, 5.0, 3.0])
     size[:2] = np.maximum(size[:2], (high - low)[[0, 2]] + 0.7)
-    at_wall, x = maker is not f.set_table or rng.random() < 0.5, rng.uniform(-0.3, 0.3)
+    at_wall = maker is not f.set_table or rng.random() < 0.5
+    x = rng.uniform(-0.3, 0.3)
     z = -size[1] / 2 - low[2] + 0.03 if at_wall else rng.uniform(-0.3, 0.3)
     standing = Furniture(size)
     standing.add(placed(piece, (x, 0, z)))
     standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 2, 4, meshes))
     target = np.array([x + rng.uniform(-0.4, 0.4) * high[0], top + rng.uniform(0.0, 0.15), z])
-    distance, up, turn, fov = rng.uniform([0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60])
+    distance, up, turn, fov = rng.uniform(
+        [0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60]
+    )
     w, d, h = size
     inside = np.array([[-w / 2 + 0.1, 0.2, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
     eye = np.clip(world.orbit(target, distance, turn, up, fov).position, *inside)
@@ -52,12 +55,15 @@ def _some(rng, kinds, low: int, high: int, meshes) -> list[Parts]:
     return [m.pick(rng, kinds)(rng, meshes) for _ in range(int(rng.integers(low, high)))]
 
 
-def _world(rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, kind: str) -> world.World:
+def _world(
+    rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, kind: str
+) -> world.World:
     w, d, _ = size
     parts, portals, envmap = shell(rng, size, captures)
     parts += furniture
     if rng.random() < 0.5:
-        a, b = w * rng.uniform(0.3, 0.7), d * rng.uniform(0.25, 0.6)
+        a = w * rng.uniform(0.3, 0.7)
+        b = d * rng.uniform(0.25, 0.6)
         rug = m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)
         parts.append(block((a, 0.012, b), (rng.normal() * 0.3, 0, rng.normal() * 0.4), rug, 0.004))
     parts += lamps(rng, size, portals, envmap)
@@ -83,12 +89,16 @@ def shell(
     is_open = rng.random() < 0.25
     parts: Parts = []
     portals: list[world.Portal] = []
-    count = int(rng.choice([0, 1, 2], p=[0.1, 0.6, 0.3])) if not is_open else int(rng.random() < 0.3)
+    count = (
+        int(rng.choice([0, 1, 2], p=[0.1, 0.6, 0.3])) if not is_open else int(rng.random() < 0.3)
+    )
     with_windows = rng.permutation(2 if is_open else 4)[:count]
-    paint, accent = m.wall_paint(rng), rng.integers(4) if rng.random() < 0.3 else -1
+    paint = m.wall_paint(rng)
+    accent = rng.integers(4) if rng.random() < 0.3 else -1
     lower = m.one_of(rng, m.wall_paint, m.tiled, m.wood) if rng.random() < 0.15 else None
     wood = m.white_paint(rng) if rng.random() < 0.7 else m.wood(rng)
-    x, z = np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
+    x = np.array([1.0, 0, 0])
+    z = np.array([0, 0, 1.0])
     for k, (corner, turn, length) in enumerate(sides(size)):
         holes = [walls.Opening(0, length, 0, h)]
         if not (is_open and k == 2):
@@ -97,10 +107,13 @@ def shell(
             own = walls.windows(rng, wall, int(rng.integers(1, most))) if k in with_windows else []
             own += walls.door(rng, wall) if rng.random() < 0.35 else []
             makers = (m.wall_paint, m.wallpaper, m.brick, m.tiled, m.wood, m.stone)
-            own += walls.surface(wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2))
+            own += walls.surface(
+                wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2)
+            )
             own.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
             own += hangings(rng, wall, int(rng.integers(0, 5)))
-            parts, holes = parts + moved(own, corner, turn), wall.holes
+            parts = parts + moved(own, corner, turn)
+            holes = wall.holes
         for hole in holes:
             up = (0, hole.top - hole.bottom, 0)
             sheet = s.sheet((hole.left, hole.bottom, -0.01), (hole.right - hole.left) * x, up)
@@ -111,7 +124,8 @@ def shell(
     parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), floor))
     parts.append(ScenePart(s.sheet((-w / 2, h, -d / 2), w * x, d * z), ceiling))
     if rng.random() < 0.12:
-        beams, look = np.arange(-w / 2 + 0.4, w / 2, 0.9), m.wood(rng)
+        beams = np.arange(-w / 2 + 0.4, w / 2, 0.9)
+        look = m.wood(rng)
         parts += [block((0.14, 0.2, d), (at, h - 0.2, 0), look) for at in beams]
     if not portals:
         return parts, portals, np.zeros((8, 16, 3), np.float32)
@@ -168,26 +182,40 @@ def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
     if portals and rng.random() < 0.12:
         envmap *= rng.uniform(0.005, 0.1)
     chosen = rng.permutation(3)[: int(rng.integers(1, 3))]
-    return [p for k in chosen for p in (_panels, _globes, _shade)[k](rng, size, power / len(chosen))]
+    return [
+        p for k in chosen for p in (_panels, _globes, _shade)[k](rng, size, power / len(chosen))
+    ]
 
 
 def _panels(rng, size, power) -> Parts:
     """A few long panels or several small spots on the ceiling."""
     w, d, h = size
     spots = rng.random() < 0.5
-    n, a, b = (rng.integers(2, 7), 0.1, 0.1) if spots else (rng.integers(1, 4), *rng.uniform(0.12, [0.6, 1.2]))
-    glow, edge, parts = _glow(rng, power, n * a * b), m.metal(rng), []
+    n, a, b = (
+        (rng.integers(2, 7), 0.1, 0.1)
+        if spots
+        else (rng.integers(1, 4), *rng.uniform(0.12, [0.6, 1.2]))
+    )
+    glow = _glow(rng, power, n * a * b)
+    edge = m.metal(rng)
+    parts = []
     for x, z in rng.uniform(-0.4, 0.4, (n, 2)) * [w, d]:
         parts.append(block((a + 0.03, 0.03, b + 0.03), (x, h - 0.03, z), edge))
-        parts.append(ScenePart(s.sheet((x - a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b)), glow))
+        parts.append(
+            ScenePart(s.sheet((x - a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b)), glow)
+        )
     return parts
 
 
 def _globes(rng, size, power) -> Parts:
     w, d, h = size
-    n, r, drop = int(rng.integers(1, 4)), rng.uniform(0.06, 0.2), rng.uniform(0.3, 0.9)
-    glow, cord = _glow(rng, power, n * 4 * np.pi * r * r), m.metal(rng)
-    x, z = rng.uniform(-0.2, 0.2) * w, rng.uniform(-0.3, 0.2) * d
+    n = int(rng.integers(1, 4))
+    r = rng.uniform(0.06, 0.2)
+    drop = rng.uniform(0.3, 0.9)
+    glow = _glow(rng, power, n * 4 * np.pi * r * r)
+    cord = m.metal(rng)
+    x = rng.uniform(-0.2, 0.2) * w
+    z = rng.uniform(-0.3, 0.2) * d
     row = [x + (k - n / 2) * 4 * r for k in range(n)]
     balls = [world.orb((at, h - drop, z), r, glow) for at in row]
     return balls + [rod([(at, h - drop + r, z), (at, h, z)], 0.006, cord, 5) for at in row]
@@ -197,9 +225,11 @@ def _shade(rng, size, power) -> Parts:
     w, d, _ = size
     r, tall, height = rng.uniform([0.12, 1.1, 0.18], [0.25, 1.7, 0.35])
     at = np.array([rng.choice([-1, 1]) * (w / 2 - r - 0.1), 0, rng.uniform(-0.45, 0.2) * d])
-    glow, stand = _glow(rng, power, 2 * np.pi * r * height), m.metal(rng)
+    glow = _glow(rng, power, 2 * np.pi * r * height)
+    stand = m.metal(rng)
     shade = s.lathe(np.array([(r, tall), (r * rng.uniform(0.5, 1), tall + height)]), 32)
-    pole, foot = rod([(0, 0, 0), (0, tall + height / 2, 0)], 0.012, stand), block((0.28, 0.03, 0.28), (0, 0, 0), stand)
+    pole = rod([(0, 0, 0), (0, tall + height / 2, 0)], 0.012, stand)
+    foot = block((0.28, 0.03, 0.28), (0, 0, 0), stand)
     return placed([ScenePart(shade, glow), pole, foot], at)
 
 
@@ -208,8 +238,12 @@ def view_of(rng: np.random.Generator, size: Size, standing: Furniture) -> world.
     w, d, h = size
     for _ in range(30):
         eye = rng.uniform([-0.44, 0, 0.05], [0.44, 0, 0.48]) * [w, 0, d]
-        if not any((eye > low - 0.25).all() and (eye < high + 0.25).all() for low, high in standing.boxes):
+        if not any(
+            (eye > low - 0.25).all() and (eye < high + 0.25).all() for low, high in standing.boxes
+        ):
             break
     eye[1] = min(rng.uniform(1.2, 1.75) if rng.random() < 0.7 else rng.uniform(0.5, 2.0), h - 0.3)
-    target = np.array([rng.uniform(-0.5, 0.5) * w, rng.uniform(0.3, 1.5), -d / 2 * rng.uniform(0.2, 1.0)])
+    target = np.array(
+        [rng.uniform(-0.5, 0.5) * w, rng.uniform(0.3, 1.5), -d / 2 * rng.uniform(0.2, 1.0)]
+    )
     return world.look(eye, target, rng.uniform(35, 75), rng.normal() * 0.025)

@@ -76,7 +76,9 @@ def make_world(rng: np.random.Generator, options: DataSetOptions) -> World:
     return makers[rng.choice(len(makers), p=shares)](rng, options.mesh_files, options.envmap_files)
 
 
-def _chosen(makers: dict[str, tuple[Callable[..., World], float]], only: str) -> tuple[list[Callable], Array]:
+def _chosen(
+    makers: dict[str, tuple[Callable[..., World], float]], only: str
+) -> tuple[list[Callable], Array]:
     """(makers, their probabilities): all, or the one that is named."""
     kept = [makers[only]] if only else list(makers.values())
     weight = np.array([share for _, share in kept])
@@ -97,7 +99,8 @@ def stock_of(options: DataSetOptions) -> Stock:
 
 def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
     """Whether a view shows several things at a distance, or a single one well, rather than the inside of a cupboard."""
-    owner, depth = probe["owner"][..., 0], probe["depth"][..., 0]
+    owner = probe["owner"][..., 0]
+    depth = probe["depth"][..., 0]
     seen = owner >= 0
     if world.kind == "single":
         subject = np.array([part.thing is not None for part in world.parts])
@@ -110,13 +113,17 @@ def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
     return bool((depth[seen] < near).mean() < 0.3 and counts.max() / owner.size < 0.75)
 
 
-def _developed(world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions) -> dict[str, Array]:
+def _developed(
+    world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions
+) -> dict[str, Array]:
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)
     image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, quality=DENOISING)
     # The shading is of white surfaces: a guide of their texture would print it into the shading.
     covered = (probe["owner"] >= 0).mean(2, dtype=np.float32)
-    shading = denoise(white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, quality=DENOISING)
+    shading = denoise(
+        white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, quality=DENOISING
+    )
     labels = labels_of(probe)
     lit = labels["mask"] if world.backdrop is not None else None
     gain = exposure(image, rng, lit) * balance(shading, rng)
@@ -128,18 +135,31 @@ def _developed(world: World, probe, tracer, rng: np.random.Generator, options: D
     if not sharp:
         image = defocused(image, labels["depth"], tracer.camera, view.aperture, view.focus)
     hidden = LIGHT_HIDDEN if world.kind in OPEN_KINDS else 0
-    light = tracer.light(probe, rows=LIGHT_ROWS, spp=LIGHT_SPP, seed=int(rng.integers(2**31)), hidden=hidden)
-    byte = lambda x: (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)  # noqa: E731
-    half = lambda x: np.clip(x, 0, 6e4).astype(np.float16)  # noqa: E731
+    light = tracer.light(
+        probe, rows=LIGHT_ROWS, spp=LIGHT_SPP, seed=int(rng.integers(2**31)), hidden=hidden
+    )
+
+    def byte(x):
+        return (np.clip(x, 0, 1) * 255 + 0.5).astype(np.uint8)
+
+    def half(x):
+        return np.clip(x, 0, 6e4).astype(np.float16)
+
     # A blurred picture is no product of its sharp maps, so that its surfaces cannot be recoloured by its shading.
     shaded = {"shading": half(shading * gain)} if sharp else {}
     return shaded | {
         "image": half(image),
-        "albedo": byte(linear_to_srgb(labels["albedo"])), "roughness": byte(labels["roughness"]),
-        "metallic": byte(labels["metallic"]), "normal": np.rint(labels["normal"] * 127).astype(np.int8),
-        "depth": half(labels["depth"]), "mask": labels["mask"].astype(np.uint8), "fov": np.float32(world.view.fov),
-        "light": half(light * [*gain, 1]), "thing": things_of(world, probe), "kind": np.array(world.kind),
-    }  # fmt: skip
+        "albedo": byte(linear_to_srgb(labels["albedo"])),
+        "roughness": byte(labels["roughness"]),
+        "metallic": byte(labels["metallic"]),
+        "normal": np.rint(labels["normal"] * 127).astype(np.int8),
+        "depth": half(labels["depth"]),
+        "mask": labels["mask"].astype(np.uint8),
+        "fov": np.float32(world.view.fov),
+        "light": half(light * [*gain, 1]),
+        "thing": things_of(world, probe),
+        "kind": np.array(world.kind),
+    }
 
 
 def things_of(world: World, probe: dict[str, Array]) -> Array:
@@ -185,7 +205,9 @@ def before(backdrop: Array, image: Array, covered: Array) -> Array:
     behind = cv2.resize(backdrop, (w, h), interpolation=cv2.INTER_LINEAR)
     # Pixels without surface show the envmap, which the backdrop hides.
     share = np.where(covered > 0, 1, 0)[..., None]
-    return (image * share * covered[..., None] + behind * (1 - covered[..., None])).astype(np.float32)
+    return (image * share * covered[..., None] + behind * (1 - covered[..., None])).astype(
+        np.float32
+    )
 
 
 def exposure(image: Array, rng: np.random.Generator, surface: Array | None = None) -> float:

@@ -28,7 +28,8 @@ from materialist.types import Array, Camera, Materials, Photo, Prediction
 
 PHOTO_SPP = 576
 """Samples a pixel of a reference picture: two seeds then agree to about 40 dB. A square, for the stratified sampler."""
-MAX_DEPTH, GLASS_DEPTH = 6, 24
+MAX_DEPTH = 6
+GLASS_DEPTH = 24
 """Path length of the reference pictures: five bounces; longer through glass."""
 WAVEFRONT = 2**24
 """Paths traced at a time."""
@@ -50,9 +51,16 @@ class SyntheticSample:
 
 
 def make_sample(
-    scene_index: int, view_index: int, light_index: int, *, size: int | tuple[int, int] = 128,
-    data: Path | None = None, seed: int = 0, spp: int = PHOTO_SPP, unseen: bool = False,
-) -> SyntheticSample:  # fmt: skip
+    scene_index: int,
+    view_index: int,
+    light_index: int,
+    *,
+    size: int | tuple[int, int] = 128,
+    data: Path | None = None,
+    seed: int = 0,
+    spp: int = PHOTO_SPP,
+    unseen: bool = False,
+) -> SyntheticSample:
     """The sample of these three numbers; the same numbers and seed give the same sample.
 
     `size` is the side of a square photo or (height, width), in pixels. With `data`, objects also come from
@@ -64,23 +72,33 @@ def make_sample(
     truth_scene = _true_scene(scene_index, view_index, height, width, data, seed, unseen)
     radiance = lights.environment(light_index, seed=seed, data=data, unseen=unseen)
     envmap = lights.envmap(radiance, truth_scene.view.to_scene)
-    photo_seed = int(np.random.default_rng((scene_index, view_index, light_index)).integers(1, 2**31))
+    photo_seed = int(
+        np.random.default_rng((scene_index, view_index, light_index)).integers(1, 2**31)
+    )
     picture = truth_scene.render(envmap, spp=spp, seed=photo_seed)
     exposure = _exposure(picture, truth_scene.truth.depth > 0)
     name = f"scene {scene_index} view {view_index} light {light_index}"
-    return photographed(truth_scene, picture * exposure, (envmap * exposure).astype(np.float32), name)
+    return photographed(
+        truth_scene, picture * exposure, (envmap * exposure).astype(np.float32), name
+    )
 
 
 def photographed(scene: TrueScene, picture: Array, envmap: Array, name: str) -> SyntheticSample:
     """The sample of a true scene whose exposed picture [H, W, 3] shows it under the light [h, 2h, 3]."""
     linear = np.clip(picture, 0, 1).astype(np.float32)
-    photo = Photo(linear=linear, camera=scene.camera, original=linear, fov_source="option", path=name)
+    photo = Photo(
+        linear=linear, camera=scene.camera, original=linear, fov_source="option", path=name
+    )
     return SyntheticSample(photo, scene.truth, envmap, scene, name)
 
 
 def _exposure(picture: Array, surface: Array) -> float:
     """Factor that brings the 98th percentile of the surfaces' luminance to EXPOSED, as a camera would."""
-    bright = float(np.percentile(luminance(picture)[surface], 98)) if surface.any() else float(picture.max())
+    bright = (
+        float(np.percentile(luminance(picture)[surface], 98))
+        if surface.any()
+        else float(picture.max())
+    )
     return EXPOSED / max(bright, 1e-6)
 
 
@@ -93,7 +111,8 @@ class TrueScene:
         self.items = items
         shapes = {f"item{k:02d}": _mesh(item) for k, item in enumerate(items)}
         # Which paths a photo has, and so its noise, depends on where its rays begin.
-        light, eye = emitter(mi), sensor(self.camera, look_along(mi)) | {"near_clip": 1e-3, "far_clip": 1e3}
+        light = emitter(mi)
+        eye = sensor(self.camera, look_along(mi)) | {"near_clip": 1e-3, "far_clip": 1e3}
         self._scene = mi.load_dict({"type": "scene", "sensor": eye, "light": light, **shapes})
         self._params = mi.traverse(self._scene)
         self._params.keep(["light.data"])
@@ -108,7 +127,9 @@ class TrueScene:
     def things(self) -> dict[int, Array]:
         """Item number -> [H, W] bool mask, of the objects that are seen; ground and walls left out."""
         flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
-        return {int(k): self.seen == k for k in np.unique(self.seen[self.seen >= 0]) if k not in flat}
+        return {
+            int(k): self.seen == k for k in np.unique(self.seen[self.seen >= 0]) if k not in flat
+        }
 
     def render(self, envmap: Array, spp: int = PHOTO_SPP, seed: int = 0) -> Array:
         """[H, W, 3] float32 linear picture under envmap [h, 2h, 3], path traced, unclipped."""
@@ -120,7 +141,8 @@ class TrueScene:
             integrator |= {"max_depth": GLASS_DEPTH, "rr_depth": GLASS_DEPTH}
         path_tracer = mi.load_dict(integrator)
         # Whole squares suit the stratified sampler; batches bound the memory.
-        total, batches = np.zeros((self.camera.height, self.camera.width, 3)), self._batches(spp)
+        total = np.zeros((self.camera.height, self.camera.width, 3))
+        batches = self._batches(spp)
         for k, part in enumerate(batches):
             number = mi.UInt32((seed * 7919 + k) & 0xFFFFFFFF)
             with recording():
@@ -137,9 +159,11 @@ class TrueScene:
     @cached_property
     def truth(self) -> Prediction:
         """Depth and normal at pixel centres; albedo averaged over 4 x 4 places on the object at the centre."""
-        centre, sub = self._centre, 4
+        centre = self._centre
+        sub = 4
         item = centre["item"]
-        total, count = np.zeros((*item.shape, 3)), np.zeros((*item.shape, 1))
+        total = np.zeros((*item.shape, 3))
+        count = np.zeros((*item.shape, 1))
         for place in np.ndindex(sub, sub):
             part = self._probe(tuple((np.array(place) + 0.5) / sub))
             same = (part["item"] == item)[..., None]
@@ -149,7 +173,9 @@ class TrueScene:
         # Item -1, the sky, finds the value at the end.
         roughness = np.array([*(i.roughness for i in self.items), 0.5])
         metallic = np.array([*(i.metallic for i in self.items), 0.0])
-        materials = Materials(*(x.astype(np.float32) for x in (albedo, roughness[item], metallic[item])))
+        materials = Materials(
+            *(x.astype(np.float32) for x in (albedo, roughness[item], metallic[item]))
+        )
         return Prediction(materials, centre["normal"], centre["depth"], predictor="truth")
 
     def _albedo(self, seen: dict[str, Array]) -> Array:
@@ -169,21 +195,38 @@ class TrueScene:
 
     def _probe(self, offset: tuple[float, float]) -> dict[str, Array]:
         """What rays through that (x, y) place in each pixel see: item (-1 = sky), depth, normal [., 3], uv [., 2]."""
-        height, width = self.camera.height, self.camera.width
+        height = self.camera.height
+        width = self.camera.width
         columns, rows = np.meshgrid(np.arange(width) + offset[0], np.arange(height) + offset[1])
         x = floats(mi, (columns - width / 2) / self.camera.focal)
         y = floats(mi, (height / 2 - rows) / self.camera.focal)
         si = self._scene.ray_intersect(mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1))))
         normal = dr.select(si.is_valid(), si.sh_frame.n, mi.Normal3f(0, 0, 1))
         depth = dr.select(si.is_valid(), -si.p.z, 0)
-        picture = lambda v: np.moveaxis(np.array(v, np.float32).reshape(-1, height, width), 0, -1)  # noqa: E731
-        item = self._item_of_shape[np.array(dr.reinterpret_array(mi.UInt32, si.shape))].reshape(height, width)
-        return {"item": item, "depth": picture(depth)[..., 0], "normal": picture(normal), "uv": picture(si.uv)}
+
+        def picture(v):
+            return np.moveaxis(np.array(v, np.float32).reshape(-1, height, width), 0, -1)
+
+        item = self._item_of_shape[np.array(dr.reinterpret_array(mi.UInt32, si.shape))].reshape(
+            height, width
+        )
+        return {
+            "item": item,
+            "depth": picture(depth)[..., 0],
+            "normal": picture(normal),
+            "uv": picture(si.uv),
+        }
 
 
 @lru_cache(maxsize=1)
 def _true_scene(
-    scene_index: int, view_index: int, height: int, width: int, data: Path | None, seed: int, unseen: bool
+    scene_index: int,
+    view_index: int,
+    height: int,
+    width: int,
+    data: Path | None,
+    seed: int,
+    unseen: bool,
 ) -> TrueScene:
     """The scene of a view; the last one is kept, since all lights of a view share it."""
     view = scenes.view(scene_index, view_index, seed=seed)
@@ -194,7 +237,9 @@ def _true_scene(
 
 def _registry(meshes: list[Any]) -> Array:
     """[n] item number by Mitsuba's number of a shape; -1 for number 0 (nothing was hit)."""
-    numbers = [int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh)))[0]) for mesh in meshes]
+    numbers = [
+        int(np.array(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(mesh)))[0]) for mesh in meshes
+    ]
     table = np.full(max(numbers, default=0) + 1, -1)
     table[numbers] = np.arange(len(meshes))
     return table
@@ -210,5 +255,7 @@ def _mesh(item: scenes.Item) -> Any:
     if item.ior:
         return shape(mi, item.solid, {"type": "dielectric", "int_ior": item.ior, "ext_ior": 1.0})
     maps = {"base_color": texture(item.albedo)}
-    maps |= {name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")}
+    maps |= {
+        name: texture(np.full((2, 2, 1), getattr(item, name))) for name in ("roughness", "metallic")
+    }
     return shape(mi, item.solid, {"type": "materialist_disney", **maps})

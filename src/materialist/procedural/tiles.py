@@ -33,7 +33,9 @@ def bank() -> tuple[Array, dict[str, range]]:
 def noise(rng: np.random.Generator, slope: float, stretch: tuple[float, float] = (1, 1)) -> Array:
     """Periodic noise [SIZE, SIZE] of spectrum 1 / f**slope, in [0, 1], mean 0.5, deviation 0.2; `stretch` (down, right)
     > 1 draws it out along an axis."""
-    f = np.hypot(np.fft.fftfreq(SIZE)[:, None] * stretch[0], np.fft.fftfreq(SIZE)[None, :] * stretch[1])
+    f = np.hypot(
+        np.fft.fftfreq(SIZE)[:, None] * stretch[0], np.fft.fftfreq(SIZE)[None, :] * stretch[1]
+    )
     f[0, 0] = 1
     spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) / f**slope
     spectrum[0, 0] = 0
@@ -65,8 +67,14 @@ def _cloudy(rng):
 
 def _speckle(rng):
     """Terrazzo, granite, gravel, asphalt."""
-    fine, coarse = noise(rng, rng.uniform(0.3, 0.9)), noise(rng, rng.uniform(0.9, 1.3))
-    return _step(coarse - 0.55, 0.1), _step(fine - rng.uniform(0.7, 0.8), 0.05), noise(rng, 0.4), coarse
+    fine = noise(rng, rng.uniform(0.3, 0.9))
+    coarse = noise(rng, rng.uniform(0.9, 1.3))
+    return (
+        _step(coarse - 0.55, 0.1),
+        _step(fine - rng.uniform(0.7, 0.8), 0.05),
+        noise(rng, 0.4),
+        coarse,
+    )
 
 
 def _marble(rng):
@@ -82,12 +90,18 @@ def _wood(rng):
     n = int(rng.integers(3, 12))
     rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * Y + rng.uniform(1, 4) * warp))
     fibre = noise(rng, 0.7, (1, 16))
-    return np.clip(0.55 * rings ** rng.uniform(1, 3) + 0.45 * fibre, 0, 1), 0.0, fibre, 0.5 * rings + 0.5 * fibre
+    return (
+        np.clip(0.55 * rings ** rng.uniform(1, 3) + 0.45 * fibre, 0, 1),
+        0.0,
+        fibre,
+        0.5 * rings + 0.5 * fibre,
+    )
 
 
 def _planks(rng):
     """Floor boards or parquet along x, each of its own shade."""
-    rows, columns = int(rng.integers(4, 11)), int(rng.integers(1, 4))
+    rows = int(rng.integers(4, 11))
+    columns = int(rng.integers(1, 4))
     r = np.floor(Y * rows).astype(int)
     x = (X + rng.random(rows)[r]) % 1 * columns
     shade = rng.random((rows, columns))[r, np.floor(x).astype(int) % columns]
@@ -97,7 +111,9 @@ def _planks(rng):
     return mix, seam * rng.uniform(0.5, 1), 0.5 + 0.6 * (fibre - 0.5), np.maximum(0.4 * fibre, seam)
 
 
-def _bricks(rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bool = True, gap: float = 0.06):
+def _bricks(
+    rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bool = True, gap: float = 0.06
+):
     n = 2 * int(rng.integers(rows[0] // 2, rows[1] // 2 + 1))
     m = max(1, round(n / aspect))
     r = np.floor(Y * n).astype(int)
@@ -105,12 +121,23 @@ def _bricks(rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bo
     wobble = 0.03 * (noise(rng, 0.8) - 0.5)
     joint = _step(gap + wobble - np.minimum(_from_line(x) * n / m, _from_line(Y * n)), 0.05)
     shade = rng.random((n, m))[r % n, np.floor(x).astype(int) % m]
-    return shade, joint, 0.5 + 0.7 * (noise(rng, 0.8) - 0.5), np.maximum(joint, 0.3 * noise(rng, 1.2))
+    return (
+        shade,
+        joint,
+        0.5 + 0.7 * (noise(rng, 0.8) - 0.5),
+        np.maximum(joint, 0.3 * noise(rng, 1.2)),
+    )
 
 
 def _tiling(rng):
     """Square or oblong ceramic tiles."""
-    return _bricks(rng, (2, 10), float(rng.choice([1, 1, 2, 0.5])), bool(rng.random() < 0.25), rng.uniform(0.02, 0.05))
+    return _bricks(
+        rng,
+        (2, 10),
+        float(rng.choice([1, 1, 2, 0.5])),
+        bool(rng.random() < 0.25),
+        rng.uniform(0.02, 0.05),
+    )
 
 
 def _checker(rng):
@@ -121,7 +148,8 @@ def _checker(rng):
 
 
 def _stripes(rng):
-    n, k = int(rng.integers(3, 16)), int(rng.integers(2, 5))
+    n = int(rng.integers(3, 16))
+    k = int(rng.integers(2, 5))
     profile = rng.choice([0, 0.5, 1], size=n * k)
     second = rng.choice([0, 0, 0, 1], size=n * k)
     i = np.floor(X * n * k).astype(int)
@@ -149,9 +177,12 @@ def _carpet(rng):
     field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4 - 0.5
     edge = np.minimum(_from_line(X), _from_line(Y))
     bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
-    border, stripes = edge < rng.uniform(0.08, 0.2), rng.random((2, 16)) < 0.5
+    border = edge < rng.uniform(0.08, 0.2)
+    stripes = rng.random((2, 16)) < 0.5
     second = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
-    mix, third = (np.where(border, s[bands], f) for s, f in zip(stripes, (_step(field, 0.02), second)))
+    mix, third = (
+        np.where(border, s[bands], f) for s, f in zip(stripes, (_step(field, 0.02), second))
+    )
     return mix, third, noise(rng, 0.2), 0.5
 
 
@@ -161,16 +192,25 @@ def _ornament(rng):
     base = noise(rng, rng.uniform(1.5, 2.2))[::n, ::n]
     base = np.tile((base + base[:, ::-1]) / 2, (n, n))
     t = np.quantile(base, rng.uniform(0.55, 0.85))
-    return _step(base - t, 0.04), _step(base - t - 0.12, 0.04), noise(rng, 0.6), 0.6 - 0.3 * _step(base - t, 0.04)
+    return (
+        _step(base - t, 0.04),
+        _step(base - t - 0.12, 0.04),
+        noise(rng, 0.6),
+        0.6 - 0.3 * _step(base - t, 0.04),
+    )
 
 
 def _spots(rng):
-    first, second = np.zeros((SIZE, SIZE)), np.zeros((SIZE, SIZE))
+    first = np.zeros((SIZE, SIZE))
+    second = np.zeros((SIZE, SIZE))
     radius = rng.uniform(0.015, 0.08)
     for _ in range(int(rng.integers(10, 60))):
-        x, y, r = rng.random(), rng.random(), radius * rng.uniform(0.5, 1.3)
+        x = rng.random()
+        y = rng.random()
+        r = radius * rng.uniform(0.5, 1.3)
         disc = _step(r - np.hypot((X - x + 0.5) % 1 - 0.5, (Y - y + 0.5) % 1 - 0.5), 0.006)
-        first, second = np.maximum(first, disc), np.maximum(second, disc * (rng.random() < 0.4))
+        first = np.maximum(first, disc)
+        second = np.maximum(second, disc * (rng.random() < 0.4))
     return first, second, noise(rng, 1.0), 0.3
 
 
@@ -181,15 +221,20 @@ def _picture(rng):
     first = np.clip(hills * noise(rng, 1.6) * 1.6, 0, 1)
     second = np.clip((1 - hills) * (1 - Y) * rng.uniform(0.5, 1.5), 0, 1)
     for _ in range(int(rng.integers(0, 9))):
-        x, y, w, h = rng.random(), rng.random(), rng.uniform(0.03, 0.3), rng.uniform(0.03, 0.3)
+        x = rng.random()
+        y = rng.random()
+        w = rng.uniform(0.03, 0.3)
+        h = rng.uniform(0.03, 0.3)
         block = (np.abs(X - x) < w) & (np.abs(Y - y) < h)
-        first, second = np.where(block, rng.random(), first), np.where(block, rng.random(), second)
+        first = np.where(block, rng.random(), first)
+        second = np.where(block, rng.random(), second)
     return first, second, noise(rng, 1.3), 0.3
 
 
 def _print(rng):
     """Lines of text, labels, book pages."""
-    first, rows = np.zeros((SIZE, SIZE)), int(rng.integers(8, 28))
+    first = np.zeros((SIZE, SIZE))
+    rows = int(rng.integers(8, 28))
     for r in range(rows):
         if rng.random() < 0.85:
             words = np.repeat(rng.random(SIZE // 4) < 0.8, 4)
@@ -201,9 +246,12 @@ def _print(rng):
 
 def _facade(rng):
     """Rows of windows in a wall; channel 1 is the pane, channel 3 where it shines."""
-    n, m = int(rng.integers(2, 5)), int(rng.integers(2, 5))
-    x, y = (X * m) % 1, (Y * n) % 1
-    w, h = rng.uniform(0.18, 0.38), rng.uniform(0.22, 0.36)
+    n = int(rng.integers(2, 5))
+    m = int(rng.integers(2, 5))
+    x = (X * m) % 1
+    y = (Y * n) % 1
+    w = rng.uniform(0.18, 0.38)
+    h = rng.uniform(0.22, 0.36)
     frame = _step(np.minimum(w + 0.04 - np.abs(x - 0.5), h + 0.04 - np.abs(y - 0.5)), 0.02)
     bars = np.minimum(np.abs(x - 0.5), np.abs(y - 0.5 - rng.uniform(-0.1, 0.1))) < 0.012
     pane = _step(np.minimum(w - np.abs(x - 0.5), h - np.abs(y - 0.5)), 0.02) * (1 - bars)
@@ -228,8 +276,25 @@ def _brushed(rng):
 
 
 _KINDS = {
-    "plain": _plain, "cloudy": _cloudy, "speckle": _speckle, "marble": _marble, "wood": _wood, "planks": _planks,
-    "bricks": _bricks, "tiling": _tiling, "checker": _checker, "stripes": _stripes, "plaid": _plaid, "weave": _weave,
-    "carpet": _carpet, "ornament": _ornament, "spots": _spots, "picture": _picture, "print": _print,
-    "facade": _facade, "grass": _grass, "rust": _rust, "brushed": _brushed,
-}  # fmt: skip
+    "plain": _plain,
+    "cloudy": _cloudy,
+    "speckle": _speckle,
+    "marble": _marble,
+    "wood": _wood,
+    "planks": _planks,
+    "bricks": _bricks,
+    "tiling": _tiling,
+    "checker": _checker,
+    "stripes": _stripes,
+    "plaid": _plaid,
+    "weave": _weave,
+    "carpet": _carpet,
+    "ornament": _ornament,
+    "spots": _spots,
+    "picture": _picture,
+    "print": _print,
+    "facade": _facade,
+    "grass": _grass,
+    "rust": _rust,
+    "brushed": _brushed,
+}

@@ -46,7 +46,9 @@ class SampleTracer:
     def __init__(self, packed: Packed, camera: Camera, *, device: str = "auto"):
         setup(device)
         if camera.width * camera.height % VECTOR:
-            raise InputError(f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4.")
+            raise InputError(
+                f"The picture is {camera.width} x {camera.height}; its sides must be multiples of 4."
+            )
         self.camera = camera
         self.scene = mi.load_dict({"type": "scene", "mesh": shape(mi, packed)})
         self.shading = shading.Shading(packed)
@@ -58,19 +60,26 @@ class SampleTracer:
 
         The shading is what the diffuse lobe of the first surface would send back with albedo 1 and metallic 0.
         """
-        h, w = self.camera.height, self.camera.width
+        h = self.camera.height
+        w = self.camera.width
         rows = max(1, int(np.ceil(np.sqrt(spp))))
         spp = rows * rows
         lane = dr.arange(mi.UInt32, h * w * spp)
         # Lanes that end together belong to pixels far from each other: their common fate leaves no streaks.
-        place, sample = lane % (h * w), lane // (h * w)
+        place = lane % (h * w)
+        sample = lane // (h * w)
         pixel = place // VECTOR + (place % VECTOR) * (h * w // VECTOR)
         rng = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))  # type: ignore[operator]
-        jitter = mi.Point2f(mi.Float(sample % rows) + rng.next_float32(), mi.Float(sample // rows) + rng.next_float32())
+        jitter = mi.Point2f(
+            mi.Float(sample % rows) + rng.next_float32(),
+            mi.Float(sample // rows) + rng.next_float32(),
+        )
         ray = self._camera_ray(pixel, jitter / rows)
         total, white = self._paths(ray, pixel, sample, rng, dr.opaque(mi.UInt32, seed))
         dr.eval(*total, *white)
-        planes = [np.array(c).reshape(spp, h * w // VECTOR, VECTOR).mean(0).T for c in (*total, *white)]
+        planes = [
+            np.array(c).reshape(spp, h * w // VECTOR, VECTOR).mean(0).T for c in (*total, *white)
+        ]
         both = np.stack([p.reshape(h, w) for p in planes], -1)
         return np.ascontiguousarray(both[..., :3]), np.ascontiguousarray(both[..., 3:])
 
@@ -80,9 +89,12 @@ class SampleTracer:
         Returns arrays of a leading [H, W, PROBE * PROBE]: owner (-1 for nothing), depth (planar, metres, 0 for
         nothing), normal [., 3] (camera frame, towards the camera), albedo [., 3], roughness, metallic.
         """
-        h, w, n = self.camera.height, self.camera.width, PROBE * PROBE
+        h = self.camera.height
+        w = self.camera.width
+        n = PROBE * PROBE
         lane = dr.arange(mi.UInt32, h * w * n)
-        pixel, sample = lane // n, lane % n
+        pixel = lane // n
+        sample = lane % n
         places = (mi.Point2f(mi.Float(sample % PROBE), mi.Float(sample // PROBE)) + 0.5) / PROBE
         ray = self._camera_ray(pixel, places)
         hit = self._hit(ray, mi.Bool(True), mi.Bool(True))
@@ -90,16 +102,26 @@ class SampleTracer:
         depth = dr.select(hit.valid, -hit.p.z, 0)
         owner = dr.select(hit.valid, mi.Int32(hit.owner), -1)
         out = {
-            "owner": owner, "depth": depth,
+            "owner": owner,
+            "depth": depth,
             "normal": [dr.select(hit.valid, c, 0) for c in hit.n],
             "albedo": [dr.select(hit.valid, c, 0) for c in look.albedo],
-            "roughness": look.roughness, "metallic": look.metallic,
-        }  # fmt: skip
+            "roughness": look.roughness,
+            "metallic": look.metallic,
+        }
         dr.eval(*(x for v in out.values() for x in (v if isinstance(v, list) else [v])))
-        shape = lambda v: np.array(v, np.float32).reshape(h, w, n)  # noqa: E731
-        return {k: np.stack([shape(c) for c in v], -1) if isinstance(v, list) else shape(v) for k, v in out.items()}
 
-    def light(self, probe: dict[str, Array], *, rows: int, spp: int, seed: int, hidden: float = 0) -> Array:
+        def shape(v):
+            return np.array(v, np.float32).reshape(h, w, n)
+
+        return {
+            k: np.stack([shape(c) for c in v], -1) if isinstance(v, list) else shape(v)
+            for k, v in out.items()
+        }
+
+    def light(
+        self, probe: dict[str, Array], *, rows: int, spp: int, seed: int, hidden: float = 0
+    ) -> Array:
         """[rows, 2 rows, 4] the light that reaches what the camera sees from what it does not see.
 
         Radiance (linear, equirectangular, camera frame) in three channels: the mean over visible surface points from
@@ -108,7 +130,8 @@ class SampleTracer:
         probe: what `probe` returned. spp: rays a texel, each from a random point. hidden: weight of the
         light from afar behind visible surfaces, which counts as well where it is above 0.
         """
-        h, w = self.camera.height, self.camera.width
+        h = self.camera.height
+        w = self.camera.width
         owner, depth = (np.ascontiguousarray(probe[k][..., CENTRE]) for k in ("owner", "depth"))
         normal = probe["normal"][:, :, CENTRE].reshape(-1, 3)
         seen = np.flatnonzero(owner.ravel() >= 0)
@@ -125,19 +148,26 @@ class SampleTracer:
         d = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)])
         points = unproject(depth, self.camera).reshape(-1, 3)[chosen]
         points += normal[chosen] * (0.002 * depth.ravel()[chosen, None])
-        ray = mi.Ray3f(mi.Point3f(*(floats(mi, c) for c in points.T)), mi.Vector3f(*(floats(mi, c) for c in d)))
+        ray = mi.Ray3f(
+            mi.Point3f(*(floats(mi, c) for c in points.T)), mi.Vector3f(*(floats(mi, c) for c in d))
+        )
         lane = dr.arange(mi.UInt32, texels * spp)
         hit = self._hit(ray, mi.Bool(True))
         found = np.stack([np.array(c) for c in hit.p], -1)
         screen, far = project(found, self.camera)
-        column, row = (np.clip(np.nan_to_num(screen[:, k]), 0, size - 1).astype(int) for k, size in ((0, w), (1, h)))
+        column, row = (
+            np.clip(np.nan_to_num(screen[:, k]), 0, size - 1).astype(int)
+            for k, size in ((0, w), (1, h))
+        )
         inside = (far > 0) & (screen >= 0).all(-1) & (screen[:, 0] < w) & (screen[:, 1] < h)
         same = owner[row, column] == np.array(hit.owner).astype(int)
         near = np.abs(depth[row, column] - far) < 0.05 * far
         below = (normal[chosen] * d.T).sum(-1) <= 0  # into the surface itself
         open_ = ~((np.array(hit.valid) & inside & same & near) | below)
         random = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))  # type: ignore[operator]
-        total, _ = self._paths(ray, lane % texels, lane // texels, random, dr.opaque(mi.UInt32, seed))
+        total, _ = self._paths(
+            ray, lane % texels, lane // texels, random, dr.opaque(mi.UInt32, seed)
+        )
         radiance = np.where(open_, np.array(total), np.array(self.shading.sky(ray.d)))
         weight = np.where(open_, 1, hidden).reshape(spp, texels, 1).astype(np.float32)
         count = weight.sum(0)
@@ -146,7 +176,8 @@ class SampleTracer:
 
     def _camera_ray(self, pixel, place):
         """Rays through `place` in [0, 1)^2 of pixels, from the origin along -Z."""
-        h, w = self.camera.height, self.camera.width
+        h = self.camera.height
+        w = self.camera.width
         x = (mi.Float(pixel % w) + place.x - w / 2) / self.focal
         y = (h / 2 - mi.Float(pixel // w) - place.y) / self.focal
         return mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1)))
@@ -157,10 +188,22 @@ class SampleTracer:
 
     def _paths(self, ray, pixel, sample, rng, seed):
         """Radiance and white diffuse shading along camera rays; each three Floats."""
-        even, lanes = _Even(pixel, sample, seed), dr.width(pixel)
-        fate = mi.PCG32(initstate=mi.UInt64(seed) + 311, initseq=mi.UInt64(dr.arange(mi.UInt32, lanes) // VECTOR))
+        even = _Even(pixel, sample, seed)
+        lanes = dr.width(pixel)
+        fate = mi.PCG32(
+            initstate=mi.UInt64(seed) + 311,
+            initseq=mi.UInt64(dr.arange(mi.UInt32, lanes) // VECTOR),
+        )
         start = mi.Ray3f(ray), rng, fate, mi.UInt32(0)
-        state = (*start, mi.Color3f(1), mi.Color3f(0), mi.Color3f(0), mi.Color3f(0), mi.Float(-1), mi.Bool(True))
+        state = (
+            *start,
+            mi.Color3f(1),
+            mi.Color3f(0),
+            mi.Color3f(0),
+            mi.Color3f(0),
+            mi.Float(-1),
+            mi.Bool(True),
+        )
 
         def body(ray, rng, fate, depth, beta, beta_white, total, white, pdf, active):
             hit = self._hit(ray, active, active & (depth == 0))
@@ -169,8 +212,14 @@ class SampleTracer:
             # What the ray itself found: the sky, or a lamp; weighed against having been aimed at.
             aimed = self.shading.density(ray, hit)
             weight = dr.select(pdf < 0, 1, pdf / dr.maximum(pdf + aimed, 1e-20))
-            glow = dr.select(hit.valid, dr.select(hit.front, look.emission, mi.Color3f(0)), self.shading.sky(ray.d))
-            glow = dr.select(active, dr.select(depth > 1, dr.minimum(glow * weight, CLAMP), glow * weight), 0)
+            glow = dr.select(
+                hit.valid,
+                dr.select(hit.front, look.emission, mi.Color3f(0)),
+                self.shading.sky(ray.d),
+            )
+            glow = dr.select(
+                active, dr.select(depth > 1, dr.minimum(glow * weight, CLAMP), glow * weight), 0
+            )
             total = total + beta * glow
             white = white + beta_white * glow
             active = active & hit.valid & (depth < MAX_DEPTH)
@@ -197,14 +246,39 @@ class SampleTracer:
             full = look.albedo * (1 - look.metallic) * diffuse + specular
             d = hit.frame.to_world(wo)
             active &= (wo.z > 0) & (pdf > 0) & (dr.dot(hit.ng, d) > 0)
-            beta_white = dr.select(first, mi.Color3f(diffuse), beta_white * full) / dr.maximum(pdf, 1e-20)
+            beta_white = dr.select(first, mi.Color3f(diffuse), beta_white * full) / dr.maximum(
+                pdf, 1e-20
+            )
             beta = beta * full / dr.maximum(pdf, 1e-20)
             keep = dr.select(first, *KEEP)
             active &= fate.next_float32() < keep
-            beta, beta_white = beta / keep, beta_white / keep
-            return mi.Ray3f(start, d), rng, fate, depth + 1, beta, beta_white, total, white, pdf, active
+            beta = beta / keep
+            beta_white = beta_white / keep
+            return (
+                mi.Ray3f(start, d),
+                rng,
+                fate,
+                depth + 1,
+                beta,
+                beta_white,
+                total,
+                white,
+                pdf,
+                active,
+            )
 
-        labels = ("ray", "rng", "fate", "depth", "beta", "beta_white", "total", "white", "pdf", "active")
+        labels = (
+            "ray",
+            "rng",
+            "fate",
+            "depth",
+            "beta",
+            "beta_white",
+            "total",
+            "white",
+            "pdf",
+            "active",
+        )
         out = dr.while_loop(state, lambda *s: s[-1], body, labels=labels, mode="symbolic")
         return out[6], out[7]
 
@@ -227,7 +301,9 @@ class _Even:
         even = [s + index * step for s, step in zip(self.shift, self._STEPS)]
         u = [dr.select(depth == 0, e - dr.floor(e), f) for e, f in zip(even, free)]
         u = [dr.minimum(x, 0.99999994) for x in u]
-        return Draws(u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7]))
+        return Draws(
+            u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7])
+        )
 
 
 @dataclass

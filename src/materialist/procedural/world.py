@@ -71,18 +71,31 @@ def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewp
     """The camera at `position` [3] that looks at `target` [3], rolled by `roll` radians."""
     back = np.asarray(position, float) - target
     upright = turn_upright(back / np.linalg.norm(back))
-    c, s = np.cos(roll), np.sin(roll)
-    return Viewpoint(np.asarray(position, float), upright @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), fov)
+    c = np.cos(roll)
+    s = np.sin(roll)
+    return Viewpoint(
+        np.asarray(position, float), upright @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), fov
+    )
 
 
-def orbit(target: Array, distance: float, azimuth: float, elevation: float, fov: float) -> Viewpoint:
+def orbit(
+    target: Array, distance: float, azimuth: float, elevation: float, fov: float
+) -> Viewpoint:
     """The camera that looks at `target` [3] from `distance` metres, at an azimuth (from +Z towards +X) and elevation in
     radians."""
-    back = np.array([np.cos(elevation) * np.sin(azimuth), np.sin(elevation), np.cos(elevation) * np.cos(azimuth)])
+    back = np.array(
+        [
+            np.cos(elevation) * np.sin(azimuth),
+            np.sin(elevation),
+            np.cos(elevation) * np.cos(azimuth),
+        ]
+    )
     return Viewpoint(target + distance * back, turn_upright(back), float(fov))
 
 
-def through_lens(rng: np.random.Generator, view: Viewpoint, focus: float, share: float) -> Viewpoint:
+def through_lens(
+    rng: np.random.Generator, view: Viewpoint, focus: float, share: float
+) -> Viewpoint:
     """The view, with that probability through a lens that blurs what is not about `focus` metres away.
 
     Its aperture blurs what is far by 1 to 6 % of the picture's width, whatever the scale of the scene.
@@ -91,11 +104,19 @@ def through_lens(rng: np.random.Generator, view: Viewpoint, focus: float, share:
         return view
     reach = 2 * np.tan(np.radians(view.fov) / 2)  # widths of the picture a metre, at one metre
     blur = np.exp(rng.uniform(np.log(0.01), np.log(0.06)))
-    return replace(view, aperture=float(blur * reach * focus), focus=float(focus * rng.uniform(0.9, 1.1)))
+    return replace(
+        view, aperture=float(blur * reach * focus), focus=float(focus * rng.uniform(0.9, 1.1))
+    )
 
 
 def block(
-    size: ArrayLike, at: ArrayLike, material: Material, radius: float = 0.0, *, turn: float = 0.0, tip: float = 0.0
+    size: ArrayLike,
+    at: ArrayLike,
+    material: Material,
+    radius: float = 0.0,
+    *,
+    turn: float = 0.0,
+    tip: float = 0.0,
 ) -> ScenePart:
     """A slab of `size` [3] standing at `at` [3], its edges rounded by `radius`; tipped about X, turned about Y."""
     return ScenePart(shapes.moved(shapes.slab(size, radius), at, turn, tip), material)

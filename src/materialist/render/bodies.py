@@ -32,7 +32,10 @@ def body_emitter(surface: Surface) -> dict | None:
     """Mitsuba's description of an emitter of the surface's emission, None where it does not glow."""
     if not is_glowing(surface):
         return None
-    return {"type": "area", "radiance": {"type": "rgb", "value": [float(c) for c in surface.emission]}}
+    return {
+        "type": "area",
+        "radiance": {"type": "rgb", "value": [float(c) for c in surface.emission]},
+    }
 
 
 def body_bsdf(surface: Surface, opaque: dict) -> dict:
@@ -45,9 +48,18 @@ def body_bsdf(surface: Surface, opaque: dict) -> dict:
         return opaque
     tint = {"type": "rgb", "value": [float(np.sqrt(c)) for c in surface.tint]}
     ior = max(float(surface.ior), LEAST_IOR)
-    glass: dict = {"type": "dielectric", "int_ior": ior, "ext_ior": 1.0, "specular_transmittance": tint}
+    glass: dict = {
+        "type": "dielectric",
+        "int_ior": ior,
+        "ext_ior": 1.0,
+        "specular_transmittance": tint,
+    }
     if surface.interface_roughness >= SMOOTH:
-        rough = {"type": "roughdielectric", "distribution": "ggx", "alpha": surface.interface_roughness**2}
+        rough = {
+            "type": "roughdielectric",
+            "distribution": "ggx",
+            "alpha": surface.interface_roughness**2,
+        }
         glass = {"type": FROSTED, "interface": {**glass, **rough}}
     if surface.transmission >= 1:
         return glass
@@ -57,10 +69,17 @@ def body_bsdf(surface: Surface, opaque: dict) -> dict:
 
 def opaque_bsdf(mi, surface: Surface) -> dict:
     """The scene's own BRDF with the surface's maps."""
-    maps = {"base_color": surface.albedo, "roughness": surface.roughness, "metallic": surface.metallic}
+    maps = {
+        "base_color": surface.albedo,
+        "roughness": surface.roughness,
+        "metallic": surface.metallic,
+    }
     how = {"type": "bitmap", "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
     data = {name: tensor(mi, at_least_2x2(np.atleast_3d(values))) for name, values in maps.items()}
-    return {"type": "materialist_disney", **{name: {**how, "data": values} for name, values in data.items()}}
+    return {
+        "type": "materialist_disney",
+        **{name: {**how, "data": values} for name, values in data.items()},
+    }
 
 
 def at_least_2x2(values: Array) -> Array:

@@ -23,13 +23,17 @@ def denoise(image: Array, albedo: Array, normal: Array, *, quality: str = "high"
     """
     for name, guide in (("albedo", albedo), ("normal", normal)):
         if guide.shape != image.shape:
-            raise InputError(f"The {name} guide is {guide.shape}, the image is {image.shape}; they must be equal.")
+            raise InputError(
+                f"The {name} guide is {guide.shape}, the image is {image.shape}; they must be equal."
+            )
     require_denoiser()
     on_card = torch_device() == "cuda"
     pyoidn = _pyoidn(with_torch=on_card)
     height, width = image.shape[:2]
     # The maps carry no noise of their own (clean_aux), so that the filter may follow their edges to the pixel.
-    pictures: list[Any] = [_padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))]
+    pictures: list[Any] = [
+        _padded(p) for p in (image, np.clip(albedo, 0, 1), np.clip(normal, -1, 1))
+    ]
     if on_card:
         pictures = [placed(p) for p in pictures]
     clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True, quality=quality)
@@ -76,4 +80,6 @@ _SMALLEST = 32
 def _padded(image: Array) -> Array:
     """float32 copy of [H, W, 3], its last row and column repeated until it has `_SMALLEST` of each."""
     missing = [max(0, _SMALLEST - n) for n in image.shape[:2]]
-    return np.pad(np.asarray(image, np.float32), ((0, missing[0]), (0, missing[1]), (0, 0)), mode="edge")
+    return np.pad(
+        np.asarray(image, np.float32), ((0, missing[0]), (0, missing[1]), (0, 0)), mode="edge"
+    )

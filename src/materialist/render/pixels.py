@@ -46,7 +46,11 @@ def only(scene, names: Sequence[str]):
 
 
 def first_hits(
-    scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box | None = None
+    scene,
+    camera: Camera,
+    bodies: Mapping[str, Body | None],
+    size: tuple[int, ...],
+    box: Box | None = None,
 ) -> FirstHits:
     """See `FirstHits`; of a Mitsuba scene (`RenderScene.mi_scene`).
 
@@ -56,13 +60,22 @@ def first_hits(
     whole = box or (slice(0, size[0]), slice(0, size[1]))
     rows, columns = _around(scene, camera, bodies, size, whole)
     found = np.zeros((*(side.stop - side.start for side in whole), 8))
-    inside = found[tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))]
+    inside = found[
+        tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))
+    ]
     step = max(1, _RAYS // GRID**2 // max(columns.stop - columns.start, 1))
     for first in range(rows.start, rows.stop, step) if area((rows, columns)) else ():
         strip = slice(first, min(first + step, rows.stop))
-        inside[first - rows.start : strip.stop - rows.start] = _strip(scene, camera, bodies, size, (strip, columns))
-    take = lambda v: np.ascontiguousarray(v, np.float32)  # noqa: E731
-    return FirstHits(take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7]))
+        inside[first - rows.start : strip.stop - rows.start] = _strip(
+            scene, camera, bodies, size, (strip, columns)
+        )
+
+    def take(v):
+        return np.ascontiguousarray(v, np.float32)
+
+    return FirstHits(
+        take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7])
+    )
 
 
 def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box) -> Box:
@@ -76,13 +89,18 @@ def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...]
     for side, n, working, places in zip(box, size, (camera.height, camera.width), at.T[::-1]):
         places = places * n / working
         margin = 2 * max(1.0, n / working)  # the sides of the working size are rounded
-        low, high = (np.clip([places.min() - margin, places.max() + margin], side.start, side.stop) if len(places)
-                     else (side.start, side.start))  # fmt: skip
+        low, high = (
+            np.clip([places.min() - margin, places.max() + margin], side.start, side.stop)
+            if len(places)
+            else (side.start, side.start)
+        )
         sides.append(slice(int(np.floor(low)), int(np.ceil(high))))
     return sides[0], sides[1]
 
 
-def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box) -> Array:
+def _strip(
+    scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box
+) -> Array:
     """[h, w, 8] share, albedo, normal and depth of a few rows."""
     import drjit as dr
     import mitsuba as mi
@@ -93,12 +111,18 @@ def _strip(scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple
     way = directions(camera, size, integers(mi, np.tile(pixel.ravel(), GRID**2)), x, y)
     si = scene.ray_intersect(mi.Ray3f(mi.Point3f(0), way))
     dr.eval(si)  # or each of the following would trace the rays again
-    normal, uv, depth = np.array(si.sh_frame.n).T, np.array(si.uv).T, -np.array(si.p.z)
-    shapes, found = {shape.id(): shape for shape in scene.shapes()}, np.zeros((len(depth), 8))
+    normal = np.array(si.sh_frame.n).T
+    uv = np.array(si.uv).T
+    depth = -np.array(si.p.z)
+    shapes = {shape.id(): shape for shape in scene.shapes()}
+    found = np.zeros((len(depth), 8))
     for name in bodies.keys() & shapes:
-        body, hit = bodies[name], np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
+        body = bodies[name]
+        hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
         albedo = np.ones((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
-        found[hit] = np.concatenate([np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1)
+        found[hit] = np.concatenate(
+            [np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1
+        )
     total = found.reshape(GRID**2, pixel.size, 8).sum(0)
     total[:, 1:] /= np.maximum(total[:, :1], 1)
     total[:, 0] /= GRID**2
@@ -120,8 +144,10 @@ def directions(camera: Camera, size: tuple[int, ...], pixel: Any, x: Any, y: Any
 
     half = float(np.tan(np.radians(camera.fov) / 2))
     # Numbers of one photo or call are data: as literals they would have the kernel compiled anew.
-    width, columns = dr.opaque(mi.UInt32, size[1]), dr.opaque(mi.Float, size[1])
-    rows, half_width = dr.opaque(mi.Float, size[0]), dr.opaque(mi.Float, half)
+    width = dr.opaque(mi.UInt32, size[1])
+    columns = dr.opaque(mi.Float, size[1])
+    rows = dr.opaque(mi.Float, size[0])
+    half_width = dr.opaque(mi.Float, half)
     half_height = dr.opaque(mi.Float, half * camera.height / camera.width)
     across = (mi.Float(pixel % width) + x) / columns * 2 - 1
     up = 1 - (mi.Float(pixel // width) + y) / rows * 2
@@ -133,24 +159,34 @@ def _albedo(body: Body, uv: Array) -> Array:
     surface = body.surface
     h, w = surface.albedo.shape[:2]
     x, y = (np.floor(np.nan_to_num(uv[:, k]) * n).astype(np.int64) % n for k, n in ((0, w), (1, h)))
-    clear = max(surface.transmission, float(surface.metallic.mean() * (surface.roughness.mean() < 0.2)))
+    clear = max(
+        surface.transmission, float(surface.metallic.mean() * (surface.roughness.mean() < 0.2))
+    )
     return surface.albedo[y, x] * (1 - clear) + clear
 
 
 def radiance(
-    target, size: tuple[int, ...], where: Box | Array, *, spp: int, seed: int, max_depth: int,
+    target,
+    size: tuple[int, ...],
+    where: Box | Array,
+    *,
+    spp: int,
+    seed: int,
+    max_depth: int,
     names: Sequence[str] | None = None,
-) -> Array:  # fmt: skip
+) -> Array:
     """[..., 3] float32 linear radiance of pixels of a `RenderScene`, path traced, with at least `spp` paths each.
 
     size: (H, W) of the whole picture. where: a box, or a mask [H, W] bool, whose pixels come in rows [N, 3]. Paths have
     random numbers by seed and pixel, whatever else of the picture is traced.
     names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
     """
-    mi, masked = target.mi, isinstance(where, np.ndarray)
+    mi = target.mi
+    masked = isinstance(where, np.ndarray)
     pixels = pixel_numbers(size, np.s_[:, :] if masked else where)
     wanted = np.asarray(where if masked else np.ones(pixels.shape, bool)).ravel()
-    each, total = stratified(spp), np.zeros((pixels.size, 4))
+    each = stratified(spp)
+    total = np.zeros((pixels.size, 4))
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
     sampler = mi.load_dict({"type": "multijitter", "sample_count": each})
     sampler.set_samples_per_wavefront(each)
@@ -159,7 +195,9 @@ def radiance(
         strip = slice(first, min(first + step, pixels.size))
         if wanted[strip].any():
             sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, (strip.stop - first) * each)
-            total[strip] = _sums(target, size, pixels.ravel()[strip], wanted[strip], integrator, sampler, each, names)
+            total[strip] = _sums(
+                target, size, pixels.ravel()[strip], wanted[strip], integrator, sampler, each, names
+            )
     mean = (total[:, :3] / np.maximum(total[:, 3:], 1)).astype(np.float32)
     return mean[wanted] if masked else mean.reshape(*pixels.shape, 3)
 
@@ -171,20 +209,31 @@ def stratified(spp: int) -> int:
 
 
 def _sums(
-    target, size: tuple[int, ...], pixels: Array, wanted: Array, integrator, sampler, each: int,
+    target,
+    size: tuple[int, ...],
+    pixels: Array,
+    wanted: Array,
+    integrator,
+    sampler,
+    each: int,
     names: Sequence[str] | None,
-) -> Array:  # fmt: skip
+) -> Array:
     """[n, 4]: of the wanted pixels' rays that count, the sum of what they bring, and their number."""
     import drjit as dr
 
-    mi, scene = target.mi, target.mi_scene
+    mi = target.mi
+    scene = target.mi_scene
     # Numbers that differ from call to call are data, or every call would be compiled anew.
     slot = dr.arange(mi.UInt32, len(pixels) * each) // dr.opaque(mi.UInt32, each)
     inside = sampler.next_2d()
-    way = directions(target.camera, size, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y)
-    ray, counts = mi.RayDifferential3f(mi.Point3f(0), way), dr.gather(mi.UInt32, integers(mi, wanted), slot) != 0
+    way = directions(
+        target.camera, size, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y
+    )
+    ray = mi.RayDifferential3f(mi.Point3f(0), way)
+    counts = dr.gather(mi.UInt32, integers(mi, wanted), slot) != 0
     if names is not None:
-        first, known = scene.ray_intersect_preliminary(ray), mi.Bool(False)
+        first = scene.ray_intersect_preliminary(ray)
+        known = mi.Bool(False)
         for one in scene.shapes():
             if one.id() in names:
                 known |= first.shape == mi.ShapePtr(one)
@@ -193,4 +242,6 @@ def _sums(
         light = integrator.sample(scene, sampler, ray, None, counts)[0]
         values = [dr.select(counts, value, 0) for value in (light.x, light.y, light.z, mi.Float(1))]
     dr.eval(values)  # together, or each sum would trace the paths again
-    return np.stack([np.array(dr.block_sum(value, each)) for value in values], -1).astype(np.float64)
+    return np.stack([np.array(dr.block_sum(value, each)) for value in values], -1).astype(
+        np.float64
+    )

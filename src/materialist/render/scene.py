@@ -33,20 +33,30 @@ class RenderScene:
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, *, bodies: tuple[Body, ...] = (), lamps: tuple[Lamp, ...] = (),
+        self,
+        geometry: Geometry,
+        camera: Camera,
+        *,
+        bodies: tuple[Body, ...] = (),
+        lamps: tuple[Lamp, ...] = (),
         device: str = "auto",
-    ):  # fmt: skip
+    ):
         if min(camera.width, camera.height) < 2:
-            raise InputError(f"The picture is {camera.width} x {camera.height}; rendering needs 2 x 2 pixels or more.")
+            raise InputError(
+                f"The picture is {camera.width} x {camera.height}; rendering needs 2 x 2 pixels or more."
+            )
         if not (geometry.mesh.face_plane == -1).any():
-            raise InputError("The mesh has no depth surface to render; give a depth map with some values above 0.")
+            raise InputError(
+                "The mesh has no depth surface to render; give a depth map with some values above 0."
+            )
         self.mi = mi = setup(device)
         self.camera = camera
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
         members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
         # A plane that no pixel lies on keeps the neutral material it starts with.
         self._members = {k: pixels for k, pixels in members.items() if len(pixels)}
-        height, width = camera.height, camera.width
+        height = camera.height
+        width = camera.width
         description = {
             "type": "scene",
             "embree_use_robust_intersections": True,
@@ -64,14 +74,18 @@ class RenderScene:
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         names = list(self.params.keys())
-        self.params.keep([k for k in names if k == "light.data" or (".bsdf." in k and k.endswith(".data"))])
+        self.params.keep(
+            [k for k in names if k == "light.data" or (".bsdf." in k and k.endswith(".data"))]
+        )
 
     def set_materials(self, materials: Materials) -> None:
         """Take other maps; their size must be the camera's, else InputError."""
         size = (self.camera.height, self.camera.width)
         for name, shape in (("albedo", (*size, 3)), ("roughness", size), ("metallic", size)):
             if getattr(materials, name).shape != shape:
-                raise InputError(f"The {name} map is {getattr(materials, name).shape}, the camera needs {shape}.")
+                raise InputError(
+                    f"The {name} map is {getattr(materials, name).shape}, the camera needs {shape}."
+                )
         maps = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
         self._assign(*(tensor(self.mi, values) for values in maps))
         self.params.update()
@@ -79,10 +93,14 @@ class RenderScene:
     def set_envmap(self, envmap: Array) -> None:
         """Take another light: [h, 2h, 3] linear radiance >= 0, h >= 4, in the project's convention; else InputError."""
         check_envmap(envmap)
-        self.params["light.data"] = tensor(self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np))
+        self.params["light.data"] = tensor(
+            self.mi, on_mitsuba_grid(np.asarray(envmap, np.float32), np)
+        )
         self.params.update()
 
-    def render(self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, where: Array | None = None) -> Array:
+    def render(
+        self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, where: Array | None = None
+    ) -> Array:
         """[H, W, 3] float32 linear radiance, path-traced.
 
         spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
@@ -95,7 +113,17 @@ class RenderScene:
         picture[where] = radiance(self, where.shape, where, spp=spp, seed=seed, max_depth=max_depth)
         return picture
 
-    def render_torch(self, albedo, roughness, metallic, envmap, *, spp: int, seed: int, max_depth: int = MAX_DEPTH):
+    def render_torch(
+        self,
+        albedo,
+        roughness,
+        metallic,
+        envmap,
+        *,
+        spp: int,
+        seed: int,
+        max_depth: int = MAX_DEPTH,
+    ):
         """[H, W, 3] linear, differentiable by path replay backpropagation (paper, section Implementation Details).
 
         Continued planes follow the means of the maps, and so do their gradients. The scene keeps materials and light.
@@ -108,7 +136,9 @@ class RenderScene:
 
         _check_options(spp, max_depth)
         if self.mi.variant().startswith("cuda") != (torch_device() == "cuda"):
-            raise SetupError('PyTorch here computes on the CPU alone: choose `device="cpu"`, or install one for CUDA.')
+            raise SetupError(
+                'PyTorch here computes on the CPU alone: choose `device="cpu"`, or install one for CUDA.'
+            )
         integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
 
         @dr.wrap(source="torch", target="drjit")
@@ -116,14 +146,25 @@ class RenderScene:
             self._assign(a, r, m)
             self.params["light.data"] = e
             self.params.update()
-            how = {"integrator": integrator, "spp": stratified(spp), "seed": seed, "seed_grad": seed + 1}
+            how = {
+                "integrator": integrator,
+                "spp": stratified(spp),
+                "seed": seed,
+                "seed_grad": seed + 1,
+            }
             with recording():
                 return self.mi.render(self.mi_scene, self.params, **how)
 
-        return run(albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch))
+        return run(
+            albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch)
+        )
 
     def _assign(self, albedo, roughness, metallic) -> None:
-        for name, maps in (("base_color", albedo), ("roughness", roughness), ("metallic", metallic)):
+        for name, maps in (
+            ("base_color", albedo),
+            ("roughness", roughness),
+            ("metallic", metallic),
+        ):
             self.params[f"surface.bsdf.{name}.data"] = maps
             for k, members in self._members.items():
                 self.params[f"plane{k}.bsdf.{name}.data"] = self._mean(maps, members)
@@ -154,34 +195,52 @@ def look_along(mi) -> Any:
 def sensor(camera: Camera, transform) -> dict:
     """Mitsuba's description of the photo's pinhole; its `to_world` looks along -Z, +Y up."""
     return {
-        "type": "perspective", "fov": camera.fov, "fov_axis": "x", "to_world": transform,
-        "near_clip": 1e-4, "far_clip": 1e7,
+        "type": "perspective",
+        "fov": camera.fov,
+        "fov_axis": "x",
+        "to_world": transform,
+        "near_clip": 1e-4,
+        "far_clip": 1e7,
         "film": {
-            "type": "hdrfilm", "width": camera.width, "height": camera.height, "rfilter": {"type": "box"},
-            "pixel_format": "rgb", "component_format": "float32",
+            "type": "hdrfilm",
+            "width": camera.width,
+            "height": camera.height,
+            "rfilter": {"type": "box"},
+            "pixel_format": "rgb",
+            "component_format": "float32",
         },
         "sampler": {"type": "multijitter"},
-    }  # fmt: skip
+    }
 
 
 def _maps_bsdf(mi, height: int, width: int) -> dict:
     def texture(channels: int, value: float) -> dict:
         data = tensor(mi, np.full((height, width, channels), value, np.float32))
-        return {"type": "bitmap", "data": data, "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}
+        return {
+            "type": "bitmap",
+            "data": data,
+            "raw": True,
+            "filter_type": "nearest",
+            "wrap_mode": "clamp",
+        }
 
     return {
         "type": "materialist_disney",
-        "base_color": texture(3, 0.5), "roughness": texture(1, 0.5), "metallic": texture(1, 0.0),
-    }  # fmt: skip
+        "base_color": texture(3, 0.5),
+        "roughness": texture(1, 0.5),
+        "metallic": texture(1, 0.0),
+    }
 
 
 def sphere(lamp: Lamp) -> dict:
     """Mitsuba's description of a black sphere whose radiant flux is the lamp's."""
     return {
-        "type": "sphere", "center": [float(v) for v in lamp.position], "radius": float(lamp.radius),
+        "type": "sphere",
+        "center": [float(v) for v in lamp.position],
+        "radius": float(lamp.radius),
         "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": list(lamp.radiance)}},
-    }  # fmt: skip
+    }
 
 
 def seen_shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -> Any:
@@ -195,15 +254,22 @@ def seen_shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -
 
 def shape(mi, mesh: Any, bsdf: dict | None = None, emitter: dict | None = None) -> Any:
     """A Mitsuba mesh of anything with vertices and faces, and, for a BSDF, shading normals and uv."""
-    props, seen = mi.Properties(), bsdf is not None
+    props = mi.Properties()
+    seen = bsdf is not None
     for name, plugin in (("mesh_bsdf", bsdf), ("mesh_emitter", emitter)):
         if plugin is not None:
             props[name] = mi.load_dict(plugin)
     count = len(mesh.vertices), len(mesh.faces)
     made = mi.Mesh("part", *count, has_vertex_normals=seen, has_vertex_texcoords=seen, props=props)
     params = mi.traverse(made)
-    params["vertex_positions"], params["faces"] = floats(mi, mesh.vertices), integers(mi, mesh.faces)
+    params["vertex_positions"], params["faces"] = (
+        floats(mi, mesh.vertices),
+        integers(mi, mesh.faces),
+    )
     if seen:
-        params["vertex_normals"], params["vertex_texcoords"] = floats(mi, mesh.normals), floats(mi, mesh.uv)
+        params["vertex_normals"], params["vertex_texcoords"] = (
+            floats(mi, mesh.normals),
+            floats(mi, mesh.uv),
+        )
     params.update()
     return made

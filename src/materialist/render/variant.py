@@ -47,21 +47,36 @@ def find_llvm() -> LLVM:
     `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded. Raises SetupError that names the package to install.
     """
     chosen = os.environ.get("DRJIT_LIBLLVM_PATH")
-    paths = [chosen] if chosen else {os.path.realpath(path) for place in _PLACES for path in glob(place)}
+    paths = (
+        [chosen]
+        if chosen
+        else {os.path.realpath(path) for place in _PLACES for path in glob(place)}
+    )
     versions = {path: llvm_version(path) for path in paths}
-    usable = [LLVM(path, version) for path, version in versions.items() if version and version >= MINIMUM_LLVM]
+    usable = [
+        LLVM(path, version)
+        for path, version in versions.items()
+        if version and version >= MINIMUM_LLVM
+    ]
     if usable:
-        return min(usable, key=lambda f: (f.version > PREFERRED_LLVM, abs(f.version - PREFERRED_LLVM), f.path))
+        return min(
+            usable,
+            key=lambda f: (f.version > PREFERRED_LLVM, abs(f.version - PREFERRED_LLVM), f.path),
+        )
     seen = ", ".join(map(str, sorted({version for version in versions.values() if version})))
     if chosen:
         found = f"LLVM {seen}" if seen else "no LLVM library"
         raise SetupError(
             f"DRJIT_LIBLLVM_PATH is {chosen}, {found}; LLVM {MINIMUM_LLVM} or later is needed: unset it, or {_remedy()}"
         )
-    raise SetupError(f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}")
+    raise SetupError(
+        f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}"
+    )
 
 
-INSTALL_LLVM = "brew install llvm@19" if sys.platform == "darwin" else "sudo apt-get install -y libllvm19"
+INSTALL_LLVM = (
+    "brew install llvm@19" if sys.platform == "darwin" else "sudo apt-get install -y libllvm19"
+)
 
 
 def _remedy() -> str:
@@ -73,7 +88,9 @@ def llvm_version(path: str) -> int | None:
     """Major version of an LLVM library by its name, its folders' or those of what it links to; None without any."""
     if not os.path.exists(path):
         return None
-    match = re.search(r"(?:libLLVM(?:-|\.so\.|\.)|llvm[-@/])(\d+)\b", f"{path} {os.path.realpath(path)}")
+    match = re.search(
+        r"(?:libLLVM(?:-|\.so\.|\.)|llvm[-@/])(\d+)\b", f"{path} {os.path.realpath(path)}"
+    )
     return int(match[1]) if match else None
 
 
@@ -134,7 +151,9 @@ def setup(device: str = "auto"):
     wanted = _VARIANTS[device]
     if current != wanted:
         if current in _VARIANTS.values():
-            raise SetupError(f'This process already renders with {current}; start a new one for `device="{device}"`.')
+            raise SetupError(
+                f'This process already renders with {current}; start a new one for `device="{device}"`.'
+            )
         _start(mi, device)
     _register_plugins(wanted)
     return mi
@@ -155,7 +174,9 @@ def _start(mi, device: str) -> None:
     import drjit as dr
 
     if device == "cuda" and not usable_gpus():
-        raise SetupError('No CUDA driver with OptiX answers; use `device="cpu"`, or install the NVIDIA driver.')
+        raise SetupError(
+            'No CUDA driver with OptiX answers; use `device="cpu"`, or install the NVIDIA driver.'
+        )
     if device == "cpu":
         loaded = dr.detail.llvm_version()[0] if dr.has_backend(dr.JitBackend.LLVM) else 0
         if loaded < MINIMUM_LLVM:

@@ -14,7 +14,13 @@ import numpy as np
 from materialist.camera import rays_through, unit
 from materialist.errors import InputError
 from materialist.geometry.membrane import membrane, nearest
-from materialist.geometry.silhouette import border_distance, silhouette_field, spacing, surface_in, window
+from materialist.geometry.silhouette import (
+    border_distance,
+    silhouette_field,
+    spacing,
+    surface_in,
+    window,
+)
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued, sampled
 from materialist.solids.shell import Shell, closed, inside_out, joined, region
 from materialist.types import Array, Camera
@@ -28,7 +34,9 @@ class ClosedSettings:
     grid: int = 300  # grid points along a small object; larger objects have one a pixel
     finest: int = 6  # grid points along a pixel, at most
     clear: float = 0.02  # pixels by which its outline keeps from the points of the grid; derived: no tiny triangles
-    nearest: float = 0.995  # the back keeps before this part of the depth behind the object; tuned by eye
+    nearest: float = (
+        0.995  # the back keeps before this part of the depth behind the object; tuned by eye
+    )
     thin: float = 0.004  # least thickness, part of the object's size: front and back never touch; tuned by eye
     least: float = 1e-4  # the same at the border, part of the depth
     smooth: float = 0.01  # standard deviation of the blur of the normals, part of the object's size; tuned by eye
@@ -41,9 +49,16 @@ NOTHING = 1e9
 
 
 def closed_proxy(
-    depth: Array, normal: Array, mask: Array, thickness: Array, camera: Camera, *,
-    wall: float | None = None, behind: Array | None = None, back: Array | None = None,
-) -> Shell:  # fmt: skip
+    depth: Array,
+    normal: Array,
+    mask: Array,
+    thickness: Array,
+    camera: Camera,
+    *,
+    wall: float | None = None,
+    behind: Array | None = None,
+    back: Array | None = None,
+) -> Shell:
     """The closed object behind a mask; watertight: every edge has two faces that run through it in opposite directions.
 
     Args:
@@ -103,14 +118,24 @@ def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _
     edge = margin + 1
     y, x = (np.arange(side.start - edge, side.stop + edge) for side in window(inside))
     # Beyond the frame everything goes on as at its edge, for some pixels.
-    i, j = np.clip(y, 0, camera.height - 1)[:, None], np.clip(x, 0, camera.width - 1)[None]
-    near = ((y >= -margin) & (y < camera.height + margin))[:, None] & ((x >= -margin) & (x < camera.width + margin))
+    i = np.clip(y, 0, camera.height - 1)[:, None]
+    j = np.clip(x, 0, camera.width - 1)[None]
+    near = ((y >= -margin) & (y < camera.height + margin))[:, None] & (
+        (x >= -margin) & (x < camera.width + margin)
+    )
     rays = rays_through(np.stack(np.meshgrid(x, y), -1) + 0.5, camera)
     beyond = np.zeros(inside.shape) if behind is None else behind
     return _View(
-        depth[i, j], normal[i, j], inside[i, j] & near, thickness[i, j], beyond[i, j],
-        None if back is None else back[i, j], rays, int(x[0]), int(y[0]),
-    )  # fmt: skip
+        depth[i, j],
+        normal[i, j],
+        inside[i, j] & near,
+        thickness[i, j],
+        beyond[i, j],
+        None if back is None else back[i, j],
+        rays,
+        int(x[0]),
+        int(y[0]),
+    )
 
 
 def _thickness(view: _View) -> Array:
@@ -131,25 +156,37 @@ def _cavity(view: _View, wall: float, camera: Camera) -> Shell | None:
         return None
     # Its walls are parallel: the same normals.
     front = view.depth + through / view.length
-    return _closed(replace(view, inside=room, depth=front, thickness=np.where(room, left, 0)), camera)
+    return _closed(
+        replace(view, inside=room, depth=front, thickness=np.where(room, left, 0)), camera
+    )
 
 
 def _closed(view: _View, camera: Camera) -> Shell:
     """Front and back over one triangulated region."""
-    known, length, front, thick = view.inside, view.length, view.depth, view.thickness
+    known = view.inside
+    length = view.length
+    front = view.depth
+    thick = view.thickness
     edge = silhouette_field(known)  # [h, w] pixels
     factor = int(np.clip(round(SETTINGS.grid / max(known.shape)), 1, SETTINGS.finest))
     size = (known.shape[1] * factor, known.shape[0] * factor)
     within = cv2.resize(edge.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     points, faces = region(_ended(within))
     if not len(faces):
-        raise InputError("The mask is too thin to give a body; mark an object that is some pixels wide.")
+        raise InputError(
+            "The mask is too thin to give a body; mark an object that is some pixels wide."
+        )
     place = (points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
-    at = lambda values: sampled(values, place, order=1)  # noqa: E731
+
+    def at(values):
+        return sampled(values, place, order=1)
+
     # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
     # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
-    through = np.sqrt(np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0))
+    through = np.sqrt(
+        np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0)
+    )
     own = np.exp(at(middle)) - through / (2 * at(length))
     through = np.maximum(np.minimum(through, at(_room(view))), SETTINGS.least * own)
     sigma = SETTINGS.smooth * view.size
@@ -157,10 +194,15 @@ def _closed(view: _View, camera: Camera) -> Shell:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
         back = blurred_normals(view.back, known, sigma)
-    normals = _between(blurred_normals(view.normal, known, sigma), known, place), _between(back, known, place)
+    normals = (
+        _between(blurred_normals(view.normal, known, sigma), known, place),
+        _between(back, known, place),
+    )
     down, right = np.gradient(edge)
     outward = np.stack([-at(right), -at(down)], -1)
-    return closed(faces, place + np.array([view.left, view.top]), own, through, normals, outward, camera)
+    return closed(
+        faces, place + np.array([view.left, view.top]), own, through, normals, outward, camera
+    )
 
 
 def _between(normal: Array, known: Array, place: Array) -> Array:
@@ -171,12 +213,17 @@ def _between(normal: Array, known: Array, place: Array) -> Array:
 def _room(view: _View) -> Array:
     """[h, w] length of the ray between the front and what stands behind, scene units."""
     known = view.inside & (view.behind > 0)
-    room = np.where(known, np.maximum(SETTINGS.nearest * view.behind - view.depth, 0) * view.length, NOTHING)
+    room = np.where(
+        known, np.maximum(SETTINGS.nearest * view.behind - view.depth, 0) * view.length, NOTHING
+    )
     # Next to the mask the values are those of the last pixels in it.
     return membrane(room, view.inside)
 
 
 def _ended(field: Array) -> Array:
     """The field with its outermost points negative, and none so near 0 that its border meets a grid point."""
-    field[[0, -1]], field[:, [0, -1]] = np.minimum(field[[0, -1]], -1), np.minimum(field[:, [0, -1]], -1)
+    field[[0, -1]], field[:, [0, -1]] = (
+        np.minimum(field[[0, -1]], -1),
+        np.minimum(field[:, [0, -1]], -1),
+    )
     return np.copysign(np.maximum(np.abs(field), SETTINGS.clear), field)

@@ -27,15 +27,21 @@ class OutlineSettings:
     """When an outline is taken for that of a surface of revolution, and how its hull is made."""
 
     fewest: int = 64  # pixels below which an object is too small to tell
-    pierced: float = 1.02  # most of its filled outline, in its area: rings and handles have holes; tuned by eye
-    alike: float = 0.964  # least share of the mask that lies in its image: boxes have edges where it is round
+    pierced: float = (
+        1.02  # most of its filled outline, in its area: rings and handles have holes; tuned by eye
+    )
+    alike: float = (
+        0.964  # least share of the mask that lies in its image: boxes have edges where it is round
+    )
     covered: float = 0.955  # least share of the mask that the body covers
     leaning: float = 0.12  # least slope of the map's sideways normals over the body's: a face seen straight on has 0
     stepped: float = 0.9  # least `_stepped`, over normals that look up or down by less than `side`
     side: float = 0.5  # see `stepped`
     above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
     standing: float = 0.15  # distance from the ground, in its heights, up to which it is made to reach it where it is
-    elsewhere: float = 0.3  # relative distance from the depth map's place up to which the ground is believed
+    elsewhere: float = (
+        0.3  # relative distance from the depth map's place up to which the ground is believed
+    )
     stairs: float = 0.1  # root mean square by which pixels move an outline, pixels: it is smoothed by so much; 4 meshes
     turns: int = 40  # turns at which a place beside the axis must stay inside the outline
     fine: int = 120  # cells of the hull along the object
@@ -47,7 +53,13 @@ SETTINGS = OutlineSettings()
 
 
 def surface_of_revolution(
-    depth: Array, normal: Array, mask: Array, camera: Camera, *, up: Array | None = None, behind: Array | None = None
+    depth: Array,
+    normal: Array,
+    mask: Array,
+    camera: Camera,
+    *,
+    up: Array | None = None,
+    behind: Array | None = None,
 ) -> tuple[Revolution, Array] | None:
     """An object that is a surface of revolution and its thickness [H, W] float32 along the rays, scene units; or None.
 
@@ -63,7 +75,8 @@ def surface_of_revolution(
     if up is None or cut or inside.sum() < SETTINGS.fewest or pierced:
         return None
     rays = pixel_rays(camera).astype(np.float64)
-    depth, normal = np.asarray(depth, np.float64), np.asarray(normal, np.float64)
+    depth = np.asarray(depth, np.float64)
+    normal = np.asarray(normal, np.float64)
     found = _along(up, _Seen(inside, depth, normal, rays, behind, camera))
     if found is None:
         return None
@@ -116,11 +129,15 @@ def _stepped(own: Array, other: Array) -> float:
     Towards the sides the normals of a round thing turn evenly, those of a box by one step at its edge.
     """
     order = np.argsort(own)
-    x, y = own[order], other[order] - other.mean()
+    x = own[order]
+    y = other[order] - other.mean()
     if len(x) < 8:
         return np.inf
-    line = float((y**2).sum() - ((x - x.mean()) @ y) ** 2 / max(float(((x - x.mean()) ** 2).sum()), 1e-12))
-    count, total = np.arange(1, len(y)), np.cumsum(y)[:-1]
+    line = float(
+        (y**2).sum() - ((x - x.mean()) @ y) ** 2 / max(float(((x - x.mean()) ** 2).sum()), 1e-12)
+    )
+    count = np.arange(1, len(y))
+    total = np.cumsum(y)[:-1]
     explained = total**2 / count + total**2 / (len(y) - count)  # y sums to 0
     return float((y**2).sum() - explained.max()) / max(line, 1e-9)
 
@@ -144,12 +161,16 @@ def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Arra
 
     width = np.ptp(own @ first) / np.linalg.norm(middle)
     best = min(np.linspace(-0.2, 0.2, 21) * width, key=unlike)
-    found = minimize_scalar(unlike, bounds=(best - 0.02 * width, best + 0.02 * width), method="bounded")
+    found = minimize_scalar(
+        unlike, bounds=(best - 0.02 * width, best + 0.02 * width), method="bounded"
+    )
     angle = min((best, float(found.x)), key=unlike)
     return plane(angle), 1 - unlike(angle)
 
 
-def _placed(first: Axis, border: tuple[Array, float], seen: _Seen, round_top: bool) -> Revolution | None:
+def _placed(
+    first: Axis, border: tuple[Array, float], seen: _Seen, round_top: bool
+) -> Revolution | None:
     """The body where the depth map has its front, or as far away as the ground that it stands on.
 
     first: its axis at distance 1. border: as of `_border`. Its upper end is round, or flat.
@@ -158,7 +179,8 @@ def _placed(first: Axis, border: tuple[Array, float], seen: _Seen, round_top: bo
     line = _capped(whole, float(np.linalg.norm(first.foot)), seen.camera, cell, round_top)
     if line is None:
         return None
-    base, high = float(line[0, 1]), float(np.ptp(line[:, 1]))
+    base = float(line[0, 1])
+    high = float(np.ptp(line[:, 1]))
     front, _ = Revolution(first, Profile.of(line, cell, base)).front(seen.inside, seen.rays)
     both = seen.inside & (front > 0)
     away = float(np.median(seen.depth[both] / front[both])) if both.any() else 1.0
@@ -191,7 +213,9 @@ def _border(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | N
     extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
     cell = extent / SETTINGS.fine
     place, _ = project(axis.foot[None], camera)
-    middle = (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
+    middle = (
+        (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
+    )
     base = middle - float((camera.height / 2 - place[0, 1]) * pixel) / max(float(axis.up[1]), 0.3)
     low = base - 0.7 * extent
     r = np.arange(int(0.6 * extent / cell)) * cell
@@ -233,7 +257,9 @@ def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: boo
     smooth = np.stack(splev(along, spline), -1)
     step = unit(np.stack(splev(along, spline, der=1), -1))
     # The lower end is seen from above over its near rim, the upper one over its far rim.
-    lower, upper = (np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1))
+    lower, upper = (
+        np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1)
+    )
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
     limit = SETTINGS.flat * np.where(half, lower, upper)
     steep = np.flatnonzero(np.abs(step[:, 1]) > limit * np.abs(step[:, 0]))

@@ -56,7 +56,9 @@ class Profile:
         """[...] the function at places [..., 2]: below 0 in the body, outside at most the cells to its border."""
         own = ((places - [0, self.low]) / self.cell).reshape(-1, 2)
         flat = sampled(self.values, own, order=1).reshape(places.shape[:-1])
-        under = (self.floor - places[..., 1]) / self.cell  # below the base the distance to the line is no bound
+        under = (
+            self.floor - places[..., 1]
+        ) / self.cell  # below the base the distance to the line is no bound
         return np.where(under > 0, under, np.maximum(flat, under))
 
     def slope(self, places: Array) -> Array:
@@ -79,17 +81,24 @@ class Profile:
             line = line[:, ::-1]  # (column, row)
             line = line[np.r_[True, np.abs(np.diff(line, axis=0)).max(1) > 1e-6]]
             place = line * self.cell + [0, self.low]
-            if len(line) < 4 or not (np.allclose(line[0], line[-1]) or max(line[0, 0], line[-1, 0]) < 1e-6):
+            if len(line) < 4 or not (
+                np.allclose(line[0], line[-1]) or max(line[0, 0], line[-1, 0]) < 1e-6
+            ):
                 continue
-            normal = unit(np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line)))
+            normal = unit(
+                np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line))
+            )
             along = np.gradient(line, axis=0)
             if np.sum(along[:, 0] * normal[:, 1] - along[:, 1] * normal[:, 0]) > 0:
-                place, normal = place[::-1], normal[::-1]
+                place = place[::-1]
+                normal = normal[::-1]
             found.append((place, normal))
         return found
 
     def _slope(self, at: Array) -> Array:
         """[K, 2] gradient at (column, row)."""
-        whole = np.concatenate([self.values[:, 1:2], self.values], 1)  # the same on the other side of the axis
+        whole = np.concatenate(
+            [self.values[:, 1:2], self.values], 1
+        )  # the same on the other side of the axis
         (up, out), beside = np.gradient(whole), at + np.array([1, 0])
         return sampled(np.stack([out, up], -1), beside, order=1)

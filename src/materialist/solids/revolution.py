@@ -17,8 +17,12 @@ class RevolutionSettings:
 
     step: float = 0.5  # least step along a ray, cells
     around: int = 256  # corners of the swept circles
-    side: float = 0.5  # least outward part of the normals of a side; above the last of it is the lid
-    under: float = 3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
+    side: float = (
+        0.5  # least outward part of the normals of a side; above the last of it is the lid
+    )
+    under: float = (
+        3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
+    )
     lip: int = 12  # points of the rounded rim of an open vessel
 
 
@@ -60,7 +64,9 @@ class Revolution:
         Every edge has two faces that run through it in opposite directions.
         """
         outer = [_swept(*line, self.axis, camera) for line in self.profile.lines()]
-        inner = [_swept(*line, self.axis, camera) for line in self.profile.lines(wall)] if wall else []
+        inner = (
+            [_swept(*line, self.axis, camera) for line in self.profile.lines(wall)] if wall else []
+        )
         return joined([*outer, *map(inside_out, inner)])
 
     def vessel(self, camera: Camera, wall: float) -> Shell | None:
@@ -73,12 +79,15 @@ class Revolution:
         nearest, reach = self._reach(rays[inside])
         last = self._met(rays[inside], nearest + reach, -2 * reach)
         found = np.zeros(depth.shape, np.float32)
-        found[inside] = np.maximum(np.nan_to_num(last) - depth[inside], 0) * np.linalg.norm(rays[inside], axis=-1)
+        found[inside] = np.maximum(np.nan_to_num(last) - depth[inside], 0) * np.linalg.norm(
+            rays[inside], axis=-1
+        )
         return found
 
     def front(self, inside: Array, rays: Array) -> tuple[Array, Array]:
         """[H, W] planar depth at which rays enter the body, and its unit normals [H, W, 3] there; 0 where they pass."""
-        depth, normal = np.zeros(inside.shape), np.zeros((*inside.shape, 3))
+        depth = np.zeros(inside.shape)
+        normal = np.zeros((*inside.shape, 3))
         nearest, reach = self._reach(rays[inside])
         depth[inside] = np.nan_to_num(self._met(rays[inside], nearest - reach, 2 * reach))
         points = rays[inside] * depth[inside][:, None]
@@ -97,10 +106,13 @@ class Revolution:
 
         The function is a bound on the distance to the body: it tells the next step (sphere tracing, Hart 1996).
         """
-        found, at = np.full(len(rays), np.nan), start
-        length, along = np.linalg.norm(rays, axis=-1), np.sign(way)
+        found = np.full(len(rays), np.nan)
+        at = start
+        length = np.linalg.norm(rays, axis=-1)
+        along = np.sign(way)
         left = np.arange(len(rays))
-        last, before = at, np.ones(len(rays))
+        last = at
+        before = np.ones(len(rays))
         while len(left):
             value = self.profile.at(self.axis.of(rays[left] * at[:, None]))
             inner = value < 0
@@ -108,7 +120,10 @@ class Revolution:
             found[left[inner]] = (last + np.clip(share, 0, 1) * (at - last))[inner]
             step = along[left] * np.maximum(value, SETTINGS.step) * self.profile.cell / length[left]
             on = ~inner & (np.abs(at + step - start[left]) < np.abs(way[left]))
-            last, before, at, left = at[on], value[on], (at + step)[on], left[on]
+            last = at[on]
+            before = value[on]
+            at = (at + step)[on]
+            left = left[on]
         return found
 
 
@@ -132,16 +147,26 @@ def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     if not ring:  # a pole is one vertex
         index[0], index[-1] = index[0, 0], index[-1, 0]
     below, above = (index, np.roll(index, -1, 0)) if ring else (index[:-1], index[1:])
-    a, b, c, d = below, np.roll(below, -1, 1), np.roll(above, -1, 1), above
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    faces = faces[(faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])]
+    a = below
+    b = np.roll(below, -1, 1)
+    c = np.roll(above, -1, 1)
+    d = above
+    faces = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
+    faces = faces[
+        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
+    ]
     used, faces = np.unique(faces, return_inverse=True)
-    vertices, normals = points.reshape(-1, 3)[used], normals.reshape(-1, 3)[used]
+    vertices = points.reshape(-1, 3)[used]
+    normals = normals.reshape(-1, 3)[used]
     place = project(vertices, camera)[0] / [camera.width, camera.height]
     return Shell(
-        vertices.astype(np.float32), faces.reshape(-1, 3).astype(np.int32), normals.astype(np.float32),
+        vertices.astype(np.float32),
+        faces.reshape(-1, 3).astype(np.int32),
+        normals.astype(np.float32),
         np.clip(place, 0, 1).astype(np.float32),
-    )  # fmt: skip
+    )
 
 
 def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
@@ -150,28 +175,37 @@ def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
     Places [K, 2] (distance, height) of the line and their unit outward normals [K, 2], glass to its left, from the
     axis to the axis; None where the profile is no single body around its axis, or has no room inside a `wall`.
     """
-    outer, inner = _around(profile.lines()), _around(profile.lines(wall))
+    outer = _around(profile.lines())
+    inner = _around(profile.lines(wall))
     if outer is None or inner is None:
         return None
     place, lean = outer
     top = _last_side(outer)
-    rim = None if top is None else _last_side(outer, place[top, 1] - wall / 2)  # the round lip ends where the side did
+    rim = (
+        None if top is None else _last_side(outer, place[top, 1] - wall / 2)
+    )  # the round lip ends where the side did
     within = None if rim is None else _last_side(inner, place[rim, 1] - SETTINGS.under * wall)
     if rim is None or within is None:
         return None
     # Next to the lid the inside is as far from the outside as the wall is thick.
-    near = np.flatnonzero((place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > SETTINGS.side))[::-1]
+    near = np.flatnonzero(
+        (place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > SETTINGS.side)
+    )[::-1]
     upper = place[near] - wall * lean[near]
     if not len(near) or upper[:, 0].min() <= 0 or inner[0][within, 0] >= place[: rim + 1, 0].max():
         return None
     inside = np.concatenate([upper, inner[0][: within + 1][::-1]])
     facing = -np.concatenate([lean[near], inner[1][: within + 1][::-1]])
-    r, height = upper[0, 0], place[rim, 1]
-    half, middle = (place[rim, 0] - r) / 2, (place[rim, 0] + r) / 2
+    r = upper[0, 0]
+    height = place[rim, 1]
+    half = (place[rim, 0] - r) / 2
+    middle = (place[rim, 0] + r) / 2
     angle = np.pi * np.arange(1, SETTINGS.lip) / SETTINGS.lip
     round_ = np.stack([np.cos(angle), np.sin(angle)], -1)
     lip = np.array([middle, height]) + half * round_
-    return np.concatenate([place[: rim + 1], lip, inside]), np.concatenate([lean[: rim + 1], round_, facing])
+    return np.concatenate([place[: rim + 1], lip, inside]), np.concatenate(
+        [lean[: rim + 1], round_, facing]
+    )
 
 
 def _around(lines: list[tuple[Array, Array]]) -> tuple[Array, Array] | None:

@@ -23,13 +23,17 @@ class Shell(Triangles):
 def joined(shells: Sequence[Shell]) -> Shell:
     """Several surfaces as one; none of them shares a vertex with another."""
     vertices, faces = joined_faces(shells)
-    normals, uv = (np.concatenate([getattr(shell, name) for shell in shells]) for name in ("normals", "uv"))
+    normals, uv = (
+        np.concatenate([getattr(shell, name) for shell in shells]) for name in ("normals", "uv")
+    )
     return Shell(vertices, faces, normals, uv, any(shell.hollow for shell in shells))
 
 
 def inside_out(shell: Shell) -> Shell:
     """The surface inside out: that of a cavity."""
-    return Shell(shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv, True)
+    return Shell(
+        shell.vertices, np.ascontiguousarray(shell.faces[:, ::-1]), -shell.normals, shell.uv, True
+    )
 
 
 def region(field: Array) -> tuple[Array, Array]:
@@ -46,9 +50,14 @@ def region(field: Array) -> tuple[Array, Array]:
 
 
 def closed(
-    region: Array, place: Array, front: Array, thick: Array, normals: tuple[Array, Array], outward: Array,
+    region: Array,
+    place: Array,
+    front: Array,
+    thick: Array,
+    normals: tuple[Array, Array],
+    outward: Array,
     camera: Camera,
-) -> Shell:  # fmt: skip
+) -> Shell:
     """The closed surface over the faces [F, 3] of a region, between a front and a back over its vertices.
 
     Its wall has vertices of its own, which look across the rays: it is a silhouette.
@@ -61,7 +70,9 @@ def closed(
     edges = np.concatenate([region[:, [0, 1]], region[:, [1, 2]], region[:, [2, 0]]])
     border = edges[~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])]
     rim = np.unique(border)
-    index = np.concatenate([np.arange(count), np.arange(count), rim, rim])  # front, back, the wall's two sides
+    index = np.concatenate(
+        [np.arange(count), np.arange(count), rim, rim]
+    )  # front, back, the wall's two sides
     beyond = np.concatenate([np.zeros(count), thick, np.zeros(len(rim)), thick[rim]])
     screen = place[index] + 0.5
     rays = rays_through(screen, camera)

@@ -22,7 +22,9 @@ class SymmetrySettings:
     ring: float = 3.0  # pixels from the silhouette within which the surface tells where its plane is, at least
     ring_share: float = 0.06  # the same as a part of the object's size
     steepest: float = 0.06  # smallest n.v that is believed: maps are not exact at a silhouette
-    grazing: float = 4.0  # power of 1 - n.v by which pixels lose weight where the surface does not turn away
+    grazing: float = (
+        4.0  # power of 1 - n.v by which pixels lose weight where the surface does not turn away
+    )
     floor: float = 0.25  # least thickness, part of that of a body as deep as wide: a box seen face on has no silhouette
     deepest: float = 2.0  # largest thickness, in object sizes
 
@@ -54,13 +56,19 @@ def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     back = 1 / np.maximum(2 * plane - 1 / front, 0.2 / front)
     width = border * front * spacing(rays)  # [H, W] scene units to the silhouette
     widest = width[inside].max()
-    inflated = 2 * np.sqrt(np.maximum(width * (2 * widest - width), 0))  # a body with a round section
+    inflated = 2 * np.sqrt(
+        np.maximum(width * (2 * widest - width), 0)
+    )  # a body with a round section
     limit = SETTINGS.deepest * object_size(inside, depth, rays)
-    thickness = np.clip((back - front) * length, np.minimum(SETTINGS.floor * inflated, limit), limit)
+    thickness = np.clip(
+        (back - front) * length, np.minimum(SETTINGS.floor * inflated, limit), limit
+    )
     return np.where(inside, thickness, 0).astype(np.float32)
 
 
-def _silhouette_plane(front: Array, normal: Array, rays: Array, border: Array, inside: Array) -> Array:
+def _silhouette_plane(
+    front: Array, normal: Array, rays: Array, border: Array, inside: Array
+) -> Array:
     """[H, W] inverse planar depth of the plane through the silhouette: linear over the picture, as for every plane."""
     widest = max(SETTINGS.ring, SETTINGS.ring_share * np.sqrt(inside.sum()))
     # The outermost pixels are known too badly: where in them the silhouette runs is open.
@@ -89,7 +97,9 @@ def _robust_plane(x: Array, y: Array, values: Array, weight: Array) -> tuple[flo
     for _ in range(12):
         # A faint pull to a plane that faces the camera, for a silhouette that shows on one side only.
         pull = np.diag([0, 1, 1]) * (1e-3 * spread**2)
-        found = np.linalg.solve(basis.T @ (basis * w[:, None]) + pull * w.sum(), basis.T @ (values * w))
+        found = np.linalg.solve(
+            basis.T @ (basis * w[:, None]) + pull * w.sum(), basis.T @ (values * w)
+        )
         w = weight / np.maximum(np.abs(values - basis @ found), 1e-3 * typical)
         w /= w.sum()
     return float(found[0] - found[1:] @ centre), float(found[1]), float(found[2])

@@ -23,7 +23,15 @@ from materialist.studio.workspace import store, with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""
-_UNREADABLE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, NotImplementedError, RuntimeError, EOFError, OSError)
+_UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    lzma.LZMAError,
+    NotImplementedError,
+    RuntimeError,
+    EOFError,
+    OSError,
+)
 
 
 def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
@@ -85,9 +93,13 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
         options = _named(steps)
         lacking = sorted(options.keys() - members.keys())
         if lacking:
-            raise InputError(f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}.")
+            raise InputError(
+                f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}."
+            )
         _extract(archive, {name: members[name] for name in options}, folder, shown)
-    readable = {name: uploads.checked(report, folder / name, option) for name, option in options.items()}
+    readable = {
+        name: uploads.checked(report, folder / name, option) for name, option in options.items()
+    }
     return steps, readable
 
 
@@ -118,16 +130,23 @@ def _members(
         with zipfile.ZipFile(archive) as given:
             infos = given.infolist()[:10_000]
             names = [one.filename for one in infos if not one.filename.startswith("__MACOSX/")]
-            found = next((name for name in names if re.fullmatch(rf"([^/]+/)?{marker}", name)), None)
+            found = next(
+                (name for name in names if re.fullmatch(rf"([^/]+/)?{marker}", name)), None
+            )
             if found is None:
                 raise InputError(f"{shown} holds {missing}.")
             root = found[: found.rfind("/") + 1]
-            yield given, {one.filename[len(root) :]: one for one in infos if one.filename.startswith(root)}
+            yield (
+                given,
+                {one.filename[len(root) :]: one for one in infos if one.filename.startswith(root)},
+            )
     except _UNREADABLE as error:
         raise InputError(f"{shown} is not a readable zip file ({error}); zip it again.") from error
 
 
-def _extract(given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder: Path, shown: str) -> None:
+def _extract(
+    given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder: Path, shown: str
+) -> None:
     """Write members under their names here into a folder; `zipfile` reads no more of one than its header promises."""
     total = sum(entry.file_size for entry in members.values())
     if total > SETTINGS.unpacked_bytes:

@@ -72,7 +72,10 @@ class Control:
 
 
 CONTROLS = {
-    **{name: Control(MaterialEdit, name) for name in ("hue", "saturation", "value", "roughness", "metallic")},
+    **{
+        name: Control(MaterialEdit, name)
+        for name in ("hue", "saturation", "value", "roughness", "metallic")
+    },
     **{name: Control(MaterialEdit, name) for name in ("texture_scale", "grow", "feather")},
     "colour": Control(MaterialEdit, "albedo", hex_colour, lambda v: picked_colour(v or GREY)),
     **{name: Control(Relight, name) for name in ("rotate", "ambient", "sun_power")},
@@ -80,7 +83,9 @@ CONTROLS = {
     "azimuth": Control(Relight, "sun", value=lambda sun: float((sun or SUN)[0])),
     "elevation": Control(Relight, "sun", value=lambda sun: float((sun or SUN)[1])),
     **{f"glass_{name}": Control(Glass, name) for name in ("ior", "transmission", "roughness")},
-    "glass_tint": Control(Glass, "tint", lambda v: None if hex_colour(v) == WHITE else hex_colour(v), picked_colour),
+    "glass_tint": Control(
+        Glass, "tint", lambda v: None if hex_colour(v) == WHITE else hex_colour(v), picked_colour
+    ),
     "glass_hollow": Control(Glass, "hollow", lambda v: v or None, _inside),
     **{name: Control(Insertion, name) for name in ("scale", "turn")},
     "thing": Control(Insertion, "mesh", value=objects.library_name),
@@ -94,13 +99,21 @@ def slider(name: str, label: str, step: float, **narrower: Any) -> Any:
     """A slider for a control, by the range and default of its option; `narrower` are arguments of Gradio's instead."""
     control = CONTROLS[name]
     declared = declarations(control.operation)[control.option][0]
-    given = {"minimum": declared.low, "maximum": declared.high, "value": control.default, "elem_id": name, **narrower}
+    given = {
+        "minimum": declared.low,
+        "maximum": declared.high,
+        "value": control.default,
+        "elem_id": name,
+        **narrower,
+    }
     return gr.Slider(step=step, label=label, buttons=[], **given)
 
 
 def file_field(name: str, label: str, suffixes: Iterable[str]) -> Any:
     """A field for one file, its name its id on the page."""
-    return gr.File(label=label, type="filepath", height=150, file_types=sorted(suffixes), elem_id=name)
+    return gr.File(
+        label=label, type="filepath", height=150, file_types=sorted(suffixes), elem_id=name
+    )
 
 
 def set_option(name: str, session: Session, value: Any) -> None:
@@ -121,21 +134,26 @@ def control_values(session: Session) -> dict[str, Any]:
     Without a current edit its controls show what was fitted under the selection, and those of glass its defaults; those
     of objects then stay as they are, for the next.
     """
-    step, light = session.edits.current_step, session.edits.light
+    step = session.edits.current_step
+    light = session.edits.light
     kind, options = (step.kind, step.options) if step is not None else ("", {})
     given: dict[type[OperationOptions], dict[str, Any]] = {
-        MaterialEdit: options if kind == "edit" else {}, Glass: options if kind == "glass" else {},
+        MaterialEdit: options if kind == "edit" else {},
+        Glass: options if kind == "glass" else {},
         Relight: session.edits.steps[light].options if light is not None else {},
-    }  # fmt: skip
+    }
     given |= {Insertion: options} if kind in objects.KINDS else {}
     given |= {Drop: options} if kind == "drop" else {}
     values: dict[str, Any] = {}
     for name, control in CONTROLS.items():
         if control.operation in given:
             with suppress(TypeError, ValueError, InputError):
-                values[name] = control.value(given[control.operation].get(control.option, control.default))
+                values[name] = control.value(
+                    given[control.operation].get(control.option, control.default)
+                )
     for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
         if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit
-            mask, fitted = session.selection.mask, getattr(session.scene.materials, name)
+            mask = session.selection.mask
+            fitted = getattr(session.scene.materials, name)
             values[name] = usual if mask is None else round(float(fitted[mask].mean()), 2)
     return values

@@ -11,15 +11,25 @@ from typing import Any
 from materialist.edits.recipe import Step
 
 _WORDS = {
-    "edit": "Material", "relight": "Light", "glass": "Glass", "insert": "Object", "drop": "Fallen", "remove": "Removed",
-}  # fmt: skip
+    "edit": "Material",
+    "relight": "Light",
+    "glass": "Glass",
+    "insert": "Object",
+    "drop": "Fallen",
+    "remove": "Removed",
+}
 _PLAIN = {"remove": "the object", "glass": "clear"}
 """Summary of a step without options."""
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness", "at", "seed", "gain")
 """Options that a summary leaves out: the picture shows them."""
 _NAMES = {
-    "mesh": "", "envmap": "", "value": "brightness", "albedo": "colour", "ior": "refraction", "ambient": "brightness",
-}  # fmt: skip
+    "mesh": "",
+    "envmap": "",
+    "value": "brightness",
+    "albedo": "colour",
+    "ior": "refraction",
+    "ambient": "brightness",
+}
 """Options that are not called so on the page."""
 _OURS = re.compile(r"(?:thing|light)-([a-z]+)")
 """The name of a file that the studio computes."""
@@ -45,7 +55,9 @@ class EditList:
         """With a step switched off, which makes none current if it was, or on again; any other current one stays."""
         step = self.steps[index]
         after = self.put(index, with_options(step, skip=None if step.skipped else "true"))
-        return after.chosen(None if after.steps[index].skipped and self.current == index else self.current)
+        return after.chosen(
+            None if after.steps[index].skipped and self.current == index else self.current
+        )
 
     def moved(self, index: int, by: int) -> EditList:
         """With a step further up (by = -1) or down (+1); the current one stays current, wherever it is then."""
@@ -54,7 +66,9 @@ class EditList:
             return self
         steps = list(self.steps)
         steps[index], steps[other] = steps[other], steps[index]
-        current = other if self.current == index else index if self.current == other else self.current
+        current = (
+            other if self.current == index else index if self.current == other else self.current
+        )
         return EditList(tuple(steps), current)
 
     def without(self, index: int) -> EditList:
@@ -83,7 +97,9 @@ class EditList:
 
 def with_options(step: Step, **options: Any) -> Step:
     """The step with some options set, or cleared (None)."""
-    return replace(step, options={k: v for k, v in {**step.options, **options}.items() if v is not None})
+    return replace(
+        step, options={k: v for k, v in {**step.options, **options}.items() if v is not None}
+    )
 
 
 def key_of(steps: tuple[Step, ...]) -> str:
@@ -105,13 +121,20 @@ def kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any]
 def summary(step: Step) -> str:
     """A step in a few words."""
     shown = {name: value for name, value in step.options.items() if name not in _SILENT}
-    parts = [f"{_NAMES.get(name, name.replace('_', ' '))} {_short(value)}".strip() for name, value in shown.items()]
+    parts = [
+        f"{_NAMES.get(name, name.replace('_', ' '))} {_short(value)}".strip()
+        for name, value in shown.items()
+    ]
     return f"{_WORDS.get(step.kind, step.kind)}: {', '.join(parts) or _PLAIN.get(step.kind, 'as it is')}"
 
 
 def _short(value: Any) -> str:
     if isinstance(value, list | tuple):
-        return f"({len(value)})" if value and isinstance(value[0], list | tuple) else ",".join(_short(v) for v in value)
+        return (
+            f"({len(value)})"
+            if value and isinstance(value[0], list | tuple)
+            else ",".join(_short(v) for v in value)
+        )
     file = re.fullmatch(r"(.*[A-Za-z_].*)\.\w+", str(value))
     if file is None:
         return str(value)

@@ -82,7 +82,8 @@ class GlassClient:
         with self.changed:
             if request == self._asked:
                 return
-            self._asked, self.state = request, GlassState()
+            self._asked = request
+            self.state = GlassState()
             if not self.fresh(steps, step):
                 self._send(*request)
             self.changed.notify_all()
@@ -106,9 +107,11 @@ class GlassClient:
     def stop(self) -> None:
         """End the process and forget the panes; a later request starts anew."""
         with self.changed:
-            worker, self._worker = self._worker, None
+            worker = self._worker
+            self._worker = None
             self._panes.clear()
-            self._asked, self.state = None, GlassState()
+            self._asked = None
+            self.state = GlassState()
             self.changed.notify_all()
         if worker is not None:
             worker.kill()
@@ -127,12 +130,16 @@ class GlassClient:
                     idle=SETTINGS.glass_idle,
                     memory=SETTINGS.job_memory,
                 )
-                threading.Thread(target=self._listen, args=(self._worker,), name="glass", daemon=True).start()
+                threading.Thread(
+                    target=self._listen, args=(self._worker,), name="glass", daemon=True
+                ).start()
         except (OSError, InputError) as error:
             self.state = GlassState(False, str(error), True)
             return
         self.state = GlassState(True, "Getting the glass ready …")
-        self._number = self._worker.begin(trace, {"scene": self._scene, "others": others, "step": step})
+        self._number = self._worker.begin(
+            trace, {"scene": self._scene, "others": others, "step": step}
+        )
 
     def _listen(self, worker: Worker) -> None:
         """Take the messages of a process until it ends."""
@@ -184,7 +191,9 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
         from materialist.edits.glass.preview import GlassPreview
 
         loaded = _loaded(scene)
-        return GlassPreview(apply(loaded, list(others)), region_of(loaded, fixed), options_of(fixed))
+        return GlassPreview(
+            apply(loaded, list(others)), region_of(loaded, fixed), options_of(fixed)
+        )
 
     preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:

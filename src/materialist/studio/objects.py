@@ -17,7 +17,10 @@ _SHAPES: dict[str, tuple[str, dict[str, Any]]] = {
     "Cube": ("box", {"extents": (1, 1, 1)}),
     "Cylinder": ("cylinder", {"radius": 0.3, "height": 1, "sections": 96}),
     "Cone": ("cone", {"radius": 0.4, "height": 1, "sections": 96}),
-    "Ring": ("torus", {"major_radius": 0.35, "minor_radius": 0.15, "major_sections": 96, "minor_sections": 48}),
+    "Ring": (
+        "torus",
+        {"major_radius": 0.35, "minor_radius": 0.15, "major_sections": 96, "minor_sections": 48},
+    ),
     "Slab": ("box", {"extents": (1, 1, 0.12)}),
 }
 LIBRARY = tuple(_SHAPES)
@@ -28,13 +31,16 @@ def last(session: Session) -> int | None:
     """The place of the object that is chosen, else of the last one in the list."""
     if session.current_kind in KINDS:
         return session.edits.current
-    return max((k for k, step in enumerate(session.edits.steps) if step.kind in KINDS), default=None)
+    return max(
+        (k for k, step in enumerate(session.edits.steps) if step.kind in KINDS), default=None
+    )
 
 
 def place(session: Session, x: float, y: float) -> None:
     """Stand the current object at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
     with session.lock:
-        at, edits = [str(v) for v in session.pixel(x, y)], session.edits
+        at = [str(v) for v in session.pixel(x, y)]
+        edits = session.edits
         if session.current_kind not in KINDS:
             if "mesh" not in session.next_object:
                 raise InputError("Choose an object from the list, or upload one, first.")
@@ -47,9 +53,13 @@ def set_option(session: Session, name: str, value: str | None) -> None:
     with session.lock:
         if name == "mesh":  # another object is a new one
             session.edits = session.edits.chosen(None)
-        if session.current_kind == "insert" or (session.current_kind == "drop" and name in STEPS["drop"]):
+        if session.current_kind == "insert" or (
+            session.current_kind == "drop" and name in STEPS["drop"]
+        ):
             session.put(session.edits, **{name: value})
-        session.next_object = {k: v for k, v in {**session.next_object, name: value}.items() if v is not None}
+        session.next_object = {
+            k: v for k, v in {**session.next_object, name: value}.items() if v is not None
+        }
 
 
 def let_fall(session: Session, height: float) -> list[str]:
@@ -62,17 +72,22 @@ def let_fall(session: Session, height: float) -> list[str]:
         InputError: there is none, or it falls beside everything. SetupError: the physics is not installed.
     """
     with session.lock:
-        index, _ = last(session), session.scene
+        index = last(session)
+        _ = session.scene
         if index is None or session.live is None:
             raise InputError("Place an object first; it falls where it stands.")
         known = session.live.edited(session.edits.active).report.warnings
         step = session.edits.steps[index]
-        kept = {name: value for name, value in step.options.items() if name in {*STEPS["drop"], "skip"}}
+        kept = {
+            name: value for name, value in step.options.items() if name in {*STEPS["drop"], "skip"}
+        }
         options = {**kept, "height": f"{height:.3g}", "seed": str(session.falls)}
         after = session.edits.put(index, replace(step, kind="drop", options=options))
         session.falls += 1
         session.change("fall", after)
-        return [note for note in session.live.edited(after.active).report.warnings if note not in known]
+        return [
+            note for note in session.live.edited(after.active).report.warnings if note not in known
+        ]
 
 
 def file_of(name: str) -> str:

@@ -8,7 +8,15 @@ import gradio as gr
 
 from materialist.edits.select import sam
 from materialist.errors import InputError
-from materialist.studio import asset, tab_light, tab_look, tab_material, tab_object, tab_open, tab_take
+from materialist.studio import (
+    asset,
+    tab_light,
+    tab_look,
+    tab_material,
+    tab_object,
+    tab_open,
+    tab_take,
+)
 from materialist.studio.objects import place
 from materialist.studio.selection import read_pick
 from materialist.studio.session import Session
@@ -18,7 +26,8 @@ from materialist.studio.widgets import PageContext, Updates, steps
 
 TABS = (tab_material, tab_light, tab_object, tab_look, tab_take)
 _HEAD = (
-    "<h1>Materialist</h1><p>One photo, taken apart into shape, material and light. Click something and change it.</p>"
+    "<h1>Materialist</h1><p>One photo, taken apart "
+    "into shape, material and light. Click something and change it.</p>"
 )
 
 
@@ -32,7 +41,10 @@ def build(studio: Studio) -> Any:
         with gr.Row(elem_id="body"):
             with gr.Column(scale=5, min_width=320, elem_id="left"):
                 _left(parts)
-            with gr.Column(scale=4, min_width=320), gr.Tabs(selected="open", overflow_behavior="wrap") as tabs:
+            with (
+                gr.Column(scale=4, min_width=320),
+                gr.Tabs(selected="open", overflow_behavior="wrap") as tabs,
+            ):
                 parts["tabs"] = tabs
                 for tab in (tab_open, *TABS):
                     tab.layout(context)
@@ -46,34 +58,55 @@ def build(studio: Studio) -> Any:
 def _left(parts: dict[str, Any]) -> None:
     with gr.Column(elem_id="frame"):
         parts["stage"] = gr.HTML(
-            {"picture": "", "width": 0, "height": 0, "badge": ""}, html_template=asset("stage.html"),
-            js_on_load=asset("stage.js"), elem_id="stage",
-        )  # fmt: skip
+            {"picture": "", "width": 0, "height": 0, "badge": ""},
+            html_template=asset("stage.html"),
+            js_on_load=asset("stage.js"),
+            elem_id="stage",
+        )
         # Not beside a button that starts a job: it must not come to lie where one was just clicked.
         with gr.Row(elem_id="strip"):
-            parts["before"] = gr.Button("Before (hold, or B)", size="sm", min_width=90, elem_id="before")
+            parts["before"] = gr.Button(
+                "Before (hold, or B)", size="sm", min_width=90, elem_id="before"
+            )
             parts["progress"] = gr.HTML("", elem_id="progress", js_on_load=None)
-            parts["stop"] = gr.Button("Stop", size="sm", variant="stop", visible=False, min_width=70, elem_id="stop")
+            parts["stop"] = gr.Button(
+                "Stop", size="sm", variant="stop", visible=False, min_width=70, elem_id="stop"
+            )
     with gr.Row(elem_id="tools"):
         tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
         tools.append(("Place an object", "place"))
-        parts["tool"] = gr.Radio(tools, value="click", label="Tool (keys 1 to 5)", scale=3, min_width=220)
+        parts["tool"] = gr.Radio(
+            tools, value="click", label="Tool (keys 1 to 5)", scale=3, min_width=220
+        )
         modes = [("New", "new"), ("Add (Shift)", "add"), ("Remove (Alt)", "remove")]
         parts["mode"] = gr.Radio(modes, value="new", label="Selection", scale=3, min_width=220)
         parts["brush"] = gr.Slider(
-            2, 60, 12, step=1, label="Brush size", scale=2, min_width=140, buttons=[], elem_id="brush"
+            2,
+            60,
+            12,
+            step=1,
+            label="Brush size",
+            scale=2,
+            min_width=140,
+            buttons=[],
+            elem_id="brush",
         )
     missing = sam.missing()
     parts["sam"] = gr.Checkbox(
-        False, label="Find objects with SAM 2", interactive=missing is None, elem_id="sam",
+        False,
+        label="Find objects with SAM 2",
+        interactive=missing is None,
+        elem_id="sam",
         info=missing or "A trained network in place of colour, depth and normals; seconds a click.",
-    )  # fmt: skip
+    )
     with gr.Row():
         parts["undo"] = gr.Button("Undo", size="sm", min_width=70, elem_id="undo")
         parts["redo"] = gr.Button("Redo", size="sm", min_width=70, elem_id="redo")
         parts["deselect"] = gr.Button("Select nothing", size="sm", min_width=110)
         parts["final"] = gr.Button("Final picture", size="sm", variant="primary", min_width=120)
-    parts["steps"] = gr.HTML([], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps")
+    parts["steps"] = gr.HTML(
+        [], html_template=asset("steps.html"), js_on_load=asset("steps.js"), elem_id="steps"
+    )
 
 
 def _wire(context: PageContext) -> None:
@@ -92,7 +125,9 @@ def _wire(context: PageContext) -> None:
     context.long(parts["stop"].click, partial(_stop, context))
 
 
-def _pick(session: Session, data: Any, sam: bool, kelvin: float, power: float, before: float) -> None:
+def _pick(
+    session: Session, data: Any, sam: bool, kelvin: float, power: float, before: float
+) -> None:
     wanted = read_pick(data)
     if wanted["tool"] == "lamp":
         x, y = wanted["at"]
@@ -106,11 +141,19 @@ def _pick(session: Session, data: Any, sam: bool, kelvin: float, power: float, b
 def _act(session: Session, data: Any) -> Updates:
     """One of the buttons of the list; an edit that is chosen shows its tab."""
     session.act(str(data.get("what")), int(data.get("index", -1)))
-    tabs = {"edit": "material", "relight": "light", "insert": "object", "drop": "object", "glass": "object"}
+    tabs = {
+        "edit": "material",
+        "relight": "light",
+        "insert": "object",
+        "drop": "object",
+        "glass": "object",
+    }
     kind = session.current_kind or ""
     if data["what"] != "choose" or kind not in tabs:
         return {}
-    return {"tabs": gr.Tabs(selected=tabs[kind])} | ({"glass_part": gr.update(open=True)} if kind == "glass" else {})
+    return {"tabs": gr.Tabs(selected=tabs[kind])} | (
+        {"glass_part": gr.update(open=True)} if kind == "glass" else {}
+    )
 
 
 def _stop(context: PageContext, session: Session) -> Iterator[Updates]:

@@ -47,7 +47,11 @@ class LivePreview:
     """A fitted scene, its preview (seconds to build, unless `file` has its tables), and the last edited scenes."""
 
     def __init__(
-        self, scene: Scene, file: Path | None = None, package: Path | None = None, allowance: Allowance | None = None
+        self,
+        scene: Scene,
+        file: Path | None = None,
+        package: Path | None = None,
+        allowance: Allowance | None = None,
     ):
         """package: where the scene lies; things then fall in a process of their own, as the allowance allows."""
         self._allowance = allowance or Allowance()
@@ -61,7 +65,9 @@ class LivePreview:
     def _prepare(self, built: Future[Any]) -> None:
         """Get ready for another light part by part: pictures come between."""
         more = built is self._preview and built.exception() is None and built.result().prepare()
-        if more and built is self._preview:  # else it would hold the closed preview until after `free_memory`
+        if (
+            more and built is self._preview
+        ):  # else it would hold the closed preview until after `free_memory`
             _THREAD.submit(self._prepare, built)
 
     @property
@@ -122,22 +128,34 @@ class LivePreview:
 
     def _glass(self, step: Step) -> tuple[Array, Colour]:
         """Region [H, W] bool and tint of a glass step; builds nothing. Raises InputError where it cannot be."""
-        made = lambda: (region_of(self.scene, step), options_of(step).tint)  # noqa: E731
+
+        def made():
+            return (region_of(self.scene, step), options_of(step).tint)
+
         return kept(self._kept, (step,), made, SETTINGS.scenes_kept)
 
     def picture(
-        self, steps: tuple[Step, ...], client: glass.GlassClient | None = None, *, coarse: bool = False
-    ) -> Array:  # fmt: skip
+        self,
+        steps: tuple[Step, ...],
+        client: glass.GlassClient | None = None,
+        *,
+        coarse: bool = False,
+    ) -> Array:
         """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
 
         Glass comes from the client, or is sketched where the client has no pane yet.
         """
         if not steps:
             return self.scene.photo.linear
-        preview, edited = self._preview.result(), self.edited(steps)
-        known = [(step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)]
+        preview = self._preview.result()
+        edited = self.edited(steps)
+        known = [
+            (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
+        ]
         shaded = edited
-        if edited.geometry is not self.scene.geometry:  # the cache knows nothing of what was taken away
+        if (
+            edited.geometry is not self.scene.geometry
+        ):  # the cache knows nothing of what was taken away
             shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
         picture = _THREAD.submit(preview.picture, shaded, coarse=coarse).result()
         if edited.photo is not self.scene.photo:
@@ -158,7 +176,9 @@ class LivePreview:
     def close(self) -> None:
         self._preview.cancel()
         self._preview = Future()
-        self._preview.set_exception(InputError("This photo was closed; open it again."))  # for who waits
+        self._preview.set_exception(
+            InputError("This photo was closed; open it again.")
+        )  # for who waits
         self._kept.clear()
 
 
@@ -209,18 +229,25 @@ def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:
     scenes = [value for value in kept_values if isinstance(value, Scene)]
     bodies = {id(body): body for scene in scenes for body in scene.bodies}
     return sum(
-        array.nbytes for body in bodies.values() for array in vars(body).values() if isinstance(array, np.ndarray)
+        array.nbytes
+        for body in bodies.values()
+        for array in vars(body).values()
+        if isinstance(array, np.ndarray)
     )
 
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:
     """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
     exposure = 2 * float(luminance(scene.photo.linear).mean())
-    for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):  # the farthest first
+    for body in sorted(
+        scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())
+    ):  # the farthest first
         colour, depth = _drawn(body, scene, exposure)
         behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
         share = 1 - 0.7 * body.surface.transmission
-        picture = np.where(((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture)
+        picture = np.where(
+            ((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture
+        )
     return picture.astype(np.float32)
 
 
@@ -248,7 +275,9 @@ def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
     length = np.linalg.norm(normal, axis=1)
     seen = (away > 0).all(1) & (length > 0) & (np.einsum("fi,fi->f", normal, corners.mean(1)) < 0)
     shade = 0.35 + 0.65 * np.clip(normal @ _LIGHT / np.maximum(length, 1e-20), 0, 1)
-    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(body.surface.tint)
+    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(
+        body.surface.tint
+    )
     points = np.round(np.clip(pixels, -1e5, 1e5) * 16).astype(np.int32)  # sixteenths of a pixel
     for face in np.argsort(-middle):
         if seen[face]:

@@ -15,7 +15,9 @@ from materialist.errors import InputError
 from materialist.io.display import encoded
 from materialist.types import Array, Scene
 
-REPLACE, ADD, REMOVE = "new", "add", "remove"
+REPLACE = "new"
+ADD = "add"
+REMOVE = "remove"
 
 
 @dataclass(frozen=True)
@@ -48,15 +50,25 @@ class Selection:
         outline[dark > 0] = (20, 30, 60, 200)
         fill = np.zeros((*mask.shape, 4), np.uint8)
         fill[mask] = (255, 255, 255, 255)
-        return {name: data_url(encoded(one), "png") for name, one in (("fill", fill), ("outline", outline))}
+        return {
+            name: data_url(encoded(one), "png")
+            for name, one in (("fill", fill), ("outline", outline))
+        }
 
-    def click(self, scene: Scene, x: float, y: float, mode: str, method: str = "network") -> Selection:
+    def click(
+        self, scene: Scene, x: float, y: float, mode: str, method: str = "network"
+    ) -> Selection:
         """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
         height, width = scene.depth.shape
-        row, column = min(int(y), height - 1), min(int(x), width - 1)
+        row = min(int(y), height - 1)
+        column = min(int(x), width - 1)
         inside = any(part[row, column] for part in self.parts)
         if (inside and mode != ADD) or mode == REMOVE:
-            return Selection(tuple(part for part in self.parts if not part[row, column])) if inside else self
+            return (
+                Selection(tuple(part for part in self.parts if not part[row, column]))
+                if inside
+                else self
+            )
         return self._with(select(scene, click=(x, y), method=method), mode)
 
     def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
@@ -77,7 +89,11 @@ class Selection:
         for x, y in line[[0, -1]]:
             cv2.circle(stroke, (int(x), int(y)), max(1, round(radius)), 1, -1)
         painted = stroke > 0
-        return self._without(painted) if mode == REMOVE else self._with(select(scene, mask=painted), ADD)
+        return (
+            self._without(painted)
+            if mode == REMOVE
+            else self._with(select(scene, mask=painted), ADD)
+        )
 
     def _with(self, region: Array, mode: str) -> Selection:
         return Selection((*self.parts, region) if mode == ADD else (region,))
@@ -90,11 +106,15 @@ class Selection:
 def read_pick(data: Any) -> dict[str, Any]:
     """A pointer event as the page sends it, with everything checked. Raises InputError."""
     try:
-        tool, mode = str(data["tool"]), str(data.get("mode", REPLACE))
+        tool = str(data["tool"])
+        mode = str(data.get("mode", REPLACE))
         numbers = [float(v) for v in data.get("at", ())]
         points = [[float(x), float(y)] for x, y in data.get("points", ())]
         radius = float(data.get("radius", 1))
-        if not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all() or min(numbers, default=0) < 0:
+        if (
+            not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all()
+            or min(numbers, default=0) < 0
+        ):
             raise ValueError("not a place")
         if {"click": 2, "box": 4, "brush": 0, "lamp": 2, "place": 2}[tool] != len(numbers):
             raise ValueError("not the numbers of the tool")

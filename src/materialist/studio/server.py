@@ -23,7 +23,9 @@ from materialist.studio.workspace import Project, WorkFolder
 def check_host(host: str, password: str | None, everyone: bool, proxy: str | None = None) -> bool:
     """Whether `host` means this machine only. Raises InputError where others could come in unasked."""
     if proxy is not None and not re.fullmatch(r"([\w.-]+|\[[\da-fA-F:]+\])(:\d+)?", proxy):
-        raise InputError(f"--behind-proxy takes the HOST or HOST:PORT that people ask for, not {proxy!r}.")
+        raise InputError(
+            f"--behind-proxy takes the HOST or HOST:PORT that people ask for, not {proxy!r}."
+        )
     try:
         local = proxy is None and (host == "localhost" or ipaddress.ip_address(host).is_loopback)
     except ValueError:
@@ -48,7 +50,9 @@ def password_of(word: str | None, file: Path | None) -> str | None:
     except (OSError, ValueError) as error:
         raise InputError(f"The password file {file} cannot be read: {error}.") from error
     if not found:
-        raise InputError(f"The password file {file} has an empty first line; write the password there.")
+        raise InputError(
+            f"The password file {file} has an empty first line; write the password there."
+        )
     return found
 
 
@@ -83,9 +87,14 @@ def first_shown(work: WorkFolder, path: Path) -> Project | Path:
 
 
 def serve(
-    studio: Studio, *, host: str, port: int, password: str | None = None, proxy: str | None = None,
+    studio: Studio,
+    *,
+    host: str,
+    port: int,
+    password: str | None = None,
+    proxy: str | None = None,
     on_ready: Callable[[str], None],
-) -> None:  # fmt: skip
+) -> None:
     """Show the studio until Ctrl-C. `on_ready` gets the address once the page answers."""
     gate = application(studio, host=host, port=port, password=password, proxy=proxy)
     import uvicorn
@@ -107,7 +116,9 @@ def serve(
         while not server.started and thread.is_alive():
             time.sleep(0.01)
         if server.started:
-            name = "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+            name = (
+                "localhost" if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host
+            )
             on_ready(f"https://{proxy}/" if proxy else f"http://{name}:{port}/")
         thread.join()
     except KeyboardInterrupt:
@@ -130,7 +141,9 @@ def application(
     """The page behind its gate, an ASGI application. Raises SetupError where Gradio is not installed."""
     studio.work.sweep()
     # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
-    os.environ.update(GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache))
+    os.environ.update(
+        GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache)
+    )
     try:
         import gradio as gr
     except ImportError as error:
@@ -145,10 +158,22 @@ def application(
     _fetch_nothing()
     page.queue(default_concurrency_limit=8, max_size=200)
     app = gr.mount_gradio_app(
-        FastAPI(openapi_url=None), page, "/", footer_links=[], show_error=True, allowed_paths=[], ssr_mode=False,
-        max_file_size=f"{SETTINGS.upload_megabytes}mb", theme=_theme(gr), css=asset("style.css"), js=asset("page.js"),
-        enable_monitoring=False, pwa=False, mcp_server=False, run_history=False,
-    )  # fmt: skip
+        FastAPI(openapi_url=None),
+        page,
+        "/",
+        footer_links=[],
+        show_error=True,
+        allowed_paths=[],
+        ssr_mode=False,
+        max_file_size=f"{SETTINGS.upload_megabytes}mb",
+        theme=_theme(gr),
+        css=asset("style.css"),
+        js=asset("page.js"),
+        enable_monitoring=False,
+        pwa=False,
+        mcp_server=False,
+        run_history=False,
+    )
     single = host if studio.single_user else None
     return Gate(app, studio, host=single, proxy=proxy, password=password, port=port)
 
@@ -158,12 +183,16 @@ def _fetch_nothing() -> None:
     from gradio import processing_utils as fetching
 
     async def refused(url: str, *_: Any, **how: Any) -> Any:
-        raise InputError(f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file.")
+        raise InputError(
+            f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file."
+        )
 
     fetching.async_ssrf_protected_get = fetching.async_ssrf_protected_download = refused  # type: ignore[assignment]
 
 
-def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto") -> Studio:
+def new_studio(
+    work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto"
+) -> Studio:
     """A studio on a work folder. Raises OutputError where it cannot be written."""
     return Studio(
         WorkFolder(work),
@@ -176,12 +205,23 @@ def new_studio(work: str | Path, *, single_user: bool, workers: int = 1, seed: i
 
 def _theme(gr: Any) -> Any:
     """Dark ink on light paper, or the other way, with the fonts of the machine: nothing is fetched."""
-    sans, mono = ["system-ui", "Segoe UI", "Roboto", "sans-serif"], ["ui-monospace", "Consolas", "monospace"]
+    sans = ["system-ui", "Segoe UI", "Roboto", "sans-serif"]
+    mono = ["ui-monospace", "Consolas", "monospace"]
     return gr.themes.Base(primary_hue="blue", neutral_hue="gray", font=sans, font_mono=mono).set(
-        button_primary_background_fill="#1d4ed8", button_primary_background_fill_hover="#1e40af",
-        button_primary_text_color="#ffffff", body_text_color="#16202e", body_text_color_subdued="#475467",
-        block_label_text_color="#16202e", block_title_text_color="#16202e", button_cancel_background_fill="#b42318",
-        button_cancel_text_color="#ffffff", slider_color="#1d4ed8", body_background_fill="#f6f7f9",
-        border_color_primary="#d5dae2", link_text_color="#1d4ed8", link_text_color_dark="#93b4ff",
-        error_text_color="#8f1d14", error_text_color_dark="#ff9d94",
-    )  # fmt: skip
+        button_primary_background_fill="#1d4ed8",
+        button_primary_background_fill_hover="#1e40af",
+        button_primary_text_color="#ffffff",
+        body_text_color="#16202e",
+        body_text_color_subdued="#475467",
+        block_label_text_color="#16202e",
+        block_title_text_color="#16202e",
+        button_cancel_background_fill="#b42318",
+        button_cancel_text_color="#ffffff",
+        slider_color="#1d4ed8",
+        body_background_fill="#f6f7f9",
+        border_color_primary="#d5dae2",
+        link_text_color="#1d4ed8",
+        link_text_color_dark="#93b4ff",
+        error_text_color="#8f1d14",
+        error_text_color_dark="#ff9d94",
+    )

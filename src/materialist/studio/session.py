@@ -52,7 +52,9 @@ class Session:
         local: bool = True,
         allowance: Allowance | None = None,
     ):
-        self.person, self.without_folders, self.local = person, without_folders, local
+        self.person = person
+        self.without_folders = without_folders
+        self.local = local
         """`without_folders` is the studio's; `local`: the person has the command line of this machine, too."""
         self.allowance = allowance or Allowance()
         self.lock = threading.RLock()
@@ -71,7 +73,8 @@ class Session:
         """Whether the page was closed."""
         self.followers: dict[int, object] = {}
         """Job (by its id) -> who follows it for this page: of several the last."""
-        self.seen, self.beats = 0.0, False
+        self.seen = 0.0
+        self.beats = False
         """When this page last asked for something, by the monotonic clock, and whether it shows that it is open."""
         self._kept: bytes | None = None
         """The list of edits as this page last read or wrote it."""
@@ -131,9 +134,13 @@ class Session:
             ) from error
         with self.lock:
             self.close()
-            self.project, self.glass = project, GlassClient(project.scene)
-            self.live = LivePreview(loaded, project.folder / "preview.npz", project.scene, self.allowance)
-            self.edits, self._kept = EditList(steps), kept
+            self.project = project
+            self.glass = GlassClient(project.scene)
+            self.live = LivePreview(
+                loaded, project.folder / "preview.npz", project.scene, self.allowance
+            )
+            self.edits = EditList(steps)
+            self._kept = kept
 
     def close(self) -> None:
         """Give the memory back; the edits stay in the work folder."""
@@ -145,7 +152,9 @@ class Session:
             if self.final is not None:
                 self.final.remove()
             self.project = self.live = self.glass = self.final = None
-            self.edits, self._past, self._future = EditList(), [], []
+            self.edits = EditList()
+            self._past = []
+            self._future = []
             self.selection = Selection()
 
     # Selecting
@@ -153,7 +162,9 @@ class Session:
     def pick(self, pick: dict[str, Any], method: str = "network") -> None:
         """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError."""
         with self.lock:
-            scene, mode, before = self.scene, pick["mode"], self.selection
+            scene = self.scene
+            mode = pick["mode"]
+            before = self.selection
             if pick["tool"] == "click":
                 x, y = self.pixel(*pick["at"])
                 after = before.click(scene, x, y, mode, method)
@@ -161,11 +172,18 @@ class Session:
                 after = before.box(scene, pick["at"], mode, method)
             else:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
-            if after.mask is None or mode not in (ADD, REMOVE) or self.current_kind not in ("edit", "glass"):
+            if (
+                after.mask is None
+                or mode not in (ADD, REMOVE)
+                or self.current_kind not in ("edit", "glass")
+            ):
                 self.remember("select")
                 self.edits = self.edits.chosen(None)
             else:  # the current edit grows or shrinks with its region, whatever that was given as
-                self.put(self.edits, **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)})
+                self.put(
+                    self.edits,
+                    **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)},
+                )
             self.selection = after
 
     def deselect(self) -> None:
@@ -182,17 +200,22 @@ class Session:
         Raises InputError, and changes nothing, for values that are not valid.
         """
         with self.lock:
-            _, mask, edits = self.scene, self.selection.mask, self.edits
+            _ = self.scene
+            mask = self.selection.mask
+            edits = self.edits
             if self.current_kind != kind:
                 if mask is None:
                     raise InputError("Click the object that you want to change first.")
-                edits = edits.add(Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace))
+                edits = edits.add(
+                    Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace)
+                )
             self.put(edits, **options)
 
     def light(self, **options: Any) -> None:
         """Set or clear (None) options of the light (`EditList.light`); it is made when the first is set."""
         with self.lock:
-            _, place = self.scene, self.edits.light
+            _ = self.scene
+            place = self.edits.light
             new = Step("relight", {}, self.workspace)
             self.put(self.edits.add(new) if place is None else self.edits.chosen(place), **options)
 
@@ -201,7 +224,8 @@ class Session:
 
         A slider (or colour) that moves on is one change in the undo history. A light without options goes.
         """
-        index, step = edits.current, edits.current_step
+        index = edits.current
+        step = edits.current_step
         assert index is not None and step is not None
         new = with_options(step, **options)
         empty = new.kind == "relight" and not {*new.options} - {"skip"}
@@ -218,10 +242,12 @@ class Session:
                 raise InputError("That edit is no longer there.")
             edits = self.edits
             changed = {
-                "toggle": lambda: edits.toggled(index), "up": lambda: edits.moved(index, -1),
-                "down": lambda: edits.moved(index, 1), "remove": lambda: edits.without(index),
+                "toggle": lambda: edits.toggled(index),
+                "up": lambda: edits.moved(index, -1),
+                "down": lambda: edits.moved(index, 1),
+                "remove": lambda: edits.without(index),
                 "choose": lambda: edits.chosen(None if edits.current == index else index),
-            }  # fmt: skip
+            }
             if what not in changed:
                 raise InputError("That button is not known; reload the page.")
             after = changed[what]()
@@ -238,7 +264,9 @@ class Session:
         with self.lock:
             source, target = (self._future, self._past) if again else (self._past, self._future)
             if not source:
-                raise InputError("There is nothing to do again." if again else "There is nothing to take back.")
+                raise InputError(
+                    "There is nothing to do again." if again else "There is nothing to take back."
+                )
             self._check_unchanged()
             target.append(("", self.edits, self.selection))
             _, self.edits, self.selection = source.pop()
@@ -276,8 +304,16 @@ class Session:
     def _take_up_object(self) -> None:
         """The next object is like the current one, as the controls show it."""
         step = self.edits.current_step
-        if step is not None and step.kind in ("insert", "drop") and isinstance(step.options.get("mesh"), str):
-            self.next_object = {k: step.options[k] for k in ("mesh", "scale", "turn", "material") if k in step.options}
+        if (
+            step is not None
+            and step.kind in ("insert", "drop")
+            and isinstance(step.options.get("mesh"), str)
+        ):
+            self.next_object = {
+                k: step.options[k]
+                for k in ("mesh", "scale", "turn", "material")
+                if k in step.options
+            }
 
     def remember(self, what: str, moving: bool = False) -> None:
         """Keep the state for undo; a slider (or colour) that moves on adds no further entry."""
@@ -297,7 +333,9 @@ class Session:
     def _check_unchanged(self) -> None:
         """Raises InputError where another page, or a person, has written the edits since this page did."""
         if self.project is not None and _content(self.workspace / EDITS) != self._kept:
-            raise InputError("These edits were changed in another place; reload the page to go on with those.")
+            raise InputError(
+                "These edits were changed in another place; reload the page to go on with those."
+            )
 
     def save(self) -> None:
         """Write edits.yaml, and forget the glass that is no longer in it.

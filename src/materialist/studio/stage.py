@@ -19,8 +19,15 @@ from materialist.studio.tasks import before_of
 from materialist.types import Array, Scene
 
 _EMPTY: dict[str, Any] = {
-    "picture": "", "width": 0, "height": 0, "badge": "", "lamps": [], "waiting": False, "bad": False, "coarse": False,
-}  # fmt: skip
+    "picture": "",
+    "width": 0,
+    "height": 0,
+    "badge": "",
+    "lamps": [],
+    "waiting": False,
+    "bad": False,
+    "coarse": False,
+}
 """What the page shows without a photo."""
 
 
@@ -36,18 +43,24 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     """
     serial = time()
     with session.lock:
-        live, edits, final = session.live, session.edits, session.final
-        masks, client = session.selection.pictures, session.glass
+        live = session.live
+        edits = session.edits
+        final = session.final
+        masks = session.selection.pictures
+        client = session.glass
     shown = {**_EMPTY, "serial": serial, "before": None, **masks}
     if live is None:
         return shown
-    camera, steps = live.scene.camera, edits.active if with_edits else ()
+    camera = live.scene.camera
+    steps = edits.active if with_edits else ()
     shown |= {"width": camera.width, "height": camera.height, "lamps": _lamps(edits)}
     current = edits.current_step
     off = "; the current edit is switched off" if current is not None and current.skipped else ""
     if final is not None and final.of(steps):
         badge = f"Path traced{off}"
-        picture, before = (jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path)))
+        picture, before = (
+            jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path))
+        )
         return {**shown, "picture": picture, "before": before, "badge": badge}
     if current is not None and client is not None and current in steps and glass.is_traced(current):
         client.ask(steps, current)
@@ -58,7 +71,8 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     try:
         linear = live.picture(steps, client, coarse=coarse)
     except MaterialistError as error:
-        photo, why = jpeg_url(live.scene.photo.linear), session.without_folders(str(error))
+        photo = jpeg_url(live.scene.photo.linear)
+        why = session.without_folders(str(error))
         badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
         return {**shown, "picture": photo, "before": "", "badge": badge, "bad": True}
     badge = _badge(steps, client, waiting) + off
@@ -85,7 +99,11 @@ def _lamps(edits: EditList) -> list[list[float]]:
 def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: bool) -> str:
     """The label of a picture that is not path traced: its kind, and its omissions."""
     panes = [step for step in steps if glass.is_traced(step)]
-    sketched = "; objects are sketched" if any(s.kind not in LIVE and s not in panes for s in steps) else ""
+    sketched = (
+        "; objects are sketched"
+        if any(s.kind not in LIVE and s not in panes for s in steps)
+        else ""
+    )
     if not steps:
         return "Photo"
     if waiting:
@@ -103,7 +121,9 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
 
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
-    return data_url(display.encoded(srgb_levels(linear), "JPEG", quality=SETTINGS.jpeg_quality), "jpeg")
+    return data_url(
+        display.encoded(srgb_levels(linear), "JPEG", quality=SETTINGS.jpeg_quality), "jpeg"
+    )
 
 
 def jpeg_file(file: Path) -> str:
@@ -122,7 +142,10 @@ def maps(scene: Scene) -> list[tuple[Array, str]]:
         (shown["depth"], "Depth: near is bright"),
         (display.light(scene.envmap), "Light, all around; ahead is the middle"),
         (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
-        (display.error(scene.photo.linear, scene.rerender), "Residual: where it misses the photo (x 4)"),
+        (
+            display.error(scene.photo.linear, scene.rerender),
+            "Residual: where it misses the photo (x 4)",
+        ),
     ]
 
 
@@ -133,9 +156,11 @@ def report(scene: Scene) -> str:
     told = f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. Edits start from the photo."
     lines = [told] if np.isfinite(value) else []
     camera = scene.camera
-    source = {"exif": "from the photo's EXIF data", "default": "assumed", "option": "as chosen"}.get(
-        scene.photo.fov_source, f"from the {_safe(scene.photo.fov_source)}"
-    )
+    source = {
+        "exif": "from the photo's EXIF data",
+        "default": "assumed",
+        "option": "as chosen",
+    }.get(scene.photo.fov_source, f"from the {_safe(scene.photo.fov_source)}")
     lines.append(
         f"Worked at {camera.width} × {camera.height} pixels; field of view {camera.fov:.1f}° ({source}); first guess "
         f"by `{_safe(scene.prior.predictor).replace('`', '')}`."

@@ -56,7 +56,9 @@ class Studio:
     _sessions: dict[str, Session] = field(default_factory=dict)
     _left: list[Session] = field(default_factory=list)
     """Sessions of closed pages, whose memory is not given back yet."""
-    _closer: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer"))
+    _closer: ThreadPoolExecutor = field(
+        default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer")
+    )
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
@@ -74,13 +76,18 @@ class Studio:
         now = time.monotonic()
         with self._lock:
             last = now - SETTINGS.page_seconds
-            gone = [name for name, one in self._sessions.items() if not one.beats and one.seen < last and name != page]
+            gone = [
+                name
+                for name, one in self._sessions.items()
+                if not one.beats and one.seen < last and name != page
+            ]
             known = self._sessions.get(page or "")
             if known is None and page:
                 self._check_pages(person)
                 known = self._sessions[page] = self._new_session(person)
             if known is not None and known.person == person:
-                known.seen, known.beats = now, known.beats or beats
+                known.seen = now
+                known.beats = known.beats or beats
         for name in gone:
             self.leave(name)
         if known is None or known.person != person:
@@ -90,8 +97,13 @@ class Studio:
     def _check_pages(self, person: str) -> None:
         """Raise InputError where a person's sender has too many pages open."""
         sender = self.sender(person)
-        if sum(self.sender(one.person) == sender for one in self._sessions.values()) >= SETTINGS.pages:
-            raise InputError(f"There are {SETTINGS.pages} pages open from your address; close some.")
+        if (
+            sum(self.sender(one.person) == sender for one in self._sessions.values())
+            >= SETTINGS.pages
+        ):
+            raise InputError(
+                f"There are {SETTINGS.pages} pages open from your address; close some."
+            )
 
     def _new_session(self, person: str) -> Session:
         allowance = Allowance(self.quota, lambda: self.sender(person))
@@ -142,7 +154,9 @@ class Studio:
         if had_scene:
             free_memory().result()
         if psutil.virtual_memory().available < _memory_of(project):
-            raise InputError("This machine has no memory left for another scene; close one in another tab.")
+            raise InputError(
+                "This machine has no memory left for another scene; close one in another tab."
+            )
         session.open(project)
         self.note_last(session.person, name)
 
@@ -161,8 +175,12 @@ class Studio:
         mine = sum(self.sender(job.owner) == sender for job in unfinished)
         all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
-            whose = f"You have {mine}" if mine >= SETTINGS.jobs_a_person else f"The studio has {all_}"
-            raise InputError(f"{whose} jobs waiting or running; stop one, or wait until one is done.")
+            whose = (
+                f"You have {mine}" if mine >= SETTINGS.jobs_a_person else f"The studio has {all_}"
+            )
+            raise InputError(
+                f"{whose} jobs waiting or running; stop one, or wait until one is done."
+            )
         self.quota.check_disk()
         work = partial(tasks.on_device, self.device, task)
         job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
@@ -188,7 +206,8 @@ class Studio:
     def close_left(self) -> None:
         """Close the sessions of the pages that were closed, and give their memory back, once for all of them."""
         with self._lock:
-            sessions, self._left = self._left, []
+            sessions = self._left
+            self._left = []
         had_scene = any(session.live is not None for session in sessions)
         for session in sessions:
             try:

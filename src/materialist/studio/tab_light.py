@@ -24,11 +24,21 @@ def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Light", id="light"):
         parts["lights"] = gr.Gallery(
-            _gallery(), label="Light from all around", columns=3, height="auto", allow_preview=False,
-            object_fit="cover", interactive=False, buttons=[], elem_id="lights", format="jpeg",
-        )  # fmt: skip
+            _gallery(),
+            label="Light from all around",
+            columns=3,
+            height="auto",
+            allow_preview=False,
+            object_fit="cover",
+            interactive=False,
+            buttons=[],
+            elem_id="lights",
+            format="jpeg",
+        )
         suffixes = (".exr", ".hdr", ".png", ".jpg")
-        parts["own_map"] = file_field("own_map", "Your own environment map (2:1; HDR or EXR)", suffixes)
+        parts["own_map"] = file_field(
+            "own_map", "Your own environment map (2:1; HDR or EXR)", suffixes
+        )
         parts["rotate"] = slider("rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
         parts["ambient"] = slider("ambient", "Dim or brighten", 0.02, maximum=2)
         with gr.Accordion("Sun", open=False):
@@ -36,14 +46,25 @@ def layout(context: PageContext) -> None:
             parts["azimuth"] = gr.Slider(
                 -180, 180, SUN[0], step=1, label="Right of straight ahead, degrees", buttons=[]
             )
-            parts["elevation"] = gr.Slider(0, 90, SUN[1], step=1, label="Above the horizon, degrees", buttons=[])
+            parts["elevation"] = gr.Slider(
+                0, 90, SUN[1], step=1, label="Above the horizon, degrees", buttons=[]
+            )
             parts["sun_power"] = slider("sun_power", "Strength", 0.05, maximum=5)
         with gr.Accordion("Lamps", open=False):
-            gr.Markdown("Choose the tool **Place a lamp** and click in the photo. Lamps show in path-traced pictures.")
-            parts["kelvin"] = gr.Slider(1700, 12000, 2700, step=100, label="Colour, kelvin: warm to cold", buttons=[])
+            gr.Markdown(
+                "Choose the tool **Place a lamp** and click in the photo. Lamps show in path-traced pictures."
+            )
+            parts["kelvin"] = gr.Slider(
+                1700, 12000, 2700, step=100, label="Colour, kelvin: warm to cold", buttons=[]
+            )
             parts["power"] = gr.Slider(0.05, 5, 1, step=0.05, label="Strength", buttons=[])
             parts["before"] = gr.Slider(
-                0.2, 0.98, SETTINGS.lamp_share, step=0.01, label="Nearer to you, or to the surface", buttons=[]
+                0.2,
+                0.98,
+                SETTINGS.lamp_share,
+                step=0.01,
+                label="Nearer to you, or to the surface",
+                buttons=[],
             )
             parts["no_lamps"] = gr.Button("Take all lamps away", size="sm")
 
@@ -56,14 +77,18 @@ def wire(context: PageContext) -> None:
     sunny = ("sun_on", "azimuth", "elevation", "sun_power")
     for name in sunny:
         context.live(parts[name].input, _sun, *sunny, coarse=True)
-    context.live(parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True)
+    context.live(
+        parts["no_lamps"].click, lambda session: session.light(lamps=None), everything=True
+    )
 
 
 def _choose(session: Session, data: Any) -> None:
     if data["index"] == 0:
         session.light(envmap=None, gain=None)
     else:
-        session.light(envmap=_written(session, [*presets.LIGHTS][int(data["index"]) - 1]), gain="auto")
+        session.light(
+            envmap=_written(session, [*presets.LIGHTS][int(data["index"]) - 1]), gain="auto"
+        )
 
 
 def _sun(session: Session, on: bool, azimuth: float, elevation: float, power: float) -> None:
@@ -79,7 +104,12 @@ def _uploaded(session: Session, file: Path) -> None:
 
 
 def place_lamp(
-    session: Session, x: float, y: float, kelvin: float = 2700, power: float = 1, before: float = SETTINGS.lamp_share
+    session: Session,
+    x: float,
+    y: float,
+    kelvin: float = 2700,
+    power: float = 1,
+    before: float = SETTINGS.lamp_share,
 ) -> None:
     """Hang a lamp before the surface at a pixel, `before` its share of the way. Raises InputError without a surface."""
     column, row = session.pixel(x, y)

@@ -18,22 +18,35 @@ def layout(context: PageContext) -> None:
         parts["look"] = tab
         parts["report"] = gr.Markdown("Open a photo first.", elem_id="report")
         parts["maps"] = gr.Gallery(
-            label="What was found", columns=2, height="auto", object_fit="contain", interactive=False, format="jpeg",
-            buttons=["fullscreen"], elem_id="maps",
-        )  # fmt: skip
+            label="What was found",
+            columns=2,
+            height="auto",
+            object_fit="contain",
+            interactive=False,
+            format="jpeg",
+            buttons=["fullscreen"],
+            elem_id="maps",
+        )
         parts["mesh_button"] = gr.Button("Show the mesh", size="sm")
         parts["mesh"] = gr.Model3D(
-            label="The mesh: drag to turn, wheel to zoom", height=380, clear_color=(0.9, 0.92, 0.94, 1.0),
-            interactive=False, elem_id="mesh",
-        )  # fmt: skip
+            label="The mesh: drag to turn, wheel to zoom",
+            height=380,
+            clear_color=(0.9, 0.92, 0.94, 1.0),
+            interactive=False,
+            elem_id="mesh",
+        )
 
 
 def wire(context: PageContext) -> None:
-    parts, studio = context.parts, context.studio
+    parts = context.parts
+    studio = context.studio
 
     def look(session: Session) -> Iterator[Updates]:
         if session.live is not None:
-            yield {"report": session.without_folders(report(session.scene)), "maps": maps(session.scene)}
+            yield {
+                "report": session.without_folders(report(session.scene)),
+                "maps": maps(session.scene),
+            }
 
     def show_mesh(session: Session) -> Iterator[Updates]:
         file = session.workspace / MESH

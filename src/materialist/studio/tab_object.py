@@ -18,19 +18,31 @@ _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
 def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Objects", id="object"):
-        gr.Markdown("Choose an object, then the tool **Place an object**, and click where it should stand.")
-        parts["thing"] = gr.Dropdown([*objects.LIBRARY], value=None, label="Object", elem_id="thing")
-        parts["own_mesh"] = file_field("own_mesh", "Your own: one GLB, PLY, OBJ or STL file", uploads.MESHES)
+        gr.Markdown(
+            "Choose an object, then the tool **Place an object**, and click where it should stand."
+        )
+        parts["thing"] = gr.Dropdown(
+            [*objects.LIBRARY], value=None, label="Object", elem_id="thing"
+        )
+        parts["own_mesh"] = file_field(
+            "own_mesh", "Your own: one GLB, PLY, OBJ or STL file", uploads.MESHES
+        )
         parts["scale"] = slider("scale", "Size", 0.05, minimum=0.1, maximum=5)
         parts["turn"] = slider("turn", "Turn, degrees", 1, minimum=-180, maximum=180)
         with gr.Row():
-            parts["made_of"] = gr.Dropdown(list(objects.MATERIALS), value="as-is", label="Material", min_width=120)
+            parts["made_of"] = gr.Dropdown(
+                list(objects.MATERIALS), value="as-is", label="Material", min_width=120
+            )
             parts["thing_colour"] = gr.ColorPicker("#c2563a", label="Its colour", min_width=120)
-        gr.Markdown("The live preview shows only where it stands; shadows and reflections come with path tracing.")
+        gr.Markdown(
+            "The live preview shows only where it stands; shadows and reflections come with path tracing."
+        )
         with gr.Accordion("Turn the selection to glass", open=False) as parts["glass_part"]:
             _layout_glass(parts)
         with gr.Accordion("Take the selection away", open=False):
-            parts["shadow"] = gr.Checkbox(True, label="Its shadow and reflection on the ground go along")
+            parts["shadow"] = gr.Checkbox(
+                True, label="Its shadow and reflection on the ground go along"
+            )
             parts["remove"] = gr.Button("Take it away", elem_id="remove", size="sm")
         with gr.Accordion("Let it fall", open=False):
             gr.Markdown("The object falls where it stands. Needs the physics extra.")
@@ -46,14 +58,20 @@ def _layout_glass(parts: dict[str, Any]) -> None:
     parts["glass_tint"] = gr.ColorPicker("#ffffff", label="Tint")
     parts["glass_hollow"] = gr.Radio(_INSIDE, value="", label="Inside", elem_id="glass_hollow")
     parts["glass"] = gr.Button("Make it glass", elem_id="glass", size="sm")
-    gr.Markdown("Its body is built once, in half a minute or so; from then on the picture follows the sliders.")
+    gr.Markdown(
+        "Its body is built once, in half a minute or so; from then on the picture follows the sliders."
+    )
 
 
 def wire(context: PageContext) -> None:
     parts = context.parts
     context.live(parts["thing"].input, _choose, "thing", more=("tool", "own_mesh"))
     context.upload("own_mesh", _uploaded, more=("tool", "thing"))
-    context.bind("scale", "turn", *(f"glass_{name}" for name in ("ior", "transmission", "roughness", "tint", "hollow")))
+    context.bind(
+        "scale",
+        "turn",
+        *(f"glass_{name}" for name in ("ior", "transmission", "roughness", "tint", "hollow")),
+    )
     for name in ("made_of", "thing_colour"):
         context.live(parts[name].input, _made_of, "made_of", "thing_colour")
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
@@ -87,7 +105,8 @@ def _remove(session: Session, shadow: bool) -> None:
 
 def _follow(context: PageContext, session: Session) -> Iterator[Updates]:
     """Tell of the glass that the stage waits for, until it is there."""
-    said, client = "", session.glass
+    said = ""
+    client = session.glass
     while client is not None and client is session.glass:
         state = client.state
         if not state.waiting:

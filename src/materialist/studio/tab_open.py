@@ -29,31 +29,55 @@ _READY = "Ready: click an object, then move a slider."
 def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Open", id="open"):
-        parts["file"] = file_field("file", "Drop a photo, or a zipped scene (up to 60 MB)", SUFFIXES | {".zip"})
+        parts["file"] = file_field(
+            "file", "Drop a photo, or a zipped scene (up to 60 MB)", SUFFIXES | {".zip"}
+        )
         parts["facts"] = gr.HTML("", elem_id="facts", js_on_load=None)
         with gr.Row():
             parts["predictor"] = gr.Dropdown(
-                list(PREDICTORS), value="auto", label="First guess by", min_width=150,
+                list(PREDICTORS),
+                value="auto",
+                label="First guess by",
+                min_width=150,
                 info="MatNet and Marigold need their weights",
-            )  # fmt: skip
+            )
             parts["size"] = gr.Dropdown(list(SIZES), value=512, label="Working size", min_width=130)
-            parts["fov"] = gr.Textbox("auto", label="Field of view, degrees", max_lines=1, min_width=130)
+            parts["fov"] = gr.Textbox(
+                "auto", label="Field of view, degrees", max_lines=1, min_width=130
+            )
         parts["start"] = gr.Button("Take the photo apart", variant="primary", elem_id="start")
         parts["found"] = gr.Gallery(
-            label="Found so far", columns=3, height="auto", visible=False, object_fit="contain", interactive=False,
+            label="Found so far",
+            columns=3,
+            height="auto",
+            visible=False,
+            object_fit="contain",
+            interactive=False,
             buttons=[],
-        )  # fmt: skip
+        )
         gr.Markdown("Or take an example photo:")
         parts["examples"] = gr.Gallery(
-            _examples(), label="Example photos", show_label=False, columns=4, height="auto", allow_preview=False,
-            object_fit="cover", interactive=False, buttons=[], elem_id="examples", format="jpeg",
-        )  # fmt: skip
-        parts["projects"] = gr.Dropdown([], label="Continue where you left", value=None, elem_id="projects")
+            _examples(),
+            label="Example photos",
+            show_label=False,
+            columns=4,
+            height="auto",
+            allow_preview=False,
+            object_fit="cover",
+            interactive=False,
+            buttons=[],
+            elem_id="examples",
+            format="jpeg",
+        )
+        parts["projects"] = gr.Dropdown(
+            [], label="Continue where you left", value=None, elem_id="projects"
+        )
         parts["continue"] = gr.Button("Continue", size="sm", elem_id="continue")
 
 
 def wire(context: PageContext, page: gr.Blocks) -> None:
-    parts, studio = context.parts, context.studio
+    parts = context.parts
+    studio = context.studio
 
     def uploaded(session: Session, file: str | None) -> Iterator[Updates]:
         name = Path(file or "").name
@@ -70,7 +94,9 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         file = example_path(name)
         yield {"file": studio.public_copy(session.person, file, f"{name}{file.suffix}")}
 
-    def start(session: Session, file: str | None, predictor: str, size: int, fov: str) -> Iterator[Updates]:
+    def start(
+        session: Session, file: str | None, predictor: str, size: int, fov: str
+    ) -> Iterator[Updates]:
         if file is not None and Path(file).suffix.lower() == ".zip":
             yield from _show_project(context, session, _unpack(context, session, Path(file)))
         else:
@@ -78,7 +104,8 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield from _follow_inversion(context, session, project, job)
 
     def arrive(session: Session) -> Iterator[Updates]:
-        known, last = _projects(context, session), studio.last.get(session.person)
+        known = _projects(context, session)
+        last = studio.last.get(session.person)
         yield {"projects": gr.update(choices=known, value=known[0][1] if known else None)}
         if not any(value == last for _, value in known):
             last = studio.start.name if isinstance(studio.start, Project) else None
@@ -99,7 +126,12 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
 def _examples() -> list[tuple[Array, str]]:
     """Small pictures of the example photos, with their names."""
     photos = {name: np.asarray(cv2.imread(str(example_path(name))))[..., ::-1] for name in EXAMPLES}
-    small = lambda photo: cv2.resize(photo, None, fx=(s := 240 / photo.shape[1]), fy=s, interpolation=cv2.INTER_AREA)  # noqa: E731
+
+    def small(photo):
+        return cv2.resize(
+            photo, None, fx=(s := 240 / photo.shape[1]), fy=s, interpolation=cv2.INTER_AREA
+        )
+
     return [(small(photo), name.capitalize()) for name, photo in photos.items()]
 
 
@@ -121,9 +153,17 @@ def _start_inversion(
         session.allowance.claim(source.stat().st_size)
         shutil.copyfile(source, photo)
         job = studio.submit(
-            session, tasks.invert, project.folder, photo=str(photo), scene=str(project.scene), title=project.title,
-            predictor=predictor, size=int(size), fov=fov.strip() or "auto", seed=studio.seed,
-        )  # fmt: skip
+            session,
+            tasks.invert,
+            project.folder,
+            photo=str(photo),
+            scene=str(project.scene),
+            title=project.title,
+            predictor=predictor,
+            size=int(size),
+            fov=fov.strip() or "auto",
+            seed=studio.seed,
+        )
     except Exception:
         shutil.rmtree(project.folder, ignore_errors=True)
         raise
@@ -140,7 +180,9 @@ def _unpack(context: PageContext, session: Session, file: Path) -> Project:
     return project
 
 
-def _follow_inversion(context: PageContext, session: Session, project: Project, job: Job) -> Iterator[Updates]:
+def _follow_inversion(
+    context: PageContext, session: Session, project: Project, job: Job
+) -> Iterator[Updates]:
     """Progress and first pictures of an inversion until it is over; then the project, if it is done."""
     studio = context.studio
     studio.note_last(session.person, project.name)
@@ -153,7 +195,9 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
             if not shown:
                 update["stage"] = waiting_photo(photo)
             shown = len(job.found)
-            pictures = [(studio.public_copy(session.person, file), name) for name, file in latest.items()]
+            pictures = [
+                (studio.public_copy(session.person, file), name) for name, file in latest.items()
+            ]
             update["found"] = gr.update(value=pictures, visible=bool(pictures))
         yield update
     if not job.over:  # the page was closed, or follows the inversion anew; it goes on
@@ -161,8 +205,13 @@ def _follow_inversion(context: PageContext, session: Session, project: Project, 
     failed = job.state != "done"
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
-    before = {"found": gr.update(visible=False, value=[]), "stage": stage(session)} if failed else {}
-    yield {"start": gr.update(interactive=True), **before}  # at last: a click before the event's end is lost
+    before = (
+        {"found": gr.update(visible=False, value=[]), "stage": stage(session)} if failed else {}
+    )
+    yield {
+        "start": gr.update(interactive=True),
+        **before,
+    }  # at last: a click before the event's end is lost
     if project.ready:
         yield from _show_project(context, session, project)
 
@@ -173,7 +222,9 @@ def _resume(context: PageContext, session: Session, name: str | None) -> Iterato
     if not name:
         raise InputError("Choose one of your photos in the list first.")
     project = studio.project(name, session.person)
-    running = [j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder]
+    running = [
+        j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder
+    ]
     if running:
         session.note_job(running[0])
         yield from _follow_inversion(context, session, project, running[0])
@@ -192,10 +243,12 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
         return
     known = _projects(context, session)
     yield context.everything(session) | {
-        "stage": stage(session, with_edits=False), "tabs": gr.Tabs(selected="material"),
-        "projects": gr.update(choices=known, value=project.name), "found": gr.update(visible=False, value=[]),
+        "stage": stage(session, with_edits=False),
+        "tabs": gr.Tabs(selected="material"),
+        "projects": gr.update(choices=known, value=project.name),
+        "found": gr.update(visible=False, value=[]),
         "progress": box("Getting the live preview ready; select something meanwhile.", 0.6),
-    }  # fmt: skip
+    }
     live.wait()
     if session.live is live:
         yield context.everything(session) | {"progress": box(_READY)}

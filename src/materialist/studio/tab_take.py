@@ -38,7 +38,12 @@ def layout(context: PageContext) -> None:
         label = "Load an edits.yaml, or the zip with its masks"
         parts["recipe"] = file_field("recipe", label, (".zip", ".yaml", ".yml"))
         parts["commands"] = gr.Textbox(
-            "", label="The same on the command line", lines=4, interactive=False, buttons=["copy"], elem_id="commands"
+            "",
+            label="The same on the command line",
+            lines=4,
+            interactive=False,
+            buttons=["copy"],
+            elem_id="commands",
         )
 
 
@@ -58,11 +63,17 @@ def wire(context: PageContext) -> None:
             if final is None:
                 return
             shutil.copyfile(final.path.with_suffix(file.suffix), file)
-        elif not (yield from context.work(session, tasks.take, file, steps=session.edits.active, what=what)):
+        elif not (
+            yield from context.work(
+                session, tasks.take, file, steps=session.edits.active, what=what
+            )
+        ):
             return
         name = f"{session.opened.stem}-{'edited' if what in ('png', 'exr') else what}{file.suffix}"
         label = f"Download {name} ({file.stat().st_size / 1e6:.1f} MB)"
-        made = gr.update(value=context.studio.public_copy(session.person, file, name), label=label, visible=True)
+        made = gr.update(
+            value=context.studio.public_copy(session.person, file, name), label=label, visible=True
+        )
         yield {"download": made, "progress": box("The file is ready."), "stage": stage(session)}
 
     context.long(context.parts["make"].click, make, "what")

@@ -36,16 +36,28 @@ def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> No
 
 
 def invert(
-    report: Reporter, photo: str, scene: str, title: str, predictor: str, size: int, fov: float | str, seed: int
-) -> None:  # fmt: skip
+    report: Reporter,
+    photo: str,
+    scene: str,
+    title: str,
+    predictor: str,
+    size: int,
+    fov: float | str,
+    seed: int,
+) -> None:
     """`materialist invert`; maps and light go to `found` as soon as they are there."""
     from dataclasses import replace
 
     picture = replace(mt.read_photo(photo, size=size, fov=fov), path=title)
     folder = Path(scene).parent
-    show = lambda name, value: _show(report, folder, name, value)  # noqa: E731
+
+    def show(name, value):
+        return _show(report, folder, name, value)
+
     show(PHOTO, picture.linear)
-    done = mt.invert(picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show)
+    done = mt.invert(
+        picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show
+    )
     report("save", 0, 1)
     mt.save_scene(done, scene, force=True)
 
@@ -55,7 +67,10 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
         shown = display.maps(value)
     elif isinstance(value, Materials):
         shown = {"albedo": srgb_levels(value.albedo)}
-        shown |= {"roughness": display.grey(value.roughness), "metallic": display.grey(value.metallic)}
+        shown |= {
+            "roughness": display.grey(value.roughness),
+            "metallic": display.grey(value.metallic),
+        }
     else:
         shown = {name: display.light(value) if name == "light" else srgb_levels(value)}
     for title, pixels in shown.items():
@@ -73,7 +88,10 @@ def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
     out = Path(output)
     for suffix in (".png", ".exr"):
         write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
-    for file, shown in ((out.with_suffix(".jpg"), picture), (before_of(out), loaded.photo.original)):
+    for file, shown in (
+        (out.with_suffix(".jpg"), picture),
+        (before_of(out), loaded.photo.original),
+    ):
         write_jpeg(file, shown, longest=2048)
 
 
@@ -178,7 +196,9 @@ def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
     """A linear picture [H, W, 3] as a JPEG of at most `longest` pixels a side."""
     scale = min(1.0, longest / max(linear.shape[:2]))
     size = (max(1, round(linear.shape[1] * scale)), max(1, round(linear.shape[0] * scale)))
-    small = np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear
+    small = (
+        np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear
+    )
     write_pixels(path, srgb_levels(small))
 
 

@@ -22,7 +22,8 @@ from materialist.studio.access.quota import Allowance
 from materialist.studio.workspace import store
 
 MESHES = (".glb", ".ply", ".obj", ".stl")
-PHOTO, MESH = "photo", "mesh"
+PHOTO = "photo"
+MESH = "mesh"
 """Options that are no data of an edit's picture: the photo to take apart, and the mesh of an object."""
 _COLOURS = ("texture", "background", "envmap")
 """Options whose picture is colour; the others are masks and maps of numbers."""
@@ -47,7 +48,9 @@ def opened(task: Callable[..., Any], file: Path, allowance: Allowance, **argumen
         raise InputError(reason if shown in reason else f"{shown}: {reason}") from error
 
 
-def used(workspace: Path, file: Path, option: str, allowance: Allowance, use: Callable[[str], Any]) -> None:
+def used(
+    workspace: Path, file: Path, option: str, allowance: Allowance, use: Callable[[str], Any]
+) -> None:
     """Check an uploaded file, copy it to a workspace and `use(name)` it; one that is refused does not stay."""
     readable = opened(checked, file, allowance, option=option)
     before = {*workspace.iterdir()}
@@ -70,7 +73,9 @@ def check_bytes(path: Path, shown: str) -> None:
     if size == 0:
         raise InputError(f"{shown} is empty (0 bytes); copy it again.")
     if size > SETTINGS.upload_megabytes * 1e6:
-        raise InputError(f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {SETTINGS.upload_megabytes} MB.")
+        raise InputError(
+            f"{shown} has {size / 1e6:.0f} MB; the studio takes up to {SETTINGS.upload_megabytes} MB."
+        )
 
 
 def shown_name(path: Path) -> str:
@@ -99,9 +104,12 @@ def checked(report: Any, file: Path, option: str) -> Path:
 
 def checked_picture(path: Path) -> str:
     """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large, by its header."""
-    suffix, shown = path.suffix.lower(), shown_name(path)
+    suffix = path.suffix.lower()
+    shown = shown_name(path)
     if suffix not in SUFFIXES:
-        raise InputError(f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR.")
+        raise InputError(
+            f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR."
+        )
     check_bytes(path, shown)
     if suffix not in RAW_SUFFIXES:
         try:
@@ -109,7 +117,9 @@ def checked_picture(path: Path) -> str:
         except InputError:
             raise
         except Exception as error:  # decoders raise anything
-            raise InputError(f"{shown} is not an image that can be read; export it as PNG or JPEG.") from error
+            raise InputError(
+                f"{shown} is not an image that can be read; export it as PNG or JPEG."
+            ) from error
         megapixels = width * height / 1e6
         if width * height > SETTINGS.upload_pixels or peak > SETTINGS.opening_memory:
             raise InputError(
@@ -123,9 +133,12 @@ def checked_picture(path: Path) -> str:
 
 def checked_mesh(path: Path) -> str:
     """The suffix of an uploaded mesh, whose reader follows no reference out of its folder. Raises InputError."""
-    suffix, shown = path.suffix.lower(), shown_name(path)
+    suffix = path.suffix.lower()
+    shown = shown_name(path)
     if suffix not in MESHES:
-        raise InputError(f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file.")
+        raise InputError(
+            f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file."
+        )
     check_bytes(path, shown)
     return suffix
 

@@ -25,18 +25,35 @@ from materialist.studio.stage import stage
 from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
 LIVE: dict[str, Any] = {
-    "queue": False, "trigger_mode": "always_last", "show_progress": "hidden", "api_visibility": "private",
-}  # fmt: skip
+    "queue": False,
+    "trigger_mode": "always_last",
+    "show_progress": "hidden",
+    "api_visibility": "private",
+}
 """Events that skip the queue; while one request is under way only the newest value waits."""
-LONG: dict[str, Any] = {"show_progress": "hidden", "concurrency_limit": None, "api_visibility": "private"}
+LONG: dict[str, Any] = {
+    "show_progress": "hidden",
+    "concurrency_limit": None,
+    "api_visibility": "private",
+}
 """Events that take long, and send updates meanwhile."""
 _WORDS = {
-    "start": "Starting", "read": "Reading the photo", "predict": "Guessing colours, shapes and depth",
-    "geometry": "Building the surface", "trace": "Tracing light paths", "light": "Finding the light",
-    "albedo": "Finding the materials", "materials": "Finding the materials", "rerender": "Rendering the result",
-    "save": "Saving", "load": "Loading", "shadow": "Taking its shadow away",
-    "render": "Path tracing", "frames": "Path tracing the frames", "export": "Writing the file",
-}  # fmt: skip
+    "start": "Starting",
+    "read": "Reading the photo",
+    "predict": "Guessing colours, shapes and depth",
+    "geometry": "Building the surface",
+    "trace": "Tracing light paths",
+    "light": "Finding the light",
+    "albedo": "Finding the materials",
+    "materials": "Finding the materials",
+    "rerender": "Rendering the result",
+    "save": "Saving",
+    "load": "Loading",
+    "shadow": "Taking its shadow away",
+    "render": "Path tracing",
+    "frames": "Path tracing the frames",
+    "export": "Writing the file",
+}
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
 
 
@@ -54,9 +71,16 @@ class PageContext:
     parts: dict[str, Any] = field(default_factory=dict)
 
     def live(
-        self, event: Any, change: Callable[..., Any], *inputs: str, everything: bool = False, coarse: bool = False,
-        more: tuple[str, ...] = (), data: bool = False, **how: Any,
-    ) -> Any:  # fmt: skip
+        self,
+        event: Any,
+        change: Callable[..., Any],
+        *inputs: str,
+        everything: bool = False,
+        coarse: bool = False,
+        more: tuple[str, ...] = (),
+        data: bool = False,
+        **how: Any,
+    ) -> Any:
         """Let an event call change(session, *values of inputs) at once, and show the (coarse) picture, or everything.
 
         `change` may return further updates, of the components `more`. With `data` the event's own come before the
@@ -68,7 +92,9 @@ class PageContext:
                 session = self.session(request)
                 with session.allowance.request():
                     further = change(session, *([told._data] if data else []), *values) or {}
-                    shown = self.everything(session) if everything else self.picture(session, coarse)
+                    shown = (
+                        self.everything(session) if everything else self.picture(session, coarse)
+                    )
                 return self._outputs(shown | further)
             except Exception as error:
                 raise self.message(error) from error
@@ -78,14 +104,21 @@ class PageContext:
         return event(run, given, outputs, **LIVE | how)
 
     def long(
-        self, event: Any, change: Callable[..., Iterator[Updates]], *inputs: str, data: bool = False, **how: Any
-    ) -> Any:  # fmt: skip
+        self,
+        event: Any,
+        change: Callable[..., Iterator[Updates]],
+        *inputs: str,
+        data: bool = False,
+        **how: Any,
+    ) -> Any:
         """Let an event call change(session, *values of inputs), which yields updates of any components."""
 
         def run(request: gr.Request, told: gr.EventData, *values: Any) -> Iterator[Any]:
             updates = None
             try:
-                for updates in change(self.session(request), *([told._data] if data else []), *values):
+                for updates in change(
+                    self.session(request), *([told._data] if data else []), *values
+                ):
                     yield self._outputs(updates)
                 if updates is None:  # Gradio would send None to every component
                     yield gr.skip()
@@ -93,7 +126,9 @@ class PageContext:
                 yield self._outputs({"progress": "", "stop": gr.update(visible=False)})
                 raise self.message(error) from error
 
-        return event(run, [self.parts[name] for name in inputs], [*self.parts.values()], **LONG | how)
+        return event(
+            run, [self.parts[name] for name in inputs], [*self.parts.values()], **LONG | how
+        )
 
     def bind(self, *names: str, coarse: bool = False) -> None:
         """Let controls set the options that they stand for."""
@@ -103,7 +138,9 @@ class PageContext:
     def upload(self, name: str, change: Callable[[Session, Path], Any], **how: Any) -> None:
         """Let an uploaded file call change(session, file); a file that is refused is taken off the page."""
         part = self.parts[name]
-        sent = self.live(part.upload, lambda session, file: change(session, Path(file)), name, **how)
+        sent = self.live(
+            part.upload, lambda session, file: change(session, Path(file)), name, **how
+        )
         sent.failure(lambda: None, None, part, **LIVE)
 
     def session(self, request: Any) -> Session:
@@ -128,7 +165,11 @@ class PageContext:
 
     def picture(self, session: Session, coarse: bool = False) -> Updates:
         """The picture with a new list of edits, and the commands that do the same."""
-        return {"stage": stage(session, coarse=coarse), "steps": steps(session), "commands": commands(session)}
+        return {
+            "stage": stage(session, coarse=coarse),
+            "steps": steps(session),
+            "commands": commands(session),
+        }
 
     def everything(self, session: Session) -> Updates:
         """The picture, and sliders as the current step, or the selected object, has them."""
@@ -169,10 +210,14 @@ class PageContext:
         part = min(1.0, job.done / job.total) if job.total else 0.0
         return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
-    def work(self, session: Session, task: tasks.Task, output: Path, **arguments: Any) -> Generator[Updates, Any, bool]:
+    def work(
+        self, session: Session, task: tasks.Task, output: Path, **arguments: Any
+    ) -> Generator[Updates, Any, bool]:
         """Let a task make OUTPUT of the open scene, with the updates of `following`; returns whether it did."""
         scene = str(session.opened.scene)
-        job = self.studio.submit(session, task, output.parent, scene=scene, output=str(output), **arguments)
+        job = self.studio.submit(
+            session, task, output.parent, scene=scene, output=str(output), **arguments
+        )
         yield from self.following(session, job)
         return job.state == DONE
 
@@ -181,13 +226,15 @@ class PageContext:
 
         Returns the picture, which the session keeps; None where the job failed or was stopped.
         """
-        steps, known = session.edits.active, session.final
+        steps = session.edits.active
+        known = session.final
         if known is not None and known.of(steps):
             return known
         made = FinalPicture(steps, self.studio.work.cache / f"final-{secrets.token_hex(16)}")
         try:
             if (yield from self.work(session, tasks.final, made.path, steps=steps)):
-                known, session.final = session.final, made
+                known = session.final
+                session.final = made
                 if known is not None:
                     known.remove()
                 return made
@@ -205,7 +252,9 @@ def failure(job: Job) -> str:
 
 def words(stage: str) -> str:
     """A stage in words; names such as `light 2` or `materials: albedo` go by their first word."""
-    return _WORDS.get(stage) or _WORDS.get(stage.replace(":", " ").partition(" ")[0], stage.capitalize())
+    return _WORDS.get(stage) or _WORDS.get(
+        stage.replace(":", " ").partition(" ")[0], stage.capitalize()
+    )
 
 
 def box(text: str, part: float | None = None, bad: bool = False) -> str:
@@ -227,9 +276,12 @@ def commands(session: Session) -> str:
     if project is None:
         return ""
     place = str if session.local else session.without_folders
-    lines, scene = [f"cd {quote(place(str(project.folder)))}"], quote(place(str(project.scene)))
+    lines = [f"cd {quote(place(str(project.folder)))}"]
+    scene = quote(place(str(project.scene)))
     if session.edits.active:
-        lines.append(f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene")
+        lines.append(
+            f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene"
+        )
         scene = "edited.scene"
     else:
         lines.append(f"materialist render {scene} -o out.png")

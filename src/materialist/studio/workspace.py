@@ -141,7 +141,9 @@ class WorkFolder:
                 with writing(folder), suppress(FileExistsError):  # another studio was faster
                     folder.mkdir()
                     break
-        project = Project(folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE)
+        project = Project(
+            folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE
+        )
         place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
         content = {"title": project.title, "owner": project.owner, "scene": place}
         with writing(folder):
@@ -151,8 +153,13 @@ class WorkFolder:
     def sweep(self) -> None:
         """Remove what lies idle: folders of photos that were not taken apart to the end, uploads, and results."""
         for place in {*self.cache.iterdir()} - self.kept:
-            with suppress(OSError):  # it goes by itself meanwhile; path-traced pictures go with their page
-                if time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds and place.name[:6] != "final-":
+            with suppress(
+                OSError
+            ):  # it goes by itself meanwhile; path-traced pictures go with their page
+                if (
+                    time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds
+                    and place.name[:6] != "final-"
+                ):
                     shutil.rmtree(place) if place.is_dir() else place.unlink()
         for project in self.projects():
             idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
@@ -205,7 +212,9 @@ def _read(folder: Path) -> Project | None:
     """The project in a folder, or None where its card is missing or damaged."""
     try:
         card = json.loads((folder / CARD).read_text("utf-8"))
-        return Project(folder, str(card["title"]), str(card["owner"]), (folder / card["scene"]).resolve())
+        return Project(
+            folder, str(card["title"]), str(card["owner"]), (folder / card["scene"]).resolve()
+        )
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
@@ -239,7 +248,9 @@ def located(workspace: Path, steps: Iterable[Step]) -> tuple[Step, ...]:
 
     def here(option: str, name: str) -> str:
         if not (workspace / name).is_file():
-            raise InputError(f"The {option} {name} of the list of edits is not here; load the zip that has its files.")
+            raise InputError(
+                f"The {option} {name} of the list of edits is not here; load the zip that has its files."
+            )
         return name
 
     return tuple(replace(with_plain_files(step, here), folder=workspace) for step in steps)
@@ -248,7 +259,9 @@ def located(workspace: Path, steps: Iterable[Step]) -> tuple[Step, ...]:
 def with_plain_files(step: Step, use: Callable[[str, str], Any]) -> Step:
     """`with_files`, where every file is named without a folder. Raises InputError for other names."""
     if step.options.get("inpaint", "sd") != "sd":
-        raise InputError("The studio takes no inpainter but 'sd'; change the inpaint of the list of edits.")
+        raise InputError(
+            "The studio takes no inpainter but 'sd'; change the inpaint of the list of edits."
+        )
 
     def plain(option: str, value: Any) -> str:
         if not isinstance(value, str) or not re.fullmatch(r"[\w-]{1,60}\.\w{1,5}", value):

@@ -17,9 +17,15 @@ from materialist.train.task import Batch, Recipe
 from materialist.types import Array, Prediction
 
 RECIPE = Recipe(
-    side=256, batch=8, rate=1e-3, warm_up=300, last_rate=0.02, ema=0.999, bfloat16=True,
+    side=256,
+    batch=8,
+    rate=1e-3,
+    warm_up=300,
+    last_rate=0.02,
+    ema=0.999,
+    bfloat16=True,
     growth=((0.3, 128), (0.75, 192)),
-)  # fmt: skip
+)
 ARCHITECTURE = BundledArchitecture(encoder="lite2", light=16, spread=True)
 
 
@@ -58,9 +64,14 @@ class BundledTask(MapsTask):
     )
 
     def __init__(
-        self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
+        self,
+        source: Source,
+        recipe: Recipe = RECIPE,
+        *,
+        init: Path | None = None,
+        score_samples: int = 12,
         architecture: BundledArchitecture = ARCHITECTURE,
-    ):  # fmt: skip
+    ):
         super().__init__(source, recipe, init=init, score_samples=score_samples)
         self.architecture = architecture
 
@@ -78,13 +89,17 @@ class BundledTask(MapsTask):
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Losses of all maps; see `BundledLoss`."""
         image = batch["image"].contiguous(memory_format=torch.channels_last)
-        out, mask, w = network(image, batch["rays"]), batch["mask"], BundledLoss()
-        albedo, depth = srgb(batch["albedo"]), relative_log_depth(batch["depth"], mask)
+        out = network(image, batch["rays"])
+        mask = batch["mask"]
+        w = BundledLoss()
+        albedo = srgb(batch["albedo"])
+        depth = relative_log_depth(batch["depth"], mask)
 
         def gradient(name: str, true: Tensor | None = None) -> Tensor:
             return losses.gradient(out[name], batch[name] if true is None else true, mask)
 
-        roughness, metallic = batch["roughness"], batch["metallic"]
+        roughness = batch["roughness"]
+        metallic = batch["metallic"]
         level = (out["depth"] - depth).abs().clamp(max=2)
         terms = {}
         if "spread" in out:
@@ -97,7 +112,8 @@ class BundledTask(MapsTask):
         return terms | {
             "albedo": w.albedo_l1 * losses.l1(out["albedo"], albedo, mask)
             + w.albedo_l2 * losses.l2(out["albedo"], albedo, mask),
-            "albedo_scaled": w.albedo_scaled * losses.scaled_l1(out["albedo"] ** 2.2, albedo**2.2, mask),
+            "albedo_scaled": w.albedo_scaled
+            * losses.scaled_l1(out["albedo"] ** 2.2, albedo**2.2, mask),
             "albedo_gradient": w.albedo_gradient * gradient("albedo", albedo),
             "roughness": w.roughness_l1 * losses.l1(out["roughness"], roughness, mask)
             + w.roughness_l2 * losses.l2(out["roughness"], roughness, mask)
@@ -116,7 +132,9 @@ class BundledTask(MapsTask):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         assert isinstance(network, BundledNetwork)
         with torch.inference_mode():
-            return infer(network, sample.image, sample.rays, device=next(network.parameters()).device)
+            return infer(
+                network, sample.image, sample.rays, device=next(network.parameters()).device
+            )
 
 
 def relative_log_depth(depth: Tensor, mask: Tensor) -> Tensor:

@@ -32,7 +32,9 @@ def save(folder: Path, state: dict[str, Any]) -> None:
         raise OutputError(f"The checkpoint cannot be written to {folder}: {error}.") from error
 
 
-def load(folder: Path, kind: str, *, resume: bool = True, device: Any = "cpu") -> dict[str, Any] | None:
+def load(
+    folder: Path, kind: str, *, resume: bool = True, device: Any = "cpu"
+) -> dict[str, Any] | None:
     """The state in FOLDER/checkpoint.pt to go on from; None where FOLDER holds no run.
 
     Raises OutputError when it holds one and `resume` is off, WeightsError when that is damaged, InputError when it is
@@ -42,15 +44,23 @@ def load(folder: Path, kind: str, *, resume: bool = True, device: Any = "cpu") -
     if not path.is_file():
         return None
     if not resume:
-        raise OutputError(f"{folder} holds a run already; add --resume to go on with it, or choose another folder.")
+        raise OutputError(
+            f"{folder} holds a run already; add --resume to go on with it, or choose another folder."
+        )
     try:
         state = torch.load(path, map_location=device, weights_only=True)
     except Exception as error:  # torch raises whatever its unpickler or zip reader raises
-        raise WeightsError(f"{path} is damaged ({reason(error)}); start the run anew in another folder.") from error
+        raise WeightsError(
+            f"{path} is damaged ({reason(error)}); start the run anew in another folder."
+        ) from error
     if not isinstance(state, dict) or state.get("version") != VERSION:
-        raise WeightsError(f"{path} is no checkpoint of this version; start the run anew in another folder.")
+        raise WeightsError(
+            f"{path} is no checkpoint of this version; start the run anew in another folder."
+        )
     if state["kind"] != kind:
-        raise InputError(f"{folder} holds a run of `train {state['kind']}`, not of `train {kind}`; choose another.")
+        raise InputError(
+            f"{folder} holds a run of `train {state['kind']}`, not of `train {kind}`; choose another."
+        )
     return state
 
 

@@ -43,13 +43,20 @@ class ClickDraw:
     """How clicks and crops are drawn; all tuned by eye."""
 
     fewest_pixels: int = 60  # of a view; smaller things are not clicked on
-    depth_inside: float = 2.5  # pixels from the border of a thing to a click, where the thing is as large
+    depth_inside: float = (
+        2.5  # pixels from the border of a thing to a click, where the thing is as large
+    )
     things: float = 0.85  # share of clicks on things; the others are on walls, floors and the like
     several: float = 0.25  # share of those with clicks that have two or three
     boxed: float = 0.35  # share of examples with a box
-    loose: tuple[float, float] = (-0.03, 0.2)  # what each side of a box is too far out, shorter sides, from and to
+    loose: tuple[float, float] = (
+        -0.03,
+        0.2,
+    )  # what each side of a box is too far out, shorter sides, from and to
     smallest_crop: float = 0.4  # smallest part of a view's side that an example shows
-    worsened: float = 0.5  # share with worse maps: the bundled network knows these pictures better than photos
+    worsened: float = (
+        0.5  # share with worse maps: the bundled network knows these pictures better than photos
+    )
     blur: tuple[float, float] = (0.008, 0.1)  # of worse maps, as a part of the side, from and to
     waves: float = 0.25  # largest amplitude of waves on worse normals and, times its spread, on worse log depth
 
@@ -62,7 +69,9 @@ View = dict[str, Array]
 depth [H, W] float16; thing [H, W] int16, number of what is seen, negative for walls and the like, 0 for nothing."""
 
 
-def produce_views(data: Path, folder: Path, cutouts: Path | None = None, progress: Progress = lambda *_: None) -> None:
+def produce_views(
+    data: Path, folder: Path, cutouts: Path | None = None, progress: Progress = lambda *_: None
+) -> None:
     """Make the views that FOLDER lacks, by the bundled network: one of each picture, PASTED more with cut-outs.
 
     `cutouts` is a folder of things photographed or drawn, with transparency around them; None for none. Raises
@@ -73,35 +82,53 @@ def produce_views(data: Path, folder: Path, cutouts: Path | None = None, progres
     said = identity(data) | {"cutouts": 0}
     pasted: list[Array] = []
     if cutouts is not None:
-        pasted = [found for path in cutout_files(cutouts) if (found := load_cutout(path)) is not None]
+        pasted = [
+            found for path in cutout_files(cutouts) if (found := load_cutout(path)) is not None
+        ]
         if not pasted:
-            raise InputError(f"No picture in {cutouts} has transparency around a thing large enough to learn from.")
+            raise InputError(
+                f"No picture in {cutouts} has transparency around a thing large enough to learn from."
+            )
         said["cutouts"] = len(pasted)
     claim(folder, DESCRIPTION, said, tuple(said))
     predictor = BundledPredictor()
     kinds = 1 + PASTED if pasted else 1
 
     def view(number: int) -> View:
-        path, kind = source.paths[number // kinds], number % kinds
-        arrays, rng = read_arrays(path, "thing", "fov"), np.random.default_rng([int(path.stem), 4, kind])
-        image, thing = read_sample(path).image, arrays["thing"]
+        path = source.paths[number // kinds]
+        kind = number % kinds
+        arrays = read_arrays(path, "thing", "fov")
+        rng = np.random.default_rng([int(path.stem), 4, kind])
+        image = read_sample(path).image
+        thing = arrays["thing"]
         if kind:
             image, thing = paste(image, thing, pasted, rng)
         linear, _ = photographic(image, rng)
         camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
-        found = predictor.predict(Photo(linear, camera, linear, False, "option", path.name, b"", ()))
+        found = predictor.predict(
+            Photo(linear, camera, linear, False, "option", path.name, b"", ())
+        )
         return {
-            "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8), "thing": thing,
-            "normal": np.rint(found.normal * 127).astype(np.int8), "depth": found.depth.astype(np.float16),
-        }  # fmt: skip
+            "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8),
+            "thing": thing,
+            "normal": np.rint(found.normal * 127).astype(np.int8),
+            "depth": found.depth.astype(np.float16),
+        }
 
-    names = [f"{path.stem}{f'-{kind}' if kind else ''}.npz" for path in source.paths for kind in range(kinds)]
+    names = [
+        f"{path.stem}{f'-{kind}' if kind else ''}.npz"
+        for path in source.paths
+        for kind in range(kinds)
+    ]
     complete([folder / name for name in names], view, "views", progress)
 
 
 def load_views(folder: Path) -> list[View]:
     """All views of a folder, in the order of their names. Raises InputError for one that is damaged."""
-    return [read_arrays(path, "rgb", "normal", "depth", "thing") for path in sorted(folder.glob("[0-9]*.npz"))]
+    return [
+        read_arrays(path, "rgb", "normal", "depth", "thing")
+        for path in sorted(folder.glob("[0-9]*.npz"))
+    ]
 
 
 def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, Array] | None:
@@ -111,30 +138,43 @@ def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, 
     """
     height, width = view["thing"].shape
     size = round(min(height, width) * rng.uniform(DRAW.smallest_crop, 1.0))
-    top, left = rng.integers(height - size + 1), rng.integers(width - size + 1)
+    top = rng.integers(height - size + 1)
+    left = rng.integers(width - size + 1)
     part = np.s_[top : top + size, left : left + size]
     smooth = cv2.INTER_AREA if size > side else cv2.INTER_LINEAR
 
     def scaled(name: str, method: int) -> Array:
         values = view[name] if name == "thing" else view[name].astype(np.float32)
-        return np.asarray(cv2.resize(np.ascontiguousarray(values[part]), (side, side), interpolation=method))
+        return np.asarray(
+            cv2.resize(np.ascontiguousarray(values[part]), (side, side), interpolation=method)
+        )
 
-    thing, depth = scaled("thing", cv2.INTER_NEAREST), scaled("depth", cv2.INTER_NEAREST)
-    rgb, normal = scaled("rgb", smooth) / 255, unit(scaled("normal", smooth))
+    thing = scaled("thing", cv2.INTER_NEAREST)
+    depth = scaled("depth", cv2.INTER_NEAREST)
+    rgb = scaled("rgb", smooth) / 255
+    normal = unit(scaled("normal", smooth))
     if rng.random() < 0.5:
-        thing, depth, rgb = thing[:, ::-1], depth[:, ::-1], rgb[:, ::-1]
+        thing = thing[:, ::-1]
+        depth = depth[:, ::-1]
+        rgb = rgb[:, ::-1]
         normal = normal[:, ::-1] * [-1, 1, 1]
     chosen = _chosen(thing, rng)
     if chosen is None:
         return None
     mask = thing == chosen
     count = int(rng.integers(2, 4)) if rng.random() < DRAW.several else 1
-    known, box = mask & (depth > 0), None
-    clicks = [place for _ in range(count) if (place := click_in(known, rng, DRAW.depth_inside)) is not None]
+    known = mask & (depth > 0)
+    box = None
+    clicks = [
+        place
+        for _ in range(count)
+        if (place := click_in(known, rng, DRAW.depth_inside)) is not None
+    ]
     if not clicks:
         return None
     if rng.random() < DRAW.boxed:
-        clicks, box = [], box_around(mask, rng)
+        clicks = []
+        box = box_around(mask, rng)
     if rng.random() < DRAW.worsened:
         normal, depth = worse(normal, depth, rng)
     rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
@@ -146,8 +186,12 @@ def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array,
 
     Pixels without depth keep none.
     """
-    side, known = max(depth.shape), depth > 0
-    blur = lambda v, s: cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), s * side)  # noqa: E731
+    side = max(depth.shape)
+    known = depth > 0
+
+    def blur(v, s):
+        return cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), s * side)
+
     sigma = float(np.exp(rng.uniform(*np.log(DRAW.blur))))
     logarithm = np.log(np.where(known, depth, 1)) * known
     share = np.maximum(blur(known, sigma), 1e-3)
@@ -172,7 +216,8 @@ def click_in(mask: Array, rng: np.random.Generator, inside: float) -> tuple[int,
 def box_around(mask: Array, rng: np.random.Generator) -> Box:
     """A box around a mask [H, W] bool as somebody might draw it, inside the picture."""
     rows, columns = np.nonzero(mask)
-    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
+    low = np.array([columns.min(), rows.min()])
+    high = np.array([columns.max(), rows.max()]) + 1
     off = rng.uniform(*DRAW.loose, (2, 2)) * (high - low).min()
     x0, y0 = np.maximum(np.rint(low - off[0]).astype(int), 0).tolist()
     x1, y1 = np.minimum(np.rint(high + off[1]).astype(int), mask.shape[::-1]).tolist()
@@ -183,7 +228,8 @@ def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
     """The number of something to click on: things rather than walls, large ones somewhat rather than small ones."""
     numbers, count = np.unique(thing[thing != 0], return_counts=True)
     large = count >= DRAW.fewest_pixels
-    numbers, count = numbers[large], count[large]
+    numbers = numbers[large]
+    count = count[large]
     if not len(numbers):
         return None
     weight = np.sqrt(count)
@@ -199,16 +245,21 @@ class ClickTask(Task):
     kind: ClassVar[str] = "clicks"
 
     def __init__(
-        self, views: Path, recipe: Recipe = RECIPE, *, init: Path | None = None,
+        self,
+        views: Path,
+        recipe: Recipe = RECIPE,
+        *,
+        init: Path | None = None,
         architecture: UNetArchitecture | None = None,
-    ):  # fmt: skip
+    ):
         """Views to learn from and weights to begin from. Raises InputError for a folder without views."""
         found = load_views(views)
         if not found:
             raise InputError(f"{views} holds no views to learn from.")
         aside = HELD_OUT if len(found) >= 10 * HELD_OUT else 0
         super().__init__(recipe, init)
-        self.views, self.held_out = found[: len(found) - aside], found[len(found) - aside :]
+        self.views = found[: len(found) - aside]
+        self.held_out = found[len(found) - aside :]
         self.architecture = architecture
 
     def count(self) -> int:
@@ -230,14 +281,21 @@ class ClickTask(Task):
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Mean and median intersection over union of the clicks of examples, on the views kept aside."""
-        network, overlap = copy.deepcopy(network).cpu(), []
+        network = copy.deepcopy(network).cpu()
+        overlap = []
         for number, view in enumerate(self.held_out):
             rng = np.random.default_rng([7, number])
-            for maps, mask in filter(None, (draw_click(view, self.recipe.side, rng) for _ in range(CLICKS))):
+            for maps, mask in filter(
+                None, (draw_click(view, self.recipe.side, rng) for _ in range(CLICKS))
+            ):
                 with torch.inference_mode():
                     found = network(torch.from_numpy(maps)[None])[0].numpy() > 0
                 overlap.append((found & mask).sum() / (found | mask).sum())
-        return {"iou": float(np.mean(overlap)), "iou_median": float(np.median(overlap))} if overlap else {}
+        return (
+            {"iou": float(np.mean(overlap)), "iou_median": float(np.median(overlap))}
+            if overlap
+            else {}
+        )
 
 
 def click_losses(found: Tensor, mask: Tensor) -> dict[str, Tensor]:

@@ -97,12 +97,16 @@ def gradient(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> 
         p, t, m = (x[..., ::step, ::step] for x in (predicted, true, mask))
         difference = p - t
         across = mean((difference[..., 1:] - difference[..., :-1]).abs(), m[..., 1:] * m[..., :-1])
-        down = mean((difference[..., 1:, :] - difference[..., :-1, :]).abs(), m[..., 1:, :] * m[..., :-1, :])
+        down = mean(
+            (difference[..., 1:, :] - difference[..., :-1, :]).abs(), m[..., 1:, :] * m[..., :-1, :]
+        )
         total = total + across + down
     return total / scales
 
 
-def slopes(log_depth: Tensor, rays: Tensor, true_normal: Tensor, mask: Tensor, step: int = 4) -> Tensor:
+def slopes(
+    log_depth: Tensor, rays: Tensor, true_normal: Tensor, mask: Tensor, step: int = 4
+) -> Tensor:
     """1 - cosine between the normals of the depth surface and the true ones: flat walls stay flat in the mesh.
 
     log_depth [B, 1, H, W], rays [B, 2, H, W]. Depth is averaged over step x step cells, and cells on an edge of the
@@ -139,12 +143,20 @@ def light(predicted: Tensor, true: Tensor) -> tuple[Tensor, Tensor]:
     weight = true[:, 3:] * angle
     known = (weight.flatten(1).sum(1) > 0).float()
     under = weight.flatten(1).sum(1).clamp(min=1e-6)
-    log, scale = predicted[:, :3].clamp(-8, 8), predicted[:, 3:].clamp(-4, 3)
+    log = predicted[:, :3].clamp(-8, 8)
+    scale = predicted[:, 3:].clamp(-4, 3)
     error = (log - true[:, :3].clamp(min=DARKEST).log()).abs()
-    likelihood = ((error * (-scale).exp() + scale).mean(1, keepdim=True) * weight).flatten(1).sum(1) / under
-    project = lambda map_: torch.einsum("bchw,hwk->bck", map_ * weight, basis)  # noqa: E731
+    likelihood = ((error * (-scale).exp() + scale).mean(1, keepdim=True) * weight).flatten(1).sum(
+        1
+    ) / under
+
+    def project(map_):
+        return torch.einsum("bchw,hwk->bck", map_ * weight, basis)
+
     aim = project(true[:, :3])
-    relative = (project(log.exp()) - aim).flatten(1).norm(dim=1) / aim.flatten(1).norm(dim=1).clamp(min=1e-6)
+    relative = (project(log.exp()) - aim).flatten(1).norm(dim=1) / aim.flatten(1).norm(dim=1).clamp(
+        min=1e-6
+    )
     irradiance = torch.where(relative < 1, relative, 1 + relative.clamp(min=1).log())
     count = known.sum().clamp(min=1)
     return (likelihood * known).sum() / count, (irradiance * known).sum() / count
@@ -154,4 +166,6 @@ def light(predicted: Tensor, true: Tensor) -> tuple[Tensor, Tensor]:
 def _light_basis(rows: int, device: torch.device) -> tuple[Tensor, Tensor]:
     """Solid angle [1, 1, h, 1] of the texels of a map of that many rows, and their harmonics [h, 2h, 16]."""
     angle = torch.from_numpy(row_solid_angle(rows)).float().view(1, 1, -1, 1)
-    return angle.to(device), torch.from_numpy(sh_basis(texel_directions(rows, 2 * rows), 3)).to(device)
+    return angle.to(device), torch.from_numpy(sh_basis(texel_directions(rows, 2 * rows), 3)).to(
+        device
+    )

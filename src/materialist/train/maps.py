@@ -19,7 +19,8 @@ from materialist.types import Prediction
 HELD_OUT_EVERY = 40
 """Of every so many samples the last one is never trained on, but scored."""
 SHEET_ROWS = 6
-HELD_OUT, TRAINED_ON = "samples kept aside", "samples trained on"
+HELD_OUT = "samples kept aside"
+TRAINED_ON = "samples trained on"
 
 
 class MapsTask(Task):
@@ -27,12 +28,15 @@ class MapsTask(Task):
 
     kind: ClassVar[str] = "matnet"
 
-    def __init__(self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12):
+    def __init__(
+        self, source: Source, recipe: Recipe, *, init: Path | None = None, score_samples: int = 12
+    ):
         """`init`: weights to begin from. `score_samples`: how many held-out samples are scored; 0 for none."""
         if score_samples < 0:
             raise InputError(f"--score-samples is {score_samples}; give 0 or more.")
         super().__init__(recipe, init)
-        self.source, self.score_samples = source, score_samples
+        self.source = source
+        self.score_samples = score_samples
         self._places = trained_on(source)
         self.notes = (*self.notes, *source.notes)
 
@@ -61,7 +65,8 @@ class MapsTask(Task):
         Of a set that is too small to hold any out, samples that it learns from are scored, and `of` says so.
         """
         what, samples = held_out(self.source, self.score_samples)
-        rows, strips = [], []
+        rows = []
+        strips = []
         for k, sample in enumerate(samples):
             photo = as_photo(sample, np.random.default_rng((7, k)))
             predicted = self.predict(network, photo)
@@ -72,14 +77,20 @@ class MapsTask(Task):
         if not samples:
             return {}
         found = summary([row for row in rows if row])
-        shown = {name: value for name, value in found.items() if not name.endswith(("_mse", "_raw", "_scale"))}
+        shown = {
+            name: value
+            for name, value in found.items()
+            if not name.endswith(("_mse", "_raw", "_scale"))
+        }
         return {"of": what, **shown}
 
 
 def trained_on(source: Source) -> list[int]:
     """Places of the samples to train on. Their own numbers say which are held out; none of a set that is too small."""
     count = len(source)
-    return [k for k in range(count) if count < HELD_OUT_EVERY or (source.number(k) + 1) % HELD_OUT_EVERY]
+    return [
+        k for k in range(count) if count < HELD_OUT_EVERY or (source.number(k) + 1) % HELD_OUT_EVERY
+    ]
 
 
 def held_out(source: Source, most: int) -> tuple[str, list[Sample]]:
@@ -88,11 +99,14 @@ def held_out(source: Source, most: int) -> tuple[str, list[Sample]]:
     They come from the source's own validation split where it has one; of a set that is too small to hold any out they
     are the first ones that it learns from. Those that cannot be read are left out.
     """
-    what, validation = HELD_OUT, source.validation()
+    what = HELD_OUT
+    validation = source.validation()
     if validation is not None:
-        source, chosen = validation, list(range(len(validation)))
+        source = validation
+        chosen = list(range(len(validation)))
     elif not (chosen := sorted(set(range(len(source))) - set(trained_on(source)))):
-        what, chosen = TRAINED_ON, list(range(min(len(source), most)))
+        what = TRAINED_ON
+        chosen = list(range(min(len(source), most)))
     found = []
     for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int)):
         with suppress(InputError):

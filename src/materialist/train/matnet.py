@@ -21,7 +21,15 @@ from materialist.train.task import Batch, Recipe
 from materialist.types import Array, Materials, Prediction
 
 RECIPE = Recipe(
-    side=512, batch=8, rate=1e-5, weight_decay=0.01, betas=(0.9, 0.999), warm_up=0, last_rate=1.0, ema=0.0, clip=1e9
+    side=512,
+    batch=8,
+    rate=1e-5,
+    weight_decay=0.01,
+    betas=(0.9, 0.999),
+    warm_up=0,
+    last_rate=1.0,
+    ema=0.0,
+    clip=1e9,
 )
 """Paper, Implementation Details: AdamW, learning rate 1e-5, 512 x 512 crops. Where the paper says nothing (batch,
 decay of weights and of the rate), torch's default or a constant."""
@@ -35,19 +43,27 @@ class PaperTask(MapsTask):
     """MatNet: LPIPS + L1 for albedo, L1 for roughness and metallic, SiLog for depth, cosine for normals."""
 
     def __init__(
-        self, source: Source, recipe: Recipe = RECIPE, *, init: Path | None = None, score_samples: int = 12,
+        self,
+        source: Source,
+        recipe: Recipe = RECIPE,
+        *,
+        init: Path | None = None,
+        score_samples: int = 12,
         size: str | Size = "vitb",
-    ):  # fmt: skip
+    ):
         """`init`: a Depth Anything or DINOv2 checkpoint; it gives what it has, the rest starts at random."""
-        self.size, self.lpips = size, backbone("vgg")
+        self.size = size
+        self.lpips = backbone("vgg")
         start = (
-            "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)." if init is None
+            "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)."
+            if init is None
             else f"MatNet starts from {init}."
-        )  # fmt: skip
+        )
         perceptual = (
-            "Albedo: L1 and LPIPS (VGG)." if self.lpips is not None
+            "Albedo: L1 and LPIPS (VGG)."
+            if self.lpips is not None
             else "Albedo: L1 and gradients at four scales in place of LPIPS, which is not installed."
-        )  # fmt: skip
+        )
         self.notes = (perceptual, start)
         super().__init__(source, recipe, init=init, score_samples=score_samples)
 
@@ -67,26 +83,40 @@ class PaperTask(MapsTask):
     def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
         """The paper's augmentation and no other: a random vertical flip and a random side x side crop; [C, H, W]."""
         sample = self.read(index)
-        maps = {name: torch.from_numpy(np.atleast_3d(getattr(sample, name))).permute(2, 0, 1) for name in MAPS}
+        maps = {
+            name: torch.from_numpy(np.atleast_3d(getattr(sample, name))).permute(2, 0, 1)
+            for name in MAPS
+        }
         if (factor := side / min(sample.depth.shape)) > 1:
             maps = enlarged(maps, [max(side, round(edge * factor)) for edge in sample.depth.shape])
         height, width = maps["depth"].shape[1:]
-        top, left = int(rng.integers(0, height - side + 1)), int(rng.integers(0, width - side + 1))
-        maps = {name: values[:, top : top + side, left : left + side] for name, values in maps.items()}
+        top = int(rng.integers(0, height - side + 1))
+        left = int(rng.integers(0, width - side + 1))
+        maps = {
+            name: values[:, top : top + side, left : left + side] for name, values in maps.items()
+        }
         if rng.random() < 0.5:
             maps = {name: values.flip(1) for name, values in maps.items()}
             maps["normal"][1] *= -1
-        return {name: values.numpy() for name, values in (maps | {"image": maps["image"].clamp(0, 1)}).items()}
+        return {
+            name: values.numpy()
+            for name, values in (maps | {"image": maps["image"].clamp(0, 1)}).items()
+        }
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
-        image, mask = batch["image"], batch["mask"]
+        image = batch["image"]
+        mask = batch["mask"]
         height, width = image.shape[-2:]
         size = _patches(height), _patches(width)
         out = network(F.interpolate(image, size, mode="bicubic", align_corners=False).clamp(min=0))
-        out = {k: F.interpolate(v, (height, width), mode="bilinear", align_corners=False) for k, v in out.items()}
+        out = {
+            k: F.interpolate(v, (height, width), mode="bilinear", align_corners=False)
+            for k, v in out.items()
+        }
         albedo = batch["albedo"]
         return {
-            "albedo": losses.l1(out["albedo"], albedo, mask) + self._perceptual(out["albedo"], albedo, mask),
+            "albedo": losses.l1(out["albedo"], albedo, mask)
+            + self._perceptual(out["albedo"], albedo, mask),
             "roughness": losses.l1(out["roughness"], batch["roughness"], mask),
             "metallic": losses.l1(out["metallic"], batch["metallic"], mask),
             "normal": losses.cosine(out["normal"], batch["normal"], mask),
@@ -95,7 +125,8 @@ class PaperTask(MapsTask):
 
     def _perceptual(self, found: Tensor, true: Tensor, mask: Tensor) -> Tensor:
         """LPIPS of sRGB-encoded albedo [B, 3, H, W], the truth where the mask is 0; or gradients in its place."""
-        found, true = srgb(found), srgb(true)
+        found = srgb(found)
+        true = srgb(true)
         if self.lpips is None:
             return losses.gradient(found, true, mask)
         kept = torch.where(mask > 0, found, true)
@@ -104,9 +135,15 @@ class PaperTask(MapsTask):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
         assert isinstance(network, MatNet)
-        maps = infer(network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape)))
-        materials = Materials(**{name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")})
-        return Prediction(materials, unit(maps["normal"]), np.maximum(maps["depth"], losses.SILOG_RANGE[0]))
+        maps = infer(
+            network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape))
+        )
+        materials = Materials(
+            **{name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
+        )
+        return Prediction(
+            materials, unit(maps["normal"]), np.maximum(maps["depth"], losses.SILOG_RANGE[0])
+        )
 
 
 def enlarged(maps: dict[str, Tensor], size: list[int]) -> dict[str, Tensor]:
@@ -114,11 +151,19 @@ def enlarged(maps: dict[str, Tensor], size: list[int]) -> dict[str, Tensor]:
 
     Albedo, roughness and metallic are means over what has a surface: the sky has none to mix in.
     """
-    smooth = lambda values: F.interpolate(values[None], size, mode="bilinear")[0]  # noqa: E731
-    nearest = lambda values: F.interpolate(values[None], size, mode="nearest-exact")[0]  # noqa: E731
-    mask, share = maps["mask"], smooth(maps["mask"]).clamp(min=1e-6)
+
+    def smooth(values):
+        return F.interpolate(values[None], size, mode="bilinear")[0]
+
+    def nearest(values):
+        return F.interpolate(values[None], size, mode="nearest-exact")[0]
+
+    mask = maps["mask"]
+    share = smooth(maps["mask"]).clamp(min=1e-6)
     found = {name: nearest(maps[name]) for name in ("normal", "depth", "mask")}
-    found |= {name: smooth(maps[name] * mask) / share for name in ("albedo", "roughness", "metallic")}
+    found |= {
+        name: smooth(maps[name] * mask) / share for name in ("albedo", "roughness", "metallic")
+    }
     return found | {"image": smooth(maps["image"])}
 
 
@@ -140,13 +185,19 @@ def load_start(network: MatNet, path: Path) -> list[str]:
     if "cls_token" in found:
         found = {f"pretrained.{name}": tensor for name, tensor in found.items()}
     state = network.state_dict()
-    start = {name: tensor for name, tensor in found.items() if name in state and tensor.shape == state[name].shape}
+    start = {
+        name: tensor
+        for name, tensor in found.items()
+        if name in state and tensor.shape == state[name].shape
+    }
     for name in [n for n in start if n.startswith("depth_head.")]:
         twin = name.replace("depth_head.", "material_head.", 1)
         if twin in state and state[twin].shape == start[name].shape:
             start[twin] = start[name]
     if not any(name.startswith("pretrained.") for name in start):
-        raise WeightsError(f"{path} has no encoder that fits MatNet; give a Depth Anything or DINOv2 ViT-B/14 file.")
+        raise WeightsError(
+            f"{path} has no encoder that fits MatNet; give a Depth Anything or DINOv2 ViT-B/14 file."
+        )
     state |= {name: tensor.to(torch.float32) for name, tensor in start.items()}
     network.load_state_dict(state)
     return sorted(start)

@@ -38,7 +38,10 @@ def stored(sample: Sample) -> dict[str, Array]:
     """
     light = np.zeros((LIGHT_ROWS, 2 * LIGHT_ROWS, 4)) if sample.light is None else sample.light
     shading = np.full_like(sample.image, np.nan) if sample.shading is None else sample.shading
-    arrays = {name: getattr(sample, name) for name in _PLANES} | {"light": light, "shading": shading}
+    arrays = {name: getattr(sample, name) for name in _PLANES} | {
+        "light": light,
+        "shading": shading,
+    }
     arrays = {name: np.moveaxis(a, -1, 0) if a.ndim == 3 else a[None] for name, a in arrays.items()}
     width = sample.depth.shape[1]
     arrays["reach"] = -sample.rays[0, 0, 0] * width / (width - 1)
@@ -49,20 +52,28 @@ def varied(batch: Batch, side: int, s: AugmentSettings, random: torch.Generator)
     """A batch of `stored` samples cropped, recoloured and developed: maps and rays [B, C, side, side], and light."""
     maps = cropped({name: values.float() for name, values in batch.items()}, side, s, random)
     maps |= recolour(maps, s, random)
-    image, light = maps["image"], maps["light"]
-    exposure = torch.exp2(torch.randn(len(image), 1, 1, 1, generator=random, device=image.device) * s.exposure)
+    image = maps["image"]
+    light = maps["light"]
+    exposure = torch.exp2(
+        torch.randn(len(image), 1, 1, 1, generator=random, device=image.device) * s.exposure
+    )
     maps["image"], gains = developed(image * exposure, random)
     maps["light"] = torch.cat([light[:, :3] * (exposure * gains), light[:, 3:]], 1)
     del maps["shading"]
     return maps
 
 
-def cropped(maps: dict[str, Tensor], side: int, s: AugmentSettings, random: torch.Generator) -> dict[str, Tensor]:
+def cropped(
+    maps: dict[str, Tensor], side: int, s: AugmentSettings, random: torch.Generator
+) -> dict[str, Tensor]:
     """Random squares of the pictures, half of them mirrored, as side x side pixels, with rays in place of `reach`."""
     (batch, _, height, width), device = maps["depth"].shape, maps["depth"].device
     u = torch.rand(5, batch, generator=random, device=device)
-    size = torch.where(u[0] < s.whole, 1.0, s.least_crop + (1 - s.least_crop) * u[4]) * min(height, width)
-    left, top = u[1] * (width - size), u[2] * (height - size)
+    size = torch.where(u[0] < s.whole, 1.0, s.least_crop + (1 - s.least_crop) * u[4]) * min(
+        height, width
+    )
+    left = u[1] * (width - size)
+    top = u[2] * (height - size)
     mirror = torch.where(u[3] < 0.5, -1.0, 1.0)
     none = torch.zeros_like(mirror)
     across = torch.stack([mirror * size / width, none, (2 * left + size) / width - 1], -1)
@@ -83,27 +94,42 @@ def cropped(maps: dict[str, Tensor], side: int, s: AugmentSettings, random: torc
     out = {name: sampled(maps[name], side, "nearest") for name in ("normal", "depth", "mask")}
     out |= {"image": image, "shading": shading}
     out |= {"albedo": albedo / share, "roughness": roughness / share, "metallic": metallic / share}
-    turn = torch.stack([mirror, torch.ones_like(mirror), torch.ones_like(mirror)], 1).view(-1, 3, 1, 1)
+    turn = torch.stack([mirror, torch.ones_like(mirror), torch.ones_like(mirror)], 1).view(
+        -1, 3, 1, 1
+    )
     normal = out["normal"] / out["normal"].norm(dim=1, keepdim=True).clamp(min=1)
     out["normal"] = normal * turn * out["mask"]
     out["depth"] = out["depth"] * out["mask"]
-    centres = F.affine_grid(place, [batch, 1, side, side], align_corners=False) * maps["reach"].view(-1, 1, 1, 1)
-    out["rays"] = torch.stack([centres[..., 0] * mirror.view(-1, 1, 1), -centres[..., 1] * height / width], 1)
+    centres = F.affine_grid(place, [batch, 1, side, side], align_corners=False) * maps[
+        "reach"
+    ].view(-1, 1, 1, 1)
+    out["rays"] = torch.stack(
+        [centres[..., 0] * mirror.view(-1, 1, 1), -centres[..., 1] * height / width], 1
+    )
     out["light"] = torch.where(mirror.view(-1, 1, 1, 1) < 0, maps["light"].flip(-1), maps["light"])
     return out
 
 
-def recolour(maps: dict[str, Tensor], s: AugmentSettings, random: torch.Generator) -> dict[str, Tensor]:
+def recolour(
+    maps: dict[str, Tensor], s: AugmentSettings, random: torch.Generator
+) -> dict[str, Tensor]:
     """Image and albedo of surfaces of other colours under the same light: image = albedo (1 - metallic) shading + rest.
 
     Pixels are grouped by the likeness of their albedo, and every group is multiplied by one random colour or brought to
     a random one. Metals keep theirs, since it also colours their reflections, which the rest holds.
     """
-    albedo, mask = maps["albedo"], maps["mask"]
+    albedo = maps["albedo"]
+    mask = maps["mask"]
     batch, _, height, width = albedo.shape
-    device, k = albedo.device, s.groups
-    rand = lambda *shape: torch.rand(*shape, generator=random, device=device)  # noqa: E731
-    normal = lambda *shape: torch.randn(*shape, generator=random, device=device)  # noqa: E731
+    device = albedo.device
+    k = s.groups
+
+    def rand(*shape):
+        return torch.rand(*shape, generator=random, device=device)
+
+    def normal(*shape):
+        return torch.randn(*shape, generator=random, device=device)
+
     even = albedo.clamp(min=0).sqrt().flatten(2)  # equal steps look about equally large
     place = (rand(batch, k) * (height * width)).long().clamp(max=height * width - 1)
     centre = even.gather(2, place[:, None].expand(-1, 3, -1))  # [B, 3, k]
@@ -117,7 +143,11 @@ def recolour(maps: dict[str, Tensor], s: AugmentSettings, random: torch.Generato
     hue = -rand(batch, 3, k).clamp(min=1e-6).log()
     hue = 3 * hue / hue.sum(1, keepdim=True)
     # A colour of its own: any brightness, mostly muted, as paint and cloth are. 1 - u^(1/2.5) is beta(1, 2.5).
-    own = (0.03 + 0.87 * rand(batch, 1, k)) * (1 + (hue - 1) * (1 - rand(batch, 1, k) ** (1 / 2.5))) / mean
+    own = (
+        (0.03 + 0.87 * rand(batch, 1, k))
+        * (1 + (hue - 1) * (1 - rand(batch, 1, k) ** (1 / 2.5)))
+        / mean
+    )
     tint = torch.exp(normal(batch, 1, k) * 0.3 + normal(batch, 3, k) * 0.15)
     gain = torch.where(rand(batch, 1, k) < 0.5, own, tint)
     bright = ((mean + 2 * spread) * gain).amax(1, keepdim=True)
@@ -128,5 +158,7 @@ def recolour(maps: dict[str, Tensor], s: AugmentSettings, random: torch.Generato
     factor = gain.gather(2, group[:, None].expand(-1, 3, -1)).view_as(albedo)
     dielectric = mask * (1 - maps["metallic"])
     new = (albedo * (1 + (factor - 1) * dielectric)).clamp(max=1)
-    image = (maps["image"] + (new - albedo) * dielectric * maps["shading"].nan_to_num()).clamp(min=0)
+    image = (maps["image"] + (new - albedo) * dielectric * maps["shading"].nan_to_num()).clamp(
+        min=0
+    )
     return {"image": image, "albedo": new}

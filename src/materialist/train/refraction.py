@@ -38,13 +38,22 @@ class RefractionTask(Task):
 
     kind: ClassVar[str] = "refraction"
 
-    def __init__(self, views: Path, held_out: Path | None, recipe: Recipe = RECIPE, *, init: Path | None = None):
+    def __init__(
+        self,
+        views: Path,
+        held_out: Path | None,
+        recipe: Recipe = RECIPE,
+        *,
+        init: Path | None = None,
+    ):
         """Views to learn from, views that are only scored, and weights to begin from.
 
         Raises InputError for a folder without views, or pictures larger than SIDE.
         """
         if recipe.side > SIDE:
-            raise InputError(f"The size of training pictures is {recipe.side}; views have {SIDE} pixels.")
+            raise InputError(
+                f"The size of training pictures is {recipe.side}; views have {SIDE} pixels."
+            )
         super().__init__(recipe, init)
         self.views = load(views)
         self.held_out = None if held_out is None else load(held_out)
@@ -58,17 +67,28 @@ class RefractionTask(Task):
 
     def vary(self, batch: Batch, side: int, random: torch.Generator) -> Batch:
         """The views at side x side pixels, half of them mirrored, all in other colours."""
-        maps, target = batch["maps"].float(), batch["target"].float()
+        maps = batch["maps"].float()
+        target = batch["target"].float()
         if side < SIDE:
-            maps, target = smaller(maps, maps[:, MASK, None], side), smaller(target, (target[:, :1] > 0).float(), side)
-        rand = lambda *shape: torch.rand(*shape, generator=random, device=maps.device)  # noqa: E731
+            maps = smaller(maps, maps[:, MASK, None], side)
+            target = smaller(target, (target[:, :1] > 0).float(), side)
+
+        def rand(*shape):
+            return torch.rand(*shape, generator=random, device=maps.device)
+
         turned = rand(len(maps), 1, 1, 1) < 0.5
-        maps, target = mirrored(maps, NORMAL_X, turned), mirrored(target, BACK_X, turned)
-        order, gain = rand(len(maps), 3).argsort(1)[..., None, None], 0.7 + 0.5 * rand(len(maps), 3, 1, 1)
+        maps = mirrored(maps, NORMAL_X, turned)
+        target = mirrored(target, BACK_X, turned)
+        order = rand(len(maps), 3).argsort(1)[..., None, None]
+        gain = 0.7 + 0.5 * rand(len(maps), 3, 1, 1)
         inside = maps[:, MASK, None]
         colours = (maps[:, :3] + 0.5 * inside).take_along_dim(order, 1)
         colours = ((colours * gain).clamp(0, 1) - 0.5) * inside
-        return {"maps": torch.cat([colours, maps[:, 3:]], 1), "target": target, "hollow": batch["hollow"].float()}
+        return {
+            "maps": torch.cat([colours, maps[:, 3:]], 1),
+            "target": target,
+            "hollow": batch["hollow"].float(),
+        }
 
     def make(self) -> RefractionNet:
         """RefractionNet, which begins as the symmetry prior."""
@@ -76,12 +96,16 @@ class RefractionTask(Task):
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Errors of lengths and of their logarithms, and of the normals of the back; see `ThicknessLoss`."""
-        found, target, weight = network(batch["maps"]).float(), batch["target"], ThicknessLoss()
+        found = network(batch["maps"]).float()
+        target = batch["target"]
+        weight = ThicknessLoss()
         inside = batch["maps"][:, MASK] * (target[:, 0] > 0)
         count = inside.sum((1, 2)).clamp(min=1)
         terms = {}
         for k, (name, share) in enumerate((("solid", 1.0), ("hollow", weight.hollow))):
-            a, b, soft = found[:, k], target[:, k], weight.soft[k]
+            a = found[:, k]
+            b = target[:, k]
+            soft = weight.soft[k]
             mean = (b * inside).sum((1, 2)) / count
             length = ((a - b).abs() * inside).sum((1, 2)) / count / (mean + 2 * soft)
             ratio = ((a + soft).log() - (b + soft).log()).abs()
@@ -97,7 +121,11 @@ class RefractionTask(Task):
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Errors on the views kept aside; see `procedural.thickness.errors`."""
-        return {} if self.held_out is None else mean_errors(copy.deepcopy(network).cpu(), self.held_out)
+        return (
+            {}
+            if self.held_out is None
+            else mean_errors(copy.deepcopy(network).cpu(), self.held_out)
+        )
 
 
 def smaller(values: Tensor, known: Tensor, side: int) -> Tensor:

@@ -41,17 +41,26 @@ class TrainingSchedule:
         self.first_step = self.step = 0
         self._first_seconds = self._earlier = 0.0
         if state is not None:
-            self.step, self._earlier = state["step"], state["seconds"]
-            unfinished = (state["steps"], state["minutes"]) == (budget.steps, budget.minutes) and not state["done"]
+            self.step = state["step"]
+            self._earlier = state["seconds"]
+            unfinished = (state["steps"], state["minutes"]) == (
+                budget.steps,
+                budget.minutes,
+            ) and not state["done"]
             self.first_step = state["first_step"] if unfinished else self.step
             self._first_seconds = state["first_seconds"] if unfinished else self._earlier
         self._start = time.monotonic()
 
     def as_dict(self) -> dict[str, Any]:
         return {
-            "step": self.step, "seconds": self.seconds, "steps": self.budget.steps, "minutes": self.budget.minutes,
-            "first_step": self.first_step, "first_seconds": self._first_seconds, "done": self.done,
-        }  # fmt: skip
+            "step": self.step,
+            "seconds": self.seconds,
+            "steps": self.budget.steps,
+            "minutes": self.budget.minutes,
+            "first_step": self.first_step,
+            "first_seconds": self._first_seconds,
+            "done": self.done,
+        }
 
     @property
     def seconds(self) -> float:
@@ -85,7 +94,8 @@ def stop_requests() -> Iterator[list[int]]:
 
     Outside of the main thread nothing is noted.
     """
-    found, before = list[int](), dict[int, Any]()
+    found = list[int]()
+    before = dict[int, Any]()
 
     def restore() -> None:
         while before:
@@ -97,7 +107,9 @@ def stop_requests() -> Iterator[list[int]]:
         restore()
 
     if threading.current_thread() is threading.main_thread():
-        before.update({number: signal.signal(number, note) for number in (signal.SIGTERM, signal.SIGINT)})
+        before.update(
+            {number: signal.signal(number, note) for number in (signal.SIGTERM, signal.SIGINT)}
+        )
     try:
         yield found
     finally:

@@ -26,8 +26,16 @@ Key = tuple[int, tuple[int, ...]]
 
 
 def epoch(
-    task: Task, *, number: int, side: int, batch: int, seed: int, skip: int = 0, workers: int = 0, device: Any = "cpu",
-) -> Generator[Batch, None, None]:  # fmt: skip
+    task: Task,
+    *,
+    number: int,
+    side: int,
+    batch: int,
+    seed: int,
+    skip: int = 0,
+    workers: int = 0,
+    device: Any = "cpu",
+) -> Generator[Batch, None, None]:
     """Batches of one pass over all examples in a random order, on the device, without the first `skip` of them.
 
     Order and variants depend on (seed, number) alone, for any number of workers. A small set is repeated so that a
@@ -42,9 +50,14 @@ def epoch(
     random = torch.Generator(device)
     rest: Any = keys[skip * batch :]
     loader: DataLoader[Any] = DataLoader(
-        rest, batch_size=batch, num_workers=workers, prefetch_factor=2 if workers else None,
-        collate_fn=partial(_drawn, task, side), worker_init_fn=_init_worker, pin_memory=random.device.type == "cuda",
-    )  # fmt: skip
+        rest,
+        batch_size=batch,
+        num_workers=workers,
+        prefetch_factor=2 if workers else None,
+        collate_fn=partial(_drawn, task, side),
+        worker_init_fn=_init_worker,
+        pin_memory=random.device.type == "cuda",
+    )
     batches = iter(loader)
     try:
         for k, found in enumerate(batches, skip):
@@ -52,7 +65,9 @@ def epoch(
                 raise InputError(found)
             random.manual_seed(int(np.random.SeedSequence((seed, number, k)).generate_state(1)[0]))
             with torch.no_grad():
-                varied = task.vary({n: t.to(device, non_blocking=True) for n, t in found.items()}, side, random)
+                varied = task.vary(
+                    {n: t.to(device, non_blocking=True) for n, t in found.items()}, side, random
+                )
             yield varied
     finally:
         del batches  # ends the workers

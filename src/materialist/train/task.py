@@ -37,7 +37,9 @@ class Recipe:
     weight_decay: float = 0.02  # of weights, not of biases and gains; tuned by eye
     betas: tuple[float, float] = (0.9, 0.98)  # of AdamW; tuned by eye
     warm_up: int = 100  # steps in which the rate rises to its peak; tuned by eye
-    last_rate: float = 0.01  # rate at the end of the cosine, as a part of the peak; 1 keeps it constant
+    last_rate: float = (
+        0.01  # rate at the end of the cosine, as a part of the peak; 1 keeps it constant
+    )
     ema: float = 0.998  # decay a step of the averaged weights; 0 averages nothing; tuned by eye
     clip: float = 1.0  # largest norm of the gradient; tuned by eye
     bfloat16: bool = False  # whether convolutions and products run in bfloat16
@@ -47,7 +49,9 @@ class Recipe:
     def __post_init__(self) -> None:
         for side in (self.side, *(size for _, size in self.growth)):
             if side < MULTIPLE or side % MULTIPLE:
-                raise InputError(f"The size of training pictures is {side}; give a multiple of {MULTIPLE}.")
+                raise InputError(
+                    f"The size of training pictures is {side}; give a multiple of {MULTIPLE}."
+                )
         if self.batch < 1:
             raise InputError(f"The batch is {self.batch}; give at least 1.")
         if not 0 < self.rate < 1:
@@ -75,7 +79,8 @@ class Task(ABC):
 
     def __init__(self, recipe: Recipe, init: Path | None = None):
         """`init`: weights to begin from."""
-        self.recipe, self.init = recipe, init
+        self.recipe = recipe
+        self.init = init
 
     @abstractmethod
     def count(self) -> int:

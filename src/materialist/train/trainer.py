@@ -46,15 +46,26 @@ class Trainer:
     """Whether Ctrl-C ended it."""
 
     def __init__(
-        self, task: Task, folder: Path, *, budget: Budget, options: RunOptions | None = None, device: str = "cpu",
-        resume: bool = False, note: Note = lambda _: None,
-    ):  # fmt: skip
+        self,
+        task: Task,
+        folder: Path,
+        *,
+        budget: Budget,
+        options: RunOptions | None = None,
+        device: str = "cpu",
+        resume: bool = False,
+        note: Note = lambda _: None,
+    ):
         """Start or resume a run.
 
         Raises OutputError when FOLDER holds a run and `resume` is off, InputError when that run is of another network.
         """
-        self.task, self.recipe, self.folder, self.note = task, task.recipe, folder, note
-        self.options, self.device = options or RunOptions(), torch.device(device)
+        self.task = task
+        self.recipe = task.recipe
+        self.folder = folder
+        self.note = note
+        self.options = options or RunOptions()
+        self.device = torch.device(device)
         state = checkpoint.load(folder, task.kind, resume=resume, device=self.device)
         torch.manual_seed(self.options.seed)
         torch.backends.cudnn.benchmark = self.device.type == "cuda"
@@ -66,11 +77,17 @@ class Trainer:
         decayed = [p for p in self._learnt if p.ndim > 1]
         others = [p for p in self._learnt if p.ndim <= 1]
         self.optimizer = torch.optim.AdamW(
-            [{"params": decayed, "weight_decay": self.recipe.weight_decay}, {"params": others, "weight_decay": 0.0}],
-            lr=self.recipe.rate, betas=self.recipe.betas, fused=True,
-        )  # fmt: skip
+            [
+                {"params": decayed, "weight_decay": self.recipe.weight_decay},
+                {"params": others, "weight_decay": 0.0},
+            ],
+            lr=self.recipe.rate,
+            betas=self.recipe.betas,
+            fused=True,
+        )
         self.schedule = TrainingSchedule(budget, state and state["schedule"])
-        self.epoch, self.batch = 1, 0
+        self.epoch = 1
+        self.batch = 0
         self.last_scores: dict[str, Any] = {}
         if state is not None:
             self._restore(state)
@@ -94,7 +111,8 @@ class Trainer:
 
     def _train(self, stop: list[int], progress: Progress) -> None:
         losses: dict[str, float] = {}
-        count, since = 0, time.monotonic()
+        count = 0
+        since = time.monotonic()
         saved = time.monotonic()
         for batch in self._batches():
             for name, value in self._step(batch).items():
@@ -103,7 +121,9 @@ class Trainer:
             done = self.schedule.done or bool(stop)
             if self.schedule.step % self.options.report_steps == 0 or done:
                 self._report(losses, count, time.monotonic() - since, progress)
-                losses, count, since = {}, 0, time.monotonic()
+                losses = {}
+                count = 0
+                since = time.monotonic()
             if done:
                 break
             if time.monotonic() - saved > self.options.checkpoint_seconds:
@@ -116,27 +136,43 @@ class Trainer:
     def save(self) -> None:
         schedule = self.schedule.as_dict()
         facts = {
-            "step": schedule["step"], "minutes": round(schedule["seconds"] / 60, 1),
-            "examples": schedule["step"] * self.recipe.batch, "recipe": asdict(self.recipe),
-            "data": self.task.data(), "scores": self.last_scores,
-        }  # fmt: skip
+            "step": schedule["step"],
+            "minutes": round(schedule["seconds"] / 60, 1),
+            "examples": schedule["step"] * self.recipe.batch,
+            "recipe": asdict(self.recipe),
+            "data": self.task.data(),
+            "scores": self.last_scores,
+        }
         self.averaged.save(self.folder / checkpoint.WEIGHTS, facts)
         state = {
-            "kind": self.task.kind, "architecture": self.network.architecture.as_dict(),
-            "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
-            "optimizer": self.optimizer.state_dict(), "schedule": schedule, "epoch": self.epoch, "batch": self.batch,
-            "random": torch.get_rng_state(), "scores": self.last_scores,
-        }  # fmt: skip
+            "kind": self.task.kind,
+            "architecture": self.network.architecture.as_dict(),
+            "network": self.network.state_dict(),
+            "averaged": self.averaged.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "schedule": schedule,
+            "epoch": self.epoch,
+            "batch": self.batch,
+            "random": torch.get_rng_state(),
+            "scores": self.last_scores,
+        }
         checkpoint.save(self.folder, state)
 
     def score(self) -> dict[str, Any]:
         """Score the averaged weights; writes a line of scores.jsonl."""
         found = self.task.scores(self.averaged, self.folder)
         self.last_scores = {name: _rounded(value) for name, value in found.items()}
-        line = {"step": self.schedule.step, "seconds": round(self.schedule.seconds, 1), **self.last_scores}
+        line = {
+            "step": self.schedule.step,
+            "seconds": round(self.schedule.seconds, 1),
+            **self.last_scores,
+        }
         if found:
             checkpoint.append_line(self.folder / checkpoint.SCORES, line)
-        self.note(f"step {self.schedule.step}  " + "  ".join(f"{k} {v}" for k, v in self.last_scores.items()))
+        self.note(
+            f"step {self.schedule.step}  "
+            + "  ".join(f"{k} {v}" for k, v in self.last_scores.items())
+        )
         return found
 
     def _batches(self) -> Iterator[Batch]:
@@ -144,16 +180,23 @@ class Trainer:
         while True:
             side = self.recipe.side_at(self.schedule.progress)
             batches = stream.epoch(
-                self.task, number=self.epoch, side=side, batch=self.recipe.batch, seed=self.options.seed,
-                skip=self.batch, workers=self.options.workers, device=self.device,
-            )  # fmt: skip
+                self.task,
+                number=self.epoch,
+                side=side,
+                batch=self.recipe.batch,
+                seed=self.options.seed,
+                skip=self.batch,
+                workers=self.options.workers,
+                device=self.device,
+            )
             for batch in batches:
                 self.batch += 1
                 yield batch
                 if self.recipe.side_at(self.schedule.progress) != side:
                     break
             else:
-                self.epoch, self.batch = self.epoch + 1, 0
+                self.epoch = self.epoch + 1
+                self.batch = 0
             batches.close()
 
     def _step(self, batch: Batch) -> dict[str, float]:
@@ -177,28 +220,46 @@ class Trainer:
     @torch.no_grad()
     def _average(self) -> None:
         """Move the averaged weights; early on they follow faster, so that they forget the random start."""
-        decay = min(self.recipe.ema, (1 + self.schedule.step) / (10 + self.schedule.step)) if self.recipe.ema else 0.0
+        decay = (
+            min(self.recipe.ema, (1 + self.schedule.step) / (10 + self.schedule.step))
+            if self.recipe.ema
+            else 0.0
+        )
         torch._foreach_lerp_(self._averages, self._learnt, 1 - decay)  # type: ignore[arg-type]
         for mine, theirs in zip(self.averaged.buffers(), self.network.buffers(), strict=True):
             mine.copy_(theirs)
 
-    def _report(self, losses: dict[str, float], count: int, seconds: float, progress: Progress) -> None:
-        line: dict[str, Any] = {"step": self.schedule.step, "seconds": self.schedule.seconds, "epoch": self.epoch}
+    def _report(
+        self, losses: dict[str, float], count: int, seconds: float, progress: Progress
+    ) -> None:
+        line: dict[str, Any] = {
+            "step": self.schedule.step,
+            "seconds": self.schedule.seconds,
+            "epoch": self.epoch,
+        }
         line |= {"rate": self.optimizer.param_groups[0]["lr"]}
         line |= {"per_second": count * self.recipe.batch / max(seconds, 1e-6)}
         line |= {name: value / count for name, value in losses.items()}
-        checkpoint.append_line(self.folder / checkpoint.CURVE, {k: _rounded(v) for k, v in line.items()})
+        checkpoint.append_line(
+            self.folder / checkpoint.CURVE, {k: _rounded(v) for k, v in line.items()}
+        )
         progress("train", round(1000 * self.schedule.progress), 1000)
 
     def _restore(self, state: dict[str, Any]) -> None:
         if state["architecture"] != self.network.architecture.as_dict():
-            raise InputError(f"{self.folder} holds a run of another network; resume it with the options it began with.")
+            raise InputError(
+                f"{self.folder} holds a run of another network; resume it with the options it began with."
+            )
         self.network.load_state_dict(state["network"])
         self.averaged.load_state_dict(state["averaged"])
         self.optimizer.load_state_dict(state["optimizer"])
         torch.set_rng_state(state["random"].cpu())
-        self.epoch, self.batch, self.last_scores = state["epoch"], state["batch"], state["scores"]
-        self.note(f"Resumed at step {self.schedule.step}, after {self.schedule.seconds / 60:.0f} minutes.")
+        self.epoch = state["epoch"]
+        self.batch = state["batch"]
+        self.last_scores = state["scores"]
+        self.note(
+            f"Resumed at step {self.schedule.step}, after {self.schedule.seconds / 60:.0f} minutes."
+        )
 
 
 def _rounded(value: Any) -> Any:

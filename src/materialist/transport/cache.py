@@ -77,33 +77,49 @@ class TransportCache:
     """
 
     def __init__(
-        self, geometry: Geometry, camera: Camera, settings: CacheSettings | None = None, *,
-        roughness: Array | None = None, seed: int = 0, progress=None,
-    ):  # fmt: skip
-        self.camera, self.mesh, self.seed = camera, geometry.mesh, seed
+        self,
+        geometry: Geometry,
+        camera: Camera,
+        settings: CacheSettings | None = None,
+        *,
+        roughness: Array | None = None,
+        seed: int = 0,
+        progress=None,
+    ):
+        self.camera = camera
+        self.mesh = geometry.mesh
+        self.seed = seed
         self.settings = s = settings or CacheSettings()
         self.scene = build_scene(geometry.mesh)
         continued = geometry.mesh.face_plane >= 0
         slots = geometry.mesh.face_pixel.astype(np.uint32)
-        slots[continued] = camera.width * camera.height + np.arange(continued.sum(), dtype=np.uint32)
+        slots[continued] = camera.width * camera.height + np.arange(
+            continued.sum(), dtype=np.uint32
+        )
         self.slots = integers(mi, slots)
         """[F] radiance slot of every face: its pixel, or one of its own on a continued plane."""
         self._primary()
-        counts, self.roughness = s.level_share, [np.array([r], np.float32) for r in ROUGHNESS_LEVELS]
+        counts = s.level_share
+        self.roughness = [np.array([r], np.float32) for r in ROUGHNESS_LEVELS]
         """Of each level of the specular lobe, [1], or [P] of the pixels."""
         if roughness is not None:
             own = np.clip(roughness.reshape(-1)[self.pixels], ROUGHNESS_LEVELS[0], 1)
-            counts, self.roughness = (1.0,), [own.astype(np.float32)]
+            counts = (1.0,)
+            self.roughness = [own.astype(np.float32)]
         specular = (max(1, round(share * s.specular_samples)) for share in counts)
         alphas = (floats(mi, alpha_of(r)) for r in self.roughness)
-        self.lobes = [(s.diffuse_samples, dr.opaque(mi.Float, 1.0)), *zip(specular, alphas, strict=True)]
+        self.lobes = [
+            (s.diffuse_samples, dr.opaque(mi.Float, 1.0)),
+            *zip(specular, alphas, strict=True),
+        ]
         """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each level."""
         self._hits: list[mi.UInt32] = []
         self._progress = progress
 
     def _primary(self) -> None:
         cam = self.camera
-        index, columns = dr.arange(mi.UInt32, cam.width * cam.height), dr.opaque(mi.UInt32, cam.width)
+        index = dr.arange(mi.UInt32, cam.width * cam.height)
+        columns = dr.opaque(mi.UInt32, cam.width)
         # Numbers of one photo are data: as literals they would have the kernel compiled anew.
         middle, centre = (dr.opaque(mi.Float, (side - 1) / 2) for side in (cam.width, cam.height))
         across = mi.Float(index % columns) - middle + _OFF_DIAGONAL[0]
@@ -114,24 +130,45 @@ class TransportCache:
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
         take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
-        normal, view = take(si.sh_frame.n), -take(d)
-        self.position, self.geometric_normal = take(si.p), take(si.n)
+        normal = take(si.sh_frame.n)
+        view = -take(d)
+        self.position = take(si.p)
+        self.geometric_normal = take(si.n)
         self.normal = _towards(normal, view)
         self.face = face_towards(self.geometric_normal, self.normal)
         self.frame = mi.Frame3f(self.normal)
         self.wo = self.frame.to_local(view)
         shift = pixel_shift(cam.height, cam.width, self.seed).reshape(-1, 2)[self.pixels]
         self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
-        dr.eval(self.position, self.geometric_normal, self.face, self.normal, self.frame, self.wo, self.shift)
+        dr.eval(
+            self.position,
+            self.geometric_normal,
+            self.face,
+            self.normal,
+            self.frame,
+            self.wo,
+            self.shift,
+        )
 
     def _trace(self, count: int, alpha: mi.Float, diffuse: bool) -> mi.UInt32:
         """[count * P] radiance slots that a lobe's rays meet, sample-major."""
         width = len(self.pixels)
         hits = dr.empty(mi.UInt32, count * width)
         _trace_loop(
-            self.scene, self.slots, hits, dr.arange(mi.UInt32, width), self.position, self.geometric_normal,
-            self.face, self.frame, self.wo, self.shift, dr.opaque(mi.UInt32, count), alpha, diffuse,
-        )  # fmt: skip
+            self.scene,
+            self.slots,
+            hits,
+            dr.arange(mi.UInt32, width),
+            self.position,
+            self.geometric_normal,
+            self.face,
+            self.frame,
+            self.wo,
+            self.shift,
+            dr.opaque(mi.UInt32, count),
+            alpha,
+            diffuse,
+        )
         dr.eval(hits)
         return hits
 
@@ -173,9 +210,19 @@ class TransportCache:
             level = pyramid.level(4 * np.pi * alpha * alpha / count)
             dr.make_opaque(level)
             sums = _gather_loop(
-                hits, slots, pyramid, level, dr.arange(mi.UInt32, width), self.face, self.frame, self.wo, self.shift,
-                dr.opaque(mi.UInt32, count), alpha, diffuse=k == 0,
-            )  # fmt: skip
+                hits,
+                slots,
+                pyramid,
+                level,
+                dr.arange(mi.UInt32, width),
+                self.face,
+                self.frame,
+                self.wo,
+                self.shift,
+                dr.opaque(mi.UInt32, count),
+                alpha,
+                diffuse=k == 0,
+            )
             dr.eval(*sums)
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
         return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous())
@@ -222,7 +269,19 @@ def _drawn(diffuse: bool, wo, alpha, sample):
 
 @dr.syntax
 def _trace_loop(
-    scene, slots, hits, lane, position, geometric_normal, face, frame, wo, shift, count, alpha, diffuse: bool
+    scene,
+    slots,
+    hits,
+    lane,
+    position,
+    geometric_normal,
+    face,
+    frame,
+    wo,
+    shift,
+    count,
+    alpha,
+    diffuse: bool,
 ):
     i = dr.zeros(mi.UInt32, dr.width(lane))
     width = dr.opaque(mi.UInt32, dr.width(lane))
@@ -249,19 +308,24 @@ def _added(sums, diffuse: bool, wi, wo, h, alpha, light):
     if diffuse:
         terms = [c * light for c in diffuse_coefficients(wi.z, wo.z, dr.dot(h, wi))]
     else:
-        fresnel, weighted = schlick(dr.dot(h, wo)), light * smith_g1(wi.z, alpha)
+        fresnel = schlick(dr.dot(h, wo))
+        weighted = light * smith_g1(wi.z, alpha)
         terms = [(1 - fresnel) * weighted, fresnel * weighted]
     return [total + term for total, term in zip(sums, terms, strict=True)]
 
 
 @dr.syntax
-def _gather_loop(hits, slots, env, level, lane, face, frame, wo, shift, count, alpha, diffuse: bool):
+def _gather_loop(
+    hits, slots, env, level, lane, face, frame, wo, shift, count, alpha, diffuse: bool
+):
     width = dr.opaque(mi.UInt32, dr.width(lane))
     i = dr.zeros(mi.UInt32, dr.width(lane))
     sums = [mi.Color3f(0)] * (3 if diffuse else 2)
     while i < count:
         wi, h = _drawn(diffuse, wo, alpha, point(i, count, shift))
-        light = _incoming(hits, slots, env, level, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0)
+        light = _incoming(
+            hits, slots, env, level, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0
+        )
         sums = _added(sums, diffuse, wi, wo, h, alpha, light)
         i += 1
     return sums

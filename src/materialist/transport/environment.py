@@ -19,7 +19,9 @@ class EnvmapPyramid:
         maps = [np.asarray(envmap, np.float32)]
         while maps[-1].shape[0] % 2 == 0 and maps[-1].shape[0] > 8:
             maps.append(halve(maps[-1]))
-        self.heights, self.widths = (integers(mi, np.array([m.shape[k] for m in maps])) for k in (0, 1))
+        self.heights, self.widths = (
+            integers(mi, np.array([m.shape[k] for m in maps])) for k in (0, 1)
+        )
         sizes = [m.shape[0] * m.shape[1] for m in maps]
         self.starts = integers(mi, np.cumsum([0, *sizes[:-1]]))
         self.data = floats(mi, np.concatenate([m.reshape(-1, 3) for m in maps]))
@@ -40,11 +42,16 @@ class EnvmapPyramid:
         x = u * mi.Float(width) - 0.5
         y = dr.clip(v * mi.Float(height) - 0.5, 0, mi.Float(height) - 1)
         x = dr.select(x < 0, x + mi.Float(width), x)
-        x0, y0 = dr.minimum(mi.UInt32(x), width - 1), mi.UInt32(y)
-        fx, fy = x - mi.Float(x0), y - mi.Float(y0)
+        x0 = dr.minimum(mi.UInt32(x), width - 1)
+        y0 = mi.UInt32(y)
+        fx = x - mi.Float(x0)
+        fy = y - mi.Float(y0)
         x1 = dr.select(x0 + 1 == width, 0, x0 + 1)
         y1 = dr.minimum(y0 + 1, height - 1)
-        texel = lambda yy, xx: dr.gather(mi.Color3f, self.data, start + yy * width + xx, active)  # noqa: E731
+
+        def texel(yy, xx):
+            return dr.gather(mi.Color3f, self.data, start + yy * width + xx, active)
+
         top = dr.lerp(texel(y0, x0), texel(y0, x1), fx)
         bottom = dr.lerp(texel(y1, x0), texel(y1, x1), fx)
         return dr.lerp(top, bottom, fy)

@@ -39,19 +39,28 @@ class Guide:
 
     def alike(self, dy: int, dx: int) -> Array:
         """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
-        normal, position = _shifted(self.normal, dy, dx), _shifted(self.position, dy, dx)
+        normal = _shifted(self.normal, dy, dx)
+        position = _shifted(self.position, dy, dx)
         cosine = np.clip((self.normal * normal).sum(-1), 0, 1)
-        away = (self.normal * (position - self.position)).sum(-1) / (self.scale * np.sqrt(1 + dy * dy + dx * dx))
+        away = (self.normal * (position - self.position)).sum(-1) / (
+            self.scale * np.sqrt(1 + dy * dy + dx * dx)
+        )
         return cosine**_SHARPNESS * np.exp(-0.5 * away * away)
 
     @cached_property
     def mean(self) -> csr_array:
         """[H W, H W]: times values of all pixels, their means over the 5 x 5 neighbours on the same surface."""
         h, w = self.scale.shape
-        taps = [(dy, dx, wy * wx) for dy, wy in enumerate(_TAPS, -2) for dx, wx in enumerate(_TAPS, -2)]
-        weight = np.stack([share * self.alike(dy, dx).ravel() for dy, dx, share in taps], -1).astype(np.float32)
+        taps = [
+            (dy, dx, wy * wx) for dy, wy in enumerate(_TAPS, -2) for dx, wx in enumerate(_TAPS, -2)
+        ]
+        weight = np.stack(
+            [share * self.alike(dy, dx).ravel() for dy, dx, share in taps], -1
+        ).astype(np.float32)
         weight /= np.maximum(weight.sum(-1, keepdims=True), 1e-6)
-        column = np.arange(h * w, dtype=np.int32)[:, None] + np.array([dy * w + dx for dy, dx, _ in taps], np.int32)
+        column = np.arange(h * w, dtype=np.int32)[:, None] + np.array(
+            [dy * w + dx for dy, dx, _ in taps], np.int32
+        )
         some = weight > _LEAST
         rows = np.concatenate([[0], some.sum(-1).cumsum()]).astype(np.int32)
         return csr_array((weight[some], column[some], rows), shape=(h * w, h * w))

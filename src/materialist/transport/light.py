@@ -73,9 +73,14 @@ class _Product(torch.autograd.Function):
 
 
 def light_matrix(
-    cache: TransportCache, materials: Materials, rows: Array, height: int, *, sphere_samples: int = 1024,
+    cache: TransportCache,
+    materials: Materials,
+    rows: Array,
+    height: int,
+    *,
+    sphere_samples: int = 1024,
     specular_samples: int = 64,
-) -> LightMatrix:  # fmt: skip
+) -> LightMatrix:
     """Trace the transport matrix of the surface pixels `cache.pixels[rows]` for envmaps of `height` rows.
 
     sphere_samples: rays of a pixel through the texels of the whole sphere, equally many through each and at least
@@ -85,14 +90,17 @@ def light_matrix(
     pixels = cache.pixels[rows]
     maps = materials.roughness, materials.metallic, materials.albedo
     rough, metallic, albedo = (values.reshape(-1, *values.shape[2:])[pixels] for values in maps)
-    shape, per_texel = (height, 2 * height), max(1, round(sphere_samples / (2 * height * height)))
+    shape = (height, 2 * height)
+    per_texel = max(1, round(sphere_samples / (2 * height * height)))
     scene: Any = cache.scene
     parts = torch.zeros(2, len(rows), height * 2 * height)
     hits = []
     for some in LobeRays(cache, rows, rough, metallic, shape, per_texel, specular_samples).parts():
         pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
         slots_met = dr.gather(mi.UInt32, cache.slots, pi.prim_index, pi.is_valid())
-        slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] uint32 radiance slot that each ray meets
+        slot = np.array(
+            dr.select(pi.is_valid(), slots_met, MISS)
+        )  # [N] uint32 radiance slot that each ray meets
         index, share = texels_around(np.array(some.ray.d).T, shape)
         leaves = slot == MISS
         for part, weight in zip(parts, some.weights, strict=True):
@@ -100,12 +108,18 @@ def light_matrix(
         hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
     row, slots, hit_weight = (placed(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
-        torch.from_numpy(pixels.astype(np.int64)), shape, placed(parts), torch.stack([row, slots.long()]), hit_weight,
+        torch.from_numpy(pixels.astype(np.int64)),
+        shape,
+        placed(parts),
+        torch.stack([row, slots.long()]),
+        hit_weight,
         placed(albedo.astype(np.float32)),
-    )  # fmt: skip
+    )
 
 
-def add_footprints(out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array) -> None:
+def add_footprints(
+    out: torch.Tensor, index: Array, share: Array, weight: Array, row: Array
+) -> None:
     """Add rays [N] to their rows [N] of out [rows, texels]: their weight [N] to the texels index by share [N, 4]."""
     flat = row[:, None] * out.shape[-1] + index
     values = (share * weight[:, None]).astype(np.float32)

@@ -13,7 +13,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from materialist.bsdf.disney import base_reflectance, diffuse_coefficients, half_vector_density, quadratic, schlick
+from materialist.bsdf.disney import (
+    base_reflectance,
+    diffuse_coefficients,
+    half_vector_density,
+    quadratic,
+    schlick,
+)
 from materialist.bsdf.ggx import alpha_of, smith_g1
 from materialist.bsdf.lobes import half_vector, lifted, visible_normal
 from materialist.buffers import floats, integers
@@ -45,18 +51,30 @@ class LobeRays:
     """
 
     def __init__(
-        self, cache: TransportCache, rows: Array, rough: Array, metallic: Array, shape: tuple[int, int],
-        per_texel: int, specular: int,
-    ):  # fmt: skip
-        self.cache, self.shape, self.per_texel, self.specular = cache, shape, per_texel, specular
+        self,
+        cache: TransportCache,
+        rows: Array,
+        rough: Array,
+        metallic: Array,
+        shape: tuple[int, int],
+        per_texel: int,
+        specular: int,
+    ):
+        self.cache = cache
+        self.shape = shape
+        self.per_texel = per_texel
+        self.specular = specular
         self._rows = integers(mi, rows)
-        self._rough, self._metallic = floats(mi, rough), floats(mi, metallic)
+        self._rough = floats(mi, rough)
+        self._metallic = floats(mi, metallic)
         self._alpha = floats(mi, alpha_of(rough))
 
     def parts(self) -> Iterator[Rays]:
         """All rays, some rows at a time."""
         total = dr.width(self._rows)
-        at_once = max(1, LANES // max(self.shape[0] * self.shape[1] * self.per_texel, self.specular))
+        at_once = max(
+            1, LANES // max(self.shape[0] * self.shape[1] * self.per_texel, self.specular)
+        )
         for first in range(0, total, at_once):
             rows = dr.opaque(mi.UInt32, first), min(at_once, total - first)
             yield self._through_texels(*rows)
@@ -67,20 +85,29 @@ class LobeRays:
         """A ray of every row through some place of every part of every texel; uniform in solid angle there."""
         lane = dr.arange(mi.UInt32, count * self.shape[0] * self.shape[1] * self.per_texel)
         normal = self._take(self.cache.normal, first + lane % count)
-        lane = mi.UInt32(dr.compress(dr.dot(self._texel(lane // count, first + lane % count), normal) > 0))
+        lane = mi.UInt32(
+            dr.compress(dr.dot(self._texel(lane // count, first + lane % count), normal) > 0)
+        )
         row = first + lane % count
         world = self._texel(lane // count, row)
         wi = mi.Frame3f(self._take(self.cache.normal, row)).to_local(world)
         wo = self._take(self.cache.wo, row)
-        rough, cos_d = dr.gather(mi.Float, self._rough, row), half_vector(wi, wo)[2]
-        diffuse = quadratic(diffuse_coefficients(wi.z, wo.z, cos_d), rough) * wi.z * dr.inv_pi / self._density(world)
+        rough = dr.gather(mi.Float, self._rough, row)
+        cos_d = half_vector(wi, wo)[2]
+        diffuse = (
+            quadratic(diffuse_coefficients(wi.z, wo.z, cos_d), rough)
+            * wi.z
+            * dr.inv_pi
+            / self._density(world)
+        )
         return self._rays(world, row, diffuse, self._reflected(world, wi, wo, row))
 
     def _along_normals(self, first: Any, count: int) -> Rays:
         """`specular` rays of every row, mirrored at its visible normals."""
         lane = dr.arange(mi.UInt32, count * self.specular)
         row = first + lane % count
-        wo, shift = self._take(self.cache.wo, row), self._take(self.cache.shift, row)
+        wo = self._take(self.cache.wo, row)
+        shift = self._take(self.cache.shift, row)
         sample = point(lane // count, dr.opaque(mi.UInt32, self.specular), shift)
         wi = mi.reflect(wo, visible_normal(wo, dr.gather(mi.Float, self._alpha, row), sample))
         world = mi.Frame3f(self._take(self.cache.normal, row)).to_world(wi)
@@ -89,12 +116,17 @@ class LobeRays:
 
     def _texel(self, number: Any, row: Any) -> Any:
         """The direction of each lane through a part of a texel, counted by `number`."""
-        texel, part = number // self.per_texel, number % self.per_texel
+        texel = number // self.per_texel
+        part = number % self.per_texel
         height, width = self.shape
         shift = self._take(self.cache.shift, row)
         # UInt32 as a fraction of 2^32, and its place in the point set
-        u, v = (mi.Float(number * step >> 8) * 2.0**-24 + s for step, s in zip(STEPS, (shift.x, shift.y), strict=True))
-        u, v = u - dr.floor(u), (mi.Float(part) + v - dr.floor(v)) / self.per_texel
+        u, v = (
+            mi.Float(number * step >> 8) * 2.0**-24 + s
+            for step, s in zip(STEPS, (shift.x, shift.y), strict=True)
+        )
+        u = u - dr.floor(u)
+        v = (mi.Float(part) + v - dr.floor(v)) / self.per_texel
         above, below = (dr.cos(mi.Float(texel // width + k) * (dr.pi / height)) for k in (0, 1))
         y = dr.lerp(above, below, u)
         azimuth = ((mi.Float(texel % width) + v) / width - 0.5) * dr.two_pi
@@ -120,13 +152,16 @@ class LobeRays:
 
     def _rays(self, world: Any, row: Any, diffuse: Any, specular: tuple[Any, Any]) -> Rays:
         """A (1 - M) diffuse + C_0 base + grazing, with C_0 = R_0 (1 - M) + M A, as A times something and the rest."""
-        cache, m = self.cache, dr.gather(mi.Float, self._metallic, row)
+        cache = self.cache
+        m = dr.gather(mi.Float, self._metallic, row)
         base, grazing = specular
         weights = m * base + (1 - m) * diffuse, base_reflectance(0, m) * base + grazing
         origin = self._take(cache.position, row), self._take(cache.geometric_normal, row)
         ray = spawn(*origin, lifted(world, self._take(cache.face, row)))
         dr.eval(ray, row, *weights)
-        return Rays(ray, np.array(row).astype(np.int64), (np.array(weights[0]), np.array(weights[1])))
+        return Rays(
+            ray, np.array(row).astype(np.int64), (np.array(weights[0]), np.array(weights[1]))
+        )
 
     def _take(self, values: Any, row: Any) -> Any:
         return dr.gather(type(values), values, dr.gather(mi.UInt32, self._rows, row))

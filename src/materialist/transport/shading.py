@@ -6,13 +6,16 @@ from materialist.bsdf.disney import combine, quadratic
 from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
 
 
-def shade(tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor) -> torch.Tensor:
+def shade(
+    tables: Tables, albedo: torch.Tensor, roughness: torch.Tensor, metallic: torch.Tensor
+) -> torch.Tensor:
     """[P, 3] outgoing linear radiance by the paper's simplified Disney BRDF (Preliminary), with gradients.
 
     A (1 - M) (D0 + D1 R + D2 R^2) + C0 S0(R) + S1(R), with C0 = R_0 (1 - M) + M A.
     tables: light transport at P pixels. albedo: [P, 3] in [0, 1]; roughness: [P] perceptual; metallic: [P].
     """
-    r, m = roughness[:, None], metallic[:, None]
+    r = roughness[:, None]
+    m = metallic[:, None]
     diffuse = quadratic(tables.diffuse.split(3, -1), r)
     return combine(albedo, m, diffuse, *specular_at(tables, roughness).split(3, -1))
 
@@ -30,5 +33,6 @@ def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
     t = ((r - levels[low]) / (levels[low + 1] - levels[low]))[:, None]
     flat = tables.specular.view(-1, 6)
     index = low * len(r) + torch.arange(len(r), device=r.device)
-    s_low, s_high = flat[index], flat[index + len(r)]
+    s_low = flat[index]
+    s_high = flat[index + len(r)]
     return s_low + t * (s_high - s_low)

@@ -55,7 +55,13 @@ def test_objects_under_lamps(photos):
 def test_some_of_the_lamps_and_a_smaller_size(photos):
     views = photos("real_light", lamps=2, size=16)
     assert [real.name for real in views] == ["ball light_00", "ball light_02"]
-    for array in (views[0].photo.linear, views[0].normal, views[0].albedo, views[0].mask, views[0].other.picture):
+    for array in (
+        views[0].photo.linear,
+        views[0].normal,
+        views[0].albedo,
+        views[0].mask,
+        views[0].other.picture,
+    ):
         assert array.shape[:2] == (12, 16)
     assert views[0].photo.camera.width == 16
 
@@ -76,13 +82,19 @@ def test_a_garage_by_its_disparity(photos):
 def test_published_maps_stand_for_the_truth(photos):
     (real,) = photos("official_indoor")
     np.testing.assert_allclose(real.albedo, 0.4, atol=1e-3)
-    assert real.photo.camera.fov == 35 and real.normal.any(-1).all() and real.source == "published maps"
+    assert (
+        real.photo.camera.fov == 35
+        and real.normal.any(-1).all()
+        and real.source == "published maps"
+    )
 
 
 def test_nyu_counts_its_crop(photos):
     (real,) = photos("nyu", size=640)
     known = real.depth > 0
-    assert real.name == "bathroom 00045" and known[45:471, 41:601].all() and known.sum() == 426 * 560
+    assert (
+        real.name == "bathroom 00045" and known[45:471, 41:601].all() and known.sum() == 426 * 560
+    )
     np.testing.assert_allclose(real.depth[known], 2.5, atol=1e-3)
 
 

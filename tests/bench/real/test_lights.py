@@ -18,7 +18,9 @@ def test_a_lamp_shines_from_its_direction(direction):
 def test_a_mirror_ball_gives_back_the_light_around_it():
     """The ball's picture: what it mirrors of a light, seen from far away along -Z."""
     light = (0.5 + 0.5 * texel_directions(64, 128)).astype(np.float32)
-    y, x = np.meshgrid((127.5 - np.arange(256)) / 128, (np.arange(256) - 127.5) / 128, indexing="ij")
+    y, x = np.meshgrid(
+        (127.5 - np.arange(256)) / 128, (np.arange(256) - 127.5) / 128, indexing="ij"
+    )
     z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
     mirrored = np.stack([2 * z * x, 2 * z * y, 2 * z * z - 1], -1)
     ball = environment(mirrored.reshape(-1, 3), light).reshape(256, 256, 3).astype(np.float32)

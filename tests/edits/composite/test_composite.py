@@ -13,7 +13,14 @@ from scipy.ndimage import binary_erosion
 
 from materialist.camera import project
 from materialist.edits.composite import into_photo as into_photo_module
-from materialist.edits.composite.composite import NARROWED, composite, developed, is_deep, pictures, write_composite
+from materialist.edits.composite.composite import (
+    NARROWED,
+    composite,
+    developed,
+    is_deep,
+    pictures,
+    write_composite,
+)
 from materialist.edits.composite.into_photo import SETTINGS, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.native_layer import NativeLayer
@@ -41,7 +48,9 @@ def test_an_edit_that_changes_nothing_gives_the_photo():
     scene = rendered_scene(2)
     same = edit(scene, MASK, roughness="+0")
     np.testing.assert_array_equal(composite(scene, same, spp=6), scene.photo.original)
-    np.testing.assert_array_equal(composite(scene, relight(scene, rotate=0), spp=6), scene.photo.original)
+    np.testing.assert_array_equal(
+        composite(scene, relight(scene, rotate=0), spp=6), scene.photo.original
+    )
 
 
 def test_pixels_out_of_reach_keep_their_bits():
@@ -77,7 +86,9 @@ def test_texture_beyond_the_fit_dims_with_the_surface():
     edited = np.where(MASK[..., None], 0.2, base).astype(np.float32)
     out = into_photo(photo, layers_of(base, edited, MASK))
     factor = (0.2 + SETTINGS.floor) / (0.5 + SETTINGS.floor)
-    np.testing.assert_allclose(out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02)
+    np.testing.assert_allclose(
+        out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02
+    )
     np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
 
 
@@ -85,14 +96,17 @@ def test_the_rim_of_a_glaring_surface_is_mixed_with_white():
     """A hundred times white in a tenth of a pixel would fill it, and the outline would be stairs."""
     small, large = (np.full((n, n, 3), 0.2, np.float32) for n in (24, 96))
     photo = Photo(small, Camera(24, 24, 45.0), large)
-    base, changed = np.full((24, 24, 3), 0.2, np.float32), np.zeros((24, 24), bool)
+    base = np.full((24, 24, 3), 0.2, np.float32)
+    changed = np.zeros((24, 24), bool)
     changed[6:18, 6:18] = True
     edited = np.where(changed[..., None], np.float32(20), base)
     share = matte(changed, photo.original)
     mixed = (share > 0) & (share < 1)
     out = into_photo(photo, layers_of(base, edited, changed))
     assert mixed.any()
-    np.testing.assert_allclose(out[mixed], (0.2 + 0.8 * share[mixed])[:, None] * np.ones(3), atol=0.02)
+    np.testing.assert_allclose(
+        out[mixed], (0.2 + 0.8 * share[mixed])[:, None] * np.ones(3), atol=0.02
+    )
     assert out[48, 48] == pytest.approx(20, rel=1e-3)
 
 
@@ -117,7 +131,9 @@ def test_hdr_stays_hdr():
     np.testing.assert_allclose(out[14:20, 15:21], 0.5 * bright[14:20, 15:21], rtol=0.05)
 
 
-@pytest.mark.parametrize("change", [(0.1, 0.1, 0.1), (-0.1, 0.0, 0.1)], ids=["brightness", "hue alone"])
+@pytest.mark.parametrize(
+    "change", [(0.1, 0.1, 0.1), (-0.1, 0.0, 0.1)], ids=["brightness", "hue alone"]
+)
 def test_noise_alone_is_no_edit_and_a_change_is_one(change):
     quiet = np.random.default_rng(0).normal(0, 0.05, (2, 40, 50, 3))
     assert (significance(*quiet) > 0).mean() < 0.02
@@ -166,7 +182,10 @@ def test_developed_scenes_start_from_the_composite(tmp_path):
 def test_the_plain_rendering_goes_through_a_super_resolution():
     scene = rendered_scene()
     edited = relight(scene, ambient=0.5)
-    double = lambda picture: np.kron(picture, np.ones((2, 2, 1)))  # noqa: E731
+
+    def double(picture):
+        return np.kron(picture, np.ones((2, 2, 1)))
+
     plain = composite(scene, edited, spp=4, full_render=True, denoise=False)
     np.testing.assert_array_equal(plain, EditRenderer(scene).pair(edited)[1](4, 0))
     large = composite(scene, edited, spp=4, full_render=True, denoise=False, upscale=double)
@@ -174,7 +193,10 @@ def test_the_plain_rendering_goes_through_a_super_resolution():
     for options, words in (
         ({"upscale": double}, "full_render"),
         ({"upscale": lambda picture: picture[1:], "full_render": True}, "return a larger picture"),
-        ({"upscale": lambda picture: 1 / 0, "full_render": True}, "upscale failed: ZeroDivisionError"),
+        (
+            {"upscale": lambda picture: 1 / 0, "full_render": True},
+            "upscale failed: ZeroDivisionError",
+        ),
         ({"spp": 1}, "spp is 1"),
     ):
         with pytest.raises(InputError, match=words):
@@ -190,7 +212,9 @@ def test_a_super_resolution_of_a_composite_is_refused_before_anything_is_rendere
 
 def test_a_photo_of_the_working_size_is_searched_once_for_each_side(monkeypatch):
     searched = []
-    monkeypatch.setattr(into_photo_module, "nearest", lambda members: searched.append(1) or nearest(members))
+    monkeypatch.setattr(
+        into_photo_module, "nearest", lambda members: searched.append(1) or nearest(members)
+    )
     texture = np.random.default_rng(1).uniform(0.1, 0.3, (400, 8, 3)).astype(np.float32)
     base, edited = (np.full(texture.shape, v, np.float32) for v in (0.2, 0.4))
     layers = layers_of(base, edited, np.broadcast_to(np.arange(8) < 4, (400, 8)))
@@ -202,16 +226,24 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     """The last pixel of what was replaced lies under the foot of a body, and has none of its kind beside it."""
     photo = rendered_scene(4).photo
     shape = photo.linear.shape[:2]
-    grey = replace(photo, linear=np.full_like(photo.linear, 0.6), original=np.full_like(photo.original, 0.6))
-    changed, inside, everywhere = np.zeros(shape, bool), np.zeros(shape, np.float32), np.ones(shape, bool)
+    grey = replace(
+        photo, linear=np.full_like(photo.linear, 0.6), original=np.full_like(photo.original, 0.6)
+    )
+    changed = np.zeros(shape, bool)
+    inside = np.zeros(shape, np.float32)
+    everywhere = np.ones(shape, bool)
     changed[:21] = True
     inside[10:20, 14:34] = 1
     inside[20, 14:34] = 0.25
     changed[20, :14] = changed[20, 34:] = False
     share = np.kron(inside >= 1, np.ones((4, 4))).astype(np.float32)
     base = np.full_like(grey.linear, 0.6)
-    edited = np.where(inside[..., None] > 0, 5, 0.3).astype(np.float32)  # all in shade, but for the body
-    layers = Layers(base, edited, everywhere, changed, native=NativeLayer(inside, share, 0 * grey.original))
+    edited = np.where(inside[..., None] > 0, 5, 0.3).astype(
+        np.float32
+    )  # all in shade, but for the body
+    layers = Layers(
+        base, edited, everywhere, changed, native=NativeLayer(inside, share, 0 * grey.original)
+    )
     out = into_photo(grey, layers)
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)
 
@@ -232,7 +264,9 @@ def test_a_lone_bright_pixel_is_brought_down_and_a_highlight_stays():
 
 def photo_from(path):
     linear = decode(path).linear
-    return replace(FLAT.photo, linear=linear, original=linear, path=str(path), source=path.read_bytes())
+    return replace(
+        FLAT.photo, linear=linear, original=linear, path=str(path), source=path.read_bytes()
+    )
 
 
 @pytest.mark.parametrize("suffix", ["png", "tiff"])

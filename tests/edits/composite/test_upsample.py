@@ -22,7 +22,8 @@ def test_values_stay_on_their_side_of_an_edge_that_only_the_large_photo_resolves
 
 
 def test_matte_finds_the_share_of_mixed_pixels():
-    front, back = np.array([0.9, 0.4, 0.1]), np.array([0.1, 0.3, 0.6])
+    front = np.array([0.9, 0.4, 0.1])
+    back = np.array([0.1, 0.3, 0.6])
     share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)  # a border six native pixels wide
     encoded = share[:, None] * linear_to_srgb(front) + (1 - share[:, None]) * linear_to_srgb(back)
     large = np.repeat(srgb_to_linear(encoded)[None], 60, 0).astype(np.float32)
@@ -46,7 +47,9 @@ def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
 def test_a_bright_rim_is_no_mixture():
     """The lip of a vase, brighter than vase and wall, is the vase's where the mask says so, and a lit edge behind its
     outline is not."""
-    body, wall, lip = np.array([0.6, 0.25, 0.08]), np.array([0.25, 0.25, 0.25]), np.array([0.95, 0.8, 0.6])
+    body = np.array([0.6, 0.25, 0.08])
+    wall = np.array([0.25, 0.25, 0.25])
+    lip = np.array([0.95, 0.8, 0.6])
     rows = np.arange(80)[:, None, None]
     large = np.where(rows < 32, wall, np.where(rows < 40, lip, body)) + np.zeros((80, 80, 3))
     mask = np.zeros((20, 20), bool)

@@ -39,17 +39,22 @@ def test_a_scene_is_rendered_with_what_was_put_into_it(scenes):
 def test_its_own_maps_guide_the_denoiser(scenes):
     _, with_box = scenes
     pattern = (np.indices(with_box.depth.shape).sum(0) % 2)[..., None] * np.ones(3, np.float32)
-    striped = replace(with_box, materials=replace(with_box.materials, albedo=pattern.astype(np.float32)))
+    striped = replace(
+        with_box, materials=replace(with_box.materials, albedo=pattern.astype(np.float32))
+    )
     albedo, _ = EditRenderer(striped).guides(striped)
     inside = body_coverage(striped) == 1
     assert np.ptp(albedo[inside]) < 0.01 < np.ptp(pattern[inside])
-    np.testing.assert_array_equal(albedo[body_coverage(striped) == 0], pattern[body_coverage(striped) == 0])
+    np.testing.assert_array_equal(
+        albedo[body_coverage(striped) == 0], pattern[body_coverage(striped) == 0]
+    )
 
 
 def test_several_clicks_cost_one_look_at_what_was_put_there(scenes, monkeypatch):
     looks = []
     monkeypatch.setattr(
-        "materialist.edits.select.select.body_coverage", lambda scene: looks.append(1) or np.zeros(scene.depth.shape)
+        "materialist.edits.select.select.body_coverage",
+        lambda scene: looks.append(1) or np.zeros(scene.depth.shape),
     )
     select(scenes[1], click=[(10, 60), (12, 62)])
     assert len(looks) == 1
@@ -70,7 +75,9 @@ def test_what_was_put_there_is_not_edited_as_the_photo(scenes):
 def test_a_pixel_of_the_file_is_told_as_one_of_working_size():
     scene = floor_scene()
     height, width = scene.depth.shape
-    large = replace(scene, photo=replace(scene.photo, original=np.zeros((3 * height, 3 * width, 3), np.float32)))
+    large = replace(
+        scene, photo=replace(scene.photo, original=np.zeros((3 * height, 3 * width, 3), np.float32))
+    )
     with pytest.raises(InputError, match=f"outside the photo.* is {width - 1},4 here"):
         checked_pixel(large, (3 * width - 1, 12))
     with pytest.raises(InputError, match=r"working size\.$"):

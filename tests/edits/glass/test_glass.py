@@ -22,7 +22,11 @@ def test_glass_is_a_body_before_the_continued_wall():
     scene = flat_scene()
     edited = glass(scene, MASK, ior=1.33, tint=(0.9, 1, 0.8), thickness="symmetry")
     (body,) = edited.bodies
-    assert (body.surface.ior, body.surface.transmission, body.surface.tint) == (1.33, 1.0, (0.9, 1.0, 0.8))
+    assert (body.surface.ior, body.surface.transmission, body.surface.tint) == (
+        1.33,
+        1.0,
+        (0.9, 1.0, 0.8),
+    )
     np.testing.assert_allclose(edited.depth[MASK], 3, rtol=1e-3)
     depth = -body.vertices[:, 2]
     assert depth.min() > 1.9 and depth.max() < 3
@@ -38,7 +42,9 @@ def test_under_even_light_clear_glass_is_as_bright_as_the_wall_and_tint_colours_
     even = replace(scene, envmap=np.ones_like(scene.envmap), materials=materials)
     clear = glass(even, MASK, ior=1.5, thickness="symmetry")
     red = glass(even, MASK, ior=1.5, tint=(1, 0.25, 0.25), thickness="symmetry")
-    seen, tinted = (composite(even, edited, spp=64, denoise=False, full_render=True) for edited in (clear, red))
+    seen, tinted = (
+        composite(even, edited, spp=64, denoise=False, full_render=True) for edited in (clear, red)
+    )
     # The wall is 0.8 of a light of 1, and so is what comes by way of any number of refractions and reflections.
     assert 0.7 < seen[INNER].mean() < 1.02
     ratio = (tinted / seen)[INNER].mean(0)
@@ -60,13 +66,19 @@ def test_hollow_glass_has_a_cavity_and_the_papers_model_no_body():
 def test_thickness_is_given_mirrored_or_predicted():
     scene = flat_scene()
     given = object_thickness(scene, MASK, np.full(MASK.shape, 0.5, np.float32))
-    assert given.method == "given" and (given.solid[MASK] == 0.5).all() and (given.solid[~MASK] == 0).all()
+    assert (
+        given.method == "given"
+        and (given.solid[MASK] == 0.5).all()
+        and (given.solid[~MASK] == 0).all()
+    )
     assert object_thickness(scene, MASK, "symmetry").method == "symmetry"
     assert object_thickness(scene, MASK).method in {"revolution", "network", "symmetry"}
     for wrong, message in (
-        (np.ones((3, 3)), "thickness map is"), (-np.ones(MASK.shape), "negative"), (np.zeros(MASK.shape), "0 all over"),
+        (np.ones((3, 3)), "thickness map is"),
+        (-np.ones(MASK.shape), "negative"),
+        (np.zeros(MASK.shape), "0 all over"),
         ("guess", "give a file, or one of"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InputError, match=message):
             object_thickness(scene, MASK, wrong)
 
@@ -81,9 +93,11 @@ def test_masks_at_the_frame_in_parts_and_over_everything():
     (body,) = glass(scene, mask, thickness="symmetry").bodies
     assert np.isfinite(body.vertices).all() and len(body.faces)
     for bad, message in (
-        (np.ones((36, 48), bool), "nothing tells"), (np.zeros((36, 48), bool), "empty"),
-        (np.arange(36)[:, None] + 0 * np.arange(48) < 6, "only sky"), (0.4 * mask, "above one half"),
-    ):  # fmt: skip
+        (np.ones((36, 48), bool), "nothing tells"),
+        (np.zeros((36, 48), bool), "empty"),
+        (np.arange(36)[:, None] + 0 * np.arange(48) < 6, "only sky"),
+        (0.4 * mask, "above one half"),
+    ):
         with pytest.raises(InputError, match=message):
             glass(scene, bad)
 
@@ -104,13 +118,16 @@ def balls(*spheres):
     """(scene, number of the ball [H, W]): balls on a floor before a wall."""
     camera = Camera(96, 72, 45.0)
     floor = plane_depth(camera, (0, 1, 0), -0.6)
-    depth, normal = np.minimum(floor, 5.0), np.where((floor < 5)[..., None], [0.0, 1, 0], [0.0, 0, 1])
+    depth = np.minimum(floor, 5.0)
+    normal = np.where((floor < 5)[..., None], [0.0, 1, 0], [0.0, 0, 1])
     number = np.full(depth.shape, -1)
     for k, sphere in enumerate(spheres):
         front, outward = sphere_depth(camera, *sphere)
         here = front < depth
         depth[here], normal[here], number[here] = front[here], outward[here], k
-    light = (0.4 * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None] * np.ones(3)).astype(np.float32)
+    light = (0.4 * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None] * np.ones(3)).astype(
+        np.float32
+    )
     return scene_of(camera, depth, normal, np.full((*depth.shape, 3), 0.4), photo=light), number
 
 
@@ -145,14 +162,18 @@ def test_the_papers_glass_is_the_same_before_and_after_another_light():
     """Its picture is in the light of the photo, which the light of the scene is not any more."""
     scene = rendered_scene()
     dimmed = replace(scene, envmap=np.roll(0.2 * scene.envmap, 4, 1))
-    one, other = glass(scene, MASK, **PAPER), glass(dimmed, MASK, fitted=scene, **PAPER)
+    one = glass(scene, MASK, **PAPER)
+    other = glass(dimmed, MASK, fitted=scene, **PAPER)
     np.testing.assert_allclose(other.photo.linear, one.photo.linear, atol=1e-6)
 
 
 def test_the_papers_back_is_the_front():
     same, found = (glass(rendered_scene(), MASK, **PAPER, back=back) for back in ("same", "found"))
     assert (same.photo.linear != found.photo.linear).any()
-    assert same.provenance["edits"][-1]["back"] == "same" and found.provenance["edits"][-1]["back"] == "found"
+    assert (
+        same.provenance["edits"][-1]["back"] == "same"
+        and found.provenance["edits"][-1]["back"] == "found"
+    )
 
 
 @pytest.mark.parametrize("place", [(35, 47), np.s_[15, 12:24]])
@@ -171,7 +192,9 @@ def preview():
 def test_inside_a_preview_is_the_final_picture_and_outside_the_photo(preview):
     scene = preview.scene
     quick = preview.picture(ior=1.3, tint=(1, 0.5, 0.5), spp=64)
-    final = composite(scene, glass(scene, MASK, ior=1.3, tint=(1, 0.5, 0.5), thickness="symmetry"), spp=128)
+    final = composite(
+        scene, glass(scene, MASK, ior=1.3, tint=(1, 0.5, 0.5), thickness="symmetry"), spp=128
+    )
     inner = np.zeros_like(MASK)
     inner[14:22, 14:24] = MASK[14:22, 14:24]
     assert np.abs(quick - final)[inner].mean() < 0.1 * final[inner].mean()

@@ -10,10 +10,14 @@ from materialist.edits.insert.formats.limits import MeshLimits
 from materialist.edits.insert.meshes import read_model
 from materialist.errors import InputError
 
-RED, GREEN, BLUE, WHITE = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 255]
+RED = [255, 0, 0]
+GREEN = [0, 255, 0]
+BLUE = [0, 0, 255]
+WHITE = [255, 255, 255]
 PICTURE = [[RED, GREEN], [BLUE, WHITE]]
 LINEAR = {"red": [1, 0, 0], "green": [0, 1, 0], "blue": [0, 0, 1], "white": [1, 1, 1]}
-CLAMP, MIRROR = {"wrapS": 33071, "wrapT": 33071}, {"wrapS": 33648, "wrapT": 33648}
+CLAMP = {"wrapS": 33071, "wrapT": 33071}
+MIRROR = {"wrapS": 33648, "wrapT": 33648}
 MOVED = {"KHR_texture_transform": {"offset": [0.5, 0.5]}}
 
 
@@ -33,7 +37,8 @@ def textured(made, tmp_path, uv, *, sampler=None, name="TEXCOORD_0", accessor=No
 
 
 @pytest.mark.parametrize(
-    ("kind", "top"), [("uint8", 255), ("uint16", 65535), ("int8", 127), ("int16", 32767), ("float32", 1)]
+    ("kind", "top"),
+    [("uint8", 255), ("uint16", 65535), ("int8", 127), ("int16", 32767), ("float32", 1)],
 )
 @pytest.mark.parametrize(("place", "colour"), [((0.75, 0.25), "green"), ((0.25, 0.75), "blue")])
 def test_texture_coordinates_of_every_type(made, tmp_path, kind, top, place, colour):
@@ -68,7 +73,8 @@ def test_a_triangle_across_the_border_of_a_clamped_texture_keeps_its_scale(made,
     albedo = body.surface.albedo
     width = albedo.shape[1]
     row = albedo[int(body.uv[0, 1] * albedo.shape[0])]
-    low, high = body.uv[:, 0].min(), body.uv[:, 0].max()
+    low = body.uv[:, 0].min()
+    high = body.uv[:, 0].max()
     for share, colour in ((0.1, "red"), (0.3, "red"), (0.45, "green"), (0.9, "green")):
         column = int((low + share * (high - low)) * width)
         assert row[column].tolist() == LINEAR[colour], share
@@ -88,7 +94,9 @@ def test_the_set_of_coordinates_that_the_texture_names(made, tmp_path):
     third = made.accessor(np.float32([[0.25, 0.75]] * 4))
     sets = {"TEXCOORD_0": first, "TEXCOORD_1": second, "TEXCOORD_2": third}
     transform = {"KHR_texture_transform": {"texCoord": 2}}
-    for k, (info, colour) in enumerate((({"texCoord": 1}, "white"), ({"extensions": transform}, "blue"))):
+    for k, (info, colour) in enumerate(
+        (({"texCoord": 1}, "white"), ({"extensions": transform}, "blue"))
+    ):
         number = made.tetrahedron(**sets)
         made.tree["meshes"][number]["primitives"][0]["material"] = made.textured(PICTURE, **info)
         made.tree["nodes"][0]["mesh"] = number
@@ -96,7 +104,10 @@ def test_the_set_of_coordinates_that_the_texture_names(made, tmp_path):
     number = made.tetrahedron()
     made.tree["meshes"][number]["primitives"][0]["material"] = 0
     made.tree["nodes"][0]["mesh"] = number
-    assert any("coordinates are missing" in n for n in read_model(made.write(tmp_path / "none.glb")).warnings)
+    assert any(
+        "coordinates are missing" in n
+        for n in read_model(made.write(tmp_path / "none.glb")).warnings
+    )
 
 
 def test_a_roughness_that_lies_otherwise_than_the_colour_is_named(made, tmp_path):
@@ -121,7 +132,9 @@ def test_sparse_numbers(made, tmp_path):
     made.mesh({"POSITION": far}, indices=made.accessor(FACES.ravel()))
     assert size(read_model(made.write(tmp_path / "a.glb"))) == [1, 1, 9]
     alone = made.sparse(4, 3, [1, 2, 3], 2 * np.eye(3))
-    made.tree["nodes"][0]["mesh"] = made.mesh({"POSITION": alone}, indices=made.accessor(FACES.ravel()))
+    made.tree["nodes"][0]["mesh"] = made.mesh(
+        {"POSITION": alone}, indices=made.accessor(FACES.ravel())
+    )
     assert size(read_model(made.write(tmp_path / "b.glb"))) == [2, 2, 2]
 
 
@@ -131,7 +144,9 @@ def test_fans_and_strips_face_one_way(made, tmp_path, mode, square, indexed):
     corners = np.float32([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     order = np.array(square, np.uint16)
     position = made.accessor(corners if indexed else corners[order])
-    made.mesh({"POSITION": position}, mode=mode, **({"indices": made.accessor(order)} if indexed else {}))
+    made.mesh(
+        {"POSITION": position}, mode=mode, **({"indices": made.accessor(order)} if indexed else {})
+    )
     model = read_model(made.write(tmp_path / "a.glb"))
     assert area(model) == pytest.approx(1)
     np.testing.assert_allclose(model.parts[0].normals, [[0, 0, 1]] * 4, atol=1e-6)
@@ -141,7 +156,9 @@ def test_lines_and_points_are_named(made, tmp_path):
     made.tetrahedron()
     for mode in (0, 1, 3):
         made.tree["meshes"][0]["primitives"].append({"attributes": {"POSITION": 0}, "mode": mode})
-    assert read_model(made.write(tmp_path / "a.glb")).warnings == ("a.glb: its points and lines is left out.",)
+    assert read_model(made.write(tmp_path / "a.glb")).warnings == (
+        "a.glb: its points and lines is left out.",
+    )
 
 
 def test_a_skin_stands_where_its_joints_are(made, tmp_path):
@@ -150,7 +167,9 @@ def test_a_skin_stands_where_its_joints_are(made, tmp_path):
     made.tetrahedron(JOINTS_0=joints, WEIGHTS_0=weights)
     inverse = np.tile(np.eye(4, dtype=np.float32), (2, 1, 1))
     inverse[1, 3, :3] = [-7, 0, 0]  # stored by columns: undoes the second joint's place
-    made.tree["skins"] = [{"joints": [1, 2], "inverseBindMatrices": made.accessor(inverse.reshape(2, 16))}]
+    made.tree["skins"] = [
+        {"joints": [1, 2], "inverseBindMatrices": made.accessor(inverse.reshape(2, 16))}
+    ]
     made.tree["nodes"] = [
         {"mesh": 0, "skin": 0, "translation": [100, 0, 0], "scale": [9, 9, 9]},
         {"scale": [1, 3, 1]},
@@ -160,7 +179,9 @@ def test_a_skin_stands_where_its_joints_are(made, tmp_path):
     assert size(read_model(made.write(tmp_path / "a.glb"))) == [1, 4, 1]
 
 
-@pytest.mark.parametrize(("weights", "height"), [({"mesh": [0.5]}, 2.5), ({"node": [1.0], "mesh": [0]}, 4), ({}, 1)])
+@pytest.mark.parametrize(
+    ("weights", "height"), [({"mesh": [0.5]}, 2.5), ({"node": [1.0], "mesh": [0]}, 4), ({}, 1)]
+)
 def test_morph_targets_by_their_weights(made, tmp_path, weights, height):
     made.tetrahedron()
     target = {"POSITION": made.sparse(4, 3, [2], [[0, 3, 0]])}
@@ -177,13 +198,17 @@ def test_instances_stand_where_they_are_put(made, tmp_path):
     half = np.int16(32767 * np.sqrt(0.5))
     places = {
         "TRANSLATION": made.accessor(np.float32([[0, 0, 0], [5, 0, 0]])),
-        "ROTATION": made.accessor(np.array([[0, 0, 0, 32767], [0, 0, half, half]], np.int16), normalized=True),
+        "ROTATION": made.accessor(
+            np.array([[0, 0, 0, 32767], [0, 0, half, half]], np.int16), normalized=True
+        ),
         "SCALE": made.accessor(np.float32([[1, 1, 1], [2, 2, 2]])),
     }
     made.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": places}}
     made.tree["nodes"][0]["scale"] = [1, 1, 4]
     model = read_model(made.write(tmp_path / "a.glb"))
-    assert size(model) == pytest.approx([5, 2, 8], abs=1e-3)  # turned about z, the second reaches from 3 to 5
+    assert size(model) == pytest.approx(
+        [5, 2, 8], abs=1e-3
+    )  # turned about z, the second reaches from 3 to 5
     assert sum(len(part.faces) for part in model.parts) == 8
 
 
@@ -205,7 +230,11 @@ def test_nodes_below_each_other_and_scenes_beside(made, tmp_path):
     half = float(np.sqrt(0.5))
     made.tree["nodes"] = [
         {"children": [1], "scale": [2, 2, 2]},
-        {"mesh": 0, "rotation": [half, 0, 0, half], "matrix": np.diag([3.0, 1, 1, 1]).ravel().tolist()},
+        {
+            "mesh": 0,
+            "rotation": [half, 0, 0, half],
+            "matrix": np.diag([3.0, 1, 1, 1]).ravel().tolist(),
+        },
         {"mesh": 0, "translation": [50, 0, 0]},
     ]
     made.tree["scenes"] = [{"nodes": [0]}, {"nodes": [2]}]
@@ -228,7 +257,9 @@ def test_a_mirrored_node_keeps_its_outside(made, tmp_path):
 def test_colours_of_vertices_are_multiplied_by_the_material(made, tmp_path, kind, top):
     values = np.tile(np.array([0.5 * top, 0.25 * top, 0, top]).astype(kind), (4, 1))
     made.tetrahedron(COLOR_0=made.accessor(values, normalized=kind != "float32"))
-    made.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0.25}}]
+    made.tree["materials"] = [
+        {"pbrMetallicRoughness": {"baseColorFactor": [0.5, 1, 1, 1], "roughnessFactor": 0.25}}
+    ]
     made.tree["meshes"][0]["primitives"][0]["material"] = 0
     model = read_model(made.write(tmp_path / "a.glb"))
     np.testing.assert_allclose(colours(model), [[0.25, 0.25, 0]], atol=3e-3)
@@ -245,7 +276,9 @@ def test_specular_and_gloss_as_metal_and_roughness(made, tmp_path):
         made.tree["materials"] = [{"extensions": {name: gloss | {"glossinessFactor": 0.7}}}]
         surface = read_model(made.write(tmp_path / "a.glb")).parts[0].surface
         np.testing.assert_allclose(surface.albedo[0, 0], albedo, atol=0.02)
-        np.testing.assert_allclose([surface.metallic.item(), surface.roughness.item()], [metallic, 0.3], atol=0.02)
+        np.testing.assert_allclose(
+            [surface.metallic.item(), surface.roughness.item()], [metallic, 0.3], atol=0.02
+        )
 
 
 def test_a_texture_in_another_format_is_named(made, tmp_path):
@@ -253,7 +286,10 @@ def test_a_texture_in_another_format_is_named(made, tmp_path):
     made.tree["textures"][0] = {"extensions": {"KHR_texture_basisu": {"source": 0}}}
     made.tetrahedron()
     made.tree["meshes"][0]["primitives"][0]["material"] = material
-    assert any("format that is not read" in note for note in read_model(made.write(tmp_path / "a.glb")).warnings)
+    assert any(
+        "format that is not read" in note
+        for note in read_model(made.write(tmp_path / "a.glb")).warnings
+    )
 
 
 def test_textures_that_are_large_together_shrink_with_a_word(made, tmp_path, monkeypatch):
@@ -263,7 +299,9 @@ def test_textures_that_are_large_together_shrink_with_a_word(made, tmp_path, mon
     made.tree["meshes"][0]["primitives"][0]["material"] = material
     model = read_model(made.write(tmp_path / "a.glb"))
     assert model.parts[0].surface.albedo.shape[:2] == (32, 32)
-    assert model.warnings == ("a.glb: its textures are shrunk to 32 pixels, because they are large together.",)
+    assert model.warnings == (
+        "a.glb: its textures are shrunk to 32 pixels, because they are large together.",
+    )
 
 
 def change(path, value):
@@ -308,7 +346,9 @@ def test_a_truncated_glb_says_by_how_much(made, tmp_path):
     path = made.write(tmp_path / "a.glb")
     data = path.read_bytes()
     path.write_bytes(data[:-20])
-    with pytest.raises(InputError, match=f"should have {len(data)} bytes, and has {len(data) - 20}"):
+    with pytest.raises(
+        InputError, match=f"should have {len(data)} bytes, and has {len(data) - 20}"
+    ):
         read_model(path)
     with pytest.raises(InputError, match="not a readable GLB"):
         read_model(write_glb(tmp_path / "b.glb", b"[]"))

@@ -32,7 +32,9 @@ def test_a_box_stands_upright_on_the_floor_at_the_click(box):
     assert edited.materials is scene.materials and edited.geometry is scene.geometry
     (glass,) = insert(scene, box, (40.0, 50.0), material="glass").bodies
     gap = (glass.vertices.astype(np.float64) - body.vertices) @ UP
-    np.testing.assert_allclose(gap, 0.005 * longest, rtol=0.01)  # air, which keeps light in the glass
+    np.testing.assert_allclose(
+        gap, 0.005 * longest, rtol=0.01
+    )  # air, which keeps light in the glass
 
 
 def test_scale_size_and_turn(box):
@@ -40,13 +42,21 @@ def test_scale_size_and_turn(box):
     (one,), support, _ = put(scene, box, (40.0, 50.0))
     (two,), *_ = put(scene, box, (40.0, 50.0), scale=2)
     (sized,), *_ = put(scene, box, (40.0, 50.0), size=0.5)
-    height = lambda b: np.ptp(b.vertices @ UP)  # noqa: E731
+
+    def height(b):
+        return np.ptp(b.vertices @ UP)
+
     np.testing.assert_allclose(height(two) / height(one), 2, rtol=1e-3)
     np.testing.assert_allclose(height(sized), 0.5, rtol=1e-3)
     (one,), support, _ = put(scene, box, (48.0, 50.0))
     (turned,), *_ = put(scene, box, (48.0, 50.0), turn=90)
-    wide = lambda b: np.ptp(b.vertices[:, 0])  # noqa: E731
-    np.testing.assert_allclose(wide(turned) / wide(one), 0.5, rtol=0.01)  # the box is 1 wide and 0.5 deep
+
+    def wide(b):
+        return np.ptp(b.vertices[:, 0])
+
+    np.testing.assert_allclose(
+        wide(turned) / wide(one), 0.5, rtol=0.01
+    )  # the box is 1 wide and 0.5 deep
     front = one.normals[np.argmax(one.normals @ -support.point)]
     assert front @ UP < 0.01 and front @ -support.point > 0
 
@@ -55,10 +65,15 @@ def test_bad_places_and_numbers(box):
     scene = floor_scene(96, 72)
     scene = replace(scene, depth=np.where(np.arange(72)[:, None] < 10, 0, scene.depth))
     for place, options, sentence in [
-        ((40, 3), {}, "sky"), ((400, 30), {}, "outside the photo"), ((40, -1), {}, "outside the photo"),
-        ((40, 50), {"scale": 0.0}, "scale"), ((40, 50), {"scale": 100.0}, "behind the camera"),
-        ((40, 50), {"turn": np.nan}, "turn"), ((40, 50), {"size": -1.0}, "size"), ("here", {}, "must be 2 numbers"),
-    ]:  # fmt: skip
+        ((40, 3), {}, "sky"),
+        ((400, 30), {}, "outside the photo"),
+        ((40, -1), {}, "outside the photo"),
+        ((40, 50), {"scale": 0.0}, "scale"),
+        ((40, 50), {"scale": 100.0}, "behind the camera"),
+        ((40, 50), {"turn": np.nan}, "turn"),
+        ((40, 50), {"size": -1.0}, "size"),
+        ("here", {}, "must be 2 numbers"),
+    ]:
         with pytest.raises(InputError, match=sentence):
             insert(scene, box, place, **options)
 
@@ -74,8 +89,12 @@ def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
     assert alone.any()
     blue = out[alone]
     assert (blue[:, 2] > 1.5 * blue[:, 0]).mean() > 0.95
-    np.testing.assert_array_equal(out[: 5 * native], scene.photo.original[: 5 * native])  # far up the floor
-    before = np.s_[26 * native : 28 * native, 20 * native : 28 * native]  # the floor around its base
+    np.testing.assert_array_equal(
+        out[: 5 * native], scene.photo.original[: 5 * native]
+    )  # far up the floor
+    before = np.s_[
+        26 * native : 28 * native, 20 * native : 28 * native
+    ]  # the floor around its base
     shadow = out[before].mean(-1)[body.share[before] == 0]
     assert shadow.size and shadow.mean() < 0.495
 
@@ -85,7 +104,9 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box, bump):
     """The ground that it stands on does not cut its foot."""
     scene = floor_scene(native=4)
     bodies = insert(scene, box, (24.0, 25.5)).bodies
-    depth = scene.depth * (1 - bump * np.exp(-(((np.arange(36) - 27) / 4) ** 2)))[:, None].astype(np.float32)
+    depth = scene.depth * (1 - bump * np.exp(-(((np.arange(36) - 27) / 4) ** 2)))[:, None].astype(
+        np.float32
+    )
     geometry = build_geometry(depth, scene.normal, scene.camera, completion="none")
     scene = replace(scene, depth=depth, geometry=geometry)
     edited = replace(scene, bodies=bodies)
@@ -104,7 +125,9 @@ def test_a_body_looks_as_in_the_plain_rendering(box):
     scene = replace(scene, envmap=red)
     edited = insert(scene, box, (24.0, 26.0), material="0.5,0.5,0.5")
     studio = EditRenderer(scene)
-    body = native_layer(studio, edited, spp=64, seed=0, clean=False)  # before anything else is rendered
+    body = native_layer(
+        studio, edited, spp=64, seed=0, clean=False
+    )  # before anything else is rendered
     plain = studio.pair(edited)[1](256, 3)
     inside = body.share > 0.999
     np.testing.assert_allclose(body.picture[inside].mean(0), plain[inside].mean(0), rtol=0.05)

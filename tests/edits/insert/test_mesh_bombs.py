@@ -13,7 +13,8 @@ from made_png import png_header
 from PIL import Image
 
 pytestmark = pytest.mark.skipif(
-    not os.path.exists("/proc/self/status"), reason="needs the peak memory of a process as Linux tells it"
+    not os.path.exists("/proc/self/status"),
+    reason="needs the peak memory of a process as Linux tells it",
 )  # ru_maxrss would begin with that of the process that starts it
 PER_BYTE = 10
 PLUS = 300e6
@@ -37,7 +38,9 @@ print(said)
 def read(path):
     """(peak memory of a process that reads the file in bytes, number of triangles or the error)."""
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    made = subprocess.run([sys.executable, "-c", READ, str(path)], capture_output=True, text=True, env=environment)
+    made = subprocess.run(
+        [sys.executable, "-c", READ, str(path)], capture_output=True, text=True, env=environment
+    )
     assert made.returncode == 0, made.stderr
     peak, said = made.stdout.split("\n", 1)
     return float(peak), said.strip()
@@ -83,7 +86,9 @@ def many_instances(path):
     made = GltfBuilder()
     made.tetrahedron()
     places = made.sparse(5_000_000, 3, [0], [[1, 1, 1]])
-    made.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}}
+    made.tree["nodes"][0]["extensions"] = {
+        "EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}
+    }
     return made.write(path)
 
 
@@ -106,8 +111,11 @@ def many_targets(path):
 
 def many_joints(path):
     made = GltfBuilder()
-    joints, weights = made.accessor(np.zeros((4, 4), np.uint8)), made.accessor(np.ones((4, 4), np.float32))
-    sets = {f"JOINTS_{k}": joints for k in range(1000)} | {f"WEIGHTS_{k}": weights for k in range(1000)}
+    joints = made.accessor(np.zeros((4, 4), np.uint8))
+    weights = made.accessor(np.ones((4, 4), np.float32))
+    sets = {f"JOINTS_{k}": joints for k in range(1000)} | {
+        f"WEIGHTS_{k}": weights for k in range(1000)
+    }
     made.tetrahedron(**sets)
     made.tree["skins"] = [{"joints": [0]}]
     made.tree["nodes"][0]["skin"] = 0
@@ -149,7 +157,14 @@ def header_of_vertices(path):
 
 
 def header_of_others(path):
-    lines = ["ply", "format ascii 1.0", "element other 4000000000", "property list int int k", "end_header", "0 "]
+    lines = [
+        "ply",
+        "format ascii 1.0",
+        "element other 4000000000",
+        "property list int int k",
+        "end_header",
+        "0 ",
+    ]
     path.write_text("\n".join(lines))
     return path
 
@@ -209,7 +224,9 @@ def test_other_files_that_ask_for_much(tmp_path, name, make, sentence):
 def grid(side):
     """Vertices [n, 3] float32 and faces [m, 3] of a wavy sheet."""
     y, x = np.mgrid[:side, :side]
-    points = np.stack([x, y, 5 * np.sin(x / 9) * np.cos(y / 7)], -1).reshape(-1, 3).astype(np.float32)
+    points = (
+        np.stack([x, y, 5 * np.sin(x / 9) * np.cos(y / 7)], -1).reshape(-1, 3).astype(np.float32)
+    )
     corner = (y * side + x)[:-1, :-1].ravel()
     first = np.stack([corner, corner + 1, corner + side], -1)
     second = np.stack([corner + 1, corner + side + 1, corner + side], -1)
@@ -244,7 +261,9 @@ def ply_grid(path, side=500):
 
 def stl_grid(path, side=400):
     points, faces = grid(side)
-    rows = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")])
+    rows = np.zeros(
+        len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("colour", "<u2")]
+    )
     rows["corners"] = points[faces]
     path.write_bytes(b"\0" * 80 + struct.pack("<I", len(rows)) + rows.tobytes())
     return path
@@ -253,7 +272,12 @@ def stl_grid(path, side=400):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "make", "side"),
-    [("a.obj", obj_grid, 320), ("a.glb", glb_grid, 600), ("a.ply", ply_grid, 500), ("a.stl", stl_grid, 400)],
+    [
+        ("a.obj", obj_grid, 320),
+        ("a.glb", glb_grid, 600),
+        ("a.ply", ply_grid, 500),
+        ("a.stl", stl_grid, 400),
+    ],
 )
 def test_ordinary_files_take_ten_times_their_size(tmp_path, name, make, side):
     assert within(make(tmp_path / name, side)) == str(2 * (side - 1) ** 2)
@@ -262,7 +286,12 @@ def test_ordinary_files_take_ten_times_their_size(tmp_path, name, make, side):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "make", "side"),
-    [("a.obj", obj_grid, 1000), ("a.glb", glb_grid, 1000), ("a.ply", ply_grid, 1000), ("a.stl", stl_grid, 1000)],
+    [
+        ("a.obj", obj_grid, 1000),
+        ("a.glb", glb_grid, 1000),
+        ("a.ply", ply_grid, 1000),
+        ("a.stl", stl_grid, 1000),
+    ],
 )
 def test_files_at_the_limit_take_ten_times_their_size(tmp_path, name, make, side):
     assert within(make(tmp_path / name, side)) == str(2 * (side - 1) ** 2)
@@ -282,7 +311,9 @@ def test_the_most_that_a_compact_file_may_ask_for(tmp_path):
     loose["TEXCOORD_0"] = np.zeros((3000, 2), np.float32)
     made.mesh({name: made.accessor(values) for name, values in loose.items()}, material=0)
     made.tree["materials"] = [{}]
-    places = {"TRANSLATION": made.accessor(np.random.default_rng(0).random((2000, 3)).astype(np.float32))}
+    places = {
+        "TRANSLATION": made.accessor(np.random.default_rng(0).random((2000, 3)).astype(np.float32))
+    }
     made.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": places}}
     peak, said = read(made.write(tmp_path / "c.glb"))
     assert int(said) > 1_900_000 and peak < 900e6

@@ -17,7 +17,9 @@ from materialist.edits.insert.meshes import read_model
 from materialist.errors import InputError
 
 resource = pytest.importorskip("resource", reason="needs POSIX limits")
-FEW = settings(max_examples=100, deadline=20_000, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FEW = settings(
+    max_examples=100, deadline=20_000, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 @contextmanager
@@ -41,7 +43,11 @@ def try_to_read(path):
             assert "\n" not in str(error) and len(str(error)) < 600
             return
     for part in model.parts:
-        assert np.isfinite(part.vertices).all() and np.isfinite(part.normals).all() and np.isfinite(part.uv).all()
+        assert (
+            np.isfinite(part.vertices).all()
+            and np.isfinite(part.normals).all()
+            and np.isfinite(part.uv).all()
+        )
         assert len(part.faces) and 0 <= part.faces.min() <= part.faces.max() < len(part.vertices)
         assert len(part.normals) == len(part.uv) == len(part.vertices)
         for values in (part.surface.albedo, part.surface.roughness, part.surface.metallic):
@@ -52,7 +58,8 @@ def rich_glb(path):
     """A glTF with a texture, colours, a skin, a morph target, instances, a sparse accessor and a fan."""
     made = GltfBuilder()
     half = np.full((4, 2), 0.5, np.float32)
-    joints, weights = np.zeros((4, 4), np.uint8), np.tile(np.float32([1, 0, 0, 0]), (4, 1))
+    joints = np.zeros((4, 4), np.uint8)
+    weights = np.tile(np.float32([1, 0, 0, 0]), (4, 1))
     attributes = {"TEXCOORD_0": half, "JOINTS_0": joints, "WEIGHTS_0": weights, "COLOR_0": weights}
     made.tetrahedron(**{name: made.accessor(values) for name, values in attributes.items()})
     primitive = made.tree["meshes"][0]["primitives"][0]
@@ -66,7 +73,10 @@ def rich_glb(path):
     primitive["targets"] = [{"POSITION": made.sparse(4, 3, [1], [[1, 2, 3]])}]
     made.tree["meshes"][0]["weights"] = [0.5]
     made.tree["skins"] = [
-        {"joints": [1], "inverseBindMatrices": made.accessor(np.eye(4, dtype=np.float32).reshape(1, 16))}
+        {
+            "joints": [1],
+            "inverseBindMatrices": made.accessor(np.eye(4, dtype=np.float32).reshape(1, 16)),
+        }
     ]
     made.mesh({"POSITION": made.sparse(4, 3, [1, 2, 3], np.eye(3))}, mode=6)
     places = {"TRANSLATION": made.accessor(np.float32([[0, 0, 0], [5, 0, 0]]))}
@@ -94,7 +104,9 @@ def whole(tmp_path_factory):
     made["text.ply"] = text
     made["text.stl"] = folder / "text.stl"
     corners = "".join("vertex {} {} {}\n".format(*v) for v in ((0, 0, 0), (1, 0, 0), (0, 1, 0)))
-    made["text.stl"].write_text(f"solid a\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid\n")
+    made["text.stl"].write_text(
+        f"solid a\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid\n"
+    )
     for path in made.values():
         assert read_model(path).parts
     return made
@@ -106,7 +118,9 @@ CHANGES = st.lists(
     st.one_of(
         st.tuples(st.just("set"), SPOTS, st.binary(min_size=1, max_size=4)),
         st.tuples(
-            st.just("insert"), SPOTS, st.sampled_from([b" ", b"\n", b"/", b"-", b"9" * 12, b"\xff" * 8, b"1e999 "])
+            st.just("insert"),
+            SPOTS,
+            st.sampled_from([b" ", b"\n", b"/", b"-", b"9" * 12, b"\xff" * 8, b"1e999 "]),
         ),
         st.tuples(st.just("cut"), SPOTS, st.integers(1, 40)),
         st.tuples(st.just("end"), SPOTS, st.none()),
@@ -146,13 +160,38 @@ def test_damaged_bytes(whole, tmp_path, kind, changes):
 def test_a_damaged_mtl(whole, tmp_path, changes):
     for name in ("quad.obj", "quad.png"):
         (tmp_path / name).write_bytes((whole["obj"].parent / name).read_bytes())
-    (tmp_path / "quad.mtl").write_bytes(changed((whole["obj"].parent / "quad.mtl").read_bytes(), changes))
+    (tmp_path / "quad.mtl").write_bytes(
+        changed((whole["obj"].parent / "quad.mtl").read_bytes(), changes)
+    )
     try_to_read(tmp_path / "quad.obj")
 
 
 VALUES = st.one_of(
-    st.sampled_from([None, True, -1, 0, 1, 2, 5, 255, 5121, 5126, 10**6, 2**31, 2**63, 1e300, 0.5, "", "x", "VEC4"]),
-    st.sampled_from([[], {}, [0], [1, 2], {"a": 1}, [[]], "../a", "data:,x", float("nan"), float("inf")]),
+    st.sampled_from(
+        [
+            None,
+            True,
+            -1,
+            0,
+            1,
+            2,
+            5,
+            255,
+            5121,
+            5126,
+            10**6,
+            2**31,
+            2**63,
+            1e300,
+            0.5,
+            "",
+            "x",
+            "VEC4",
+        ]
+    ),
+    st.sampled_from(
+        [[], {}, [0], [1, 2], {"a": 1}, [[]], "../a", "data:,x", float("nan"), float("inf")]
+    ),
 )
 
 
@@ -166,7 +205,9 @@ def places(tree):
 
 
 @settings(FEW, max_examples=300)
-@given(changes=st.lists(st.tuples(SPOTS, st.one_of(VALUES, st.just("remove"))), min_size=1, max_size=3))
+@given(
+    changes=st.lists(st.tuples(SPOTS, st.one_of(VALUES, st.just("remove"))), min_size=1, max_size=3)
+)
 def test_documents_with_other_values(whole, tmp_path, changes):
     data = whole["glb"].read_bytes()
     (length,) = struct.unpack_from("<I", data, 12)

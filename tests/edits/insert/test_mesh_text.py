@@ -41,7 +41,9 @@ def test_polygons_of_any_shape_keep_their_area_and_side(tmp_path, suffix, outlin
     points = np.roll([(x, y, 0) for x, y in outline], plane, axis=1)
     numbers = range(len(points))
     if suffix == "obj":
-        lines = ["v {} {} {}".format(*p) for p in points] + ["f " + " ".join(str(k + 1) for k in numbers)]
+        lines = ["v {} {} {}".format(*p) for p in points] + [
+            "f " + " ".join(str(k + 1) for k in numbers)
+        ]
     else:
         header = ply_header("ascii", len(points), ("float x", "float y", "float z"), 1)
         rows = [" ".join(map(str, p)) for p in points]
@@ -56,7 +58,15 @@ def test_polygons_of_any_shape_keep_their_area_and_side(tmp_path, suffix, outlin
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"])
 def test_lines_of_any_kind(tmp_path, end, mark):
-    lines = [*BOX_LINES[:8], "# v 9 9 9", "", "f 1 2 \\", "4 3  # a side", "  " + BOX_LINES[9], *BOX_LINES[10:]]
+    lines = [
+        *BOX_LINES[:8],
+        "# v 9 9 9",
+        "",
+        "f 1 2 \\",
+        "4 3  # a side",
+        "  " + BOX_LINES[9],
+        *BOX_LINES[10:],
+    ]
     assert size(read_model(write(tmp_path / "a.obj", mark + end.join(lines)))) == [1, 2, 3]
 
 
@@ -75,7 +85,8 @@ def test_numbers_that_count_backwards_do_so_from_their_line(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "corners", ["1 2 3", "1/1 2/2 3/3", "1//1 2//1 3//1", "1/1/1 2/2/1 3/3/1", "1/ 2/ 3/", "1 2/2 3/3/1"]
+    "corners",
+    ["1 2 3", "1/1 2/2 3/3", "1//1 2//1 3//1", "1/1/1 2/2/1 3/3/1", "1/ 2/ 3/", "1 2/2 3/3/1"],
 )
 def test_corners_of_every_spelling(tmp_path, corners):
     lines = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt .25 .5\nvt 1 0\nvt 0 1\nvn 0 0 2\n"
@@ -86,7 +97,8 @@ def test_corners_of_every_spelling(tmp_path, corners):
 
 
 @pytest.mark.parametrize(
-    "colour", ["200 100 50", "0.784313 0.392156 0.196078", "200 100 50 255", "0.784313 0.392156 0.196078 1"]
+    "colour",
+    ["200 100 50", "0.784313 0.392156 0.196078", "200 100 50 255", "0.784313 0.392156 0.196078 1"],
 )
 def test_colours_behind_vertices(tmp_path, colour):
     lines = [f"v {x} {y} 0 {colour}" for x, y in ((0, 0), (1, 0), (0, 1))]
@@ -102,18 +114,30 @@ def test_a_fourth_coordinate_is_no_colour(tmp_path):
 def test_several_libraries_and_names_with_spaces(tmp_path):
     write(tmp_path / "a.mtl", "newmtl red paint\nKd 0.8 0.1 0.1\n")
     write(tmp_path / "b c.mtl", "newmtl blue\nKd 0.1 0.1 0.8\n")
-    for k, lines in enumerate((["mtllib a.mtl b.mtl", "mtllib b c.mtl"], ["mtllib b c.mtl", "mtllib a.mtl"])):
+    for k, lines in enumerate(
+        (["mtllib a.mtl b.mtl", "mtllib b c.mtl"], ["mtllib b c.mtl", "mtllib a.mtl"])
+    ):
         faces = ["usemtl red paint", "f 1 2 4", "usemtl blue", "f 5 7 8", "usemtl", "f 1 5 6"]
         path = write(tmp_path / f"{k}.obj", "\n".join([*lines, *BOX_LINES[:8], *faces]))
         model = read_model(path)
-        np.testing.assert_allclose(colours(model), [[0.1, 0.1, 0.8], [0.5, 0.5, 0.5], [0.8, 0.1, 0.1]], atol=1e-3)
+        np.testing.assert_allclose(
+            colours(model), [[0.1, 0.1, 0.8], [0.5, 0.5, 0.5], [0.8, 0.1, 0.1]], atol=1e-3
+        )
         assert any("b.mtl is missing" in note for note in model.warnings) is (k == 0)
 
 
 def test_options_of_a_map(tmp_path):
     pixels = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
     Image.fromarray(pixels).save(tmp_path / "a b.png")
-    lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt {} {}", "usemtl a", "f 1/1 2/1 3/1"]
+    lines = [
+        "mtllib a.mtl",
+        "v 0 0 0",
+        "v 1 0 0",
+        "v 0 1 0",
+        "vt {} {}",
+        "usemtl a",
+        "f 1/1 2/1 3/1",
+    ]
     for options, place, colour in (
         ("", (0.25, 0.25), [0, 0, 1]),
         ("-s 3 1 1", (0.25, 0.25), [1, 1, 1]),
@@ -151,7 +175,9 @@ def test_binary_plys_of_every_type(tmp_path, order, mixed, count, index):
         polygons = [[a, b, c], *polygons, [a, c, d]]
     data = b"".join(struct.pack(f"{order}3d", *v) for v in BOX)
     for polygon in polygons:
-        data += struct.pack(f"{order}{letters[count]}{len(polygon)}{letters[index]}", len(polygon), *polygon)
+        data += struct.pack(
+            f"{order}{letters[count]}{len(polygon)}{letters[index]}", len(polygon), *polygon
+        )
     columns = ("double x", "double y", "double z")
     header = ply_header(form, 8, columns, len(polygons), (f"{count} {index} vertex_index",))
     model = read_model(write(tmp_path / "a.ply", header.encode() + data))
@@ -162,7 +188,10 @@ def test_binary_plys_of_every_type(tmp_path, order, mixed, count, index):
 @pytest.mark.parametrize("prefix", ["", "diffuse_"])
 @pytest.mark.parametrize(("kind", "top"), [("uchar", 255), ("ushort", 65535), ("float", 1)])
 def test_colours_of_ply(tmp_path, form, prefix, kind, top):
-    values = [share * top if kind == "float" else round(share * top) for share in (200 / 255, 100 / 255, 50 / 255)]
+    values = [
+        share * top if kind == "float" else round(share * top)
+        for share in (200 / 255, 100 / 255, 50 / 255)
+    ]
     names = tuple(f"{kind} {prefix}{name}" for name in ("red", "green", "blue"))
     corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0))
     header = ply_header(form, 3, XYZ + names, 1)
@@ -182,13 +211,18 @@ def test_colours_of_faces_and_coordinates_of_corners(tmp_path):
     corners = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
     faces = "element face 2\nproperty list uchar int vertex_indices\n"
     coloured = faces + "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"
-    path = write(tmp_path / "a.ply", head.format("") + coloured + corners + "3 0 1 2 255 0 0\n3 0 2 3 0 255 0\n")
+    path = write(
+        tmp_path / "a.ply",
+        head.format("") + coloured + corners + "3 0 1 2 255 0 0\n3 0 2 3 0 255 0\n",
+    )
     assert colours(read_model(path)) == [[0, 1, 0], [1, 0, 0]]
     pixels = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 255]]], np.uint8)
     Image.fromarray(pixels).save(tmp_path / "a b.png")
     laid = faces + "property list uchar float texcoord\nend_header\n"
     rows = "3 0 1 2 6 .1 .1 .4 .1 .1 .4\n3 0 2 3 6 .9 .9 .6 .9 .9 .6\n"
-    path = write(tmp_path / "b.ply", head.format("comment TextureFile a b.png\n") + laid + corners + rows)
+    path = write(
+        tmp_path / "b.ply", head.format("comment TextureFile a b.png\n") + laid + corners + rows
+    )
     assert colours(read_model(path)) == [[0, 0, 1], [0, 1, 0]]
 
 
@@ -208,10 +242,15 @@ FACET = [[0, 0, 0], [1, 0, 0], [0, 2, 0]]
 
 
 def test_stl_of_every_kind(tmp_path):
-    for k, data in enumerate((stl([FACET]), stl([FACET], head=b"solid blender"), stl([FACET]) + b"\0" * 100)):
+    for k, data in enumerate(
+        (stl([FACET]), stl([FACET], head=b"solid blender"), stl([FACET]) + b"\0" * 100)
+    ):
         assert area(read_model(write(tmp_path / f"{k}.stl", data))) == pytest.approx(1)
     text = "solid a\r\nFACET NORMAL 0 0 1\r\nOUTER LOOP\r\n"
-    text += "".join("  VERTEX {} {} {}\r\n".format(*c) for c in FACET) + "ENDLOOP\r\nENDFACET\r\nendsolid\r\n"
+    text += (
+        "".join("  VERTEX {} {} {}\r\n".format(*c) for c in FACET)
+        + "ENDLOOP\r\nENDFACET\r\nendsolid\r\n"
+    )
     for data in (text, text.lower(), "\ufeff" + text.lower()):
         assert area(read_model(write(tmp_path / "a.stl", data))) == pytest.approx(1)
     coloured = read_model(write(tmp_path / "b.stl", stl([FACET], colour=0x801F)))
@@ -221,9 +260,15 @@ def test_stl_of_every_kind(tmp_path):
 def test_counts_that_the_bytes_do_not_hold(tmp_path):
     little = "binary_little_endian"
     bad = [
-        (write(tmp_path / "a.stl", stl([FACET], count=9)), "counts 9 facets, and it has bytes for 1"),
+        (
+            write(tmp_path / "a.stl", stl([FACET], count=9)),
+            "counts 9 facets, and it has bytes for 1",
+        ),
         (write(tmp_path / "b.ply", ply_header("ascii", 10**9, XYZ, 1)), "more than 6 million"),
-        (write(tmp_path / "c.ply", ply_header(little, 1000, XYZ, 1)), "1000 of 'vertex', at least 12000 bytes, and 0"),
+        (
+            write(tmp_path / "c.ply", ply_header(little, 1000, XYZ, 1)),
+            "1000 of 'vertex', at least 12000 bytes, and 0",
+        ),
         (write(tmp_path / "d.ply", ply_header("ascii", 0, XYZ, 10**9)), "more than 2 million"),
         (
             write(
@@ -235,10 +280,22 @@ def test_counts_that_the_bytes_do_not_hold(tmp_path):
             ),
             "row 1 of 'face' does not end",
         ),
-        (write(tmp_path / "f.ply", "ply\nformat ascii 1.0\nelement vertex -3\nend_header\n"), "element vertex -3"),
-        (write(tmp_path / "g.ply", ply_header("ascii", 1, ("half x",), 0)), "the property 'half x'"),
-        (write(tmp_path / "h.ply", ply_header("ascii", 1, XYZ, 1) + "0 0 0\n3 0 0 7\n"), "do not exist"),
-        (write(tmp_path / "i.ply", ply_header("ascii", 1, XYZ, 1) + "0 x 0\n3 0 0 0\n"), "not a readable PLY"),
+        (
+            write(tmp_path / "f.ply", "ply\nformat ascii 1.0\nelement vertex -3\nend_header\n"),
+            "element vertex -3",
+        ),
+        (
+            write(tmp_path / "g.ply", ply_header("ascii", 1, ("half x",), 0)),
+            "the property 'half x'",
+        ),
+        (
+            write(tmp_path / "h.ply", ply_header("ascii", 1, XYZ, 1) + "0 0 0\n3 0 0 7\n"),
+            "do not exist",
+        ),
+        (
+            write(tmp_path / "i.ply", ply_header("ascii", 1, XYZ, 1) + "0 x 0\n3 0 0 0\n"),
+            "not a readable PLY",
+        ),
         (write(tmp_path / "j.obj", "v 0 0 0\nf 1 1 1 x\n"), "not a readable OBJ"),
         (write(tmp_path / "k.obj", "v 0 0 0\nf 1 1 4\n"), "does not exist"),
         (write(tmp_path / "l.obj", "v 0 0 0\nf -2 1 1\n"), "does not exist"),
@@ -254,6 +311,8 @@ def test_limits_have_a_sentence_each(tmp_path, monkeypatch):
     lines = [*("v {} {} 0".format(*p) for p in U_SHAPE), "usemtl a", "f 1 2 3 4 5 6 7 8", "f 1 2 3"]
     path = write(tmp_path / "a.obj", "\n".join(lines))
     for name in names:
-        monkeypatch.setattr(meshes, "LIMITS", MeshLimits(**{name: 1e-6 if name == "megabytes" else 1}))
+        monkeypatch.setattr(
+            meshes, "LIMITS", MeshLimits(**{name: 1e-6 if name == "megabytes" else 1})
+        )
         with pytest.raises(InputError, match=r"has .* more than 1(e-06)?; "):
             read_model(path)

@@ -39,7 +39,9 @@ def test_colours(real_data, name):
 
 @pytest.mark.parametrize("name", AREAS)
 def test_areas(real_data, name):
-    assert area(read_model(real_data("data/reported") / "mesh_concave_ngon" / name)) == pytest.approx(AREAS[name])
+    assert area(
+        read_model(real_data("data/reported") / "mesh_concave_ngon" / name)
+    ) == pytest.approx(AREAS[name])
 
 
 def test_a_texture_that_is_not_read_is_named(real_data):

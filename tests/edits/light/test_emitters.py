@@ -46,8 +46,15 @@ def rooms() -> tuple[Scene, Scene]:
     linear = np.clip(picture(true), 0, 1)
     photo = replace(bare.photo, linear=linear, original=linear)
     rendered = picture(bare)
-    factor = float((linear * rendered)[~LIGHT].sum() / (rendered**2)[~LIGHT].sum())  # what a fit of the map would do
-    brighter = replace(bare, photo=photo, envmap=envmap * np.float32(factor), rerender=rendered * np.float32(factor))
+    factor = float(
+        (linear * rendered)[~LIGHT].sum() / (rendered**2)[~LIGHT].sum()
+    )  # what a fit of the map would do
+    brighter = replace(
+        bare,
+        photo=photo,
+        envmap=envmap * np.float32(factor),
+        rerender=rendered * np.float32(factor),
+    )
     return replace(true, photo=photo), brighter
 
 
@@ -55,7 +62,9 @@ def test_the_window_is_found_and_a_speck_is_not():
     _, fit = rooms()
     (mask,) = visible_lights(fit)
     assert (mask & LIGHT).sum() / (mask | LIGHT).sum() > 0.95
-    assert not visible_lights(replace(fit, depth=np.where(LIGHT, 0, fit.depth)))  # the sky is in the map
+    assert not visible_lights(
+        replace(fit, depth=np.where(LIGHT, 0, fit.depth))
+    )  # the sky is in the map
     large = np.zeros((60, 80, 3), np.float32)
     large[3, 3:6] = 1  # a highlight: less than a thousandth
     depth = np.ones((60, 80), np.float32)
@@ -75,7 +84,9 @@ def test_specks_take_no_memory():
 
 def test_its_radiance_is_found():
     _, fit = rooms()
-    ambient, radiance, share = (dimmed(fit, 1.0).provenance[KEY][key] for key in ("ambient", "radiance", "share"))
+    ambient, radiance, share = (
+        dimmed(fit, 1.0).provenance[KEY][key] for key in ("ambient", "radiance", "share")
+    )
     assert 6 <= radiance <= 12
     np.testing.assert_allclose(ambient * fit.envmap.mean(), 0.15, rtol=0.25)
     assert ambient + share == pytest.approx(1, abs=0.25)  # the two together are the photo
@@ -95,16 +106,25 @@ def test_switched_off_is_the_true_room_without_the_window():
 def test_bad_input_and_files(tmp_path):
     _, fit = rooms()
     for scene, options, sentence in [
-        (fit, {"dim": -1.0}, "dimming"), (fit, {"dim": np.nan}, "dimming"),
-        (fit, {"dim": 0.2, "ambient": -1}, "ambient"), (dimmed(fit, 0.5), {"dim": 0.2}, "already"),
-        (replace(fit, photo=replace(fit.photo, linear=fit.photo.linear * 0.5)), {"dim": 0.2}, "no light"),
-    ]:  # fmt: skip
+        (fit, {"dim": -1.0}, "dimming"),
+        (fit, {"dim": np.nan}, "dimming"),
+        (fit, {"dim": 0.2, "ambient": -1}, "ambient"),
+        (dimmed(fit, 0.5), {"dim": 0.2}, "already"),
+        (
+            replace(fit, photo=replace(fit.photo, linear=fit.photo.linear * 0.5)),
+            {"dim": 0.2},
+            "no light",
+        ),
+    ]:
         with pytest.raises(InputError, match=sentence):
             relight(scene, **options)
     edited = dimmed(fit, 0.5)
     assert any("clipped regions around 20,7" in note for note in edited.report.warnings)
     save_scene(edited, tmp_path / "a.scene")
-    assert load_scene(tmp_path / "a.scene").bodies[0].surface.emission == edited.bodies[0].surface.emission
+    assert (
+        load_scene(tmp_path / "a.scene").bodies[0].surface.emission
+        == edited.bodies[0].surface.emission
+    )
     assert min(edited.bodies[0].surface.emission) > 0
 
 
@@ -139,7 +159,9 @@ def test_the_lights_that_are_meant_need_not_be_clipped():
     _, fit = rooms()
     tint = np.float32([1.0, 0.8, 0.5])
     grey = np.where(LIGHT[..., None], 0.6 * tint, 0.1 * fit.photo.linear).astype(np.float32)
-    scene = replace(fit, photo=replace(fit.photo, linear=grey, original=grey), rerender=0.1 * fit.rerender)
+    scene = replace(
+        fit, photo=replace(fit.photo, linear=grey, original=grey), rerender=0.1 * fit.rerender
+    )
     meant = LIGHT & (np.arange(40) < 20)
     with pytest.raises(InputError, match="no light"):
         relight(scene, dim=0.5)
@@ -151,7 +173,10 @@ def test_the_lights_that_are_meant_need_not_be_clipped():
     np.testing.assert_allclose(out[inner], 0.5 * grey[inner], rtol=0.02)
     other = LIGHT & (np.arange(40) > 24)
     assert out[other].mean() > 0.8 * grey[other].mean(), "the other half stays"
-    for mask, sentence in ((np.zeros((30, 40), bool), "mask"), (np.ones((9, 9), bool), "resize it")):
+    for mask, sentence in (
+        (np.zeros((30, 40), bool), "mask"),
+        (np.ones((9, 9), bool), "resize it"),
+    ):
         with pytest.raises(InputError, match=sentence):
             relight(scene, dim=0.5, lights=mask)
     with pytest.raises(InputError, match="give dim"):

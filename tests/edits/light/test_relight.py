@@ -18,7 +18,7 @@ from materialist.edits.light.relight import (
     relight,
     rotated,
     with_sun,
-)  # fmt: skip
+)
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
@@ -46,12 +46,15 @@ def test_sun_stands_where_it_was_asked_for_and_has_its_irradiance():
     envmap = np.ones((h, 2 * h, 3), np.float32)
     calm, sun = with_sun(envmap, 90, 30, power=2)
     rows, columns = np.nonzero(sun.sum(-1))
-    row, column = rows.mean() + 0.5, columns.mean() + 0.5
+    row = rows.mean() + 0.5
+    column = columns.mean() + 0.5
     assert abs(row - (90 - 30) / 180 * h) <= 1 and abs(column - 0.75 * 2 * h) <= 1
     edges = np.cos(np.pi * np.arange(h + 1) / h)
     solid = ((edges[:-1] - edges[1:]) * np.pi / h)[:, None, None]
     irradiance = (sun * solid).sum((0, 1)) @ [0.2126, 0.7152, 0.0722]
-    np.testing.assert_allclose(irradiance, 2 * np.pi, rtol=1e-3)  # twice pi, that of a sky of radiance 1
+    np.testing.assert_allclose(
+        irradiance, 2 * np.pi, rtol=1e-3
+    )  # twice pi, that of a sky of radiance 1
     np.testing.assert_array_equal(calm, envmap)
 
 
@@ -88,7 +91,9 @@ def test_a_lamp_of_power_one_shows_a_white_wall_as_white():
     hidden = replace(lit.lamps[0], position=(0.4, 0.0, -(3.0 - distance)))
     picture = EditRenderer(lit).pair(replace(lit, lamps=(hidden,)))[1](256, 1)
     column = round(0.4 / 3 * lit.camera.focal + 16 - 0.5)
-    np.testing.assert_allclose(picture[11:13, column].mean(), 1.0, rtol=0.2)  # R = 1: the lobes add up to 1.02-1.05
+    np.testing.assert_allclose(
+        picture[11:13, column].mean(), 1.0, rtol=0.2
+    )  # R = 1: the lobes add up to 1.02-1.05
 
 
 def test_edited_light_is_noted_and_warned_about():
@@ -129,7 +134,9 @@ def test_envmap_files(tmp_path):
     np.testing.assert_array_equal(read_envmap(tmp_path / "sky.exr"), spot(32))
     write_exr(tmp_path / "large.exr", spot(300))
     assert read_envmap(tmp_path / "large.exr").shape == (256, 512, 3)
-    film = np.concatenate([spot(32), np.zeros((32, 64, 1), np.float32)], -1)  # as renderers write a world's picture
+    film = np.concatenate(
+        [spot(32), np.zeros((32, 64, 1), np.float32)], -1
+    )  # as renderers write a world's picture
     write_exr(tmp_path / "film.exr", film)
     np.testing.assert_array_equal(read_envmap(tmp_path / "film.exr"), spot(32))
     write_exr(tmp_path / "square.exr", np.ones((32, 32, 3), np.float32))
@@ -146,7 +153,9 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
     np.testing.assert_allclose([path[0].position, path[2].position], [e.position for e in ends])
     np.testing.assert_allclose(path[1].power, np.mean([e.power for e in ends], 0))
     more = [s.envmap for s in moving_light(SCENE, 4, rotate=450)]
-    np.testing.assert_allclose(more[3], rotated(SCENE.envmap, 450), atol=1e-6)  # by as much as was asked
+    np.testing.assert_allclose(
+        more[3], rotated(SCENE.envmap, 450), atol=1e-6
+    )  # by as much as was asked
     np.testing.assert_allclose(more[1], rotated(SCENE.envmap, 150), atol=1e-6)
     film = [edit(SCENE, SCENE.depth > 0, hue=k) for k in (0, 30, 60)]
     span = list(moving_light(film, 3, rotate="-30..50"))
@@ -163,13 +172,17 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
 
 def test_lights_are_environment_maps():
     made = {name: presets.light(name, 64) for name in presets.LIGHTS}
-    assert all(checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20 for light in made.values())
+    assert all(
+        checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20
+        for light in made.values()
+    )
     assert made["Window"][:, 64:].sum() > made["Window"][:, :64].sum()  # on the right
     assert made["Noon"][:32].sum() > made["Noon"][32:].sum()  # from above
 
 
 def test_a_light_without_effect_is_named_and_nothing_else():
-    dimmed, photo = relight(SCENE, ambient=0.5), SCENE.photo.original
+    dimmed = relight(SCENE, ambient=0.5)
+    photo = SCENE.photo.original
     (note,) = effect_notes(SCENE, dimmed, mean_change(SCENE, photo * np.float32(0.99)))
     assert "of 255 levels" in note and "lamp" in note
     assert effect_notes(SCENE, dimmed, mean_change(SCENE, photo * np.float32(0.5))) == []

@@ -41,33 +41,52 @@ def test_value_keeps_the_order_of_a_texture(value):
 
 def test_only_the_mask_changes_and_the_rest_is_shared():
     edited = edit(SCENE, MASK, hue=90, roughness=0.1, metallic="+0.25")
-    new, old = edited.materials, SCENE.materials
+    new = edited.materials
+    old = SCENE.materials
     for name in ("albedo", "roughness", "metallic"):
         np.testing.assert_array_equal(getattr(new, name)[~MASK], getattr(old, name)[~MASK])
     assert (new.roughness[MASK] == np.float32(0.1)).all() and (new.metallic[MASK] == 0.25).all()
     assert edited.geometry is SCENE.geometry and edited.photo is SCENE.photo
     assert (SCENE.materials.roughness == 0.5).all()
     assert edited.provenance["edits"] == [
-        {"kind": "material", "hue": 90, "roughness": 0.1, "metallic": "+0.25", "pixels": int(MASK.sum())}
+        {
+            "kind": "material",
+            "hue": 90,
+            "roughness": 0.1,
+            "metallic": "+0.25",
+            "pixels": int(MASK.sum()),
+        }
     ]
 
 
 def test_a_region_grows_shrinks_and_is_feathered():
-    reached = lambda **values: edit(SCENE, MASK, roughness=1.0, **values).materials.roughness  # noqa: E731
+    def reached(**values):
+        return edit(SCENE, MASK, roughness=1.0, **values).materials.roughness
+
     rows, columns = MASK.nonzero()
     for grow in (2 / 48, -2 / 48):
         row, column = (reached(grow=grow) > 0.5).nonzero()
         assert row.min() == rows.min() - 48 * grow and column.max() == columns.max() + 48 * grow
     soft = reached(feather=8 / 48)[(rows.min() + rows.max()) // 2]
     border = columns.min()
-    assert (np.diff(soft[: border + 3]) >= 0).all() and 0.5 < soft[border - 2] < soft[border + 1] < 1
-    assert abs(soft[border - 1] + soft[border] - 1.5) < 0.02  # half of the change where the border was
+    assert (np.diff(soft[: border + 3]) >= 0).all() and 0.5 < soft[border - 2] < soft[
+        border + 1
+    ] < 1
+    assert (
+        abs(soft[border - 1] + soft[border] - 1.5) < 0.02
+    )  # half of the change where the border was
     with pytest.raises(InputError, match="shrink it less"):
         edit(SCENE, MASK, grow=-0.2, hue=1)
 
 
 def test_shift_and_set_differ_by_the_sign():
-    for wanted, expected in (("+0.3", 0.8), ("-0.3", 0.2), ("0.3", 0.3), ("+0.9", 1.0), ("-0.9", 0.0)):
+    for wanted, expected in (
+        ("+0.3", 0.8),
+        ("-0.3", 0.2),
+        ("0.3", 0.3),
+        ("+0.9", 1.0),
+        ("-0.9", 0.0),
+    ):
         got = edit(SCENE, MASK, roughness=wanted).materials.roughness[MASK]
         np.testing.assert_allclose(got, expected, atol=1e-6)
 
@@ -103,7 +122,9 @@ def test_a_texture_keeps_its_detail_before_a_wall_far_away():
     scene = flat_scene()
     far = replace(scene, depth=np.where(MASK, scene.depth, 60).astype(np.float32))
     picture = np.random.default_rng(0).random((12, 12, 3), np.float32)
-    near, before_far = (edit(one, MASK, texture=picture).materials.albedo[MASK] for one in (scene, far))
+    near, before_far = (
+        edit(one, MASK, texture=picture).materials.albedo[MASK] for one in (scene, far)
+    )
     np.testing.assert_allclose(before_far, near, atol=1e-5)
 
 
@@ -112,4 +133,6 @@ def test_a_texture_lies_on_a_floor_with_its_top_in_the_depth():
     ramp = np.linspace(0.9, 0.1, 16, dtype=np.float32)
     picture = np.stack(np.broadcast_arrays(ramp[:, None], ramp[None], 0.5), -1)
     albedo = edit(scene, scene.depth > 0, texture=picture).materials.albedo[4:-4, 4:-4]
-    assert (np.diff(albedo[..., 0], axis=0) < 0).mean() > 0.9 and (np.diff(albedo[..., 1], axis=1) < 0).mean() > 0.9
+    assert (np.diff(albedo[..., 0], axis=0) < 0).mean() > 0.9 and (
+        np.diff(albedo[..., 1], axis=1) < 0
+    ).mean() > 0.9

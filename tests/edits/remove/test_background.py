@@ -26,7 +26,9 @@ def test_a_background_may_have_the_unit_of_the_photos_file(tmp_path):
 def test_a_true_background_is_what_is_seen():
     scene = rendered_scene()
     y, x = np.mgrid[:36, :48]
-    truth = np.stack([0.2 + 0.2 * (x % 6 < 3), 0.3 + 0.1 * (y % 8 < 4), 0.25 + 0 * x], -1).astype(np.float32)
+    truth = np.stack([0.2 + 0.2 * (x % 6 < 3), 0.3 + 0.1 * (y % 8 < 4), 0.25 + 0 * x], -1).astype(
+        np.float32
+    )
     removed = remove(scene, MASK, background=truth)
     np.testing.assert_allclose(removed.photo.linear[MASK], truth[MASK], rtol=1e-5)
     picture = composite(scene, removed, spp=48, denoise=False)
@@ -36,17 +38,19 @@ def test_a_true_background_is_what_is_seen():
 def test_options_out_of_range_and_backgrounds_of_another_aspect():
     scene = flat_scene()
     for options, message in (
-        ({"grow": -1}, "rim is -1"), ({"shadow": np.nan}, "shadow is nan"),
+        ({"grow": -1}, "rim is -1"),
+        ({"shadow": np.nan}, "shadow is nan"),
         ({"background": np.ones((20, 20, 3))}, "same proportions"),
         ({"background": -np.ones((36, 48, 3))}, "negative"),
         ({"background": np.ones((36, 48, 3)), "inpaint": lambda photo, hole: photo}, "not both"),
-    ):  # fmt: skip
+    ):
         with pytest.raises(InputError, match=message):
             remove(scene, MASK, **options)
 
 
 def test_an_inpainter_gets_the_photo_and_the_hole():
-    scene, seen = flat_scene(), []
+    scene = flat_scene()
+    seen = []
 
     def paint(photo, hole):
         seen.append(hole)
@@ -62,9 +66,10 @@ def test_an_inpainter_gets_the_photo_and_the_hole():
     [
         (lambda photo, hole: np.where(hole[..., None], np.nan, photo), "or NaN"),
         (lambda photo, hole: photo[..., 0], r"picture of the inpainter is \(36, 48\)"),
-        (lambda photo, hole: None, "same proportions"), (lambda photo, hole: photo / hole.sum(2), "inpainter failed"),
+        (lambda photo, hole: None, "same proportions"),
+        (lambda photo, hole: photo / hole.sum(2), "inpainter failed"),
     ],
-)  # fmt: skip
+)
 def test_what_an_inpainter_gives_is_checked(paint, message):
     with pytest.raises(InputError, match=message):
         remove(flat_scene(), MASK, inpaint=paint)
@@ -74,7 +79,8 @@ def test_a_saved_pipeline_fills_the_hole_and_nothing_else(tmp_path):
     pytest.importorskip("diffusers")
     paint = inpainter(f"sd:{save_inpainting(tmp_path / 'sd')}", device="cpu", steps=2)
     photo = flat_scene().photo.linear
-    one, two = paint(photo, MASK), paint(photo, MASK)
+    one = paint(photo, MASK)
+    two = paint(photo, MASK)
     assert one.shape == photo.shape and one.dtype == np.float32
     np.testing.assert_array_equal(one[~MASK], photo[~MASK])
     assert (one[MASK] != photo[MASK]).any() and one.min() >= 0 and one.max() <= 1

@@ -42,7 +42,8 @@ def test_a_table_goes_on_behind_things_that_stand_on_it():
     plane = np.where(plane == 1, 0, plane)
     hole = disc(46, 40, 8)
     cup = disc(46, 55, 9) & ~hole
-    depth, plane = np.where(cup, 0.9, depth), np.where(cup, LOOSE, plane)
+    depth = np.where(cup, 0.9, depth)
+    plane = np.where(cup, LOOSE, plane)
     depth[:40] = np.minimum(depth[:40], 3.0)
     found = behind(np.where(hole, 0.8, depth), normal, plane, hole, np.where(hole, 0.8, 0), CAMERA)
     assert (found.label[hole] == 0).all()

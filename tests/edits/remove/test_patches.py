@@ -19,12 +19,14 @@ def stripes(height=72, width=96, period=8):
 
 def filled(picture, hole, usable=None, label=None):
     """What was in the hole is spoiled first."""
-    usable, label = ~hole if usable is None else usable, 0 * hole if label is None else label
+    usable = ~hole if usable is None else usable
+    label = 0 * hole if label is None else label
     return patched(np.where(hole[..., None], 0.9, picture), hole, usable, label, seed=1)
 
 
 def test_stripes_go_on_through_the_hole():
-    picture, hole = stripes(), hole_in((72, 96))
+    picture = stripes()
+    hole = hole_in((72, 96))
     found = filled(picture, hole)
     np.testing.assert_array_equal(found[~hole], picture[~hole].astype(np.float32))
     assert np.abs(found - picture)[hole].mean() < 0.05  # the mean colour alone is 0.26 off
@@ -34,11 +36,15 @@ def test_a_slanting_edge_of_two_textures_crosses_the_hole():
     rng = np.random.default_rng(0)
     rows, columns = np.indices((96, 128))
     below = rows > 46 - columns / 8
-    picture = np.where(below[..., None], [0.5, 0.2, 0.1], [0.3, 0.4, 0.6]) * rng.uniform(0.85, 1.15, (96, 128, 1))
+    picture = np.where(below[..., None], [0.5, 0.2, 0.1], [0.3, 0.4, 0.6]) * rng.uniform(
+        0.85, 1.15, (96, 128, 1)
+    )
     hole = np.hypot(rows - 40, columns - 64) < 16
     for label in (None, below.astype(int)):
         found = filled(picture, hole, label=label)
-        assert ((found[..., 0] > found[..., 2]) != below)[hole].mean() < 0.05, "of the hole's outline nothing stays"
+        assert ((found[..., 0] > found[..., 2]) != below)[hole].mean() < 0.05, (
+            "of the hole's outline nothing stays"
+        )
         assert found[hole & below].std(0).mean() > 0.3 * picture[below & ~hole].std(0).mean()
 
 
@@ -69,7 +75,9 @@ def test_hdr_values_stay_and_odd_holes_are_filled():
         most = np.zeros((72, 96), bool)
         most[place] = True
         found = filled(stripes(), most)
-        assert np.isfinite(found).all() and found[most].min() > 0.1, "black is no colour of the photo"
+        assert np.isfinite(found).all() and found[most].min() > 0.1, (
+            "black is no colour of the photo"
+        )
 
 
 def test_black_of_the_photo_is_copied():

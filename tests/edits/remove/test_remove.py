@@ -23,7 +23,11 @@ def far_from(mask, pixels):
 def without_the_block(scene):
     """[H, W, 3] the true picture of the flat scene's wall alone."""
     wall = np.full_like(scene.depth, 3.0)
-    bare = replace(scene, depth=wall, geometry=build_geometry(wall, scene.normal, scene.camera, completion="none"))
+    bare = replace(
+        scene,
+        depth=wall,
+        geometry=build_geometry(wall, scene.normal, scene.camera, completion="none"),
+    )
     return np.clip(render_scene(bare, spp=256, seed=11), 0, 1)
 
 
@@ -35,10 +39,15 @@ def test_the_wall_goes_on_behind_the_block():
     assert np.abs(removed.materials.albedo[MASK].mean(0) - wall.mean(0)).max() < 0.03
     assert np.abs(removed.photo.linear[MASK].mean(0) - wall.mean(0)).max() < 0.05
     outside = far_from(MASK, 2)
-    for old, new in ((scene.depth, removed.depth), (scene.materials.albedo, removed.materials.albedo),
-                     (scene.photo.original, removed.photo.original)):  # fmt: skip
+    for old, new in (
+        (scene.depth, removed.depth),
+        (scene.materials.albedo, removed.materials.albedo),
+        (scene.photo.original, removed.photo.original),
+    ):
         np.testing.assert_array_equal(new[outside], old[outside])
-    assert removed.geometry.mesh.vertices[:, 2].max() < -2.9, "the block's surface is gone from the mesh"
+    assert removed.geometry.mesh.vertices[:, 2].max() < -2.9, (
+        "the block's surface is gone from the mesh"
+    )
     assert removed.provenance["edits"][-1]["kind"] == "remove"
 
 
@@ -46,7 +55,8 @@ def test_the_native_photo_is_filled_with_native_detail():
     scene = flat_scene(native=3)
     removed = remove(scene, MASK)
     native = np.kron(MASK, np.ones((3, 3), bool))
-    filled, wall = removed.photo.original[native], scene.photo.original[np.kron(far_from(MASK, 3), np.ones((3, 3)) > 0)]
+    filled = removed.photo.original[native]
+    wall = scene.photo.original[np.kron(far_from(MASK, 3), np.ones((3, 3)) > 0)]
     assert np.abs(filled.mean(0) - wall.mean(0)).max() < 0.05
     fine = removed.photo.original - np.kron(removed.photo.linear, np.ones((3, 3, 1)))
     assert fine[native].std() > 0.3 * fine[~native].std()
@@ -69,12 +79,16 @@ def test_its_shadow_on_the_wall_goes_with_it():
     envmap[3, 1] = 20  # behind the camera, to the left: the shadow falls to the right of the block
     scene = replace(scene, envmap=envmap)
     before = np.clip(render_scene(scene, spp=256, seed=11), 0, 1)
-    scene = replace(scene, photo=replace(scene.photo, linear=before, original=before), rerender=before)
+    scene = replace(
+        scene, photo=replace(scene.photo, linear=before, original=before), rerender=before
+    )
     after = without_the_block(scene)
     shadow = far_from(MASK, 4) & ((after - before).max(-1) > 0.1 * after.max(-1))
     assert shadow.sum() > 20
     told = []
-    picture = composite(scene, remove(scene, MASK), spp=64, progress=lambda *event: told.append(event))
+    picture = composite(
+        scene, remove(scene, MASK), spp=64, progress=lambda *event: told.append(event)
+    )
     assert told[0][:2] == ("shadow", 0) and told[-1][1] == told[-1][2]
     assert np.abs(picture - after)[shadow].mean() < 0.3 * np.abs(before - after)[shadow].mean()
     still = far_from(MASK, 4) & (np.abs(after - before).max(-1) < 0.005 * after.max(-1))
@@ -97,7 +111,8 @@ def test_a_clipped_photo_stays_outside_the_hole():
 def test_a_hole_that_little_is_known_of_is_told():
     scene = flat_scene()
     assert not remove(scene, MASK).report.warnings
-    large, cut = np.zeros((36, 48), bool), np.zeros((36, 48), bool)
+    large = np.zeros((36, 48), bool)
+    cut = np.zeros((36, 48), bool)
     large[6:30, 8:40] = True
     cut[30:, 10:20] = True
     for mask, words in ((large, "of the photo. What"), (cut, "of its outline lies on the frame")):
@@ -111,14 +126,19 @@ def test_what_was_put_before_it_stays_whole():
     scene = rendered_scene()
     red = replace(scene, bodies=(tetrahedron(),))
     picture = composite(scene, red, spp=16)
-    saved = replace(red, photo=replace(scene.photo, linear=picture, original=picture), rerender=picture)
+    saved = replace(
+        red, photo=replace(scene.photo, linear=picture, original=picture), rerender=picture
+    )
     here = body_coverage(saved) > 0
     mask = MASK.copy()
     mask |= here & (np.arange(48) < np.median(np.nonzero(here)[1]))
     assert (here & mask).sum() > 10
     gone = remove(saved, mask, shadow=0).photo.original
     np.testing.assert_array_equal(gone[here], picture[here])
-    red_there = lambda seen: seen[..., 0] > 2 * seen[..., 1]  # noqa: E731
+
+    def red_there(seen):
+        return seen[..., 0] > 2 * seen[..., 1]
+
     assert not (red_there(gone) & ~here).any(), "nor is it copied"
 
 
@@ -140,14 +160,17 @@ def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
 def on_floor():
     """The flat scene, its lower half a floor."""
     scene = flat_scene()
-    floor = np.where(np.arange(36)[:, None] >= 20, 0, -1).astype(np.int8) * np.ones((1, 48), np.int8)
+    floor = np.where(np.arange(36)[:, None] >= 20, 0, -1).astype(np.int8) * np.ones(
+        (1, 48), np.int8
+    )
     normal = np.where(floor[..., None] == 0, [0.0, 1, 0], scene.normal).astype(np.float32)
     return replace(scene, normal=normal, geometry=replace(scene.geometry, plane_label=floor))
 
 
 def test_a_given_shadow_widens_the_hole_on_the_ground_alone():
     plain, wide = (
-        make_hole(on_floor(), MASK, grow=0.006, shadow=shadow, bodies=np.zeros_like(MASK)) for shadow in (0.0, 0.5)
+        make_hole(on_floor(), MASK, grow=0.006, shadow=shadow, bodies=np.zeros_like(MASK))
+        for shadow in (0.0, 0.5)
     )
     np.testing.assert_array_equal(plain.painted, plain.gone)
     more = wide.painted & ~wide.gone
@@ -155,8 +178,12 @@ def test_a_given_shadow_widens_the_hole_on_the_ground_alone():
     np.testing.assert_array_equal(wide.gone, plain.gone)
     floor = on_floor()
     floor = replace(
-        floor, depth=np.where(np.arange(36)[:, None] >= 12, floor.depth, 0), normal=0 * floor.normal + [0, 1, 0]
+        floor,
+        depth=np.where(np.arange(36)[:, None] >= 12, floor.depth, 0),
+        normal=0 * floor.normal + [0, 1, 0],
     )
-    floor = replace(floor, geometry=replace(floor.geometry, plane_label=np.zeros((36, 48), np.int8)))
+    floor = replace(
+        floor, geometry=replace(floor.geometry, plane_label=np.zeros((36, 48), np.int8))
+    )
     with pytest.raises(InputError, match=r"shadow of 5, .* smaller shadow"):
         make_hole(floor, MASK, grow=0.006, shadow=5.0, bodies=np.zeros_like(MASK))

@@ -15,21 +15,27 @@ from materialist.types import Camera
 @pytest.fixture(scope="module")
 def table():
     """A textured ball with a handle, and a second ball, on a shaded floor; and the masks of the two."""
-    h, w = 120, 160
+    h = 120
+    w = 160
     rng = np.random.default_rng(3)
     y, x = np.mgrid[:h, :w]
     ball = (x - 60) ** 2 + (y - 60) ** 2 < 28**2
     ring = np.abs(np.hypot(x - 94, y - 60) - 12) < 3.5
-    first, second = ball | (ring & (x > 85)), (x - 130) ** 2 + (y - 85) ** 2 < 14**2
+    first = ball | (ring & (x > 85))
+    second = (x - 130) ** 2 + (y - 85) ** 2 < 14**2
     colour = np.broadcast_to([0.45, 0.42, 0.38], (h, w, 3)) * (0.7 + 0.4 * y / h)[..., None]
     colour = np.where(
-        first[..., None], np.array([0.7, 0.2, 0.05]) * (0.7 + 0.5 * (60 - x) / 60)[..., None].clip(0.4, 1.3), colour
+        first[..., None],
+        np.array([0.7, 0.2, 0.05]) * (0.7 + 0.5 * (60 - x) / 60)[..., None].clip(0.4, 1.3),
+        colour,
     )
     colour = np.where(second[..., None], [0.1, 0.2, 0.5], colour)
     photo = (colour * rng.uniform(0.85, 1.15, (h, w, 1))).astype(np.float32).clip(0.01, 1)
     depth = np.where(first, 2.0, np.where(second, 2.3, 3.0)).astype(np.float32)
     depth[:4] = 0
-    scene = scene_of(Camera(w, h, 40.0), depth, np.broadcast_to([0, 0, 1], (h, w, 3)), photo, completion="none")
+    scene = scene_of(
+        Camera(w, h, 40.0), depth, np.broadcast_to([0, 0, 1], (h, w, 3)), photo, completion="none"
+    )
     return scene, first, second
 
 
@@ -83,7 +89,8 @@ def test_sam2_without_weights_says_what_to_do(table, models):
 
 
 def around(mask, more):
-    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+    rows = np.flatnonzero(mask.any(1))
+    columns = np.flatnonzero(mask.any(0))
     return columns[0] - more, rows[0] - more, columns[-1] + 1 + more, rows[-1] + 1 + more
 
 
@@ -103,20 +110,35 @@ def model_folder(tmp_path_factory):
     torch.manual_seed(0)
     size = 64
     backbone = transformers.Sam2HieraDetConfig(
-        hidden_size=8, num_attention_heads=1, image_size=[size, size], blocks_per_stage=[1, 1, 2, 1],
-        embed_dim_per_stage=[8, 16, 32, 64], num_attention_heads_per_stage=[1, 1, 2, 2],
+        hidden_size=8,
+        num_attention_heads=1,
+        image_size=[size, size],
+        blocks_per_stage=[1, 1, 2, 1],
+        embed_dim_per_stage=[8, 16, 32, 64],
+        num_attention_heads_per_stage=[1, 1, 2, 2],
         window_size_per_stage=[4, 4, 4, 2],
-        global_attention_blocks=[3], window_positional_embedding_background_size=[4, 4],
-    )  # fmt: skip
-    vision = transformers.Sam2VisionConfig(
-        backbone_config=backbone, backbone_channel_list=[64, 32, 16, 8], fpn_hidden_size=32,
-        backbone_feature_sizes=[[size // 4] * 2, [size // 8] * 2, [size // 16] * 2],
-    )  # fmt: skip
-    prompt = transformers.Sam2PromptEncoderConfig(hidden_size=32, image_size=size, patch_size=16, mask_input_channels=4)
-    decoder = transformers.Sam2MaskDecoderConfig(
-        hidden_size=32, mlp_dim=32, num_attention_heads=2, iou_head_hidden_dim=16, num_hidden_layers=1
+        global_attention_blocks=[3],
+        window_positional_embedding_background_size=[4, 4],
     )
-    config = transformers.Sam2Config(vision_config=vision, prompt_encoder_config=prompt, mask_decoder_config=decoder)
+    vision = transformers.Sam2VisionConfig(
+        backbone_config=backbone,
+        backbone_channel_list=[64, 32, 16, 8],
+        fpn_hidden_size=32,
+        backbone_feature_sizes=[[size // 4] * 2, [size // 8] * 2, [size // 16] * 2],
+    )
+    prompt = transformers.Sam2PromptEncoderConfig(
+        hidden_size=32, image_size=size, patch_size=16, mask_input_channels=4
+    )
+    decoder = transformers.Sam2MaskDecoderConfig(
+        hidden_size=32,
+        mlp_dim=32,
+        num_attention_heads=2,
+        iou_head_hidden_dim=16,
+        num_hidden_layers=1,
+    )
+    config = transformers.Sam2Config(
+        vision_config=vision, prompt_encoder_config=prompt, mask_decoder_config=decoder
+    )
     folder = tmp_path_factory.mktemp("sam2")
     transformers.Sam2Model(config).save_pretrained(folder)
     return folder

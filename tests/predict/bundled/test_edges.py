@@ -5,7 +5,13 @@ import numpy as np
 import pytest
 
 from materialist.camera import pixel_rays
-from materialist.predict.bundled.edges import GuidedFilter, least_squares_change, slopes, weighted_median, with_relief
+from materialist.predict.bundled.edges import (
+    GuidedFilter,
+    least_squares_change,
+    slopes,
+    weighted_median,
+    with_relief,
+)
 from materialist.types import Camera
 
 CAMERA = Camera(64, 48, 50.0)
@@ -17,9 +23,9 @@ def two_sides(height=24, width=32, noise=0.01):
     rows, columns = np.mgrid[:height, :width]
     side = columns + 0.3 * rows > width * 0.6
     rng = np.random.default_rng(2)
-    photo = np.where(side[..., None], [0.8, 0.3, 0.1], [0.3, 0.4, 0.6]) + noise * rng.standard_normal(
-        (height, width, 3)
-    )
+    photo = np.where(
+        side[..., None], [0.8, 0.3, 0.1], [0.3, 0.4, 0.6]
+    ) + noise * rng.standard_normal((height, width, 3))
     return photo.astype(np.float32), side
 
 
@@ -28,7 +34,10 @@ def written_out(photo, members, radius, eps):
     height, width = photo.shape[:2]
     count = (2 * radius + 1) ** 2
     out = np.full((height, width), np.nan)
-    window = lambda r, c: (slice(r - radius, r + radius + 1), slice(c - radius, c + radius + 1))  # noqa: E731
+
+    def window(r, c):
+        return (slice(r - radius, r + radius + 1), slice(c - radius, c + radius + 1))
+
     for r in range(2 * radius, height - 2 * radius):
         for c in range(2 * radius, width - 2 * radius):
             total = 0.0
@@ -36,7 +45,9 @@ def written_out(photo, members, radius, eps):
                 for kc in range(c - radius, c + radius + 1):
                     colours = photo[window(kr, kc)].reshape(-1, 3).astype(np.float64)
                     mean = colours.mean(0)
-                    inverse = np.linalg.inv((colours - mean).T @ (colours - mean) / count + eps * np.eye(3))
+                    inverse = np.linalg.inv(
+                        (colours - mean).T @ (colours - mean) / count + eps * np.eye(3)
+                    )
                     weight = 1 + (colours - mean) @ inverse @ (photo[r, c] - mean)
                     total += (weight * members[window(kr, kc)].ravel()).sum() / count**2
             out[r, c] = total
@@ -68,14 +79,18 @@ def _plane(normal, offset):
     normal = np.array(normal) / np.linalg.norm(normal)
     directions = np.concatenate([RAYS, -np.ones((*RAYS.shape[:2], 1))], -1)
     depth = -offset / (directions @ normal)
-    return np.log(depth).astype(np.float32), np.broadcast_to(normal, directions.shape).astype(np.float32)
+    return np.log(depth).astype(np.float32), np.broadcast_to(normal, directions.shape).astype(
+        np.float32
+    )
 
 
 @pytest.mark.parametrize("normal", [(0.1, 0.2, 1), (0, 1, 0.7), (0.8, 0, 0.6)])
 def test_texture_printed_onto_a_plane_is_gone(normal):
     true, normals = _plane(normal, 1.5)
     assert np.isfinite(true).all()
-    printed = true + np.random.default_rng(0).choice([-0.005, 0, 0.005], true.shape).astype(np.float32)
+    printed = true + np.random.default_rng(0).choice([-0.005, 0, 0.005], true.shape).astype(
+        np.float32
+    )
     found = with_relief(printed, normals, RAYS)
     assert np.abs(found - true).max() < 2e-3
 
@@ -112,11 +127,17 @@ def test_a_plane_has_the_slopes_of_its_depth():
 
 def test_the_change_solves_the_dense_least_squares_problem():
     rng = np.random.default_rng(0)
-    count, first, second = 12, np.r_[np.arange(11), 0, 3], np.r_[np.arange(1, 12), 7, 11]
-    wanted, weight, pull = rng.normal(size=13), rng.uniform(0.01, 2, 13), rng.uniform(0.1, 1, count)
+    count = 12
+    first = np.r_[np.arange(11), 0, 3]
+    second = np.r_[np.arange(1, 12), 7, 11]
+    wanted = rng.normal(size=13)
+    weight = rng.uniform(0.01, 2, 13)
+    pull = rng.uniform(0.1, 1, count)
     found = least_squares_change(first, second, wanted, weight, pull, rtol=1e-12, maxiter=200)
     rows = np.zeros((13, count))
     rows[np.arange(13), first], rows[np.arange(13), second] = -1, 1
     system = np.r_[np.sqrt(weight)[:, None] * rows, np.diag(np.sqrt(pull))]
-    expected = np.linalg.lstsq(system, np.r_[np.sqrt(weight) * wanted, np.zeros(count)], rcond=None)[0]
+    expected = np.linalg.lstsq(
+        system, np.r_[np.sqrt(weight) * wanted, np.zeros(count)], rcond=None
+    )[0]
     np.testing.assert_allclose(found, expected, atol=1e-9)

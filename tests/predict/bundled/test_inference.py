@@ -4,14 +4,18 @@ import numpy as np
 
 from materialist.predict.bundled.inference import _surface
 
-BLUE, CLOUD, GREEN, DARK = (0.25, 0.4, 0.8), (0.7, 0.75, 0.85), (0.1, 0.2, 0.05), (0.01, 0.012, 0.01)
+BLUE = (0.25, 0.4, 0.8)
+CLOUD = (0.7, 0.75, 0.85)
+GREEN = (0.1, 0.2, 0.05)
+DARK = (0.01, 0.012, 0.01)
 
 
 def valley():
     """Logit and photo [40, 60] of a sky over a meadow, with a cloud that might be a surface, and a dark pit that might
     be sky."""
     rng = np.random.default_rng(0)
-    photo, logit = np.empty((40, 60, 3), np.float32), np.full((40, 60), 6.0, np.float32)
+    photo = np.empty((40, 60, 3), np.float32)
+    logit = np.full((40, 60), 6.0, np.float32)
     photo[:20], photo[20:] = BLUE, GREEN
     logit[:20], logit[:20, :15] = -3, -7
     photo[3:9, 5:14], photo[4:12, 30:45], photo[24:30, 20:30] = CLOUD, CLOUD, DARK

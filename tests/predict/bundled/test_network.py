@@ -14,7 +14,9 @@ from materialist.predict.bundled import inference
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork
 from materialist.predict.bundled.predictor import BundledPredictor
 
-TINY = BundledArchitecture(widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8)
+TINY = BundledArchitecture(
+    widths=(8, 8, 16, 32), blocks=(1, 1, 1, 1), attention=1, decoder_blocks=(1, 1, 1), fine=8
+)
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +63,9 @@ def test_any_size(file, size):
     check_conventions(prediction, size)
     known = prediction.depth > 0
     assert known.any()
-    assert np.median(prediction.depth[known]) == pytest.approx(inference.SETTINGS.median_depth, rel=0.05)
+    assert np.median(prediction.depth[known]) == pytest.approx(
+        inference.SETTINGS.median_depth, rel=0.05
+    )
 
 
 def test_bad_weights_are_refused(file, tmp_path):
@@ -72,7 +76,11 @@ def test_bad_weights_are_refused(file, tmp_path):
         BundledPredictor(broken)
     tensors = load_file(file)
     tensors["head.bias"] = torch.full_like(tensors["head.bias"], float("nan"))
-    meta = {"format": BundledNetwork.FORMAT, "architecture": json.dumps(TINY.as_dict()), "facts": "{}"}
+    meta = {
+        "format": BundledNetwork.FORMAT,
+        "architecture": json.dumps(TINY.as_dict()),
+        "facts": "{}",
+    }
     save_file(tensors, broken, meta)
     with pytest.raises(WeightsError, match="NaN"):
         BundledPredictor(broken)

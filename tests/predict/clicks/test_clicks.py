@@ -13,7 +13,8 @@ from materialist.predict.network import UNetArchitecture
 from materialist.types import Camera
 
 SMALL = UNetArchitecture((8, 8, 8, 8, 8), (1, 1, 1, 1, 1))
-DISTANCE, COSINE = 13, 11
+DISTANCE = 13
+COSINE = 11
 COLOUR = slice(8, 11)
 
 
@@ -24,7 +25,8 @@ def scene(size=(120, 160), at=(80, 66), radius=30):
     floor = np.array([0.0, 0.6, 0.8])
     depth = -2.0 / np.minimum(rays @ floor, -1e-3)
     y, x = np.mgrid[: size[0], : size[1]]
-    u, v = (x - at[0]) / radius, (y - at[1]) / radius
+    u = (x - at[0]) / radius
+    v = (y - at[1]) / radius
     ball = u**2 + v**2 < 1
     bulge = np.sqrt(np.clip(1 - u**2 - v**2, 0, 1))
     normal = np.where(ball[..., None], np.stack([u, -v, bulge], -1), floor)
@@ -33,7 +35,11 @@ def scene(size=(120, 160), at=(80, 66), radius=30):
     shade = (normal @ np.array([0.3, 0.8, 0.5])).clip(0.15)
     rgb = np.where(ball[..., None], [0.75, 0.2, 0.15], [0.55, 0.55, 0.52]) * shade[..., None] ** 0.5
     rgb = rgb + np.random.default_rng(0).normal(0, 0.01, rgb.shape)
-    return (rgb.clip(0, 1).astype(np.float32), normal.astype(np.float32), depth.astype(np.float32)), ball
+    return (
+        rgb.clip(0, 1).astype(np.float32),
+        normal.astype(np.float32),
+        depth.astype(np.float32),
+    ), ball
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +72,9 @@ def test_a_box_stands_for_a_click_in_its_middle():
     assert (columns.min(), rows.min(), columns.max(), rows.max()) == (60, 40, 100, 90)
     assert maps[BOX].sum() == 41 * 51 and not maps[SPOT].any() and maps[DISTANCE, 65, 80] == 0
     inner = np.median(photo[0][52:79, 70:91].reshape(-1, 3), 0)
-    np.testing.assert_allclose(maps[COLOUR], np.moveaxis(np.abs(photo[0] - inner), -1, 0), atol=1e-6)
+    np.testing.assert_allclose(
+        maps[COLOUR], np.moveaxis(np.abs(photo[0] - inner), -1, 0), atol=1e-6
+    )
     assert not features(*photo, [(80, 66)])[BOX].any()
 
 
@@ -92,13 +100,17 @@ def test_boxes_of_any_shape(untrained, box):
     assert found.shape == (120, 160) and np.isfinite(found).all()
 
 
-@pytest.mark.parametrize("where", [{}, {"clicks": [(160, 3)]}, {"box": (5, 5, 5, 9)}, {"box": (0, 0, 161, 9)}])
+@pytest.mark.parametrize(
+    "where", [{}, {"clicks": [(160, 3)]}, {"box": (5, 5, 5, 9)}, {"box": (0, 0, 161, 9)}]
+)
 def test_places_outside_are_errors(untrained, where):
     with pytest.raises(InputError, match="inside 160 x 120 pixels"):
         object_at(*scene()[0], **where, weights=untrained)
 
 
-@pytest.mark.parametrize("where", [{"clicks": [(80, 66)]}, {"clicks": [(92, 80)]}, {"box": (48, 34, 112, 98)}])
+@pytest.mark.parametrize(
+    "where", [{"clicks": [(80, 66)]}, {"clicks": [(92, 80)]}, {"box": (48, 34, 112, 98)}]
+)
 def test_the_weights_that_ship_find_a_ball(where):
     photo, ball = scene()
     found = object_at(*photo, **where) > 0.5

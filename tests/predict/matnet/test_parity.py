@@ -37,7 +37,9 @@ def keys(real_data) -> dict[str, list[int]]:
 @pytest.fixture(scope="module")
 def network(keys) -> MatNet:
     network = MatNet("vitb")
-    network.load_state_dict({name: filled(name, shape) for name, shape in keys.items()}, strict=True)
+    network.load_state_dict(
+        {name: filled(name, shape) for name, shape in keys.items()}, strict=True
+    )
     return network.eval()
 
 

@@ -43,11 +43,15 @@ def refused(path, *words):
 def test_prediction_is_the_networks_answer_in_our_conventions(tmp_path, state):
     photo = made_photo()
     predictor = MatNetPredictor(saved(tmp_path / "w.pth", state), input_size=28)
-    prediction, raw = predictor.predict(photo), infer(made_network(), photo.linear, input_size=28)
+    prediction = predictor.predict(photo)
+    raw = infer(made_network(), photo.linear, input_size=28)
     assert np.array_equal(prediction.materials.albedo, raw["albedo"].clip(0, 1))
     assert np.array_equal(prediction.materials.roughness, raw["roughness"].clip(0, 1))
     assert np.array_equal(prediction.materials.metallic, raw["metallic"].clip(0, 1))
-    assert np.allclose(prediction.depth, 2 * raw["depth"].max() - raw["depth"]) and prediction.depth.min() > 0
+    assert (
+        np.allclose(prediction.depth, 2 * raw["depth"].max() - raw["depth"])
+        and prediction.depth.min() > 0
+    )
     check_conventions(prediction, photo.linear.shape[:2])
     known = np.linalg.norm(raw["normal"], axis=-1) > 0.1
     assert ((prediction.normal * raw["normal"]).sum(-1)[known] > 0).all()
@@ -64,7 +68,10 @@ def test_the_same_weights_in_every_packing(tmp_path, state):
         saved(tmp_path / "parallel.ckpt", {f"module.{k}": v for k, v in state.items()}),
         saved(tmp_path / "half.pth", {k: v.half() for k, v in state.items()}),
     ]
-    maps = [MatNetPredictor(file, input_size=28).predict(made_photo()).materials.albedo for file in files]
+    maps = [
+        MatNetPredictor(file, input_size=28).predict(made_photo()).materials.albedo
+        for file in files
+    ]
     for other in maps[1:4]:
         assert np.array_equal(other, maps[0])
     assert np.allclose(maps[4], maps[0], atol=2e-2)
@@ -133,7 +140,9 @@ def test_downloaded_models_are_found_by_name_and_by_id(tmp_path, state):
         folder = tmp_path / "models" / repo
         folder.mkdir(parents=True)
         path = saved(folder / "matnet_weights.pth", state)
-        (folder / "SHA256SUMS").write_text(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n")
+        (folder / "SHA256SUMS").write_text(
+            f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n"
+        )
     assert get_predictor("matnet").name == get_predictor("matnet:someone/theirs").name
 
 
@@ -145,13 +154,22 @@ def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
     assert np.ptp(output) > 0
     np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
-    own = MatNetPredictor(tmp_path / "own.safetensors", device="cpu", input_size=28).predict(photo).depth
+    own = (
+        MatNetPredictor(tmp_path / "own.safetensors", device="cpu", input_size=28)
+        .predict(photo)
+        .depth
+    )
     np.testing.assert_allclose(own, np.maximum(output, 1e-3), rtol=1e-2, atol=1e-2 * output.max())
 
 
 @pytest.mark.parametrize(
     ("height", "width", "wanted"),
-    [(512, 512, (518, 518)), (384, 512, (518, 686)), (98, 126, (518, 672)), (1000, 300, (1722, 518))],
+    [
+        (512, 512, (518, 518)),
+        (384, 512, (518, 686)),
+        (98, 126, (518, 672)),
+        (1000, 300, (1722, 518)),
+    ],
 )
 def test_network_size_keeps_the_aspect_and_the_shorter_side(height, width, wanted):
     found = network_size(height, width)

@@ -54,6 +54,13 @@ def test_a_ball_is_a_surface_of_revolution_and_half_a_ball_is_the_networks():
     found = best_thickness(photo, mask, normal, depth, camera, up=np.array([0.0, 1, 0]))
     assert found.method == "revolution" and found.revolution is not None and found.back is None
     assert np.abs(found.solid - true)[mask].sum() < 0.12 * true[mask].sum()
-    assert (found.hollow <= found.solid).all() and (found.hollow <= guess.hollow).all() and found.hollow.max() > 0
+    assert (
+        (found.hollow <= found.solid).all()
+        and (found.hollow <= guess.hollow).all()
+        and found.hollow.max() > 0
+    )
     half = mask & (np.arange(64) > 32)
-    assert best_thickness(photo, half, normal, depth, camera, up=np.array([0.0, 1, 0])).method == "network"
+    assert (
+        best_thickness(photo, half, normal, depth, camera, up=np.array([0.0, 1, 0])).method
+        == "network"
+    )

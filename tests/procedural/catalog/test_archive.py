@@ -15,8 +15,13 @@ def found(tmp_path_factory):
 
 def test_sizes_are_metres_and_names_are_decoded(found):
     assert len(found) == len(MODELS)
-    table, sign = found[0], found[5]
-    assert table.key == "made-001" and table.path == "made/table/table.obj" and table.creator == "Somebody"
+    table = found[0]
+    sign = found[5]
+    assert (
+        table.key == "made-001"
+        and table.path == "made/table/table.obj"
+        and table.creator == "Somebody"
+    )
     assert table.size == pytest.approx((1.2, 0.75, 0.6))
     assert sign.name == "Café sign" and sign.elevation == pytest.approx(1.5)
     assert found[4].lights == (pytest.approx((0.1, 0.35, 0.1)),)
@@ -25,8 +30,16 @@ def test_sizes_are_metres_and_names_are_decoded(found):
 
 def test_roles(found):
     assert [role_of(entry) for entry in found] == [
-        "table", "chair", "small", "storage", "lamp", "wall", "small", "small", "small",
-    ]  # fmt: skip
+        "table",
+        "chair",
+        "small",
+        "storage",
+        "lamp",
+        "wall",
+        "small",
+        "small",
+        "small",
+    ]
 
 
 @pytest.mark.parametrize("content", [b"no zip", None])

@@ -28,21 +28,38 @@ def test_models_by_role_and_why_others_are_left_out(kept):
     assert kept.models["table"] == ("made-001",) and kept.models["wall"] == ("made-006",)
     assert kept.models["small"] == ("made-003", "made-009")
     told = json.loads((kept.folder / LIST).read_text())
-    assert told["left_out"] == {"made-007 Jar": "it is of glass", "made-008 Net": "its picture has holes"}
-    assert [key for key, _ in kept.textures["wood"]] == ["made-001", "made-009"] and len(kept.textures) == 1
+    assert told["left_out"] == {
+        "made-007 Jar": "it is of glass",
+        "made-008 Net": "its picture has holes",
+    }
+    assert [key for key, _ in kept.textures["wood"]] == ["made-001", "made-009"] and len(
+        kept.textures
+    ) == 1
     key, solid = kept.textures["wood"][0]
     assert kept.model(key).looks[solid].family == "wood"
-    assert len(kept.photographs) == 2 and kept.photograph(kept.photographs[0]).shape == (300, 400, 3)
+    assert len(kept.photographs) == 2 and kept.photograph(kept.photographs[0]).shape == (
+        300,
+        400,
+        3,
+    )
 
 
 def test_who_made_what_is_kept_beside_it(kept):
     text = (kept.folder / CREDITS).read_text()
-    assert "made-001: Table, by Somebody" in text and "creativecommons.org" in text and "Jar" not in text
+    assert (
+        "made-001: Table, by Somebody" in text
+        and "creativecommons.org" in text
+        and "Jar" not in text
+    )
 
 
 def test_a_model_comes_back(kept):
     model = kept.model("made-001")
-    assert model.entry.name == "Table" and model.role == "table" and model.places[-1].height == pytest.approx(0.75)
+    assert (
+        model.entry.name == "Table"
+        and model.role == "table"
+        and model.places[-1].height == pytest.approx(0.75)
+    )
     wood = [look.family for look in model.looks].index("wood")
     assert np.ptp(model.solids[wood].vertices[:, 0]) == pytest.approx(1.2)
     picture = model.pictures[wood]

@@ -35,7 +35,14 @@ def test_worlds_can_be_packed(stock, kind):
         rng = np.random.default_rng([6, k])
         world = maker(rng, stock)
         packed = packing.pack(world, rng)
-        for array in (packed.vertices, packed.face, packed.material, packed.env, packed.env_density, packed.portals):
+        for array in (
+            packed.vertices,
+            packed.face,
+            packed.material,
+            packed.env,
+            packed.env_density,
+            packed.portals,
+        ):
             assert np.isfinite(array).all()
         assert world.kind == kind and 8 < world.view.fov < 75
         assert packed.shares.sum() == pytest.approx(1)
@@ -85,14 +92,20 @@ def test_finishes_are_physical(stock, family):
     rng = np.random.default_rng(1)
     for _ in range(20):
         made = finishes.finish(
-            rng, type(look)(family, (0.4, 0.3, 0.2), 0.5, "", False), None, finishes.style(rng), stock
+            rng,
+            type(look)(family, (0.4, 0.3, 0.2), 0.5, "", False),
+            None,
+            finishes.style(rng),
+            stock,
         )
         assert all(0 < r <= 1 for r in made.roughness) and all(0 <= v <= 1 for v in made.metallic)
         assert all(0 < c <= 1 for colour in made.colours for c in colour)
         assert made.relief is None or 0 < made.relief.slope < 0.6
 
 
-@pytest.mark.parametrize("make", [sculptures._stone, sculptures._body, sculptures._plate, sculptures._vessel])
+@pytest.mark.parametrize(
+    "make", [sculptures._stone, sculptures._body, sculptures._plate, sculptures._vessel]
+)
 def test_sculptures_are_fine_meshes_with_unit_normals(stock, make):
     for k in range(2):
         solid = make(np.random.default_rng([2, k]), stock)
@@ -112,8 +125,14 @@ def test_hard_lamps_are_small_and_stand_on_the_side_of_the_camera():
 def test_what_is_kept_aside_is_never_trained_on(stock, monkeypatch):
     monkeypatch.setattr(stocks, "HELD_OUT_EVERY", 2)
     keys = tuple(f"made-{k:03d}" for k in range(40))
-    one, other = (stocks.Stock(stock.listing, held_out=aside)._mine(keys) for aside in (False, True))
-    assert set(one) | set(other) == set(keys) and not set(one) & set(other) and min(len(one), len(other)) > 5
+    one, other = (
+        stocks.Stock(stock.listing, held_out=aside)._mine(keys) for aside in (False, True)
+    )
+    assert (
+        set(one) | set(other) == set(keys)
+        and not set(one) & set(other)
+        and min(len(one), len(other)) > 5
+    )
 
 
 def test_options_need_the_models(tmp_path, monkeypatch):
@@ -125,7 +144,10 @@ def test_options_need_the_models(tmp_path, monkeypatch):
     make_archive(tmp_path / "made.sh3f")
     assert o.DataSetOptions().real_share == o.REAL_SHARE
     assert o.DataSetOptions(real=0.25).real_share == 0.25
-    assert o.DataSetOptions(only="room").real_share == 0 and o.DataSetOptions(only="laid").real_share == 1
+    assert (
+        o.DataSetOptions(only="room").real_share == 0
+        and o.DataSetOptions(only="laid").real_share == 1
+    )
 
 
 def test_a_set_of_real_things_keeps_the_contract_and_the_credits(tmp_path, monkeypatch):
@@ -144,8 +166,14 @@ def test_a_set_of_real_things_keeps_the_contract_and_the_credits(tmp_path, monke
             length = np.linalg.norm(stored["normal"].astype(float) / 127, axis=-1)
             np.testing.assert_allclose(length[mask], 1, atol=0.02)
             rays = pixel_rays(Camera(32, 32, float(stored["fov"])))
-            towards = (stored["normal"] / 127 * rays / np.linalg.norm(rays, axis=-1, keepdims=True)).sum(-1)
+            towards = (
+                stored["normal"] / 127 * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+            ).sum(-1)
             assert towards.max() < 0.1, "normals face the viewer"
-            assert np.isfinite(stored["image"].astype(np.float32)).all() and stored["image"].max() > 0
+            assert (
+                np.isfinite(stored["image"].astype(np.float32)).all() and stored["image"].max() > 0
+            )
             again = sample.make_sample(k, options)
-            assert np.array_equal(again["albedo"], stored["albedo"]) and np.array_equal(again["image"], stored["image"])
+            assert np.array_equal(again["albedo"], stored["albedo"]) and np.array_equal(
+                again["image"], stored["image"]
+            )

@@ -46,10 +46,14 @@ def test_a_hollow_ball_has_walls():
     found = ShapeTracer(shell).trace(*straight(x))
     outer, inner = (2 * np.sqrt(np.maximum(r * r - x * x, 0)) for r in (0.5, 0.4))
     np.testing.assert_allclose(found.solid, outer, atol=6e-3)
-    np.testing.assert_allclose(found.material, outer - inner, atol=1e-2)  # the paper's sum of both walls
+    np.testing.assert_allclose(
+        found.material, outer - inner, atol=1e-2
+    )  # the paper's sum of both walls
 
 
-@pytest.mark.parametrize(("radius", "at", "solid", "material"), [(0.2, 0.4, 1.2, 0.8), (0.3, 0.1, 0.8, 0.8)])
+@pytest.mark.parametrize(
+    ("radius", "at", "solid", "material"), [(0.2, 0.4, 1.2, 0.8), (0.3, 0.1, 0.8, 0.8)]
+)
 def test_gaps_count_as_solid_alone_and_overlaps_once(radius, at, solid, material):
     pair = shapes.joined([shapes.moved(ball(radius), at=(0, 0, z)) for z in (-at, at)])
     found = ShapeTracer(pair).trace(*straight([0.01]))

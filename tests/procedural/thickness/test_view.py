@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.predict.refraction.crop import ANSWERS, BACK_X, CHANNELS, MARGIN, MASK, MIRROR, NORMAL_X, SIDE
+from materialist.predict.refraction.crop import (
+    ANSWERS,
+    BACK_X,
+    CHANNELS,
+    MARGIN,
+    MASK,
+    MIRROR,
+    NORMAL_X,
+    SIDE,
+)
 from materialist.procedural.objects import shapes as solids
 from materialist.procedural.objects.glassware import Shape, make_shape
 from materialist.procedural.thickness import dataset
@@ -21,7 +30,9 @@ def test_every_kind_of_shape_is_usable(index):
     np.testing.assert_allclose(vertices.min(0) + vertices.max(0), 0, atol=1e-9)
     assert made.solid.faces.max() < len(vertices)
     # Level rays from the front meet it from outside, whatever it is, and run through material behind that.
-    origin = np.stack(np.meshgrid(np.linspace(-0.4, 0.4, 24), np.linspace(-0.4, 0.4, 24), [2.0]), -1).reshape(-1, 3)
+    origin = np.stack(
+        np.meshgrid(np.linspace(-0.4, 0.4, 24), np.linspace(-0.4, 0.4, 24), [2.0]), -1
+    ).reshape(-1, 3)
     found = ShapeTracer(made.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
     hit = np.isfinite(found.first)
     assert hit.any() and (found.material <= found.solid + 1e-3).all()

@@ -60,7 +60,8 @@ def event(client, number, data, place="queue/join"):
 
 def test_no_event_takes_a_file_of_the_server(page, shared):
     """Every event of the page, each of its inputs, each place, each shape."""
-    anna, bert = browser(page), browser(page)
+    anna = browser(page)
+    bert = browser(page)
     (own,) = upload(anna)
     stored = shared.files.path(shared.person(anna.cookies[PERSON]), own)
     project = shared.work.new("Anna's", shared.person(anna.cookies[PERSON]))
@@ -83,7 +84,8 @@ def test_no_event_takes_a_file_of_the_server(page, shared):
 
 
 def test_an_upload_is_an_id_for_its_owner_alone(page, shared):
-    anna, bert = browser(page), browser(page)
+    anna = browser(page)
+    bert = browser(page)
     (name,) = upload(anna)
     assert name.startswith("upload-") and "/" not in name
     assert anna.get(f"/gradio_api/file={name}").content == SECRET
@@ -96,7 +98,10 @@ def test_what_is_named_is_replaced_by_its_path(tmp_path):
     photo = tmp_path / "a.png"
     photo.write_bytes(SECRET)
     name = files.add("anna", photo)
-    body = {"data": [3, {"path": name, "orig_name": "mine.png", "url": "http://x/y"}, "text"], "fn_index": 4}
+    body = {
+        "data": [3, {"path": name, "orig_name": "mine.png", "url": "http://x/y"}, "text"],
+        "fn_index": 4,
+    }
     located = json.loads(with_known_files(json.dumps(body).encode(), "anna", files))
     assert located["fn_index"] == 4
     assert located["data"] == [
@@ -119,7 +124,8 @@ def test_what_is_named_is_replaced_by_its_path(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "body", [b"", b"[]", b"nonsense", b"[" * 100_000, b'{"data":' + b"[" * 5000 + b"]" * 5000 + b"}"]
+    "body",
+    [b"", b"[]", b"nonsense", b"[" * 100_000, b'{"data":' + b"[" * 5000 + b"]" * 5000 + b"}"],
 )
 def test_a_body_that_is_no_event_is_a_sentence(body):
     with pytest.raises(InputError, match="reload the page"):
@@ -163,7 +169,8 @@ def test_a_login_stays_with_its_person(shared):
         assert client.get("/").status_code == 200
         return client
 
-    anna, bert = log_in(), log_in()
+    anna = log_in()
+    bert = log_in()
     beat = "/gradio_api/queue/data?session_hash=annas"
     shared.session("annas", shared.person(anna.cookies[PERSON]))
     stolen = anna.cookies[PERSON]

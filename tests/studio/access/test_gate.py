@@ -55,17 +55,47 @@ def headers(**values):
         ({"host": "127.0.0.1:7860", "origin": "http://evil.example"}, False, False, False),
         ({"host": "127.0.0.1:7860", "origin": "http://127.0.0.1:9000"}, False, False, False),
         ({"host": "127.0.0.1:7860", "origin": "null"}, False, False, False),
-        ({"host": "127.0.0.1:7860", "sec_fetch_site": "cross-site", "sec_fetch_mode": "no-cors"}, False, False, False),
-        ({"host": "127.0.0.1:7860", "sec_fetch_site": "cross-site", "sec_fetch_mode": "navigate"}, True, True, False),
+        (
+            {"host": "127.0.0.1:7860", "sec_fetch_site": "cross-site", "sec_fetch_mode": "no-cors"},
+            False,
+            False,
+            False,
+        ),
+        (
+            {
+                "host": "127.0.0.1:7860",
+                "sec_fetch_site": "cross-site",
+                "sec_fetch_mode": "navigate",
+            },
+            True,
+            True,
+            False,
+        ),
         ({"host": "studio.example", "origin": "https://studio.example"}, False, True, True),
-        ({"host": "10.0.0.5:7860", "origin": "https://a.example", "x_forwarded_host": "a.example"},
-         False, False, False),
-        ({"host": "127.0.0.1:7860", "origin": "https://studio.example", "x_forwarded_host": "studio.example"},
-         False, False, True),
+        (
+            {
+                "host": "10.0.0.5:7860",
+                "origin": "https://a.example",
+                "x_forwarded_host": "a.example",
+            },
+            False,
+            False,
+            False,
+        ),
+        (
+            {
+                "host": "127.0.0.1:7860",
+                "origin": "https://studio.example",
+                "x_forwarded_host": "studio.example",
+            },
+            False,
+            False,
+            True,
+        ),
         ({"host": "[broken", "origin": "http://[broken"}, False, False, False),
         ({}, False, True, False),
     ],
-)  # fmt: skip
+)
 def test_welcome(shared, sent, alone, everyone, behind):
     assert Gate(echo, shared, host=ALONE).allows(headers(**sent)) is alone
     assert Gate(echo, shared).allows(headers(**sent)) is everyone
@@ -73,10 +103,17 @@ def test_welcome(shared, sent, alone, everyone, behind):
 
 
 def test_forwarded_headers_count_behind_a_proxy_only(shared):
-    told = {"x-forwarded-host": "studio.example", "x-forwarded-for": "1.2.3.4", "forwarded": "host=evil.example"}
+    told = {
+        "x-forwarded-host": "studio.example",
+        "x-forwarded-for": "1.2.3.4",
+        "forwarded": "host=evil.example",
+    }
     assert client(shared).get("/", headers=told).text == ""
     page = client(shared, "http://10.0.0.5:7860", proxy="studio.example")
-    assert page.get("/", headers=told).text == "x-forwarded-host=studio.example x-forwarded-proto=https"
+    assert (
+        page.get("/", headers=told).text
+        == "x-forwarded-host=studio.example x-forwarded-proto=https"
+    )
     assert "Secure" in page.get("/", headers=told).headers["set-cookie"]
     assert page.get("/", headers={**told, "x-forwarded-host": "evil.example"}).status_code == 403
     assert page.get("/").status_code == 403
@@ -96,7 +133,8 @@ def test_every_answer_tells_the_browser_to_be_careful(shared):
 
 
 def test_sockets_are_closed_and_the_lifespan_passes(shared):
-    reached, sent = [], []
+    reached = []
+    sent = []
 
     async def app(scope, receive, send):
         reached.append(scope["type"])
@@ -106,7 +144,9 @@ def test_sockets_are_closed_and_the_lifespan_passes(shared):
 
     for kind in ("websocket", "lifespan"):
         call = Gate(app, shared)({"type": kind, "headers": []}, None, send)
-        with ThreadPoolExecutor(1) as thread:  # browser tests leave an event loop running in this one
+        with ThreadPoolExecutor(
+            1
+        ) as thread:  # browser tests leave an event loop running in this one
             thread.submit(asyncio.run, call).result()
     assert reached == ["lifespan"] and sent == [{"type": "websocket.close", "code": 1008}]
 
@@ -114,7 +154,10 @@ def test_sockets_are_closed_and_the_lifespan_passes(shared):
 def test_a_password_closes_every_door(shared, monkeypatch):
     monkeypatch.setattr(gate, "SETTINGS", StudioSettings(wrong_passwords=3))
     page = client(shared, password="open sesame ü")
-    enter = lambda word: page.post("/login", data={"password": word})  # noqa: E731
+
+    def enter(word):
+        return page.post("/login", data={"password": word})
+
     for place in ("/", "/config", "/assets/a.js", "/gradio_api/heartbeat/abc"):
         assert page.get(place).status_code == 401
     assert "password" in page.get("/").text and page.post("/gradio_api/upload").status_code == 401
@@ -124,7 +167,8 @@ def test_a_password_closes_every_door(shared, monkeypatch):
     assert answer.status_code == 303 and "SameSite=Lax" in answer.headers["set-cookie"]
     assert "HttpOnly" in answer.headers["set-cookie"] and page.get("/config").status_code == 200
     other, elsewhere = (
-        TestClient(page.app, follow_redirects=False, client=(address, 1)) for address in ("1.2.3.4", "5.6.7.8")
+        TestClient(page.app, follow_redirects=False, client=(address, 1))
+        for address in ("1.2.3.4", "5.6.7.8")
     )
     assert other.get("/").status_code == 401
     for _ in range(2):
@@ -136,7 +180,8 @@ def test_a_password_closes_every_door(shared, monkeypatch):
 
 
 def test_a_page_belongs_to_the_browser_that_used_it_first(shared):
-    anna, bert = client(shared), client(shared)
+    anna = client(shared)
+    bert = client(shared)
     anna.get("/")
     person = shared.person(anna.cookies[PERSON])
     assert anna.get("/gradio_api/queue/data?session_hash=abc").status_code == 200
@@ -167,29 +212,49 @@ def test_uploads_have_a_quota(shared, monkeypatch):
 
 def test_the_password_need_not_be_an_argument(tmp_path, refused):
     (tmp_path / "word").write_text("open sesame\nsecond line\n")
-    assert password_of(None, tmp_path / "word") == "open sesame" and password_of("word", None) == "word"
+    assert (
+        password_of(None, tmp_path / "word") == "open sesame"
+        and password_of("word", None) == "word"
+    )
     (tmp_path / "none").write_text("\n")
-    for word, file, message in (("a", "word", "not both"), (None, "none", "empty"), (None, "no", "cannot be read")):
+    for word, file, message in (
+        ("a", "word", "not both"),
+        (None, "none", "empty"),
+        (None, "no", "cannot be read"),
+    ):
         with pytest.raises(InputError, match=message):
             password_of(word, tmp_path / file)
-    assert "--password-file" in refused("studio", "--behind-proxy", "studio.example", "--work", tmp_path / "w")
-    assert "HOST" in refused("studio", "--behind-proxy", "http://x/y", "--open", "--work", tmp_path / "w")
+    assert "--password-file" in refused(
+        "studio", "--behind-proxy", "studio.example", "--work", tmp_path / "w"
+    )
+    assert "HOST" in refused(
+        "studio", "--behind-proxy", "http://x/y", "--open", "--work", tmp_path / "w"
+    )
 
 
 @pytest.mark.parametrize(
     ("method", "place", "status"),
     [
-        ("GET", "/", 200), ("HEAD", "/", 200), ("GET", "/gradio_api/queue/data", 200), ("GET", "/runs", 404),
-        ("POST", "/", 404), ("POST", "/gradio_api/queue/join", 200), ("GET", "/gradio_api/info", 404),
-        ("POST", "/gradio_api/process_recording", 404), ("GET", "/gradio_api/deep_link", 404),
+        ("GET", "/", 200),
+        ("HEAD", "/", 200),
+        ("GET", "/gradio_api/queue/data", 200),
+        ("GET", "/runs", 404),
+        ("POST", "/", 404),
+        ("POST", "/gradio_api/queue/join", 200),
+        ("GET", "/gradio_api/info", 404),
+        ("POST", "/gradio_api/process_recording", 404),
+        ("GET", "/gradio_api/deep_link", 404),
         ("GET", "/gradio_api/proxy=http://a.example/b", 404),
-        ("GET", "/gradio_api/file=http://a.example/b.png", 403), ("GET", "/gradio_api/file=/etc/passwd", 403),
+        ("GET", "/gradio_api/file=http://a.example/b.png", 403),
+        ("GET", "/gradio_api/file=/etc/passwd", 403),
         ("GET", "/gradio_api/file=%00", 404),
-        ("GET", "/gradio_api/file=CACHE/../../etc/passwd", 403), ("GET", "/gradio_api/file=CACHE/a/b.png", 200),
-        ("GET", "/gradio_api/heartbeat/a/b", 404), ("POST", "/gradio_api/heartbeat/a", 404),
+        ("GET", "/gradio_api/file=CACHE/../../etc/passwd", 403),
+        ("GET", "/gradio_api/file=CACHE/a/b.png", 200),
+        ("GET", "/gradio_api/heartbeat/a/b", 404),
+        ("POST", "/gradio_api/heartbeat/a", 404),
         ("HEAD", "/gradio_api/heartbeat/a", 200),
     ],
-)  # fmt: skip
+)
 def test_only_what_the_page_asks_for_is_answered(shared, method, place, status):
     place = place.replace("CACHE", str(shared.work.cache))
     body = b'{"data": []}' if method == "POST" else None
@@ -198,7 +263,9 @@ def test_only_what_the_page_asks_for_is_answered(shared, method, place, status):
 
 
 def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
-    monkeypatch.setattr(gate, "SETTINGS", StudioSettings(request_bytes=1000, upload_megabytes=0.001))
+    monkeypatch.setattr(
+        gate, "SETTINGS", StudioSettings(request_bytes=1000, upload_megabytes=0.001)
+    )
 
     async def read(request):
         return PlainTextResponse(str(len(await request.body())))
@@ -211,7 +278,9 @@ def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
         Route("/{path:path}", read, methods=["POST"]),
     ]
     reader = Starlette(routes=routes)
-    page, closed = (TestClient(Gate(reader, shared, password=word)) for word in (None, "open sesame"))
+    page, closed = (
+        TestClient(Gate(reader, shared, password=word)) for word in (None, "open sesame")
+    )
 
     def chunks(count):
         return iter([b'{"data": []}'.ljust(100), *[b" " * 100] * (count - 1)])
@@ -230,8 +299,13 @@ def test_gradio_fetches_nothing(shared, monkeypatch):
         monkeypatch.setattr(processing, name, getattr(processing, name))  # as it was, afterwards
     server._fetch_nothing()
     with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
-        thread.submit(processing.save_url_to_cache, "http://127.0.0.1:9/a.png", str(shared.work.cache)).result()
-    asked = lambda: processing.async_ssrf_protected_download("http://127.0.0.1:9/a.png", cache_dir="x")  # noqa: E731
+        thread.submit(
+            processing.save_url_to_cache, "http://127.0.0.1:9/a.png", str(shared.work.cache)
+        ).result()
+
+    def asked():
+        return processing.async_ssrf_protected_download("http://127.0.0.1:9/a.png", cache_dir="x")
+
     with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
         thread.submit(lambda: asyncio.run(asked())).result()
     assert set(shared.work.cache.iterdir()) == shared.work.kept  # nothing was stored

@@ -65,7 +65,9 @@ def test_a_promise_that_is_larger_than_an_upload_takes_nothing_from_the_neighbou
 def test_what_was_promised_and_never_came_is_given_back(page, shared):
     """The next one finds the whole hour again."""
     kind = {"content-type": "multipart/form-data; boundary=B"}
-    browser(page).post("/gradio_api/upload", content=FORM, headers=kind | {"content-length": "50000000"})
+    browser(page).post(
+        "/gradio_api/upload", content=FORM, headers=kind | {"content-length": "50000000"}
+    )
     assert shared.quota._stored("1.2.3.4") <= quota.SMALLEST
 
 
@@ -81,7 +83,9 @@ def test_a_work_folder_that_two_versions_used_opens(tmp_path):
     project = tmp_path / "photo-001"
     for name in (COOKIE, person_of(COOKIE)):
         (project / f"edits-{name}").mkdir(parents=True)
-        (project / f"edits-{name}" / "edits.yaml").write_text("- edit: {box: [1, 1, 5, 5], hue: 3}\n")
+        (project / f"edits-{name}" / "edits.yaml").write_text(
+            "- edit: {box: [1, 1, 5, 5], hue: 3}\n"
+        )
     card = {"title": "One", "owner": COOKIE, "scene": "photo.scene"}
     (project / "project.json").write_text(json.dumps(card))
     (project,) = WorkFolder(tmp_path).projects(person_of(COOKIE))
@@ -118,12 +122,16 @@ def test_ids_of_files_that_were_swept_are_forgotten(shared, tmp_path):
     file.unlink()
     for _ in range(600):
         shared.files.add("bert", shared.work.cache / "b.png")
-    assert not shared.files._files.keys() & {name for name, (who, _) in shared.files._files.items() if who == "anna"}
+    assert not shared.files._files.keys() & {
+        name for name, (who, _) in shared.files._files.items() if who == "anna"
+    }
 
 
 def test_few_uploads_are_opened_at_once_and_one_of_each_sender(monkeypatch, tmp_path):
     """Each may use 2 GB and one thread of the page: all at once they would freeze it for everybody."""
-    opened_at_once, running, lock = [], [], threading.Lock()
+    opened_at_once = []
+    running = []
+    lock = threading.Lock()
 
     def slow(task, limits, **given):
         with lock:
@@ -178,9 +186,11 @@ def test_a_promise_is_settled_with_the_address_that_made_it(shared):
 
 def test_a_page_follows_a_job_once_and_not_after_it_was_closed(shared, tmp_path):
     """Else every reload would keep a thread of the page until the job ends."""
-    context, session = PageContext(shared), shared.session("page", "anna")
+    context = PageContext(shared)
+    session = shared.session("page", "anna")
     job = Job("invert", "anna", tmp_path, print)
-    first, second = context.following(session, job), context.following(session, job)
+    first = context.following(session, job)
+    second = context.following(session, job)
     assert "progress" in next(first) and "progress" in next(second)
     assert next(second) == {}  # the thread is free between two looks
     assert [*first] == []
@@ -245,4 +255,6 @@ def test_a_large_scene_is_refused(tmp_path, monkeypatch):
 def test_gradio_is_not_asked_to_tell_of_closed_pages(page):
     """It makes the whole state of a page anew for that, on the loop of all requests: 200 pages stop it for 16 s."""
     events = browser(page).get("/config").json()["dependencies"]
-    assert not [one["id"] for one in events if any(event == "unload" for _, event in one["targets"])]
+    assert not [
+        one["id"] for one in events if any(event == "unload" for _, event in one["targets"])
+    ]

@@ -31,7 +31,9 @@ KINECT_FOV = 63.3
 PUBLISHED_FOV = 35.0
 """Degrees: that of the published network's runs."""
 GARAGE = "motorcycle_garage"
-FOCAL, BASELINE, OFFSET = 994.978, 0.193001, 31.086
+FOCAL = 994.978
+BASELINE = 0.193001
+OFFSET = 31.086
 """Pixels, metres and pixels of a stereo pair (Middlebury 2014): depth = focal baseline / (disparity + offset)."""
 
 
@@ -47,7 +49,9 @@ def object_photos(folder: Path, reading: Reading) -> Iterator[RealPhoto]:
         (directions,) = json.loads(file.read_text("utf-8")).values()
         envmaps = [lamp_light(direction) for direction in directions]
     except (OSError, ValueError, AttributeError, TypeError) as error:
-        raise InputError(f"{file} does not hold one list of directions to lamps ({error}).") from error
+        raise InputError(
+            f"{file} does not hold one list of directions to lamps ({error})."
+        ) from error
     files = [folder / f"light_{k:02d}.png" for k in range(len(envmaps))]
 
     def read(path: Path) -> Photo:
@@ -91,7 +95,11 @@ def garage_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
 
 def published(place: Path) -> list[Path]:
     """A photo with another network's maps beside it."""
-    return [place / "photo.png"] if (place / "photo.png").is_file() and (place / "maps").is_dir() else []
+    return (
+        [place / "photo.png"]
+        if (place / "photo.png").is_file() and (place / "maps").is_dir()
+        else []
+    )
 
 
 def published_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
@@ -99,5 +107,7 @@ def published_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
     photo = read_photo(path, size=reading.size, fov=PUBLISHED_FOV)
     maps = MapsPredictor(path.parent / "maps").predict(photo)
     surface = maps.depth > 0
-    reference = RealPhoto("indoor", photo, maps.materials.albedo, maps.normal, maps.depth, mask=surface)
+    reference = RealPhoto(
+        "indoor", photo, maps.materials.albedo, maps.normal, maps.depth, mask=surface
+    )
     yield replace(reference, source="published maps")

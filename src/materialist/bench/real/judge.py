@@ -51,22 +51,34 @@ class RealBench(Benchmark):
     )
     plotted = ("normal_angle", "albedo_psnr", "relit_psnr", "depth_abs_rel")
 
-    predictor: str = option("auto", "Names, with commas; bundled:FILE are other weights.", kind="name")
+    predictor: str = option(
+        "auto", "Names, with commas; bundled:FILE are other weights.", kind="name"
+    )
     size: int = option(512, "Longer side of the photos.", **SIZE)
-    lamps: int = option(3, "Photos of each view under several lights, evenly spread; 0: all.", **COUNT_OR_0)
-    limit: int = option(8, "At most so many photos (or views) of a layout, evenly spread; 0: all.", **COUNT_OR_0)
-    prior_only: bool = option(False, "Judges the maps alone, in seconds: no fit, no other light.", kind="switch")
+    lamps: int = option(
+        3, "Photos of each view under several lights, evenly spread; 0: all.", **COUNT_OR_0
+    )
+    limit: int = option(
+        8, "At most so many photos (or views) of a layout, evenly spread; 0: all.", **COUNT_OR_0
+    )
+    prior_only: bool = option(
+        False, "Judges the maps alone, in seconds: no fit, no other light.", kind="switch"
+    )
     pictures: int = option(8, "Photos of a layout with a sheet in pictures/.", **COUNT_OR_0)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         if data is None:
-            raise InputError("This benchmark needs photographs with measured truth; give --data DIR.")
+            raise InputError(
+                "This benchmark needs photographs with measured truth; give --data DIR."
+            )
         specs = names("predictor", self.predictor)
         sources = {spec: get_predictor(spec, device=self.device) for spec in specs}
         by_layout = located(data)
         if not any(by_layout.values()):
             places = ", ".join(_described(layout) for layout in LAYOUTS)
-            raise InputError(f"{data} holds no photographs with measured truth; it may have {places}.")
+            raise InputError(
+                f"{data} holds no photographs with measured truth; it may have {places}."
+            )
         absent = [_described(layout) for layout in LAYOUTS if not by_layout[layout.name]]
         report.settings["skipped, since not there"] = "; ".join(absent) or None
         for layout in LAYOUTS:
@@ -87,7 +99,9 @@ class RealBench(Benchmark):
                 name = f"{Path(layout.folder).name} {real.name}"
                 report.pictures[name.replace(" ", "_")] = sheet(real, [*shown, truth_row(real)])
 
-    def _photo_rows(self, real: RealPhoto, sources: dict[str, Predictor], shown: list[SheetRow]) -> Iterator[Row]:
+    def _photo_rows(
+        self, real: RealPhoto, sources: dict[str, Predictor], shown: list[SheetRow]
+    ) -> Iterator[Row]:
         """The rows of a photo; adds the maps and pictures to `shown`."""
         photo = real.photo
         untouched = albedo_figures(photo.linear, real) | light_figures(photo.linear, real)
@@ -96,7 +110,9 @@ class RealBench(Benchmark):
         for spec, source in sources.items():
             prior, cost = timed(source.predict, photo, seed=self.seed)
             picture = None if shown else photo.linear
-            shown.append(SheetRow(spec, "photo", picture, prior.materials.albedo, prior.normal, prior.depth))
+            shown.append(
+                SheetRow(spec, "photo", picture, prior.materials.albedo, prior.normal, prior.depth)
+            )
             yield {"method": spec, **map_figures(prior, real), "seconds": cost["seconds"]}
             if real.other is None or self.prior_only:
                 continue

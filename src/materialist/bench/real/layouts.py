@@ -105,4 +105,6 @@ LAYOUTS = (
 
 def located(data: Path) -> dict[str, Sequence[Any]]:
     """Name of each layout -> its items in DATA/FOLDER, or else in DATA itself; empty where it has none."""
-    return {layout.name: layout.items(data / layout.folder) or layout.items(data) for layout in LAYOUTS}
+    return {
+        layout.name: layout.items(data / layout.folder) or layout.items(data) for layout in LAYOUTS
+    }

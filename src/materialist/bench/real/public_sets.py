@@ -10,7 +10,13 @@ import numpy as np
 from materialist.bench.materials import photo_of
 from materialist.bench.real.captures import KINECT_FOV
 from materialist.bench.real.lights import ball_light, views
-from materialist.bench.real.photos import Reading, RealPhoto, read_array, read_millimetres, with_depth
+from materialist.bench.real.photos import (
+    Reading,
+    RealPhoto,
+    read_array,
+    read_millimetres,
+    with_depth,
+)
 from materialist.edits.light.relight import read_envmap
 from materialist.io.datasets import InteriorVerse, parts
 from materialist.io.photo import decode_photo, read_photo
@@ -74,7 +80,8 @@ def interiorverse_photo(item: tuple[InteriorVerse, int], reading: Reading) -> It
     """A rendered room, at its own size."""
     source, index = item
     sample = source.read(index)
-    photo, inside = photo_of(sample), sample.mask > 0
+    photo = photo_of(sample)
+    inside = sample.mask > 0
     yield RealPhoto(f"{index:07d}", photo, sample.albedo, sample.normal, sample.depth, mask=inside)
 
 

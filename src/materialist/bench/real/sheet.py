@@ -13,9 +13,13 @@ from materialist.io import display
 from materialist.metrics.maps import best_scale
 from materialist.types import Array
 
-WIDTH, CAPTION, GAP, TEXT = 360, 26, 8, 15
+WIDTH = 360
+CAPTION = 26
+GAP = 8
+TEXT = 15
 """Pixels: a tile's width, the line below it, the gap between tiles, the height of the text."""
-PAPER, INK = (24, 25, 28), (220, 220, 224)
+PAPER = (24, 25, 28)
+INK = (220, 220, 224)
 
 
 @dataclass(frozen=True)
@@ -35,7 +39,9 @@ class SheetRow:
 def truth_row(real: RealPhoto) -> SheetRow:
     """What was measured; the picture is the photo under another light."""
     picture = None if real.other is None else real.other.picture
-    return SheetRow(real.source, "under the other light", picture, real.albedo, real.normal, real.depth)
+    return SheetRow(
+        real.source, "under the other light", picture, real.albedo, real.normal, real.depth
+    )
 
 
 def sheet(real: RealPhoto, rows: Sequence[SheetRow]) -> Array:
@@ -59,15 +65,18 @@ def sheet(real: RealPhoto, rows: Sequence[SheetRow]) -> Array:
 def _drawn(lines: Sequence[dict[str, Array | None]], aspect: float) -> Array:
     """[h, w, 3] uint8: pictures with their titles, a line under each other; aspect: height / width."""
     tile = (WIDTH, max(1, round(WIDTH * aspect)))
-    across, down = WIDTH + GAP, tile[1] + CAPTION
+    across = WIDTH + GAP
+    down = tile[1] + CAPTION
     size = (GAP + across * max(map(len, lines)), GAP + down * len(lines))
     image = Image.new("RGB", size, PAPER)
-    draw, font = ImageDraw.Draw(image), ImageFont.load_default(TEXT)
+    draw = ImageDraw.Draw(image)
+    font = ImageFont.load_default(TEXT)
     for row, line in enumerate(lines):
         for column, (title, pixels) in enumerate(line.items()):
             if pixels is None:
                 continue
-            left, top = GAP + column * across, GAP + row * down
+            left = GAP + column * across
+            top = GAP + row * down
             small = cv2.resize(pixels, tile, interpolation=cv2.INTER_AREA)
             image.paste(Image.fromarray(small), (left, top))
             draw.text((left, top + tile[1] + 4), title, font=font, fill=INK)
@@ -91,7 +100,9 @@ def _depths(maps: Sequence[Array | None]) -> list[Array | None]:
         return [None for _ in maps]
     true = known[-1]
     factors = [_median_factor(depth, true) for depth in known]
-    joined = np.concatenate([depth * np.float32(f) for depth, f in zip(known, factors, strict=True)], 1)
+    joined = np.concatenate(
+        [depth * np.float32(f) for depth, f in zip(known, factors, strict=True)], 1
+    )
     shown = iter(np.split(display.depths(joined), len(known), 1))
     return [None if depth is None else next(shown) for depth in maps]
 

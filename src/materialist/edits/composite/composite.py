@@ -31,9 +31,17 @@ RERENDERED = 64
 
 
 def composite(
-    scene: Scene, edited: Scene, *, spp: int = PATHS, seed: int = 0, full_render: bool = False,
-    denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
-) -> Array:  # fmt: skip
+    scene: Scene,
+    edited: Scene,
+    *,
+    spp: int = PATHS,
+    seed: int = 0,
+    full_render: bool = False,
+    denoise: bool = True,
+    upscale: Upscale | None = None,
+    device: str = "auto",
+    progress=None,
+) -> Array:
     """The photograph with the edit in it: [H0, W0, 3] float32 linear, at the photo's native size.
 
     Bit for bit the photo's own values where the edit does not reach, everywhere if it changes nothing; HDR stays HDR.
@@ -50,15 +58,25 @@ def composite(
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
     _check(upscale, full_render)
-    renderer = EditRenderer(_base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device)
+    renderer = EditRenderer(
+        _base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device
+    )
     return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
 
 
 def pictures(
-    scene: Scene, edits: Iterable[Scene], *, spp: int = PATHS, seed: int = 0, full_render: bool = False,
-    denoise: bool = True, upscale: Upscale | None = None, device: str = "auto", progress=None,
+    scene: Scene,
+    edits: Iterable[Scene],
+    *,
+    spp: int = PATHS,
+    seed: int = 0,
+    full_render: bool = False,
+    denoise: bool = True,
+    upscale: Upscale | None = None,
+    device: str = "auto",
+    progress=None,
     count: int | None = None,
-) -> Iterator[Array]:  # fmt: skip
+) -> Iterator[Array]:
     """[H0, W0, 3] each: composites of many edits of one scene, as `composite`; what they share is rendered once.
 
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
@@ -68,7 +86,8 @@ def pictures(
     tick = progress or (lambda *_: None)
     total = len(edits) if isinstance(edits, Sequence) else count or 0
     before: Scene | None = None
-    renderer, picture = EditRenderer(scene, device=device), scene.photo.original
+    renderer = EditRenderer(scene, device=device)
+    picture = scene.photo.original
     for k, edited in enumerate(edits):
         tick("frames", k, total)
         if edited is not before:
@@ -83,33 +102,54 @@ def pictures(
 
 def _check(upscale: Upscale | None, full_render: bool) -> None:
     if upscale is not None and not full_render:
-        raise InputError("upscale goes with full_render=True; the composite has the photo's native size already.")
+        raise InputError(
+            "upscale goes with full_render=True; the composite has the photo's native size already."
+        )
 
 
 def _base(
-    scene: Scene, edited: Scene, spp: int, seed: int, full_render: bool, denoise: bool, device: str,
+    scene: Scene,
+    edited: Scene,
+    spp: int,
+    seed: int,
+    full_render: bool,
+    denoise: bool,
+    device: str,
     progress=None,
-) -> Scene:  # fmt: skip
+) -> Scene:
     """What the edit is compared with."""
     if full_render:
         return compared(scene, edited)
-    return without_traces(scene, edited, spp=spp, seed=seed, denoise=denoise, device=device, progress=progress)
+    return without_traces(
+        scene, edited, spp=spp, seed=seed, denoise=denoise, device=device, progress=progress
+    )
 
 
 def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
     if dimmed_emitters(scene, one) != dimmed_emitters(scene, other) or one.photo is not other.photo:
         return False
-    return one.photo is scene.photo or (one.geometry is other.geometry and one.materials is other.materials)
+    return one.photo is scene.photo or (
+        one.geometry is other.geometry and one.materials is other.materials
+    )
 
 
 def _picture(
-    renderer: EditRenderer, scene: Scene, edited: Scene, spp: int, seed: int, full_render: bool, denoise: bool,
-    upscale: Upscale | None, progress=None,
-) -> Array:  # fmt: skip
+    renderer: EditRenderer,
+    scene: Scene,
+    edited: Scene,
+    spp: int,
+    seed: int,
+    full_render: bool,
+    denoise: bool,
+    upscale: Upscale | None,
+    progress=None,
+) -> Array:
     """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
     if full_render:
         if is_pictured(edited):
-            raise InputError(f"{PICTURED}a full rendering would not show it; take the closed model, or the composite.")
+            raise InputError(
+                f"{PICTURED}a full rendering would not show it; take the closed model, or the composite."
+            )
         picture = renderer.pair(edited)[1](spp, seed)
         picture = denoised(picture, *renderer.guides(edited)) if denoise else picture
         return picture if upscale is None else _enlarged(picture, upscale)
@@ -126,20 +166,30 @@ def _enlarged(picture: Array, upscale: Upscale) -> Array:
         large = np.asarray(upscale(picture), np.float32)
     except Exception as error:  # whatever a user's function raises
         raise InputError(f"upscale failed: {type(error).__name__}: {error}.") from error
-    larger = large.ndim == 3 and large.shape[2] == 3 and min(np.subtract(large.shape, picture.shape)) >= 0
+    larger = (
+        large.ndim == 3
+        and large.shape[2] == 3
+        and min(np.subtract(large.shape, picture.shape)) >= 0
+    )
     if not larger or not np.isfinite(large).all():
-        raise InputError(f"upscale gave {large.shape} for {picture.shape}; return a larger picture, finite and linear.")
+        raise InputError(
+            f"upscale gave {large.shape} for {picture.shape}; return a larger picture, finite and linear."
+        )
     return np.maximum(large, 0)
 
 
-def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, device: str = "auto") -> Scene:
+def developed(
+    scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, device: str = "auto"
+) -> Scene:
     """The edited scene as a scene of its own: its photo is the composite [H0, W0, 3], its re-rendering one of itself.
 
     Edits of it start there.
     """
     size = (scene.camera.width, scene.camera.height)
     same = picture.shape[:2] == size[::-1]
-    linear = picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    linear = (
+        picture if same else np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    )
     photo = replace(
         scene.photo,
         linear=linear.astype(np.float32),
@@ -151,13 +201,19 @@ def developed(scene: Scene, edited: Scene, picture: Array, *, seed: int = 0, dev
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
     figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}
     figures["rerender_ssim_path"] = metrics.ssim(again, photo.linear)
-    stage = {"name": "edit", "edits": edited.provenance.get("edits", []), "bodies": len(edited.bodies)}
+    stage = {
+        "name": "edit",
+        "edits": edited.provenance.get("edits", []),
+        "bodies": len(edited.bodies),
+    }
     old = edited.report
     report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})
     saved = replace(edited, photo=photo, rerender=again, report=report)
     return saved if photo_colours(scene.photo).space is None else warned(saved, NARROWED)
 
 
-def write_composite(path: str | Path, picture: Array, photo: Photo, *, force: bool = False) -> tuple[str, ...]:
+def write_composite(
+    path: str | Path, picture: Array, photo: Photo, *, force: bool = False
+) -> tuple[str, ...]:
     """Write linear [H, W, 3] as the photo's own file would be, see `io.out.encode.save_image`; returns its notes."""
     return save_image(path, picture, photo, force=force)

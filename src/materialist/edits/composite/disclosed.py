@@ -31,20 +31,33 @@ def compared(scene: Scene, edited: Scene) -> Scene:
     if edited.photo is scene.photo:
         return base
     hole = _disclosed(scene, edited)
-    old, new = scene.materials, edited.materials
+    old = scene.materials
+    new = edited.materials
     materials = Materials(
         np.where(hole[..., None], new.albedo, old.albedo),
         np.where(hole, new.roughness, old.roughness),
         np.where(hole, new.metallic, old.metallic),
     )
     return replace(
-        base, photo=edited.photo, rerender=edited.rerender, materials=materials, depth=edited.depth,
-        normal=edited.normal, geometry=edited.geometry,
-    )  # fmt: skip
+        base,
+        photo=edited.photo,
+        rerender=edited.rerender,
+        materials=materials,
+        depth=edited.depth,
+        normal=edited.normal,
+        geometry=edited.geometry,
+    )
 
 
 def without_traces(
-    scene: Scene, edited: Scene, *, spp: int, seed: int, denoise: bool, device: str = "auto", progress=None
+    scene: Scene,
+    edited: Scene,
+    *,
+    spp: int,
+    seed: int,
+    denoise: bool,
+    device: str = "auto",
+    progress=None,
 ) -> Scene:
     """`compared`, and its photo changes around the hole as the rendering does when the object goes.
 
@@ -54,19 +67,29 @@ def without_traces(
     base = compared(scene, edited)
     if base.photo is scene.photo:
         return base
-    hole, photo = _disclosed(scene, edited), base.photo
+    hole = _disclosed(scene, edited)
+    photo = base.photo
     # Planes that the rest of the picture suggests when the object is gone were there before.
     before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
     guides = [(one.materials.albedo, one.normal) for one in (before, base)] if denoise else None
     pair = EditRenderer(before, device=device).pair(base)
     tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
     spanned = grown(hole, RIM)
-    layers = difference(*pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp, seed=seed, progress=tick)
+    layers = difference(
+        *pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp, seed=seed, progress=tick
+    )
     factor = np.log((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor))
     factor = np.where(spanned[..., None], membrane(factor, ~spanned), factor)
     reached = np.where(spanned, np.abs(factor).max(-1) > LEAST, layers.reached)
-    layers = replace(layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached)
-    return replace(base, photo=replace(photo, original=into_photo(photo, layers), linear=onto_working(photo, layers)))
+    layers = replace(
+        layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached
+    )
+    return replace(
+        base,
+        photo=replace(
+            photo, original=into_photo(photo, layers), linear=onto_working(photo, layers)
+        ),
+    )
 
 
 def _disclosed(scene: Scene, edited: Scene) -> Array:

@@ -19,13 +19,23 @@ class CompositeSettings:
     """How the photo's residual over the fit follows an edit; tuned by eye unless derived."""
 
     floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
-    most_detail: float = 2.0  # largest factor on the photo's detail beyond working size under another light
-    edge: int = 2  # working pixels to either side of a changed surface's border; derived: the matte's reach
+    most_detail: float = (
+        2.0  # largest factor on the photo's detail beyond working size under another light
+    )
+    edge: int = (
+        2  # working pixels to either side of a changed surface's border; derived: the matte's reach
+    )
     rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
     white: float = 0.995  # channel of a linear photo from which it is clipped; derived: 8 bits
-    clipped: float = 0.97  # least channel of a pixel of an emitter from which it is clipped; derived: 8 bits
-    nearly: float = 0.9  # least channel from which a pixel of an emitter may be brighter than it looks
-    threads: int = 4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
+    clipped: float = (
+        0.97  # least channel of a pixel of an emitter from which it is clipped; derived: 8 bits
+    )
+    nearly: float = (
+        0.9  # least channel from which a pixel of an emitter may be brighter than it looks
+    )
+    threads: int = (
+        4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
+    )
 
 
 SETTINGS = CompositeSettings()
@@ -48,7 +58,8 @@ def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None =
         picture = in_photo(picture, photo, *lights)
     if layers.native is None:
         return picture
-    share, own = layers.native.share[..., None], layers.native.picture
+    share = layers.native.share[..., None]
+    own = layers.native.picture
     own = own if photo.hdr else np.where(share < 1, np.minimum(own, 1), own)
     return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
 
@@ -58,7 +69,8 @@ def _changed(photo: Photo, layers: Layers) -> Array:
     out = photo.original.copy()
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
-    upsample, native = GuidedUpsample(photo.linear, photo.original), out.shape[:2]
+    upsample = GuidedUpsample(photo.linear, photo.original)
+    native = out.shape[:2]
     alpha = matte(layers.changed, photo.original)
     stack, clear = _under_bodies(stack, layers)
     changed = layers.changed
@@ -72,7 +84,8 @@ def _changed(photo: Photo, layers: Layers) -> Array:
     ]
 
     def laid(rows: slice) -> None:
-        here, share = out[rows, columns], alpha[rows, columns]
+        here = out[rows, columns]
+        share = alpha[rows, columns]
         large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
         for part, side in zip((share, 1 - share), sides, strict=True):
             where = np.flatnonzero((part > 0).any(0))
@@ -80,7 +93,9 @@ def _changed(photo: Photo, layers: Layers) -> Array:
                 own = slice(int(where[0]), int(where[-1]) + 1)
                 there = slice(columns.start + own.start, columns.start + own.stop)
                 large[:, own] += part[:, own, None] * upsample(*side, rows, there)
-        change, excess, reference = large[..., :3], large[..., 3:6], large[..., 6:]
+        change = large[..., :3]
+        excess = large[..., 3:6]
+        reference = large[..., 6:]
         held = here if photo.hdr or layers.relit else _unclipped(here, reference)
         moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
@@ -134,12 +149,16 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     What the fit leaves unexplained is mostly texture, which goes with the light as the surface does. Highlights and
     shadows that the fit has elsewhere than the photo are not: without the bounds they would print their negative.
     """
-    base, edited, floor = np.maximum(layers.base, 0), np.maximum(layers.edited, 0), SETTINGS.floor
+    base = np.maximum(layers.base, 0)
+    edited = np.maximum(layers.edited, 0)
+    floor = SETTINGS.floor
     factor = (edited + floor) / (base + floor)
     overall = np.exp(np.median(np.log(factor).reshape(-1, 3), axis=0))
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
     dimmed = overall * held
-    moved = np.clip((held + floor) * factor - floor, np.minimum(dimmed, edited), np.maximum(dimmed, edited))
+    moved = np.clip(
+        (held + floor) * factor - floor, np.minimum(dimmed, edited), np.maximum(dimmed, edited)
+    )
     return moved - photo.linear, np.minimum(factor, SETTINGS.most_detail) - 1, photo.linear
 
 
@@ -169,9 +188,12 @@ def in_photo(picture: Array, photo: Photo, seen: Array, found: dict) -> Array:
     dim = float(found["dim"])
     if dim == 1 or not seen.any():
         return picture
-    share, picture = matte(seen, photo.original), picture.copy()
+    share = matte(seen, photo.original)
+    picture = picture.copy()
     box = window(seen, picture.shape[:2], 4)
-    share, seen_so, here = share[box][..., None], photo.original[box], picture[box]
+    share = share[box][..., None]
+    seen_so = photo.original[box]
+    here = picture[box]
     white = seen_so.min(-1, keepdims=True)
     own = dim * seen_so
     if not photo.hdr:

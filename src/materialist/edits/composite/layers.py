@@ -23,10 +23,14 @@ class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
     first: int = 16  # one in so many of all paths, in each half, finds out where the edit reaches
-    least_first: int = 8  # paths of each half that do so at the least, below 144 paths; at 16 all of them
+    least_first: int = (
+        8  # paths of each half that do so at the least, below 144 paths; at 16 all of them
+    )
     lattice: int = 256  # pixels along the longer side that do so
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
-    visible: float = 1 / 255  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
+    visible: float = (
+        1 / 255
+    )  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
     sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
     least_gain: float = 0.25  # gain below which a difference is none
     margin: int = 16  # pixels around them that the denoiser sees
@@ -60,8 +64,14 @@ class Layers:
 
 
 def render_layers(
-    renderer: EditRenderer, edited: Scene, *, spp: int, seed: int = 0, clean: bool = True, progress=None,
-) -> Layers:  # fmt: skip
+    renderer: EditRenderer,
+    edited: Scene,
+    *,
+    spp: int,
+    seed: int = 0,
+    clean: bool = True,
+    progress=None,
+) -> Layers:
     """Render a fitted scene and an edit of it, and separate the edit from the noise.
 
     `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
@@ -75,7 +85,9 @@ def render_layers(
         nothing = np.zeros_like(scene.photo.linear)
         return Layers(nothing, nothing, changed, changed)
     guides = [(one.materials.albedo, one.normal) for one in (scene, edited)]
-    alone, covered, hidden = None, None, None
+    alone = None
+    covered = None
+    hidden = None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
         alone = native_layer(renderer, edited, spp=spp, seed=seed, clean=clean)
         anything = renderer.covered(edited)
@@ -88,7 +100,9 @@ def render_layers(
             guides[1] = renderer.guides(edited, anything)
     how: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
     layers = difference(base, other, changed, guides if clean else None, **how)
-    return replace(layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited))
+    return replace(
+        layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited)
+    )
 
 
 def diffuse_left(scene: Scene, edited: Scene) -> Array:
@@ -99,8 +113,11 @@ def diffuse_left(scene: Scene, edited: Scene) -> Array:
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:
     """[H, W] bool: where the maps or the depth of the two scenes differ; everywhere under another light."""
-    a, b = scene.materials, edited.materials
-    changed = (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
+    a = scene.materials
+    b = edited.materials
+    changed = (
+        (a.albedo != b.albedo).any(-1) | (a.roughness != b.roughness) | (a.metallic != b.metallic)
+    )
     changed = (changed & (scene.depth > 0)) | (scene.depth != edited.depth)
     if changed.any() and scene.bodies and scene.bodies == edited.bodies[: len(scene.bodies)]:
         changed &= body_coverage(scene) < 1  # a body hides the surface before and after
@@ -108,9 +125,16 @@ def changed_pixels(scene: Scene, edited: Scene) -> Array:
 
 
 def difference(
-    base: Render, edited: Render, changed: Array, guides: list[tuple[Array, Array]] | None, *,
-    hidden: Array | None = None, spp: int, seed: int, progress=None,
-) -> Layers:  # fmt: skip
+    base: Render,
+    edited: Render,
+    changed: Array,
+    guides: list[tuple[Array, Array]] | None,
+    *,
+    hidden: Array | None = None,
+    spp: int,
+    seed: int,
+    progress=None,
+) -> Layers:
     """Layers of any two renderings of one view, 0 where they are not traced.
 
     Outside `changed` the edit arrives by way of a few paths only, and their noise would dust the whole photo. There
@@ -128,7 +152,9 @@ def difference(
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     half = -(-spp // 2)
     first = min(half, max(SETTINGS.least_first, spp // SETTINGS.first))
-    tick, seeds, done = progress or (lambda *_: None), (2 * seed, 2 * seed + 1), count()
+    tick = progress or (lambda *_: None)
+    seeds = (2 * seed, 2 * seed + 1)
+    done = count()
     steps = 2 * (1 + (not changed.all()) + (half > first))
     wanted = np.ones_like(changed) if hidden is None else ~hidden
 
@@ -144,7 +170,10 @@ def difference(
         few = [p[::step, ::step] for k in seeds for p in traced(first, k, lattice, lattice)]
         # Parts that chance makes are as large as a window or two.
         large = remove_small_objects(_gain(*few) > 0, max_size=2 * SETTINGS.window**2 // step**2)
-        near = changed | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
+        near = (
+            changed
+            | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
+        )
     if half > first:
         near = grown(near, SETTINGS.window)
     shown = grown(near, SETTINGS.margin)
@@ -165,7 +194,9 @@ def difference(
     gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
     if guides is not None:
         box = window(near, margin=SETTINGS.margin)
-        for picture, noisy, maps in zip((b, e), (b, without_fireflies(e, changed)), guides, strict=True):
+        for picture, noisy, maps in zip(
+            (b, e), (b, without_fireflies(e, changed)), guides, strict=True
+        ):
             picture[box] = denoised(noisy[box], *(one[box] for one in maps))
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
@@ -179,9 +210,15 @@ def inner(hidden: Array) -> Array:
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
     """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
-    base, edited = (np.maximum(_mean(((one + other) / 2).astype(np.float32)), 0) for one, other in ((b0, b1), (e0, e1)))
+    base, edited = (
+        np.maximum(_mean(((one + other) / 2).astype(np.float32)), 0)
+        for one, other in ((b0, b1), (e0, e1))
+    )
     white = np.maximum(np.maximum(base, edited), 1)
-    seen = np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1) >= SETTINGS.visible
+    seen = (
+        np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1)
+        >= SETTINGS.visible
+    )
     return np.where(seen, significance(e0 - b0, e1 - b1), 0)
 
 
@@ -195,7 +232,8 @@ def significance(d0: Array, d1: Array) -> Array:
     """
     gain = np.zeros(d0.shape[:2])
     for first, second in ((d0, d1), (d0.sum(-1, keepdims=True), d1.sum(-1, keepdims=True))):
-        m2, variance = np.zeros(gain.shape), np.zeros(gain.shape)
+        m2 = np.zeros(gain.shape)
+        variance = np.zeros(gain.shape)
         for k in range(first.shape[-1]):
             m2 += _mean((first[..., k] + second[..., k]) / 2) ** 2
             variance += _mean(((first[..., k] - second[..., k]) / 2) ** 2) / SETTINGS.window**2
@@ -205,7 +243,9 @@ def significance(d0: Array, d1: Array) -> Array:
 
 def _mean(values: Array) -> Array:
     """Means over a window: Gaussian ones, as of a box of `window` pixels, which would show its corners in the gain."""
-    return cv2.GaussianBlur(values, (0, 0), SETTINGS.window / np.sqrt(4 * np.pi), borderType=cv2.BORDER_REFLECT)
+    return cv2.GaussianBlur(
+        values, (0, 0), SETTINGS.window / np.sqrt(4 * np.pi), borderType=cv2.BORDER_REFLECT
+    )
 
 
 def without_fireflies(picture: Array, where: Array | None = None) -> Array:
@@ -217,6 +257,10 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
     light = luminance(picture)
     around = np.ones((3, 3), bool)
     around[1, 1] = False
-    limit = np.maximum(SETTINGS.times * rank_filter(light, -2, footprint=around, mode="nearest"), SETTINGS.bright)
+    limit = np.maximum(
+        SETTINGS.times * rank_filter(light, -2, footprint=around, mode="nearest"), SETTINGS.bright
+    )
     found = (light > limit) & (True if where is None else where)
-    return (picture * np.where(found, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(np.float32)
+    return (picture * np.where(found, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(
+        np.float32
+    )

@@ -27,7 +27,9 @@ class NativeSettings:
     most_paths: int = 4  # most paths a native pixel, times those of the picture, and twice that in glass; derived: time
     budget: float = 0.5  # all paths, of those of a whole picture of working size; derived: time
     margin: int = 3  # working pixels around the bodies that the denoiser sees
-    contact: float = 0.05  # share of a body's extent up to which a surface before it is the ground it stands on
+    contact: float = (
+        0.05  # share of a body's extent up to which a surface before it is the ground it stands on
+    )
     lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
 
 
@@ -46,7 +48,9 @@ class NativeLayer:
     """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
 
 
-def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, clean: bool) -> NativeLayer | None:
+def native_layer(
+    renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, clean: bool
+) -> NativeLayer | None:
     """Trace the bodies and lamps that are new in `edited` at native size; None where the camera sees none of them.
 
     The photo's own lights are left to its outlines. Under another light every lamp counts as new: it stays as bright as
@@ -63,7 +67,9 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     if not names:
         return None
     target = renderer.render_scene(renderer.lit(edited, edited))
-    camera, native, working = scene.camera, scene.photo.original.shape[:2], scene.depth.shape
+    camera = scene.camera
+    native = scene.photo.original.shape[:2]
+    working = scene.depth.shape
     chosen = {name: bodies.get(name) for name in names}
     small = first_hits(target.mi_scene, camera, chosen, working).share
     if not small.any():
@@ -77,17 +83,25 @@ def native_layer(renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, 
     stands = names != lamps
     gap = (SETTINGS.contact if stands else SETTINGS.lamp_contact) * _extent(alone)
     size, part = _traced_size(native, there)
-    most = SETTINGS.most_paths * (1 + any(body and is_transparent(body.surface) for body in chosen.values()))
-    paths = max(SETTINGS.fewest_paths, min(most * spp, int(SETTINGS.budget * spp * small.size / area(part))))
+    most = SETTINGS.most_paths * (
+        1 + any(body and is_transparent(body.surface) for body in chosen.values())
+    )
+    paths = max(
+        SETTINGS.fewest_paths, min(most * spp, int(SETTINGS.budget * spp * small.size / area(part)))
+    )
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
     picture = radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names)
-    few = _resized((sight.share < alone.share / 2).astype(np.float32), picture.shape[:2])[..., None] > 0
+    few = (
+        _resized((sight.share < alone.share / 2).astype(np.float32), picture.shape[:2])[..., None]
+        > 0
+    )
     picture = spread(np.where(few, 0, picture))  # too few paths met the body there
     if clean:
         guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
         picture = spread(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
-    share, whole = np.zeros(native, np.float32), np.zeros((*native, 3), np.float32)
+    share = np.zeros(native, np.float32)
+    whole = np.zeros((*native, 3), np.float32)
     share[there] = _behind_things(target.mi_scene, sight, alone, scene, there, gap, stands=stands)
     whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
@@ -122,7 +136,8 @@ def _behind_things(
     """
     from materialist.render.pixels import first_hits
 
-    native, working = scene.photo.original.shape[:2], scene.depth.shape
+    native = scene.photo.original.shape[:2]
+    working = scene.depth.shape
     share = alone.share if stands else sight.share
     hidden = alone.share > sight.share + 0.05
     if hidden.any():

@@ -16,12 +16,24 @@ class MatteSettings:
     """Shares of a surface in the photo's pixels along its outline; tuned by eye unless derived."""
 
     tile: int = 32  # working pixels: side of the parts in which a matte is made; derived: memory
-    border: int = 4  # working pixels from the mask's border up to which a matte may reach; derived: `near`
+    border: int = (
+        4  # working pixels from the mask's border up to which a matte may reach; derived: `near`
+    )
     near: float = 2.5  # standard deviation of the windows of mean colours, working pixels; larger averages texture
-    grain: float = 0.03  # standard deviation of an even surface's colour, sRGB-encoded, channels added
-    apart: tuple[float, float] = (2.0, 5.0)  # mean colours' distance, standard deviations: not told apart, and clearly
-    beside: tuple[float, float] = (0.3, 0.6)  # a colour's distance from the line between both: a mixture, and none
-    beyond: float = 0.75  # continuation of that line beyond its ends, as the halos of sharpened edges need
+    grain: float = (
+        0.03  # standard deviation of an even surface's colour, sRGB-encoded, channels added
+    )
+    apart: tuple[float, float] = (
+        2.0,
+        5.0,
+    )  # mean colours' distance, standard deviations: not told apart, and clearly
+    beside: tuple[float, float] = (
+        0.3,
+        0.6,
+    )  # a colour's distance from the line between both: a mixture, and none
+    beyond: float = (
+        0.75  # continuation of that line beyond its ends, as the halos of sharpened edges need
+    )
 
 
 @dataclass(frozen=True)
@@ -50,10 +62,13 @@ class GuidedUpsample:
     """
 
     def __init__(self, small: Array, large: Array):
-        self.guide, self.large = linear_to_srgb(small), large
+        self.guide = linear_to_srgb(small)
+        self.large = large
         self.same = small.shape == large.shape
 
-    def __call__(self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)) -> Array:
+    def __call__(
+        self, layer: Array, members: Array, rows: slice, columns: slice = slice(None)
+    ) -> Array:
         """[h, w, C] float32: `layer` [H, W, C] in a native window, from the working pixels `members` [H, W] bool.
 
         0 where none of the 4 x 4 is a member. At equal sizes (`same`) the layer itself, whatever the members.
@@ -61,7 +76,8 @@ class GuidedUpsample:
         if self.same:
             return layer[rows, columns].astype(np.float32)
         here = linear_to_srgb(self.large[rows, columns])  # [h, w, 3]
-        native, working = self.large.shape[:2], members.shape
+        native = self.large.shape[:2]
+        working = members.shape
         y0, ys = _taps(np.arange(rows.start, rows.stop), native[0], working[0], UPSAMPLE.radius)
         x0, xs = _taps(np.arange(native[1])[columns], native[1], working[1], UPSAMPLE.radius)
         total = np.zeros((*here.shape[:2], layer.shape[2]), np.float32)
@@ -70,7 +86,9 @@ class GuidedUpsample:
         norm = np.zeros(here.shape[:2], np.float32)
         for i in range(4):
             for row in np.unique(y0[i]):
-                band = slice(*np.searchsorted(y0[i], (row, row + 1)))  # the native rows that look up this working row
+                band = slice(
+                    *np.searchsorted(y0[i], (row, row + 1))
+                )  # the native rows that look up this working row
                 for j in range(4):
                     away = here[band] - self.guide[row, x0[j]]
                     away = np.einsum("ijk,ijk->ij", away, away)
@@ -96,7 +114,9 @@ def matte(mask: Array, large: Array) -> Array:
     if mask.all() or not mask.any():
         return soft
     wide = np.ones((2 * MATTE.border + 1,) * 2, np.uint8)
-    border = np.asarray(cv2.dilate(mask.astype(np.uint8), wide) != cv2.erode(mask.astype(np.uint8), wide))
+    border = np.asarray(
+        cv2.dilate(mask.astype(np.uint8), wide) != cv2.erode(mask.astype(np.uint8), wide)
+    )
     alpha = (soft >= 0.5).astype(np.float32)
     margin = int(np.ceil((3 * MATTE.near + 4) * scale))
     for tile in strips(mask.shape[0], MATTE.tile):
@@ -106,10 +126,15 @@ def matte(mask: Array, large: Array) -> Array:
             own = np.zeros_like(border)
             own[tile, part] = True
             rows, columns = window(own, (height, width))
-            around = tuple(slice(max(v.start - margin, 0), v.stop + margin) for v in (rows, columns))
+            around = tuple(
+                slice(max(v.start - margin, 0), v.stop + margin) for v in (rows, columns)
+            )
             found = _shares(soft[around], large[around], scale)
-            top, left = rows.start - around[0].start, columns.start - around[1].start
-            alpha[rows, columns] = found[top:, left:][: rows.stop - rows.start, : columns.stop - columns.start]
+            top = rows.start - around[0].start
+            left = columns.start - around[1].start
+            alpha[rows, columns] = found[top:, left:][
+                : rows.stop - rows.start, : columns.stop - columns.start
+            ]
     return alpha
 
 
@@ -117,7 +142,8 @@ def _shares(soft: Array, large: Array, scale: float) -> Array:
     """[h, w] float32: `matte` of a window, of `scale` native pixels a working pixel; `soft` the enlarged mask."""
     reach = 2 * int(np.ceil(1.5 * scale)) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    sure_in, sure_out = cv2.erode(soft, kernel) >= 0.999, cv2.dilate(soft, kernel) <= 0.001
+    sure_in = cv2.erode(soft, kernel) >= 0.999
+    sure_out = cv2.dilate(soft, kernel) <= 0.001
     encoded = linear_to_srgb(large)
     front, front_variance, known_front = _mean_of(encoded, sure_in, MATTE.near * scale)
     back, back_variance, known_back = _mean_of(encoded, sure_out, MATTE.near * scale)
@@ -128,7 +154,12 @@ def _shares(soft: Array, large: Array, scale: float) -> Array:
     nearest = np.clip(place, -MATTE.beyond, 1 + MATTE.beyond)[..., None]
     away = np.sqrt(((encoded - back - nearest * line) ** 2).sum(-1))
     off = np.maximum(away - 2 * MATTE.grain, 0) / length
-    told = _ramp(length / deviation, *MATTE.apart) * (1 - _ramp(off, *MATTE.beside)) * known_front * known_back
+    told = (
+        _ramp(length / deviation, *MATTE.apart)
+        * (1 - _ramp(off, *MATTE.beside))
+        * known_front
+        * known_back
+    )
     alpha = soft + told * (np.clip(place, 0, 1) - soft)
     alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
     return alpha.astype(np.float32)
@@ -141,7 +172,10 @@ def _ramp(values: Array, low: float, high: float) -> Array:
 
 def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array, Array]:
     """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
-    blurred = lambda values: cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)  # noqa: E731
+
+    def blurred(values):
+        return cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
+
     weight = members.astype(np.float32)
     norm = np.maximum(blurred(weight), 1e-12)
     mean = blurred(picture * weight[..., None]) / norm[..., None]

@@ -26,7 +26,10 @@ def noted(scene: Scene, kind: str, what: dict[str, Any]) -> Scene:
 
 def warned(scene: Scene, *notes: str) -> Scene:
     """The scene with further warnings in its report; a warning that an earlier edit gave is repeated."""
-    return replace(scene, report=replace(scene.report, warnings=(*scene.report.warnings, *dict.fromkeys(notes))))
+    return replace(
+        scene,
+        report=replace(scene.report, warnings=(*scene.report.warnings, *dict.fromkeys(notes))),
+    )
 
 
 def warnings_since(scene: Scene, edited: Scene) -> list[str]:
@@ -71,5 +74,7 @@ def is_pictured(scene: Scene) -> bool:
 
 def is_edited(scene: Scene) -> bool:
     """Whether a scene has edits that its photo and its re-rendering do not show."""
-    saved = [len(stage.get("edits", ())) for stage in scene.report.stages if stage.get("name") == "edit"]
+    saved = [
+        len(stage.get("edits", ())) for stage in scene.report.stages if stage.get("name") == "edit"
+    ]
     return len(scene.provenance.get("edits", ())) > max(saved, default=0)

@@ -26,7 +26,9 @@ def checked_region(scene: Scene, mask: Array) -> Array:
     mask = np.asarray(mask)
     shape = (scene.camera.height, scene.camera.width)
     if mask.shape != shape:
-        raise InputError(f"The mask is {mask.shape}, the photo at working size {shape} (rows, columns); resize it.")
+        raise InputError(
+            f"The mask is {mask.shape}, the photo at working size {shape} (rows, columns); resize it."
+        )
     weight = mask.astype(np.float32)
     if not (np.isfinite(weight).all() and weight.min() >= 0 and weight.max() <= 1):
         raise InputError(
@@ -36,7 +38,9 @@ def checked_region(scene: Scene, mask: Array) -> Array:
         raise InputError("The mask is empty; mark at least one pixel.")
     weight = weight * (scene.depth > 0)
     if not weight.any():
-        raise InputError("The mask covers only sky, where the scene has no surface to edit; mark a surface.")
+        raise InputError(
+            "The mask covers only sky, where the scene has no surface to edit; mark a surface."
+        )
     if scene.bodies and float((body_coverage(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
         emitters = EditRenderer(scene).emitter_pixels(scene)
         what = DIMMED if float((emitters * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
@@ -53,9 +57,13 @@ def reshaped(weight: Array, grow: float, feather: float) -> Array:
     if radius := round(abs(grow) * longer):
         weight = (cv2.dilate if grow > 0 else cv2.erode)(weight, disc(radius))
     if feather:
-        weight = cv2.GaussianBlur(weight, (0, 0), feather * longer / 4)  # four standard deviations: nearly all of it
+        weight = cv2.GaussianBlur(
+            weight, (0, 0), feather * longer / 4
+        )  # four standard deviations: nearly all of it
     if not weight.any():
-        raise InputError(f"Shrunk by {-grow:g} of the longer side nothing is left of the region; shrink it less.")
+        raise InputError(
+            f"Shrunk by {-grow:g} of the longer side nothing is left of the region; shrink it less."
+        )
     return np.asarray(weight)
 
 
@@ -66,12 +74,15 @@ def body_coverage(scene: Scene) -> Array:
 
 def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click") -> tuple[int, int]:
     """(column, row) of a point (x, y) at working size. Raises InputError when it lies outside the picture."""
-    width, height = scene.camera.width, scene.camera.height
+    width = scene.camera.width
+    height = scene.camera.height
     x, y = numbers(point, 2, name)
     if not (0 <= x < width and 0 <= y < height):
         rows, columns = scene.photo.original.shape[:2]
         small = f"{int(x * width / columns)},{int(y * height / rows)}"
-        native = f" In the file's own {columns} x {rows} pixels that point is {small} here: give this."
+        native = (
+            f" In the file's own {columns} x {rows} pixels that point is {small} here: give this."
+        )
         raise InputError(
             f"The {name} {x:g},{y:g} lies outside the photo, which is {width} x {height} pixels at working size."
             + native * (columns > width and 0 <= x < columns and 0 <= y < rows)

@@ -31,13 +31,19 @@ class Render:
     None: all. Later calls complete the same array.
     """
 
-    def __init__(self, traced: Callable[..., Array], shape: tuple[int, ...], made: Made | None = None):
-        self._traced, self._shape = traced, shape
+    def __init__(
+        self, traced: Callable[..., Array], shape: tuple[int, ...], made: Made | None = None
+    ):
+        self._traced = traced
+        self._shape = shape
         self._made: Made = {} if made is None else made
 
     def __call__(self, spp: int, seed: int, where: Array | None = None) -> Array:
         if (spp, seed) not in self._made:
-            self._made[spp, seed] = np.zeros((*self._shape, 3), np.float32), np.zeros(self._shape, bool)
+            self._made[spp, seed] = (
+                np.zeros((*self._shape, 3), np.float32),
+                np.zeros(self._shape, bool),
+            )
         picture, known = self._made[spp, seed]
         missing = ~known if where is None else where & ~known
         if missing.any():
@@ -55,7 +61,8 @@ class EditRenderer:
 
     def __init__(self, scene: Scene, *, device: str = "auto"):
         check_process()
-        self.scene, self.device = scene, device
+        self.scene = scene
+        self.device = device
         self._built: dict[bool, tuple[Scene, Any]] = {}
         """The base's (True) and those of the last edit of other shapes."""
         self._base: dict[tuple, Made] = {}
@@ -63,10 +70,14 @@ class EditRenderer:
 
     def pair(self, edited: Scene) -> tuple[Render, Render]:
         """The renderings of the base and of `edited`, with paths of equal length."""
-        scene, edited = self.lit(self.scene, edited), self.lit(edited, edited)
-        depth, shape = max(path_depth(s) for s in (scene, edited)), self.scene.depth.shape
+        scene = self.lit(self.scene, edited)
+        edited = self.lit(edited, edited)
+        depth = max(path_depth(s) for s in (scene, edited))
+        shape = self.scene.depth.shape
         key = (scene is self.scene, depth)
-        made = self._base.setdefault(key, {})  # alone: a `Render` of its own would keep this renderer alive
+        made = self._base.setdefault(
+            key, {}
+        )  # alone: a `Render` of its own would keep this renderer alive
         return Render(partial(self._render, scene, depth), shape, made), Render(
             partial(self._render, edited, depth), shape
         )
@@ -74,7 +85,9 @@ class EditRenderer:
     def lit(self, shown: Scene, edited: Scene) -> Scene:
         """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
         old = self.scene.bodies
-        if is_relit(self.scene, edited) or all(b in old or not is_transparent(b.surface) for b in edited.bodies):
+        if is_relit(self.scene, edited) or all(
+            b in old or not is_transparent(b.surface) for b in edited.bodies
+        ):
             return shown
         if self._sky is None:
             self._sky = photo_sky(self.scene)
@@ -95,7 +108,9 @@ class EditRenderer:
 
     def emitter_pixels(self, edited: Scene) -> Array:
         """[H, W] bool: where in-photo emitters of `edited` are seen."""
-        names = [f"body{k}" for k, body in enumerate(edited.bodies) if body.name.startswith(PHOTO_LIGHT)]
+        names = [
+            f"body{k}" for k, body in enumerate(edited.bodies) if body.name.startswith(PHOTO_LIGHT)
+        ]
         return self._seen(edited, names) > 0.5
 
     def guides(self, edited: Scene, covered: Array | None = None) -> tuple[Array, Array]:
@@ -110,8 +125,11 @@ class EditRenderer:
             return edited.materials.albedo, edited.normal
         bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
         part = window(covered)
-        sight = first_hits(self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, part)
-        albedo, normal = edited.materials.albedo.copy(), edited.normal.copy()
+        sight = first_hits(
+            self.render_scene(edited).mi_scene, edited.camera, bodies, covered.shape, part
+        )
+        albedo = edited.materials.albedo.copy()
+        normal = edited.normal.copy()
         share = np.where(covered[part], sight.share, 0)[..., None]
         albedo[part] = share * sight.albedo + (1 - share) * albedo[part]
         normal[part] = share * sight.normal + (1 - share) * normal[part]
@@ -133,7 +151,9 @@ class EditRenderer:
 
         if not names:
             return np.zeros(scene.depth.shape, np.float32)
-        return first_hits(self._target(scene).mi_scene, scene.camera, dict.fromkeys(names), scene.depth.shape).share
+        return first_hits(
+            self._target(scene).mi_scene, scene.camera, dict.fromkeys(names), scene.depth.shape
+        ).share
 
     def _target(self, scene: Scene):
         """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of its last use."""
@@ -143,8 +163,12 @@ class EditRenderer:
             from materialist.render.scene import RenderScene
 
             target = RenderScene(
-                scene.geometry, scene.camera, bodies=scene.bodies, lamps=scene.lamps, device=self.device
-            )  # fmt: skip
+                scene.geometry,
+                scene.camera,
+                bodies=scene.bodies,
+                lamps=scene.lamps,
+                device=self.device,
+            )
             known = self._built[of_base] = scene, target
         return known[1]
 
@@ -164,15 +188,23 @@ def photo_sky(scene: Scene) -> Array:
     if (scene.depth > 0).all():
         return scene.envmap
     rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), max(SKY_ROWS, len(scene.envmap))))
-    sky = environment(texel_directions(rows, 2 * rows).reshape(-1, 3), scene.envmap).reshape(rows, 2 * rows, 3)
+    sky = environment(texel_directions(rows, 2 * rows).reshape(-1, 3), scene.envmap).reshape(
+        rows, 2 * rows, 3
+    )
     white = HDR_CLIP if scene.photo.hdr else CLIPPED
-    return paste_visible_sky(sky.astype(np.float32), scene.photo.linear, scene.depth > 0, camera, white=white)
+    return paste_visible_sky(
+        sky.astype(np.float32), scene.photo.linear, scene.depth > 0, camera, white=white
+    )
 
 
 def is_relit(scene: Scene, edited: Scene) -> bool:
     """Whether the two scenes have different light."""
     glowing = [[body for body in s.bodies if is_glowing(body.surface)] for s in (scene, edited)]
-    return scene.lamps != edited.lamps or glowing[0] != glowing[1] or not np.array_equal(scene.envmap, edited.envmap)
+    return (
+        scene.lamps != edited.lamps
+        or glowing[0] != glowing[1]
+        or not np.array_equal(scene.envmap, edited.envmap)
+    )
 
 
 def path_depth(scene: Scene) -> int:
@@ -182,7 +214,9 @@ def path_depth(scene: Scene) -> int:
     return GLASS_DEPTH if any(is_transparent(body.surface) for body in scene.bodies) else MAX_DEPTH
 
 
-def rendered(scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto") -> Array:
+def rendered(
+    scene: Scene, *, spp: int, seed: int = 0, denoise: bool = False, device: str = "auto"
+) -> Array:
     """[H, W, 3] float32 linear: the scene as it stands, with its bodies and lamps; `spp` paths a pixel.
 
     Raises SetupError with `denoise` where the denoiser is not installed.

@@ -19,10 +19,15 @@ OFF = 1e-6
 """Radiance of an emitter that is switched off: the renderer still knows it as an emitter."""
 
 
-def uniform_surface(albedo: Array | float, roughness: float, metallic: float, **fields: Any) -> Surface:
+def uniform_surface(
+    albedo: Array | float, roughness: float, metallic: float, **fields: Any
+) -> Surface:
     """A surface without texture; albedo [3] linear, or one number for a grey. `fields` are others of `Surface`."""
     colour = np.broadcast_to(np.asarray(albedo, np.float32), (3,)).reshape(1, 1, 3).copy()
-    flat = lambda v: np.full((1, 1), v, np.float32)  # noqa: E731
+
+    def flat(v):
+        return np.full((1, 1), v, np.float32)
+
     return Surface(colour, flat(roughness), flat(metallic), **fields)
 
 
@@ -46,12 +51,16 @@ def base_of(scene: Scene, edited: Scene) -> Scene:
     if found is None:
         return scene
     lights = [body for body in edited.bodies if body.name.startswith(PHOTO_LIGHT)]
-    return with_emitters(scene, [emitting(body, own) for body, own in zip(lights, found["emission"])], found)
+    return with_emitters(
+        scene, [emitting(body, own) for body, own in zip(lights, found["emission"])], found
+    )
 
 
 def with_emitters(scene: Scene, emitters: Sequence[Body], found: dict) -> Scene:
     """The scene with emitters as further bodies, and without their light in the environment map."""
-    return replace(scene, envmap=scene.envmap * np.float32(found["ambient"]), bodies=(*scene.bodies, *emitters))
+    return replace(
+        scene, envmap=scene.envmap * np.float32(found["ambient"]), bodies=(*scene.bodies, *emitters)
+    )
 
 
 def emitting(body: Body, emission: Sequence[float]) -> Body:
@@ -86,5 +95,6 @@ def welded(vertices: Array) -> Array:
 def edge_keys(faces: Array) -> Array:
     """[3 F] int64 of faces [F, 3], face by face: a number for each edge, the same both ways."""
     after = np.roll(faces, -1, 1)
-    low, high = np.minimum(faces, after), np.maximum(faces, after)
+    low = np.minimum(faces, after)
+    high = np.maximum(faces, after)
     return (low.astype(np.int64) * (int(faces.max(initial=0)) + 1) + high).ravel()

@@ -28,7 +28,9 @@ from materialist.types import Array, Body, Scene
 class DropSettings:
     """What is a floor, and when things are at rest; tuned by eye."""
 
-    upright: float = 0.5  # cosine to the camera's up from which a plane can be a floor or a table top
+    upright: float = (
+        0.5  # cosine to the camera's up from which a plane can be a floor or a table top
+    )
     longest: float = 20.0  # seconds after which a thing that still rolls is left where it is
     looks: int = 24  # looks at the things a second
     still: int = 12  # looks in a row without motion after which things are at rest
@@ -46,9 +48,15 @@ Places = tuple[float, float] | Sequence[tuple[float, float]]
 
 @documented(Drop)
 def drop(
-    scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, options: Drop | None = None, *, frames: int = 48,
-    fps: float = 24.0, **values: Unpack[DropKeywords],
-) -> list[Scene]:  # fmt: skip
+    scene: Scene,
+    meshes: Mesh | Sequence[Mesh],
+    at: Places,
+    options: Drop | None = None,
+    *,
+    frames: int = 48,
+    fps: float = 24.0,
+    **values: Unpack[DropKeywords],
+) -> list[Scene]:
     """One scene a frame: meshes fall onto the surface under a pixel, tumble, and come to rest.
 
     The visible surface and the planes that continue it are the ground; bodies that are in the scene already count as
@@ -70,11 +78,13 @@ def drop(
     if not 1 <= fps <= 240:
         raise InputError(f"The frame rate is {fps:g}; it must lie in [1, 240].")
     falling = _prepared(scene, meshes, at, wanted)
-    film, last = [], scene
+    film = []
+    last = scene
     poses: list[Pose] | None = None
     for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
         if poses is None or moves(poses, frame, wanted.metres):
-            last, poses = falling.at(frame), frame
+            last = falling.at(frame)
+            poses = frame
         film.append(last)
     if not _in_view(scene, last):
         film[-1] = warned(last, UNSEEN)
@@ -83,7 +93,11 @@ def drop(
 
 @documented(Drop)
 def settle(
-    scene: Scene, meshes: Sequence[Mesh], at: Places, options: Drop | None = None, **values: Unpack[DropKeywords]
+    scene: Scene,
+    meshes: Sequence[Mesh],
+    at: Places,
+    options: Drop | None = None,
+    **values: Unpack[DropKeywords],
 ) -> Scene:
     """The scene with meshes that fell onto the surface under a pixel and lie where they came to rest.
 
@@ -103,7 +117,10 @@ def settle(
             f"{', '.join(names)} falls beside everything that the photo shows; choose a place further from the edge of "
             "the surface, a smaller height, or another seed."
         )
-    notes = [f"{names[k]} falls beside everything that the photo shows, and was left out." for k in sorted(gone)]
+    notes = [
+        f"{names[k]} falls beside everything that the photo shows, and was left out."
+        for k in sorted(gone)
+    ]
     if not rests:
         notes.append(
             f"After {SETTINGS.longest:g} seconds not everything that fell is at rest; it stays where it is then."
@@ -116,7 +133,9 @@ def _in_view(scene: Scene, edited: Scene) -> bool:
     """Whether the picture shows a vertex of what the edited scene has more, were nothing before it."""
     size = scene.camera.width, scene.camera.height
     places = (project(body.vertices, scene.camera) for body in edited.bodies[len(scene.bodies) :])
-    return any(((depth > 0) & ((place > 0) & (place < size)).all(-1)).any() for place, depth in places)
+    return any(
+        ((depth > 0) & ((place > 0) & (place < size)).all(-1)).any() for place, depth in places
+    )
 
 
 @dataclass(frozen=True)
@@ -153,7 +172,8 @@ def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: D
     load("mujoco")
     meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
     models = [
-        repainted(m if isinstance(m, MeshModel) else read_model(m, up=wanted.up), wanted.material) for m in meshes
+        repainted(m if isinstance(m, MeshModel) else read_model(m, up=wanted.up), wanted.material)
+        for m in meshes
     ]
     if not models:
         raise InputError("Nothing falls; give at least one mesh.")
@@ -162,13 +182,20 @@ def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: D
     direction = down(scene, stood[0][1], wanted.gravity)
     to_up = np.concatenate([axes(-direction), -direction[None]])
     factor = wanted.metres / max(longest for *_, longest in stood)
-    points = [np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor for bodies, *_ in stood]
+    points = [
+        np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor
+        for bodies, *_ in stood
+    ]
     lifts = _lifts(points, wanted.height * wanted.metres)
     high = np.array([own[:, 2].max() + lift for own, lift in zip(points, lifts)])
     middles = np.array([(own.min(0) + own.max(0))[:2] / 2 for own in points])
-    field = ground_field(scene, to_up, factor, places=middles, tops=high + wanted.metres, metres=wanted.metres)
+    field = ground_field(
+        scene, to_up, factor, places=middles, tops=high + wanted.metres, metres=wanted.metres
+    )
     # What would start in a bump lifts them all.
-    clear = max(0.0, *(depth_in(field, own + np.array([0, 0, lift])) for own, lift in zip(points, lifts)))
+    clear = max(
+        0.0, *(depth_in(field, own + np.array([0, 0, lift])) for own, lift in zip(points, lifts))
+    )
     if clear >= wanted.metres:
         raise InputError(
             f"There is no room at {places[0][0]:g},{places[0][1]:g}: the things would start inside of something; "
@@ -178,10 +205,14 @@ def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: D
     things = _things(starts, to_up, factor, wanted)
     ground = blocks(field, metres=wanted.metres)
     what: dict[str, Any] = {
-        "meshes": [model.name for model in models], "at": [[float(v) for v in place] for place in places],
-        **{name: getattr(wanted, name) for name in ("height", "spin", "scale", "material", "metres", "seed", "up")},
+        "meshes": [model.name for model in models],
+        "at": [[float(v) for v in place] for place in places],
+        **{
+            name: getattr(wanted, name)
+            for name in ("height", "spin", "scale", "material", "metres", "seed", "up")
+        },
         "gravity": [round(float(v), 6) for v in direction],
-    }  # fmt: skip
+    }
     notes = tuple(note for model in models for note in model.warnings)
     return Falling(scene, things, ground, starts, to_up, factor, notes, what)
 
@@ -191,7 +222,9 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
     if gravity is not None:
         direction = np.asarray(gravity, np.float64)
         if not (np.isfinite(direction).all() and direction.any()):
-            raise InputError(f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0.")
+            raise InputError(
+                f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0."
+            )
         return direction / np.linalg.norm(direction)
     if support.normal[1] > SETTINGS.upright:
         return -support.normal
@@ -203,7 +236,9 @@ def _places(at: Any, count: int) -> list[Any]:
     places = [numbers(place, 2, "place") for place in several(at)]
     places = places * count if len(places) == 1 else places
     if len(places) != count:
-        raise InputError(f"There are {len(places)} places for {count} meshes; give one, or as many.")
+        raise InputError(
+            f"There are {len(places)} places for {count} meshes; give one, or as many."
+        )
     return places
 
 
@@ -212,11 +247,13 @@ def _lifts(points: list[Array], height: float) -> list[float]:
     boxes: list[tuple[Array, Array]] = []
     lifts = []
     for own in points:
-        low, high = own.min(0), own.max(0)
+        low = own.min(0)
+        high = own.max(0)
         over = [
-            top[2] - low[2] + 0.25 * (high[2] - low[2]) for bottom, top in boxes
+            top[2] - low[2] + 0.25 * (high[2] - low[2])
+            for bottom, top in boxes
             if (low[:2] < top[:2]).all() and (high[:2] > bottom[:2]).all()
-        ]  # fmt: skip
+        ]
         lift = float(max([height, *over]))
         lifts.append(lift)
         up = np.array([0, 0, lift])
@@ -224,7 +261,9 @@ def _lifts(points: list[Array], height: float) -> list[float]:
     return lifts
 
 
-def _things(starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop) -> list[RigidBody]:
+def _things(
+    starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop
+) -> list[RigidBody]:
     """What the simulation needs to know of each thing; all turn as fast, each about an axis of its own."""
     rng = np.random.default_rng(wanted.seed)
     things = []
@@ -253,12 +292,16 @@ def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
     recent: deque[list[Pose]] = deque(maxlen=SETTINGS.still + 1)
     gone: frozenset[int] = frozenset()
     for poses in fall(
-        falling.things, falling.ground, frames=round(SETTINGS.longest * SETTINGS.looks) + 1, fps=SETTINGS.looks
+        falling.things,
+        falling.ground,
+        frames=round(SETTINGS.longest * SETTINGS.looks) + 1,
+        fps=SETTINGS.looks,
     ):
         gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
-        last, metres = recent[-1], falling.what["metres"]
+        last = recent[-1]
+        metres = falling.what["metres"]
         still = all(len(look) == len(last) and not moves(look, last, metres) for look in recent)
         if not last or (len(recent) > SETTINGS.still and still):
             return poses, gone, True

@@ -21,7 +21,9 @@ class GroundSettings:
     flat: float = 0.004  # how plane a block must be
     deep: float = 2.0  # how far a block reaches below the field
     blocks: int = 1500  # most blocks; `flat` is relaxed until there are no more
-    behind: float = 0.05  # least cosine of a face's normal with a ray for the ray to come from behind
+    behind: float = (
+        0.05  # least cosine of a face's normal with a ray for the ray to come from behind
+    )
 
 
 SETTINGS = GroundSettings()
@@ -39,7 +41,9 @@ class Field:
     """[n + 1, n + 1] z of the surface at (x, y) = corner + cell * (column, row); NaN where there is none."""
 
 
-def ground_field(scene: Scene, to_up: Array, factor: float, *, places: Array, tops: Array, metres: float) -> Field:
+def ground_field(
+    scene: Scene, to_up: Array, factor: float, *, places: Array, tops: Array, metres: float
+) -> Field:
     """Heights of a scene with its bodies, under and around places.
 
     places: [n, 2] x and y over which things fall. metres: longest side of the falling things.
@@ -60,13 +64,17 @@ def ground_field(scene: Scene, to_up: Array, factor: float, *, places: Array, to
     start = np.stack([x.ravel(), y.ravel(), top(x.ravel(), y.ravel())], -1)
     height = _met(target, start, to_up, factor).reshape(x.shape)
     # Rays along gravity miss what is upright: where visible points stand out of the field, they raise it.
-    points = unproject(scene.depth, scene.camera)[scene.depth > 0].astype(np.float64) @ to_up.T * factor
+    points = (
+        unproject(scene.depth, scene.camera)[scene.depth > 0].astype(np.float64) @ to_up.T * factor
+    )
     cell = 2 * half / SETTINGS.cells
     low = np.nanmin(height) if np.isfinite(height).any() else 0.0
     column, row = np.round((points[:, :2] - [x[0, 0], y[0, 0]]) / cell).astype(int).T
     inside = (column >= 0) & (column <= SETTINGS.cells) & (row >= 0) & (row <= SETTINGS.cells)
     inside &= points[:, 2] < top(points[:, 0], points[:, 1])
-    column, row, z = column[inside], row[inside], points[inside, 2]
+    column = column[inside]
+    row = row[inside]
+    z = points[inside, 2]
     upright = z > np.nan_to_num(height[row, column], nan=low - metres) + SETTINGS.steep * metres
     np.fmax.at(height, (row[upright], column[upright]), z[upright])
     return Field(np.array([x[0, 0], y[0, 0]]), cell, height)
@@ -81,7 +89,9 @@ def _met(target, points: Array, to_up: Array, factor: float) -> Array:
 
     mi, start = target.mi, points / factor @ to_up  # back in the camera frame
     origin = mi.Point3f(*(floats(mi, start[:, k]) for k in range(3)))
-    hit = target.mi_scene.ray_intersect(mi.Ray3f(origin, mi.Vector3f(*(float(-v) for v in to_up[2]))))
+    hit = target.mi_scene.ray_intersect(
+        mi.Ray3f(origin, mi.Vector3f(*(float(-v) for v in to_up[2])))
+    )
     distance = np.where(np.array(hit.is_valid()), np.array(hit.t, np.float64) * factor, np.nan)
     distance[np.array(hit.n, np.float64).T @ to_up[2] < -SETTINGS.behind] = 0
     return points[:, 2] - distance
@@ -101,7 +111,9 @@ def blocks(ground: Field, *, metres: float) -> list[Array]:
     return found
 
 
-def _split(ground: Field, square: tuple[int, int, int], flat: float, depth: float, found: list[Array]) -> None:
+def _split(
+    ground: Field, square: tuple[int, int, int], flat: float, depth: float, found: list[Array]
+) -> None:
     """Add the blocks of a square (row, column, cells along a side) to those that were found."""
     row, column, n = square
     part = ground.height[row : row + n + 1, column : column + n + 1]
@@ -122,7 +134,9 @@ def _split(ground: Field, square: tuple[int, int, int], flat: float, depth: floa
         tops = np.array([[1, 0, 0], [1, n, 0], [1, 0, n], [1, n, n]]) @ plane
     x = ground.corner[0] + ground.cell * (column + n * np.array([0, 1, 0, 1]))
     y = ground.corner[1] + ground.cell * (row + n * np.array([0, 0, 1, 1]))
-    found.append(np.concatenate([np.stack([x, y, z], -1) for z in (tops, np.full(4, tops.min() - depth))]))
+    found.append(
+        np.concatenate([np.stack([x, y, z], -1) for z in (tops, np.full(4, tops.min() - depth))])
+    )
 
 
 def depth_in(ground: Field, points: Array) -> float:

@@ -21,10 +21,19 @@ class PhysicsSettings:
 
     step: float = 1e-3  # seconds: at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper; derived
     gravity: float = 9.81  # m / s^2
-    stiff: tuple[float, float] = (4e-3, 1.0)  # of contacts: time constant, as short as the step allows, and damping
-    friction: tuple[float, float, float] = (0.6, 0.01, 0.0005)  # sliding, torsional (m) and rolling (m)
+    stiff: tuple[float, float] = (
+        4e-3,
+        1.0,
+    )  # of contacts: time constant, as short as the step allows, and damping
+    friction: tuple[float, float, float] = (
+        0.6,
+        0.01,
+        0.0005,
+    )  # sliding, torsional (m) and rolling (m)
     density: float = 600.0  # kg / m^3: wood; things of one density fall alike
-    same: float = 1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
+    same: float = (
+        1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
+    )
     concave: float = 0.12  # concavity that is left in a piece (CoACD's threshold)
     pieces: int = 16  # most pieces
     fine: int = 1500  # triangles from which a mesh is thinned out before it is taken apart
@@ -58,13 +67,17 @@ class Pose:
     """Kinetic and potential energy of all things, joule; heights count from z = 0."""
 
 
-def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: float) -> Iterator[list[Pose]]:
+def fall(
+    things: list[RigidBody], ground: list[Array], *, frames: int, fps: float
+) -> Iterator[list[Pose]]:
     """Poses of all things at the times 0, 1 / fps, ...: `frames` lists. The same input gives the same poses.
 
     Raises SetupError where mujoco is not installed, InputError where the motion cannot be followed.
     """
     mujoco = load("mujoco")
-    mujoco.set_mju_user_warning(lambda message: None)  # it would write a file where the command was called
+    mujoco.set_mju_user_warning(
+        lambda message: None
+    )  # it would write a file where the command was called
     model = _world(mujoco, things, ground)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -83,7 +96,9 @@ def fall(things: list[RigidBody], ground: list[Array], *, frames: int, fps: floa
             mujoco.mj_step(model, data)
             done += 1
         if any(data.warning[int(kind)].number for kind in diverged):
-            raise InputError("The things fly apart in the simulation; choose a smaller spin, or larger metres.")
+            raise InputError(
+                "The things fly apart in the simulation; choose a smaller spin, or larger metres."
+            )
         mujoco.mj_forward(model, data)
         mujoco.mj_energyPos(model, data)
         mujoco.mj_energyVel(model, data)
@@ -106,9 +121,13 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
     spec.option.timestep = SETTINGS.step
     spec.option.gravity = [0, 0, -SETTINGS.gravity]
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable for things that spin fast
+    spec.option.integrator = (
+        mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    )  # stable for things that spin fast
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):  # later versions always find several contacts
+    if hasattr(
+        mujoco.mjtEnableBit, "mjENBL_MULTICCD"
+    ):  # later versions always find several contacts
         spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     for number, corners in enumerate(ground):
@@ -122,15 +141,23 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
         return spec.compile()
     except ValueError as error:  # as of a mass that is nearly none
         size = max(float(np.ptp(piece, axis=0).max()) for thing in things for piece in thing.pieces)
-        raise InputError(f"Things of {size:.3g} m are too light for the simulation; choose larger metres.") from error
+        raise InputError(
+            f"Things of {size:.3g} m are too light for the simulation; choose larger metres."
+        ) from error
 
 
 def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
     spec.add_mesh(name=name, uservert=np.ascontiguousarray(corners, np.float64).ravel().tolist())
     body.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, density=SETTINGS.density, friction=list(SETTINGS.friction),
-        condim=4, solref=list(SETTINGS.stiff), solimp=[0.95, 0.99, 1e-4, 0.5, 2], margin=0.0,
-    )  # fmt: skip
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        density=SETTINGS.density,
+        friction=list(SETTINGS.friction),
+        condim=4,
+        solref=list(SETTINGS.stiff),
+        solimp=[0.95, 0.99, 1e-4, 0.5, 2],
+        margin=0.0,
+    )
 
 
 def hull(points: Array) -> Array:
@@ -149,7 +176,8 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
     Raises SetupError where coacd is not installed and the mesh is not nearly convex.
     """
     vertices = np.asarray(vertices, np.float64)
-    outer, mesh = hull(vertices), Trimesh(vertices, faces, validate=True)
+    outer = hull(vertices)
+    mesh = Trimesh(vertices, faces, validate=True)
     if mesh.is_watertight and ConvexHull(outer).volume <= SETTINGS.same * abs(mesh.volume):
         return [outer]
     coacd = load("coacd")
@@ -159,7 +187,16 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
         cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / SETTINGS.coarse
         mesh = Trimesh(np.round(vertices / cell) * cell, faces, validate=True)
     parts = coacd.run_coacd(
-        coacd.Mesh(mesh.vertices, mesh.faces), threshold=SETTINGS.concave, max_convex_hull=SETTINGS.pieces,
-        preprocess_resolution=30, resolution=400, mcts_nodes=8, mcts_iterations=20, mcts_max_depth=2, seed=seed,
-    )  # fmt: skip
-    return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [outer]
+        coacd.Mesh(mesh.vertices, mesh.faces),
+        threshold=SETTINGS.concave,
+        max_convex_hull=SETTINGS.pieces,
+        preprocess_resolution=30,
+        resolution=400,
+        mcts_nodes=8,
+        mcts_iterations=20,
+        mcts_max_depth=2,
+        seed=seed,
+    )
+    return [hull(np.asarray(points, np.float64)) for points, _ in parts if len(points) >= 4] or [
+        outer
+    ]

@@ -31,9 +31,13 @@ NO_ROOM = "There is no room for a wall around air: this glass is solid."
 
 @documented(Glass)
 def glass(
-    scene: Scene, mask: Array, options: Glass | None = None, *, fitted: Scene | None = None,
+    scene: Scene,
+    mask: Array,
+    options: Glass | None = None,
+    *,
+    fitted: Scene | None = None,
     **values: Unpack[GlassKeywords],
-) -> Scene:  # fmt: skip
+) -> Scene:
     """The scene with the object under a mask of glass, before what it hid.
 
     The model `closed` path-traces a closed body (`solids.closed`); `two-interface` is the paper's: every camera ray
@@ -47,31 +51,60 @@ def glass(
     options = Glass.given(options, **values)
     own = checked_region(scene, mask) > 0.5
     removed = remove(scene, mask, options, fitted=fitted)
-    each = [(part, object_thickness(scene, part, options.thickness, behind=removed.depth)) for part in objects_in(own)]
+    each = [
+        (part, object_thickness(scene, part, options.thickness, behind=removed.depth))
+        for part in objects_in(own)
+    ]
     if options.model == "two-interface":
         edited = _two_interface(scene, removed, each, options, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if options.hollow else edited
     else:
-        shells, notes = zip(*(_shell(scene, removed, part, found, options.hollow) for part, found in each), strict=True)
+        shells, notes = zip(
+            *(_shell(scene, removed, part, found, options.hollow) for part, found in each),
+            strict=True,
+        )
         shell = joined(shells)
-        body = Body(shell.vertices, shell.faces, shell.normals, shell.uv, glass_surface(scene, options), PHOTO_GLASS)
+        body = Body(
+            shell.vertices,
+            shell.faces,
+            shell.normals,
+            shell.uv,
+            glass_surface(scene, options),
+            PHOTO_GLASS,
+        )
         edited = warned(replace(removed, bodies=(*removed.bodies, body)), *chain(*notes))
     what = {
-        "ior": options.ior, "transmission": options.transmission, "tint": list(options.tint),
-        "roughness": options.roughness, "hollow": options.hollow, "model": options.model, "back": options.back,
-        "thickness": ", ".join(dict.fromkeys(found.method for _, found in each)), "pixels": int(own.sum()),
-    }  # fmt: skip
+        "ior": options.ior,
+        "transmission": options.transmission,
+        "tint": list(options.tint),
+        "roughness": options.roughness,
+        "hollow": options.hollow,
+        "model": options.model,
+        "back": options.back,
+        "thickness": ", ".join(dict.fromkeys(found.method for _, found in each)),
+        "pixels": int(own.sum()),
+    }
     return noted(edited, "glass", what)
 
 
-def _shell(scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: bool | str) -> tuple[Shell, list[str]]:
+def _shell(
+    scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: bool | str
+) -> tuple[Shell, list[str]]:
     """(the body of one object, what of a hollow could not be made, in words)."""
-    camera, whole = scene.camera, found.revolution
+    camera = scene.camera
+    whole = found.revolution
     wall = wall_of(scene, part, found) if hollow else None
     if whole is None:
         shell = closed_proxy(
-            scene.depth, scene.normal, part, found.solid, camera, wall=wall, behind=removed.depth, back=found.back
-        )  # fmt: skip
+            scene.depth,
+            scene.normal,
+            part,
+            found.solid,
+            camera,
+            wall=wall,
+            behind=removed.depth,
+            back=found.back,
+        )
     else:
         opened = whole.vessel(camera, wall) if wall and hollow == "open" else None
         if opened is not None:
@@ -88,8 +121,14 @@ def glass_surface(scene: Scene, options: Glass) -> Surface:
     metallic = np.zeros((1, 1), np.float32) if clear else scene.materials.metallic
     rough = np.full((1, 1), options.roughness, np.float32) if clear else scene.materials.roughness
     return Surface(
-        albedo, rough, metallic, options.transmission, options.ior, options.tint, glass_roughness=options.roughness
-    )  # fmt: skip
+        albedo,
+        rough,
+        metallic,
+        options.transmission,
+        options.ior,
+        options.tint,
+        glass_roughness=options.roughness,
+    )
 
 
 def _two_interface(
@@ -101,10 +140,13 @@ def _two_interface(
     own: Array = np.zeros(scene.depth.shape, bool)
     photo = removed.photo
     picture: Array = np.zeros(scene.photo.linear.shape, np.float32)
-    clear, behind = options.transmission, Backdrop(photo.linear, removed.depth, envmap)
+    clear = options.transmission
+    behind = Backdrop(photo.linear, removed.depth, envmap)
     for part, found in each:
         seen, front, facing = _front(scene, part, found)
-        one = two_interface(scene.camera, facing, front, seen, found.solid, behind, options, found.back)
+        one = two_interface(
+            scene.camera, facing, front, seen, found.solid, behind, options, found.back
+        )
         picture = np.where(seen[..., None], one, picture)
         own |= seen
     # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.
@@ -112,7 +154,9 @@ def _two_interface(
     linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
     share = np.clip(resample.values(own.astype(np.float32), native), 0, 1)[..., None]
-    near = resample.values(picture[nearest(own)], native)  # with nothing else mixed in where it is enlarged
+    near = resample.values(
+        picture[nearest(own)], native
+    )  # with nothing else mixed in where it is enlarged
     original = (share * near + (1 - share) * photo.original).astype(np.float32)
     return replace(removed, photo=replace(photo, linear=linear, original=original))
 
@@ -123,6 +167,10 @@ def _front(scene: Scene, own: Array, found: Thickness) -> tuple[Array, Array, Ar
     Normals of the maps are blurred as for the closed proxy.
     """
     if found.revolution is None:
-        return own, scene.depth, blurred_normals(scene.normal, own, 0.01 * float(np.sqrt(own.sum())))
+        return (
+            own,
+            scene.depth,
+            blurred_normals(scene.normal, own, 0.01 * float(np.sqrt(own.sum()))),
+        )
     depth, normal = found.revolution.front(own, pixel_rays(scene.camera).astype(np.float64))
     return depth > 0, depth, normal

@@ -36,7 +36,9 @@ class GlassPreview:
 
         self._options = options = Glass.given(options, **values)
         if options.model != "closed":
-            raise InputError(f"The preview traces the closed body; model is '{options.model}', leave it 'closed'.")
+            raise InputError(
+                f"The preview traces the closed body; model is '{options.model}', leave it 'closed'."
+            )
         setup(options.device)
         self.scene = scene
         # The glass itself is exchanged for every picture.
@@ -45,7 +47,8 @@ class GlassPreview:
         self._renderer = EditRenderer(self._edited, device=options.device)
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._size = scene.depth.shape
-        traced, body = self._target(self._edited.bodies[-1].surface).mi_scene, {self._name: self._edited.bodies[-1]}
+        traced = self._target(self._edited.bodies[-1].surface).mi_scene
+        body = {self._name: self._edited.bodies[-1]}
         sight = first_hits(traced, scene.camera, body, self._size)
         self.share = sight.share
         """[H, W] float32 in [0, 1]: share of each working pixel in which the glass is seen."""
@@ -64,11 +67,15 @@ class GlassPreview:
         from materialist.render.scene import GLASS_DEPTH
 
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
-        target, box = self._target(surface), self._box
+        target = self._target(surface)
+        box = self._box
         paths = max(FEWEST, min(spp, PATHS // area(box)))
-        seen = radiance(target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name])
+        seen = radiance(
+            target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name]
+        )
         traced = denoised(without_fireflies(spread(seen)), *self._guides)
-        out, share = self._edited.photo.linear.copy(), self.share[box][..., None]
+        out = self._edited.photo.linear.copy()
+        share = self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]
         return out
 

@@ -28,7 +28,9 @@ class WallSettings:
     least: float = 0.015  # bounds on what RefractionNet says
     most: float = 0.12
     thick: float = 0.02  # pixels inside its outline that a part of a mask has to reach, or it gives no body; derived
-    part: float = 0.01  # share of the largest part of a mask from which a part is an object of its own
+    part: float = (
+        0.01  # share of the largest part of a mask from which a part is an object of its own
+    )
 
 
 WALL = WallSettings()
@@ -78,19 +80,24 @@ def object_thickness(
 
 def wall_of(scene: Scene, mask: Array, found: Thickness) -> float:
     """Thickness of the wall of the object under a mask [H, W] bool, were it hollow; scene units."""
-    inside, rays = surface_in(mask, scene.depth, scene.camera), pixel_rays(scene.camera)
+    inside = surface_in(mask, scene.depth, scene.camera)
+    rays = pixel_rays(scene.camera)
     size = object_size(inside, scene.depth, rays)
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
     across = inside & (found.hollow > 0) & (found.hollow < 0.8 * found.solid)
-    wall = float(np.median((found.hollow * facing / 2)[across])) if across.any() else WALL.usual * size
+    wall = (
+        float(np.median((found.hollow * facing / 2)[across])) if across.any() else WALL.usual * size
+    )
     return float(np.clip(wall, WALL.least * size, WALL.most * size))
 
 
 def _given(method: str | Array | Path, inside: Array) -> Array:
     if isinstance(method, str | Path):
         if not Path(method).is_file():
-            raise InputError(f"The thickness is {str(method)!r}; give a file, or one of {', '.join(METHODS)}.")
+            raise InputError(
+                f"The thickness is {str(method)!r}; give a file, or one of {', '.join(METHODS)}."
+            )
         method = read_map(method)
     given = np.asarray(method, np.float32)
     given = given[..., 0] if given.ndim == 3 else given
@@ -99,7 +106,11 @@ def _given(method: str | Array | Path, inside: Array) -> Array:
             f"The thickness map is {given.shape}, the photo at working size {inside.shape} (rows, columns)."
         )
     if not (np.isfinite(given).all() and given.min() >= 0):
-        raise InputError("The thickness map has negative or infinite values; give scene units >= 0.")
+        raise InputError(
+            "The thickness map has negative or infinite values; give scene units >= 0."
+        )
     if not (given[inside] > 0).any():
-        raise InputError("The thickness is 0 all over the mask; give scene units along the camera rays.")
+        raise InputError(
+            "The thickness is 0 all over the mask; give scene units along the camera rays."
+        )
     return given

@@ -63,9 +63,15 @@ class Crossing:
 
 
 def two_interface(
-    camera: Camera, normal: Array, depth: Array, mask: Array, thickness: Array, behind: Backdrop, options: Glass,
+    camera: Camera,
+    normal: Array,
+    depth: Array,
+    mask: Array,
+    thickness: Array,
+    behind: Backdrop,
+    options: Glass,
     back: Array | None = None,
-) -> Array:  # fmt: skip
+) -> Array:
     """The object under the mask as glass: [H, W, 3] float32 linear radiance inside the mask, 0 outside.
 
     Args:
@@ -77,22 +83,30 @@ def two_interface(
             `thickness` describes, with its normals.
         back: [H, W, 3] unit outward normals of that surface, where they are known better than by its depth.
     """
-    inside, rays = surface_in(mask, depth, camera), pixel_rays(camera).astype(np.float64)
+    inside = surface_in(mask, depth, camera)
+    rays = pixel_rays(camera).astype(np.float64)
     if options.back == "same":
         front = Front(camera, normal, depth, inside)
     else:
         if back is None:
-            back = back_normals(depth + thickness / np.linalg.norm(rays, axis=-1), inside, rays).astype(np.float32)
+            back = back_normals(
+                depth + thickness / np.linalg.norm(rays, axis=-1), inside, rays
+            ).astype(np.float32)
         front = Front(camera, normal, depth, inside, back, thickness)
     d1 = thickness[inside]
-    side, tint = SIDES[options.roughness > 0], np.asarray(options.tint, float)
+    side = SIDES[options.roughness > 0]
+    tint = np.asarray(options.tint, float)
     total = np.zeros((int(inside.sum()), 3))
     for k in range(side**2):
         front.through((np.array([k % side, k // side]) + 0.5) / side - 0.5)
-        crossing = cross(front, d1, ior=options.ior, alpha=options.roughness**2, sample=(k, side**2))
+        crossing = cross(
+            front, d1, ior=options.ior, alpha=options.roughness**2, sample=(k, side**2)
+        )
         through = look(crossing.exit, crossing.direction, behind, camera)
         trapped = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
-        mirror = crossing.reflectance[:, None] * look(front.point, crossing.reflected, behind, camera)
+        mirror = crossing.reflectance[:, None] * look(
+            front.point, crossing.reflected, behind, camera
+        )
         total += (crossing.share[:, None] * through + trapped * through.mean(0)) * tint + mirror
     result = np.zeros((*inside.shape, 3), np.float32)
     result[inside] = total / side**2
@@ -106,9 +120,14 @@ class Front:
     """
 
     def __init__(
-        self, camera: Camera, normal: Array, depth: Array, inside: Array, back: Array | None = None,
+        self,
+        camera: Camera,
+        normal: Array,
+        depth: Array,
+        inside: Array,
+        back: Array | None = None,
         thickness: Array | None = None,
-    ):  # fmt: skip
+    ):
         self.camera = camera
         self._centres = np.argwhere(inside)[:, ::-1] + 0.5  # [N, 2] x, y
         own = nearest(inside)
@@ -118,8 +137,11 @@ class Front:
         self._backs = None if back is None else back[own].astype(np.float64)
         self._ends: Array | None = None
         if thickness is not None:
-            ends = depth + thickness / np.linalg.norm(pixel_rays(camera), axis=-1)  # [H, W] planar depth of the back
-            self._ends, self._longest = ends[own], LONGEST * float(thickness[inside].max())
+            ends = depth + thickness / np.linalg.norm(
+                pixel_rays(camera), axis=-1
+            )  # [H, W] planar depth of the back
+            self._ends = ends[own]
+            self._longest = LONGEST * float(thickness[inside].max())
 
     def through(self, offset: Array) -> None:
         """Look through the pixels at this distance [2] (x right, y down) from their centres."""
@@ -144,7 +166,9 @@ class Front:
         return np.minimum(np.where(np.isfinite(found), found, d1), self._longest)
 
 
-def cross(front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1)) -> Crossing:
+def cross(
+    front: Front, d1: Array, *, ior: float, alpha: float = 0.0, sample: tuple[int, int] = (0, 1)
+) -> Crossing:
     """Rays through both surfaces; d1 [N] scene units.
 
     `sample` (k, n) is the k-th of n facets of rough surfaces.
@@ -183,7 +207,9 @@ def look(origin: Array, direction: Array, behind: Backdrop, camera: Camera) -> A
     """
     distance = background_distance(origin, direction, behind.depth, camera)
     met = np.isfinite(distance)
-    end = np.where(met[:, None], origin + np.where(met, distance, 0)[:, None] * direction, direction)
+    end = np.where(
+        met[:, None], origin + np.where(met, distance, 0)[:, None] * direction, direction
+    )
     place, depth = project(end, camera)
     size = np.array([camera.width, camera.height])
     sky = ~met & (depth > 0) & ((place >= 0) & (place < size)).all(-1)
@@ -203,11 +229,14 @@ def background_distance(origin: Array, direction: Array, depth: Array, camera: C
     far = 2 * float(depth.max())
     surface = np.where(depth > 0, depth, 1e6).astype(np.float64)
     length = far * (np.arange(STEPS + 1) / STEPS) ** 2  # [STEPS + 1]
-    low, high = np.zeros(len(origin)), np.full(len(origin), np.inf)
+    low = np.zeros(len(origin))
+    high = np.full(len(origin), np.inf)
     open_ = np.ones(len(origin), bool)
     for a, b in pairwise(length):
         hit = open_.copy()
-        hit[open_] = _behind(origin[open_], direction[open_], np.full(int(open_.sum()), b), surface, camera)
+        hit[open_] = _behind(
+            origin[open_], direction[open_], np.full(int(open_.sum()), b), surface, camera
+        )
         low[hit], high[hit] = a, b
         open_ &= ~hit
         if not open_.any():
@@ -216,11 +245,16 @@ def background_distance(origin: Array, direction: Array, depth: Array, camera: C
     for _ in range(12):
         middle = (low[met] + high[met]) / 2
         beyond = _behind(origin[met], direction[met], middle, surface, camera)
-        high[met], low[met] = np.where(beyond, middle, high[met]), np.where(beyond, low[met], middle)
+        high[met], low[met] = (
+            np.where(beyond, middle, high[met]),
+            np.where(beyond, low[met], middle),
+        )
     return high
 
 
-def _behind(origin: Array, direction: Array, distance: Array, surface: Array, camera: Camera) -> Array:
+def _behind(
+    origin: Array, direction: Array, distance: Array, surface: Array, camera: Camera
+) -> Array:
     """[n] bool: whether the points on the rays at `distance` [n] are behind the surface [H, W], and in view."""
     place, depth = project(origin + distance[:, None] * direction, camera)
     return (depth > 0) & (depth >= bilinear(surface[..., None], place)[:, 0])

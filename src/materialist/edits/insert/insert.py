@@ -24,12 +24,18 @@ from materialist.types import Array, Body, Scene
 class InsertSettings:
     """Size of an inserted mesh, and the plane that it stands on; tuned by eye."""
 
-    width: float = 1 / 6  # longest side at scale 1, share of the width that the picture shows at its depth
-    nearest: float = 0.02  # depth that nothing may come nearer than, share of the depth of its place
+    width: float = (
+        1 / 6
+    )  # longest side at scale 1, share of the width that the picture shows at its depth
+    nearest: float = (
+        0.02  # depth that nothing may come nearer than, share of the depth of its place
+    )
     samples: int = 6000  # points that stand for its surface where it falls
     alike: float = 0.7  # cosine from which a neighbour's normal counts as that of the same surface
     fewest: int = 12  # pixels whose median counts, at least; with fewer the one pixel decides
-    nearby: float = 1 / 24  # radius around the place, share of the picture's width, where no radius is given
+    nearby: float = (
+        1 / 24
+    )  # radius around the place, share of the picture's width, where no radius is given
     air: float = 0.005  # under glass, share of its longest side: glass and floor without any are one block; derived
 
 
@@ -73,32 +79,57 @@ def insert(
     camera; a mesh that cannot be used; a number out of its range.
     """
     wanted = Insertion.given(options, **values)
-    model = repainted(mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=wanted.up), wanted.material)
-    placed, _, longest = put(scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size)
+    model = repainted(
+        mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=wanted.up), wanted.material
+    )
+    placed, _, longest = put(
+        scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size
+    )
     what: dict[str, Any] = {
-        "mesh": model.name, "at": [float(v) for v in at], "scale": wanted.scale, "turn": wanted.turn,
-        "material": wanted.material, "size": longest, "triangles": sum(len(body.faces) for body in placed),
-    }  # fmt: skip
-    return noted(warned(replace(scene, bodies=(*scene.bodies, *placed)), *model.warnings), "insert", what)
+        "mesh": model.name,
+        "at": [float(v) for v in at],
+        "scale": wanted.scale,
+        "turn": wanted.turn,
+        "material": wanted.material,
+        "size": longest,
+        "triangles": sum(len(body.faces) for body in placed),
+    }
+    return noted(
+        warned(replace(scene, bodies=(*scene.bodies, *placed)), *model.warnings), "insert", what
+    )
 
 
 def put(
-    scene: Scene, model: MeshModel, at: tuple[float, float], *, scale: float = 1.0, turn: float = 0.0,
+    scene: Scene,
+    model: MeshModel,
+    at: tuple[float, float],
+    *,
+    scale: float = 1.0,
+    turn: float = 0.0,
     size: float | None = None,
-) -> tuple[tuple[Body, ...], Support, float]:  # fmt: skip
+) -> tuple[tuple[Body, ...], Support, float]:
     """The model's parts as they stand in the camera frame, the plane they stand on, and their longest side.
 
     The side is the model's own, in scene units; see `insert`.
     """
-    low, high = model.vertices.min(0).astype(np.float64), model.vertices.max(0).astype(np.float64)
+    low = model.vertices.min(0).astype(np.float64)
+    high = model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
     first = support_at(scene, at)
-    factor = scale * (size if size is not None else SETTINGS.width * picture_width(scene, first.depth)) / longest
+    factor = (
+        scale
+        * (size if size is not None else SETTINGS.width * picture_width(scene, first.depth))
+        / longest
+    )
     footprint = factor * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     support = support_at(scene, at, footprint)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     turned = frame(support) @ Rotation.from_euler("y", turn, degrees=True).as_matrix()
-    air = SETTINGS.air * factor * longest if any(is_transparent(part.surface) for part in model.parts) else 0.0
+    air = (
+        SETTINGS.air * factor * longest
+        if any(is_transparent(part.surface) for part in model.parts)
+        else 0.0
+    )
     origin = support.point + air * support.normal - (turned * factor) @ base
     bodies = tuple(moved(part, turned * factor, origin) for part in model.parts)
     nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
@@ -122,7 +153,9 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
     column, row = checked_pixel(scene, at, "place")
     depth = float(scene.depth[row, column])
     if not depth > 0:
-        raise InputError(f"The place {at[0]:g},{at[1]:g} is sky, where nothing can stand; choose a surface.")
+        raise InputError(
+            f"The place {at[0]:g},{at[1]:g} is sky, where nothing can stand; choose a surface."
+        )
     camera = scene.camera
     ray = rays_through(np.array(at), camera)
     point = ray * depth
@@ -166,7 +199,9 @@ def frame(support: Support) -> Array:
     front = towards - (towards @ up) * up
     down = np.array([0.0, -1.0, 0.0])
     down = down - (down @ up) * up
-    share = np.clip((np.linalg.norm(front) - 0.2) / 0.2, 0, 1)  # a steep wall turns gently from one to the other
+    share = np.clip(
+        (np.linalg.norm(front) - 0.2) / 0.2, 0, 1
+    )  # a steep wall turns gently from one to the other
     front = share * front + (1 - share) * down
     if np.linalg.norm(front) < 1e-6:
         front = np.cross([1.0, 0.0, 0.0], up)

@@ -67,11 +67,15 @@ def read_model(path: str | Path, *, up: str = "auto") -> MeshModel:
     if up not in ("auto", "y", "z"):
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
     source = MeshSource(path, LIMITS)
-    with np.errstate(over="ignore", invalid="ignore"):  # numbers of damaged files; what is not finite is refused
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # numbers of damaged files; what is not finite is refused
         content = READERS[source.suffix](source)
         parts = _bodies(source, content)
     if up == "z" or (up == "auto" and source.suffix == ".stl"):
-        parts = [replace(p, vertices=_upright(p.vertices), normals=_upright(p.normals)) for p in parts]
+        parts = [
+            replace(p, vertices=_upright(p.vertices), normals=_upright(p.normals)) for p in parts
+        ]
     missing = [f"{name} is missing; a constant takes its place." for name in source.folder.missing]
     left_out = [f"{thing} is left out." for thing in content.left_out]
     notes = [f"{path.name}: {note}" for note in left_out + missing + content.notes]
@@ -104,8 +108,13 @@ def repainted(model: MeshModel, material: str) -> MeshModel:
         surface = uniform_surface(np.asarray(parse_colour(material)), 0.5, 0.0)
     notes = model.warnings
     if material == "glass" and not model.closed:
-        notes = (*notes, f"{model.name} is not closed, so its glass has holes; close the mesh for a solid look.")
-    return replace(model, parts=tuple(replace(part, surface=surface) for part in model.parts), warnings=notes)
+        notes = (
+            *notes,
+            f"{model.name} is not closed, so its glass has holes; close the mesh for a solid look.",
+        )
+    return replace(
+        model, parts=tuple(replace(part, surface=surface) for part in model.parts), warnings=notes
+    )
 
 
 def _bodies(source: MeshSource, content: MeshContent) -> list[Body]:
@@ -142,7 +151,9 @@ def _without_empty(source: MeshSource, part: MeshPart) -> MeshPart:
     used = np.zeros(len(part.vertices), bool)
     used[faces.ravel()] = True
     if not np.isfinite(part.vertices[used]).all():
-        raise InputError(f"{source.path} has vertices that are NaN or infinite; repair it, in Blender for example.")
+        raise InputError(
+            f"{source.path} has vertices that are NaN or infinite; repair it, in Blender for example."
+        )
     kept = area_vectors(part.vertices, faces).any(1)
     if kept.all() and used.all():
         return replace(part, vertices=part.vertices.astype(np.float64, copy=False))
@@ -185,7 +196,9 @@ def _with_normals(part: MeshPart, crease: float) -> MeshPart:
 
 def _body(source: MeshSource, content: MeshContent, part: MeshPart, paint: Paint) -> Body:
     """A part with normals as a body."""
-    vertices, faces, normals = part.vertices, part.faces.astype(np.int32), part.normals
+    vertices = part.vertices
+    faces = part.faces.astype(np.int32)
+    normals = part.normals
     assert normals is not None
     if part.face_colours is not None:
         surface, of_face = coloured(paint.surface, part.face_colours)
@@ -195,10 +208,16 @@ def _body(source: MeshSource, content: MeshContent, part: MeshPart, paint: Paint
         return Body(vertices[corners], faces, normals[corners], uv, surface, part.name)
     uv = np.zeros((len(vertices), 2)) if part.uv is None else part.uv
     uv = np.clip(np.nan_to_num(uv), -FARTHEST_UV, FARTHEST_UV)
-    surface, uv, exact = wrapped(paint.surface, uv, faces, paint.layout.wrap, source.limits.texture_pixels)
+    surface, uv, exact = wrapped(
+        paint.surface, uv, faces, paint.layout.wrap, source.limits.texture_pixels
+    )
     if not exact:
-        content.notes.append("a clamped texture is cut off where its coordinates lie far outside of it.")
-    return Body(vertices, np.ascontiguousarray(faces), normals, uv.astype(np.float32), surface, part.name)
+        content.notes.append(
+            "a clamped texture is cut off where its coordinates lie far outside of it."
+        )
+    return Body(
+        vertices, np.ascontiguousarray(faces), normals, uv.astype(np.float32), surface, part.name
+    )
 
 
 def coloured(surface: Surface, colours: Array) -> tuple[Surface, Array]:
@@ -216,12 +235,15 @@ def _checked(parts: list[Body], path: Path, notes: list[str]) -> MeshModel:
     vertices, faces = joined_faces(parts)
     open_edges, crowded = edge_faults(vertices, faces)
     if crowded:
-        notes.append(f"{path.name} is not manifold: {crowded} edges belong to three or more triangles.")
+        notes.append(
+            f"{path.name} is not manifold: {crowded} edges belong to three or more triangles."
+        )
     base = np.array([0, vertices[:, 1].min(), 0], np.float32)
     parts = [replace(part, vertices=part.vertices - base) for part in parts]
     if not open_edges and not crowded and _volume(vertices, faces) < 0:
         parts = [
-            replace(part, faces=np.ascontiguousarray(part.faces[:, ::-1]), normals=-part.normals) for part in parts
+            replace(part, faces=np.ascontiguousarray(part.faces[:, ::-1]), normals=-part.normals)
+            for part in parts
         ]
     return MeshModel(tuple(parts), path.stem, tuple(notes), open_edges == 0)
 

@@ -11,7 +11,9 @@ CHUNK = 1 << 18
 """Faces that are looked at in one go: bounds the memory."""
 
 
-def creased_normals(vertices: Array, faces: Array, degrees: float, pieces: Array | None = None) -> tuple[Array, Array]:
+def creased_normals(
+    vertices: Array, faces: Array, degrees: float, pieces: Array | None = None
+) -> tuple[Array, Array]:
     """(number [F, 3] of the normal of each corner, unit normals [N, 3] float64) of vertices [V, 3], faces [F, 3].
 
     Faces that meet at a sharper angle keep an edge; those that meet at a smaller one, or are linked by such, share
@@ -48,9 +50,11 @@ def _smooth_groups(corners: Array, flat: Array, cosine: float) -> Array:
     order = np.argsort(keys, kind="stable").astype(np.int32)
     keys = keys[order]
     shared = np.flatnonzero(keys[1:] == keys[:-1])
-    first, second = order[shared] // 3, order[shared + 1] // 3
+    first = order[shared] // 3
+    second = order[shared + 1] // 3
     smooth = np.einsum("ij,ij->i", flat[first], flat[second]) >= cosine
-    first, second = first[smooth], second[smooth]
+    first = first[smooth]
+    second = second[smooth]
     links = coo_array((np.ones(len(first), bool), (first, second)), shape=(len(flat), len(flat)))
     return np.asarray(connected_components(links, directed=False)[1])
 

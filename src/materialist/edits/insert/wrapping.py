@@ -43,7 +43,9 @@ def _mirrored(surface: Surface, axis: int) -> Surface:
     return _each_map(surface, axis, both)
 
 
-def _clamped(surface: Surface, u: Array, faces: Array, axis: int, pixels: int) -> tuple[Surface, Array, bool]:
+def _clamped(
+    surface: Surface, u: Array, faces: Array, axis: int, pixels: int
+) -> tuple[Surface, Array, bool]:
     """(surface with its maps continued along an axis, u [V] on them, whether they reach far enough)."""
     maps = [getattr(surface, name) for name in MAPS]
     sizes = [values.shape[axis] for values in maps if values.shape[axis] > 1]
@@ -52,15 +54,19 @@ def _clamped(surface: Surface, u: Array, faces: Array, axis: int, pixels: int) -
     step = 1 / math.gcd(*sizes)  # whole pixels of every map
     corner = u[faces]
     crossing = ~((corner <= 0).all(1) | (corner >= 1).all(1))
-    inner = u[np.unique(faces[crossing])]  # the others show the border alone, however far they reach
+    inner = u[
+        np.unique(faces[crossing])
+    ]  # the others show the border alone, however far they reach
     before = math.ceil(max(-inner.min(initial=0), 0) / step) + 1
     after = math.ceil(max(inner.max(initial=1) - 1, 0) / step) + 1
     largest = max(values.shape[0] * values.shape[1] for values in maps)
     room = max(int((pixels / largest - 1) / step), 2)
     exact = before + after <= room
     if not exact:
-        before, after = min(before, room // 2), min(after, room // 2)
-    low, high = before * step, after * step
+        before = min(before, room // 2)
+        after = min(after, room // 2)
+    low = before * step
+    high = after * step
 
     def continued(values: Array) -> Array:
         size = values.shape[axis]
@@ -74,5 +80,7 @@ def _clamped(surface: Surface, u: Array, faces: Array, axis: int, pixels: int) -
 def _each_map(surface: Surface, axis: int, change: Callable[[Array], Array]) -> Surface:
     """The surface with its maps changed; those of one value along the axis stay."""
     maps = {name: getattr(surface, name) for name in MAPS}
-    changed: dict[str, Any] = {name: change(values) for name, values in maps.items() if values.shape[axis] > 1}
+    changed: dict[str, Any] = {
+        name: change(values) for name, values in maps.items() if values.shape[axis] > 1
+    }
     return replace(surface, **changed)

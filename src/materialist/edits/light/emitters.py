@@ -9,7 +9,15 @@ from scipy.optimize import lsq_linear
 
 from materialist.edits.core.notes import is_edited, warned
 from materialist.edits.core.region import checked_region
-from materialist.edits.core.surfaces import KEY, OFF, PHOTO_LIGHT, emitting, triple, uniform_surface, with_emitters
+from materialist.edits.core.surfaces import (
+    KEY,
+    OFF,
+    PHOTO_LIGHT,
+    emitting,
+    triple,
+    uniform_surface,
+    with_emitters,
+)
 from materialist.errors import InputError
 from materialist.geometry.build import part
 from materialist.geometry.silhouette import disc
@@ -24,13 +32,17 @@ class EmitterSettings:
     beside: float = 0.6  # share of `clipped` from which pixels beside an emitter belong to it, as its shade does
     reach: float = 0.015  # how far beside it, share of the longer side
     gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; share of the longer side
-    upward: float = 0.7  # mean Y of the normals above which a surface reflects a light, or lies in the sun
+    upward: float = (
+        0.7  # mean Y of the normals above which a surface reflects a light, or lies in the sun
+    )
     area: float = 0.001  # smallest share of the picture; less is a highlight
     pixels: int = 9  # smallest part of a mask, pixels; derived: a surface needs some triangles
     hdr: float = 4.0  # least multiple of the median of an HDR photo
     known: float = 0.1  # share of clipped pixels up to which the photo tells the radiance
     white: float = 0.5  # share of clipped pixels above which an emitter is taken as white
-    lift: float = 2e-3  # distance of an emitter before its surface, share of the depth; derived: ray offsets
+    lift: float = (
+        2e-3  # distance of an emitter before its surface, share of the depth; derived: ray offsets
+    )
     spp: int = 32  # paths a pixel of the rendering that estimates the radiance; derived: sums over the whole picture
 
 
@@ -42,26 +54,38 @@ def visible_lights(scene: Scene) -> list[Array]:
 
     They are connected regions of clipped pixels with the bright ones beside them, and do not face up.
     """
-    photo, surface = scene.photo, scene.depth > 0
+    photo = scene.photo
+    surface = scene.depth > 0
     least = SETTINGS.clipped
     if photo.hdr and surface.any():
         least = max(least, SETTINGS.hdr * float(np.median(photo.linear[surface].mean(-1))))
-    value, longer = photo.linear.min(-1), max(surface.shape)
+    value = photo.linear.min(-1)
+    longer = max(surface.shape)
     bright = (value >= least) & surface
     if not bright.any():
         return []
     near = ndimage.distance_transform_edt(~bright) <= max(1, round(SETTINGS.reach * longer))
-    grown = ndimage.binary_propagation(bright, mask=(value >= SETTINGS.beside * least) & surface & near)
-    closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(SETTINGS.gap * longer))) > 0
+    grown = ndimage.binary_propagation(
+        bright, mask=(value >= SETTINGS.beside * least) & surface & near
+    )
+    closed = (
+        cv2.morphologyEx(
+            grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(SETTINGS.gap * longer))
+        )
+        > 0
+    )
     masks = [
-        mask for mask in _parts(closed, SETTINGS.area * closed.size)
+        mask
+        for mask in _parts(closed, SETTINGS.area * closed.size)
         if (mask & bright).sum() >= SETTINGS.area * mask.size
         and scene.normal[mask][:, 1].mean() <= SETTINGS.upward
-    ]  # fmt: skip
+    ]
     return sorted(masks, key=lambda mask: -int(mask.sum()))
 
 
-def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None) -> Scene:
+def dimmed(
+    scene: Scene, dim: float, *, lights: Array | None = None, fitted: Scene | None = None
+) -> Scene:
     """The scene with its in-photo emitters as surfaces of `dim` times their radiance; the photo's is 1.
 
     The fitted environment map explains the whole photo. Here it is scaled down to leave room for the emitters, whose
@@ -74,13 +98,19 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
     enough, or the mask has another size or no surface in it.
     """
     if any(body.name.startswith(PHOTO_LIGHT) for body in scene.bodies):
-        raise InputError("The lights of this photo are dimmed already; start from the scene before.")
+        raise InputError(
+            "The lights of this photo are dimmed already; start from the scene before."
+        )
     if fitted is None and is_edited(scene):
         raise InputError(
             "The lights of a photo are found in the scene before its edits; dim that one, and edit it afterwards."
         )
     known = fitted or scene
-    masks = visible_lights(known) if lights is None else _parts(checked_region(known, lights) > 0.5, SETTINGS.pixels)
+    masks = (
+        visible_lights(known)
+        if lights is None
+        else _parts(checked_region(known, lights) > 0.5, SETTINGS.pixels)
+    )
     if not any(mask.sum() >= SETTINGS.pixels for mask in masks):
         raise InputError(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
@@ -91,13 +121,21 @@ def dimmed(scene: Scene, dim: float, *, lights: Array | None = None, fitted: Sce
     gone = (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
     masks = [part for mask in masks for part in _parts(mask & ~gone, SETTINGS.pixels)]
     if not masks:
-        raise InputError("The lights of this photo were taken away by an earlier step; leave the dimming out.")
+        raise InputError(
+            "The lights of this photo were taken away by an earlier step; leave the dimming out."
+        )
     colours, radiance = _looks(known.photo, masks)
     patches = [_patch(scene, mask, f"{PHOTO_LIGHT} {k}") for k, mask in enumerate(masks)]
     shining = tuple(emitting(body, colour) for body, colour in zip(patches, colours))
     ambient, radiance, share = _estimated(known, shining, np.any(masks, 0), radiance)
     emission = [[radiance * c for c in colour] for colour in colours]
-    found = {"ambient": ambient, "radiance": radiance, "dim": dim, "share": share, "emission": emission}
+    found = {
+        "ambient": ambient,
+        "radiance": radiance,
+        "dim": dim,
+        "share": share,
+        "emission": emission,
+    }
     bodies = [emitting(body, [dim * c for c in own]) for body, own in zip(patches, emission)]
     edited = with_emitters(scene, bodies, found)
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
@@ -112,7 +150,9 @@ def _parts(mask: Array, least: float) -> list[Array]:
     return [label == k for k in np.flatnonzero(np.bincount(label.ravel()) >= least) if k]
 
 
-def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, float]], float | None]:
+def _looks(
+    photo: Photo, masks: list[Array]
+) -> tuple[list[tuple[float, float, float]], float | None]:
     """(colours of the emitters, the radiance that goes with them where the photo tells it).
 
     An HDR photo tells the radiance, and any photo that of emitters that are not clipped. Else colours are 1 in the
@@ -120,7 +160,11 @@ def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, f
     """
     inside = [photo.linear[mask] for mask in masks]
     means = [pixels.mean(0) for pixels in inside]
-    if photo.hdr or np.concatenate([pixels.max(-1) >= SETTINGS.clipped for pixels in inside]).mean() < SETTINGS.known:
+    if (
+        photo.hdr
+        or np.concatenate([pixels.max(-1) >= SETTINGS.clipped for pixels in inside]).mean()
+        < SETTINGS.known
+    ):
         peak = max(*(float(mean.max()) for mean in means), OFF)
         return [triple(mean / peak) for mean in means], peak
     white = [(pixels.min(-1) >= SETTINGS.clipped).mean() > SETTINGS.white for pixels in inside]
@@ -130,7 +174,7 @@ def _looks(photo: Photo, masks: list[Array]) -> tuple[list[tuple[float, float, f
 
 def _estimated(
     scene: Scene, emitters: tuple[Body, ...], masked: Array, radiance: float | None
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """(factor on the environment map, radiance of the emitters) that together give the photo, and the emitters' share.
 
     Weighted least squares of photo = factor * rerender + radiance * (picture by the emitters alone), the radiance at
@@ -159,4 +203,6 @@ def _patch(scene: Scene, mask: Array, name: str) -> Body:
     """The surface of the masked pixels, black, and moved a little towards the camera."""
     surface = part(scene.geometry.mesh, -1, mask)
     vertices = (surface.vertices * np.float32(1 - SETTINGS.lift)).astype(np.float32)
-    return Body(vertices, surface.faces, surface.normals, surface.uv, uniform_surface(0.0, 1.0, 0.0), name)
+    return Body(
+        vertices, surface.faces, surface.normals, surface.uv, uniform_surface(0.0, 1.0, 0.0), name
+    )

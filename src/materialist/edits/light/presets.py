@@ -18,18 +18,24 @@ def light(name: str, rows: int = ROWS) -> Array:
     return np.ascontiguousarray(LIGHTS[name](*np.meshgrid(azimuth, elevation)), np.float32)
 
 
-def _panel(az: Array, el: Array, at: tuple[float, float], size: tuple[float, float], colour: Colour) -> Array:
+def _panel(
+    az: Array, el: Array, at: tuple[float, float], size: tuple[float, float], colour: Colour
+) -> Array:
     """[h, w, 3]: a soft-edged rectangle; `at` and `size` in degrees."""
     across = np.abs((az - at[0] + 180) % 360 - 180) / (size[0] / 2)
     up = np.abs(el - at[1]) / (size[1] / 2)
-    return (1 / (1 + np.exp(np.clip(14 * (np.maximum(across, up) - 1), -60, 60))))[..., None] * np.array(colour)
+    return (1 / (1 + np.exp(np.clip(14 * (np.maximum(across, up) - 1), -60, 60))))[
+        ..., None
+    ] * np.array(colour)
 
 
 def _spot(az: Array, el: Array, at: tuple[float, float], width: float, colour: Colour) -> Array:
     """[h, w, 3]: a Gaussian of `width` degrees around a direction."""
     a, e, a0, e0 = (np.radians(v) for v in (az, el, *at))
     cosine = np.sin(e) * np.sin(e0) + np.cos(e) * np.cos(e0) * np.cos(a - a0)
-    return np.exp(-((np.degrees(np.arccos(np.clip(cosine, -1, 1))) / width) ** 2))[..., None] * np.array(colour)
+    return np.exp(-((np.degrees(np.arccos(np.clip(cosine, -1, 1))) / width) ** 2))[
+        ..., None
+    ] * np.array(colour)
 
 
 def _room(el: Array, wall: Colour, floor: Colour) -> Array:
@@ -59,7 +65,9 @@ LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
         + sum(_panel(az, el, (x, y), (19, 24), (6.8, 7.6, 8.8)) for x in (69, 91) for y in (4, 32))
     ),
     # CIE standard overcast sky: the zenith is three times as bright as the horizon.
-    "Overcast": lambda az, el: _sky(el, _up(el), (0.95 / 3, 1 / 3, 0.36), (0.95, 1.0, 1.08), (0.22, 0.22, 0.20)),
+    "Overcast": lambda az, el: _sky(
+        el, _up(el), (0.95 / 3, 1 / 3, 0.36), (0.95, 1.0, 1.08), (0.22, 0.22, 0.20)
+    ),
     "Noon": lambda az, el: (
         _sky(el, _up(el), (0.75, 0.85, 1.0), (0.22, 0.42, 0.95), (0.30, 0.27, 0.22))
         + _spot(az, el, (-50, 55), 2.5, (160, 152, 136))
@@ -70,7 +78,8 @@ LIGHTS: dict[str, Callable[[Array, Array], Array]] = {
         + _spot(az, el, (75, 7), 2.5, (120, 66, 26.4))
     ),
     "Candle": lambda az, el: (
-        _room(el, (0.05, 0.035, 0.025), (0.03, 0.02, 0.015)) + _spot(az, el, (-60, 10), 7, (30, 16.5, 6.6))
+        _room(el, (0.05, 0.035, 0.025), (0.03, 0.02, 0.015))
+        + _spot(az, el, (-60, 10), 7, (30, 16.5, 6.6))
     ),
     "Even": lambda az, el: np.ones((*el.shape, 3)),
 }

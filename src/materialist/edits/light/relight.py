@@ -30,7 +30,9 @@ class AddedLightSettings:
 
     map_rows: int = 256  # of the largest map; derived: memory
     sun_radius: float = 6.0  # of an added sun, degrees: a hard shadow shows each step of a predicted depth; 5 photos
-    lamp_unit: float = 0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
+    lamp_unit: float = (
+        0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
+    )
     lamp_radius: float = 0.015  # radius of a lamp, share of the median depth; tuned by eye
 
 
@@ -39,7 +41,11 @@ SETTINGS = AddedLightSettings()
 
 @documented(Relight)
 def relight(
-    scene: Scene, options: Relight | None = None, *, fitted: Scene | None = None, **values: Unpack[RelightKeywords]
+    scene: Scene,
+    options: Relight | None = None,
+    *,
+    fitted: Scene | None = None,
+    **values: Unpack[RelightKeywords],
 ) -> Scene:
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of `Relight`.
 
@@ -53,14 +59,17 @@ def relight(
     notes: list[str] = []
     wanted = resolved(scene, Relight.given(options, **values), notes)
     if isinstance(wanted.rotate, tuple):
-        raise InputError(f"The rotation is {'..'.join(map('{:g}'.format, wanted.rotate))}; one picture has one number.")
+        raise InputError(
+            f"The rotation is {'..'.join(map('{:g}'.format, wanted.rotate))}; one picture has one number."
+        )
     if wanted.dim is not None:
         from materialist.edits.light.emitters import dimmed
 
         scene = dimmed(scene, wanted.dim, lights=wanted.lights, fitted=fitted)
     elif wanted.lights is not None:
         raise InputError("The mask of lights says nothing without a dimming; give dim, too.")
-    light, lamps = scene.envmap, wanted.lamps
+    light = scene.envmap
+    lamps = wanted.lamps
     if wanted.envmap is not None:
         light = wanted.envmap * _gain(wanted.gain, wanted.envmap, scene.envmap)
     if wanted.rotate:
@@ -69,13 +78,19 @@ def relight(
     if wanted.sun is not None:
         light, disc = with_sun(light, *wanted.sun, power=wanted.sun_power)
     light = (light * np.float32(wanted.ambient) + disc).astype(np.float32)
-    if not light.any() and not (lamps or scene.lamps or any(max(b.surface.emission) > 0 for b in scene.bodies)):
+    if not light.any() and not (
+        lamps or scene.lamps or any(max(b.surface.emission) > 0 for b in scene.bodies)
+    ):
         raise InputError("The new light is black; give an ambient above 0, a sun or a lamp.")
     what = {
         "envmap": None if wanted.envmap is None else list(np.shape(wanted.envmap)),
-        "gain": wanted.gain if wanted.envmap is not None else None, "rotate": wanted.rotate or None, "sun": wanted.sun,
-        "ambient": wanted.ambient if wanted.ambient != 1 else None, "lamps": len(lamps) or None, "dim": wanted.dim,
-    }  # fmt: skip
+        "gain": wanted.gain if wanted.envmap is not None else None,
+        "rotate": wanted.rotate or None,
+        "sun": wanted.sun,
+        "ambient": wanted.ambient if wanted.ambient != 1 else None,
+        "lamps": len(lamps) or None,
+        "dim": wanted.dim,
+    }
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
     return noted(warned(new, *_warnings(fitted or scene), *notes), "light", what)
 
@@ -85,11 +100,14 @@ def resolved(scene: Scene, options: Relight, notes: list[str] | None = None) -> 
 
     `notes` get what its reader assumed. Raises InputError.
     """
-    envmap, gain = options.envmap, options.gain
+    envmap = options.envmap
+    gain = options.gain
     if isinstance(envmap, str | Path):
-        envmap, gain = read_envmap(envmap, notes), "auto" if gain is None else gain
+        envmap = read_envmap(envmap, notes)
+        gain = "auto" if gain is None else gain
     elif envmap is not None:
-        envmap, gain = checked_envmap(envmap), 1.0 if gain is None else gain
+        envmap = checked_envmap(envmap)
+        gain = 1.0 if gain is None else gain
     lamps = tuple(one if isinstance(one, Lamp) else lamp(scene, *one) for one in options.lamps)
     return replace(options, envmap=envmap, gain=gain, lamps=lamps)
 
@@ -117,7 +135,9 @@ def kelvin_colour(kelvin: float) -> Array:
     Chromaticity by the cubic fits of Kim et al. (2002). Raises InputError outside 1667 to 25000 K.
     """
     if not 1667 <= kelvin <= 25000:
-        raise InputError(f"The lamp has {kelvin:g} K; a colour temperature lies between 1667 and 25000.")
+        raise InputError(
+            f"The lamp has {kelvin:g} K; a colour temperature lies between 1667 and 25000."
+        )
     t = 1000.0 / kelvin
     if kelvin < 4000:
         x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
@@ -131,7 +151,11 @@ def kelvin_colour(kelvin: float) -> Array:
         y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
     xyz = np.array([x / y, 1.0, (1 - x - y) / y])
     to_rgb = np.array(
-        [[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]]
+        [
+            [3.2404542, -1.5371385, -0.4985314],
+            [-0.9692660, 1.8760108, 0.0415560],
+            [0.0556434, -0.2040259, 1.0572252],
+        ]
     )
     rgb = np.maximum(to_rgb @ xyz, 0)
     return (rgb / (LUMINANCE @ rgb)).astype(np.float32)
@@ -169,7 +193,9 @@ def rotated(envmap: Array, degrees: float) -> Array:
     return turned if share == 0 else (1 - share) * turned + share * np.roll(envmap, whole + 1, 1)
 
 
-def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 1.0) -> tuple[Array, Array]:
+def with_sun(
+    envmap: Array, azimuth: float, elevation: float, *, power: float = 1.0
+) -> tuple[Array, Array]:
     """(map without its brightest spot, the sun alone), both [h, 2h, 3].
 
     azimuth: degrees from straight ahead of the camera, > 0 to the right, in [-360, 360]; 180 is behind the camera.
@@ -180,7 +206,8 @@ def with_sun(envmap: Array, azimuth: float, elevation: float, *, power: float = 
         raise InputError(f"The sun's azimuth is {azimuth:g}; it must lie in [-360, 360] degrees.")
     if not (np.isfinite(elevation) and -90 <= elevation <= 90):
         raise InputError(f"The sun's elevation is {elevation:g}; it must lie in [-90, 90] degrees.")
-    az, el = np.radians(azimuth), np.radians(elevation)
+    az = np.radians(azimuth)
+    el = np.radians(elevation)
     towards = np.array([np.cos(el) * np.sin(az), np.sin(el), -np.cos(el) * np.cos(az)])
     cosine = texel_directions(*envmap.shape[:2]) @ towards
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))  # [h, 2h]
@@ -200,7 +227,10 @@ def _gain(gain: float | str, envmap: Array, fitted: Array) -> np.float32:
     """The factor on `envmap`; `auto` gives it the mean light of the fitted map."""
     if gain != "auto":
         return np.float32(gain)
-    mean = lambda e: float((e.mean(-1).T * row_solid_angle(e.shape[0])).sum())  # noqa: E731
+
+    def mean(e):
+        return float((e.mean(-1).T * row_solid_angle(e.shape[0])).sum())
+
     return np.float32(mean(np.asarray(fitted)) / mean(np.asarray(envmap)))
 
 
@@ -214,14 +244,20 @@ def _warnings(scene: Scene) -> list[str]:
         )
     clipped = float((scene.photo.linear >= CLIPPED).any(-1).mean())
     if clipped > 0.05 and not scene.photo.hdr:
-        notes.append(f"{clipped:.0%} of the photo is clipped; light and albedo are uncertain there.")
+        notes.append(
+            f"{clipped:.0%} of the photo is clipped; light and albedo are uncertain there."
+        )
     return notes
 
 
 def moving_light(
-    scene: Scene | Sequence[Scene], count: int, options: Relight | None = None, *,
-    suns: tuple[tuple[float, float], ...] = (), **values: Unpack[RelightKeywords],
-) -> Iterator[Scene]:  # fmt: skip
+    scene: Scene | Sequence[Scene],
+    count: int,
+    options: Relight | None = None,
+    *,
+    suns: tuple[tuple[float, float], ...] = (),
+    **values: Unpack[RelightKeywords],
+) -> Iterator[Scene]:
     """`count` relit scenes: the light turns by `rotate` degrees in all, or from A to B; the sun and one lamp follow
     their stations.
 
@@ -236,7 +272,10 @@ def moving_light(
     film = [scene] * count if isinstance(scene, Scene) else scene
     notes: list[str] = []
     wanted = resolved(film[0], Relight.given(options, **values), notes)
-    lamps, (first, last) = wanted.lamps, wanted.rotate if isinstance(wanted.rotate, tuple) else (0.0, wanted.rotate)
+    lamps, (first, last) = (
+        wanted.lamps,
+        wanted.rotate if isinstance(wanted.rotate, tuple) else (0.0, wanted.rotate),
+    )
     if not (first or last) and len(suns) < 2 and len(lamps) < 2:
         last = 360.0
     turn = last - first
@@ -244,15 +283,21 @@ def moving_light(
         # Once: finding the lights takes a rendering.
         film = [relight(scene, dim=wanted.dim, lights=wanted.lights)] * count
         wanted = replace(wanted, dim=None, lights=None)
-    closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2  # the last frame then meets the first
+    closed = (
+        turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2
+    )  # the last frame then meets the first
     for k in range(count):
         t = k / (count if closed else count - 1)
         sun = tuple(_between(suns, t)) if suns else None
         placed: tuple[Lamp, ...] = ()
         if lamps:
-            x, y, z, *power, radius = _between([(*one.position, *one.power, one.radius) for one in lamps], t)
+            x, y, z, *power, radius = _between(
+                [(*one.position, *one.power, one.radius) for one in lamps], t
+            )
             placed = (Lamp((x, y, z), triple(power), radius),)
-        yield warned(relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=placed), *notes)
+        yield warned(
+            relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=placed), *notes
+        )
 
 
 def _between(stations: Sequence[tuple[float, ...]], t: float) -> list[float]:

@@ -21,7 +21,12 @@ from materialist.types import Array, Materials, Scene
 
 
 @documented(MaterialEdit)
-def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **values: Unpack[MaterialKeywords]) -> Scene:
+def edit(
+    scene: Scene,
+    mask: Array,
+    options: MaterialEdit | None = None,
+    **values: Unpack[MaterialKeywords],
+) -> Scene:
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
 
     Saturation and value keep the order of a texture: nothing clips, and grey stays grey. A number for roughness or
@@ -45,8 +50,15 @@ def edit(scene: Scene, mask: Array, options: MaterialEdit | None = None, **value
     )
     names = ("hue", "saturation", "value", "grow", "feather")
     what: dict[str, Any] = {name: getattr(wanted, name) or None for name in names}
-    what |= {"albedo": wanted.albedo, "roughness": wanted.roughness, "metallic": wanted.metallic, "texture": texture}
-    return noted(replace(scene, materials=new), "material", {**what, "pixels": int((weight > 0.5).sum())})
+    what |= {
+        "albedo": wanted.albedo,
+        "roughness": wanted.roughness,
+        "metallic": wanted.metallic,
+        "texture": texture,
+    }
+    return noted(
+        replace(scene, materials=new), "material", {**what, "pixels": int((weight > 0.5).sum())}
+    )
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:
@@ -57,8 +69,12 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     """
     shape = albedo.shape
     encoded = linear_to_srgb(albedo).reshape(-1, 1, 3)
-    hsv = cv2.cvtColor(np.ascontiguousarray(encoded), cv2.COLOR_RGB2HSV)  # float: H in [0, 360), S and V in [0, 1]
-    h, s, v = hsv[..., 0], hsv[..., 1], hsv[..., 2]
+    hsv = cv2.cvtColor(
+        np.ascontiguousarray(encoded), cv2.COLOR_RGB2HSV
+    )  # float: H in [0, 360), S and V in [0, 1]
+    h = hsv[..., 0]
+    s = hsv[..., 1]
+    v = hsv[..., 2]
     h = (h + hue) % 360
     s = s * (1 + saturation * (1 - s)) if saturation > 0 else s * (1 + saturation)
     v = v + value * (1 - v) if value > 0 else v * (1 + value)
@@ -66,10 +82,14 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     return srgb_to_linear(np.clip(moved, 0, 1)).reshape(shape)
 
 
-def _base_colour(scene: Scene, weight: Array, wanted: MaterialEdit) -> tuple[Array, list[int] | None]:
+def _base_colour(
+    scene: Scene, weight: Array, wanted: MaterialEdit
+) -> tuple[Array, list[int] | None]:
     """([H, W, 3] albedo before hue, saturation and value act, shape of the texture that it has)."""
     if wanted.albedo is not None and wanted.texture is not None:
-        raise InputError("Give an albedo or a texture, not both; hue, saturation and value can go with either.")
+        raise InputError(
+            "Give an albedo or a texture, not both; hue, saturation and value can go with either."
+        )
     if wanted.texture is not None:
         picture = wanted.texture
         if isinstance(picture, str | Path):
@@ -77,7 +97,9 @@ def _base_colour(scene: Scene, weight: Array, wanted: MaterialEdit) -> tuple[Arr
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
         return projected(scene, region, picture, wanted.texture_scale), list(np.shape(picture))
     if wanted.albedo is not None:
-        return np.broadcast_to(np.asarray(wanted.albedo, np.float32), scene.materials.albedo.shape), None
+        return np.broadcast_to(
+            np.asarray(wanted.albedo, np.float32), scene.materials.albedo.shape
+        ), None
     return scene.materials.albedo, None
 
 
@@ -85,7 +107,9 @@ def _changed(old: Array, wanted: float | str | None) -> Array:
     """[H, W] property set to a number, or shifted by a signed text, and kept in [0, 1]."""
     if wanted is None:
         return old
-    return np.clip(old + float(wanted), 0, 1) if isinstance(wanted, str) else np.full_like(old, wanted)
+    return (
+        np.clip(old + float(wanted), 0, 1) if isinstance(wanted, str) else np.full_like(old, wanted)
+    )
 
 
 def _mix(old: Array, new: Array, weight: Array) -> Array:
@@ -104,12 +128,19 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
     if picture.ndim != 3 or picture.shape[2] != 3 or min(picture.shape[:2]) < 1:
         raise InputError(f"The texture is {picture.shape}; it must be a picture [h, w, 3].")
     if not (np.isfinite(picture).all() and picture.min() >= 0 and picture.max() <= 1):
-        raise InputError(f"The texture has values from {picture.min():g} to {picture.max():g}; they must be 0 to 1.")
+        raise InputError(
+            f"The texture has values from {picture.min():g} to {picture.max():g}; they must be 0 to 1."
+        )
     use = region & (scene.depth > 0)
     points = unproject(scene.depth, scene.camera)
     normal = unit(scene.normal[use].mean(0))
-    right, up = axes(normal) * (-1 if normal[1] >= 0.9 else 1)  # on a floor the way up leads into the depth
-    across, along = points @ right, points @ -up  # [H, W], scene units, along growing downwards as rows do
+    right, up = axes(normal) * (
+        -1 if normal[1] >= 0.9 else 1
+    )  # on a floor the way up leads into the depth
+    across, along = (
+        points @ right,
+        points @ -up,
+    )  # [H, W], scene units, along growing downwards as rows do
     h, w = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
     extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h, 1e-9) * scale
@@ -126,7 +157,9 @@ def _repeated(picture: Array, u: Array, v: Array, use: Array) -> Array:
     step = max(_median_step(u.T, use.T) * w, _median_step(v, use) * h)
     if step > 1.5:
         k = min(1 / step, 1.0)
-        small = cv2.resize(picture, (max(1, round(w * k)), max(1, round(h * k))), interpolation=cv2.INTER_AREA)
+        small = cv2.resize(
+            picture, (max(1, round(w * k)), max(1, round(h * k))), interpolation=cv2.INTER_AREA
+        )
         return _repeated(small, u, v, use) if small.shape != picture.shape else small
     padded = cv2.copyMakeBorder(picture, 1, 1, 1, 1, cv2.BORDER_WRAP)
     return cv2.remap(padded, x.astype(np.float32) + 1, y.astype(np.float32) + 1, cv2.INTER_LINEAR)

@@ -30,18 +30,20 @@ LONGEST = 768
 
 def picture_behind(
     scene: Scene, options: Removal, hole: Array, usable: Array, found: HiddenGeometry
-) -> tuple[Array, str, list[str]]:  # fmt: skip
+) -> tuple[Array, str, list[str]]:
     """([h, w, 3] linear picture of what is behind a hole [H, W] bool, what made it, warnings of its file).
 
     usable [H, W] bool: what patches may come from. found: what stands there. Raises InputError for a picture that
     is none of this view; see `inpainter` and `patches.patched`.
     """
-    background, inpaint = options.background, options.inpaint
+    background = options.background
+    inpaint = options.inpaint
     if background is not None and inpaint is not None:
         raise InputError("Give a background or an inpainter, not both.")
     if background is None and inpaint is None:
         return patched(scene.photo.original, hole, usable, found.label, options.seed), "patches", []
-    name, notes = "background" if inpaint is None else "inpainter", list[str]()
+    name = "background" if inpaint is None else "inpainter"
+    notes = list[str]()
     if isinstance(inpaint, str):
         inpaint = inpainter(inpaint, seed=options.seed, device=options.device)
     if inpaint is not None:
@@ -52,7 +54,9 @@ def picture_behind(
     if isinstance(background, str | Path):
         decoded = decode_photo(Path(background))
         notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
-        background = decoded.exposed() * np.float32(2.0**scene.photo.stops if decoded.scene_linear else 1)
+        background = decoded.exposed() * np.float32(
+            2.0**scene.photo.stops if decoded.scene_linear else 1
+        )
     picture = np.asarray(background, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, hole.shape):
         raise InputError(
@@ -60,7 +64,9 @@ def picture_behind(
             "give the same view in colour, at the same proportions."
         )
     if not (np.isfinite(picture).all() and picture.min() >= 0):
-        raise InputError(f"The picture of the {name} has negative or infinite values, or NaN; give a linear one.")
+        raise InputError(
+            f"The picture of the {name} has negative or infinite values, or NaN; give a linear one."
+        )
     return picture, name, notes
 
 
@@ -71,14 +77,20 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     """
     kind, _, where = text.partition(":")
     if kind != "sd":
-        raise InputError(f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option).")
+        raise InputError(
+            f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option)."
+        )
     gpu = on_gpu(device)
     with hub.advice("leave inpaint out"):
         folder = locate(where, DEFAULT)
         pipeline = hub.pipeline(
-            "StableDiffusionInpaintPipeline", folder, gpu, "inpainting pipeline",
-            safety_checker=None, requires_safety_checker=False,
-        )  # fmt: skip
+            "StableDiffusionInpaintPipeline",
+            folder,
+            gpu,
+            "inpainting pipeline",
+            safety_checker=None,
+            requires_safety_checker=False,
+        )
     return lambda photo, hole: _diffused(pipeline, photo, hole, seed=seed, steps=steps)
 
 
@@ -93,8 +105,14 @@ def _diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int
     image = Image.fromarray(srgb_levels(photo)).resize((w, h), Image.Resampling.LANCZOS)
     mask = Image.fromarray(hole.astype(np.uint8) * 255).resize((w, h), Image.Resampling.NEAREST)
     out = pipeline(
-        prompt=PROMPT, image=image, mask_image=mask, height=h, width=w, num_inference_steps=steps,
-        generator=torch.Generator("cpu").manual_seed(seed), output_type="np",
-    ).images[0]  # fmt: skip
+        prompt=PROMPT,
+        image=image,
+        mask_image=mask,
+        height=h,
+        width=w,
+        num_inference_steps=steps,
+        generator=torch.Generator("cpu").manual_seed(seed),
+        output_type="np",
+    ).images[0]
     large = srgb_to_linear(np.clip(resample.values(np.asarray(out, np.float32), hole.shape), 0, 1))
     return np.where(hole[..., None], large, photo).astype(np.float32)

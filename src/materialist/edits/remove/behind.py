@@ -13,7 +13,8 @@ from materialist.geometry.planes import through
 from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Camera
 
-SKY, LOOSE = -2, -1
+SKY = -2
+LOOSE = -1
 """Labels of what has no surface, and of surfaces that lie on no plane; planes are 0, 1, ..."""
 
 
@@ -48,7 +49,9 @@ class HiddenGeometry:
     """[H, W] int: SKY, LOOSE, or the plane."""
 
 
-def behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera) -> HiddenGeometry:
+def behind(
+    depth: Array, normal: Array, plane: Array, hole: Array, front: Array, camera: Camera
+) -> HiddenGeometry:
     """Continue the surfaces around a hole into it.
 
     Surfaces part along straight lines where such lines sort the pixels around; else each hidden pixel belongs to the
@@ -64,7 +67,9 @@ def behind(depth: Array, normal: Array, plane: Array, hole: Array, front: Array,
     known = np.where(depth > 0, plane, SKY).astype(np.int64)
     out = HiddenGeometry(depth.astype(np.float32), normal.astype(np.float32), known)
     box = window(hole, margin=max(8, round(SETTINGS.window * float(np.sqrt(hole.sum()))) + 1))
-    around = _Surroundings(depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float))
+    around = _Surroundings(
+        depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float)
+    )
     label = around.labels()
     for k in np.unique(label[around.hole]):
         here = around.hole & (label == k)
@@ -78,7 +83,10 @@ class _Surroundings:
     """The hole and the surroundings that tell what is in it."""
 
     def __init__(self, depth: Array, normal: Array, known: Array, hole: Array, rays: Array):
-        self.normal, self.known, self.hole, self.rays = normal, known, hole, rays
+        self.normal = normal
+        self.known = known
+        self.hole = hole
+        self.rays = rays
         surface = depth > 0
         self.inverse = np.where(surface, 1 / np.where(surface, depth, 1), 0).astype(np.float64)
         self.spanned = membrane(self.inverse, ~hole & surface)
@@ -87,7 +95,9 @@ class _Surroundings:
     def labels(self) -> Array:
         """[h, w] int: the labels around, carried into the hole."""
         kinds, count = np.unique(self.known[~self.hole], return_counts=True)
-        shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(self.ring.sum(), 1)
+        shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(
+            self.ring.sum(), 1
+        )
         kept = kinds[shares >= SETTINGS.share] if self.ring.any() else kinds[count.argmax()][None]
         if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= SETTINGS.firm:
             kept = kept[kept != LOOSE]
@@ -122,8 +132,12 @@ class _Surroundings:
         own = ~self.hole & (self.known == label) & (self.inverse > 0)
         spanned = self._on_plane(own) if label >= 0 else membrane(self.inverse, own)
         spanned = np.where(spanned > 0, spanned, self.spanned)[here]
-        limit = np.where(front[here] > 0, (1 - SETTINGS.gap) / np.maximum(front[here], 1e-12), np.inf)
-        return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), unit(membrane(self.normal, own)[here])
+        limit = np.where(
+            front[here] > 0, (1 - SETTINGS.gap) / np.maximum(front[here], 1e-12), np.inf
+        )
+        return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), unit(
+            membrane(self.normal, own)[here]
+        )
 
     def _on_plane(self, own: Array) -> Array:
         """[h, w] inverse depth of the plane through the pixels `own` [h, w] bool, bent to meet them at the hole."""
@@ -143,7 +157,8 @@ def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:
 
     Nearly without a penalty, and converged: where lines part the samples, they run in the middle of the gap.
     """
-    shape, slack = (basis.shape[1], wanted.shape[1]), 1e-7
+    shape = (basis.shape[1], wanted.shape[1])
+    slack = 1e-7
 
     def loss(flat: Array) -> tuple[float, Array]:
         at = flat.reshape(shape)
@@ -151,5 +166,7 @@ def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:
         slope = basis.T @ ((np.exp(logs) - wanted) * weight[:, None]) + slack * at
         return float(-(logs[wanted] * weight).sum() + slack / 2 * (at**2).sum()), slope.ravel()
 
-    found = minimize(loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 500})
+    found = minimize(
+        loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 500}
+    )
     return found.x.reshape(shape)

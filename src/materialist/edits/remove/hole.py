@@ -16,10 +16,16 @@ from materialist.types import Array, Scene
 class HoleSettings:
     """When there is no hole, and what else is filled."""
 
-    most: float = 0.9  # part of the photo's surfaces beyond which nothing is left to tell what stood behind
+    most: float = (
+        0.9  # part of the photo's surfaces beyond which nothing is left to tell what stood behind
+    )
     shadow: float = 0.15  # how far around the object the ground is filled by default, part of the root of its area
-    island: float = 0.01  # part of the object up to which what is surrounded by filled pixels is filled as well
-    large: float = 0.15  # part of the photo from which a filled hole is a guess; tuned by eye on 6 photos
+    island: float = (
+        0.01  # part of the object up to which what is surrounded by filled pixels is filled as well
+    )
+    large: float = (
+        0.15  # part of the photo from which a filled hole is a guess; tuned by eye on 6 photos
+    )
     cut: float = 0.1  # part of its outline that the frame cuts from which it is one, too; tuned by eye on 6 photos
 
 
@@ -38,7 +44,9 @@ class Hole:
     """[H, W] bool: where materials and photo are filled: `gone`, its shadow and reflection on the ground, no bodies."""
 
 
-def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array) -> Hole:
+def make_hole(
+    scene: Scene, mask: Array, *, grow: float, shadow: float | None, bodies: Array
+) -> Hole:
     """The pixels that a removal concerns; `grow` and `shadow` as of `materialist.Removal`.
 
     `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay.
@@ -54,12 +62,16 @@ def make_hole(scene: Scene, mask: Array, *, grow: float, shadow: float | None, b
     share = SETTINGS.shadow if shadow is None else shadow
     painted = gone | (ground & grown(gone, round(share * float(np.sqrt(own.sum())))))
     if (painted & surface).sum() > SETTINGS.most * surface.sum() or (painted | ~surface).all():
-        mask_share, whole = ((part & surface).sum() / max(surface.sum(), 1) for part in (own, painted))
+        mask_share, whole = (
+            (part & surface).sum() / max(surface.sum(), 1) for part in (own, painted)
+        )
         raise InputError(
             f"The mask covers {mask_share:.0%} of the photo's surfaces (sky is none), {whole:.0%} with a shadow of "
             f"{share:g}, so that nothing tells what stands behind; mark one object only, or give a smaller shadow."
         )
-    return Hole(own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies)
+    return Hole(
+        own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies
+    )
 
 
 def evidence_notes(hole: Hole) -> list[str]:
@@ -67,7 +79,8 @@ def evidence_notes(hole: Hole) -> list[str]:
     here = hole.painted
     frame = np.pad(np.zeros(tuple(n - 2 for n in here.shape), bool), 1, constant_values=True)
     outline = here & ~binary_erosion(here)
-    share, cut = float(here.mean()), float((here & frame).sum() / max(int(outline.sum()), 1))
+    share = float(here.mean())
+    cut = float((here & frame).sum() / max(int(outline.sum()), 1))
     why = [f"it takes {share:.0%} of the photo"] * (share > SETTINGS.large)
     why += [f"{cut:.0%} of its outline lies on the frame"] * (cut > SETTINGS.cut)
     if not why:

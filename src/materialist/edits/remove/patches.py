@@ -24,12 +24,20 @@ from materialist.types import Array
 class PatchSettings:
     """How a hole is filled; tuned on 6 photos by eye, 10 photos with an object pasted in and 6 made ones."""
 
-    longest: int = 768  # longer side, pixels, at which patches are matched; more: finer texture, slower
-    radius: float = 1 / 150  # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
+    longest: int = (
+        768  # longer side, pixels, at which patches are matched; more: finer texture, slower
+    )
+    radius: float = (
+        1 / 150
+    )  # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
     near: float = 0.4  # distance to the hole, in its sizes, up to which anything may be copied; more: other things
-    guide: float = 0.25  # weight of the guide beside the patches' colours; more: less from other surfaces
+    guide: float = (
+        0.25  # weight of the guide beside the patches' colours; more: less from other surfaces
+    )
     surface: float = 0.1  # guide: from one surface to another
-    floor: float = 0.05  # radiance below which HDR values are compared by difference, above by ratio; by eye
+    floor: float = (
+        0.05  # radiance below which HDR values are compared by difference, above by ratio; by eye
+    )
 
 
 SETTINGS = PatchSettings()
@@ -54,7 +62,9 @@ def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 
     gap, kept = (resample.values(m.astype(np.float32), shape) > 0 for m in (hole, ~usable & ~hole))
     kept &= ~gap
     top = max(1.0, float(picture.max()))
-    levels = np.maximum(np.round(255 * _encoded(picture, top)), 1).astype(np.uint8)  # 0: no patch fitted
+    levels = np.maximum(np.round(255 * _encoded(picture, top)), 1).astype(
+        np.uint8
+    )  # 0: no patch fitted
     surface = resample.values((SETTINGS.surface * label).astype(np.float32), shape)
     guide = np.stack([surface, 0 * surface, 0 * surface], -1)
     filled = _inpainted(levels, gap, kept, guide, seed).astype(np.float32) / 255
@@ -83,9 +93,16 @@ def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) 
         radius = max(2, round(SETTINGS.radius * max(gap.shape)))
         with _LOCK:
             patchmatch.set_random_seed(seed)
-            return np.asarray(patchmatch.inpaint_regularity(
-                levels, gap, guide, global_mask=kept, patch_size=radius, guide_weight=SETTINGS.guide
-            ))  # fmt: skip
+            return np.asarray(
+                patchmatch.inpaint_regularity(
+                    levels,
+                    gap,
+                    guide,
+                    global_mask=kept,
+                    patch_size=radius,
+                    guide_weight=SETTINGS.guide,
+                )
+            )
     except (ImportError, RuntimeError) as error:
         raise SetupError(
             f"Filling what was hidden needs the package PyPatchMatch ({error}); install it with: {sys.executable} -m "

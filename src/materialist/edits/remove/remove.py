@@ -27,9 +27,13 @@ FLOOR = 0.05
 
 @documented(Removal)
 def remove(
-    scene: Scene, mask: Array, options: Removal | None = None, *, fitted: Scene | None = None,
+    scene: Scene,
+    mask: Array,
+    options: Removal | None = None,
+    *,
+    fitted: Scene | None = None,
     **values: Unpack[RemovalKeywords],
-) -> Scene:  # fmt: skip
+) -> Scene:
     """The scene without the object under a mask: photo, surfaces and materials go on behind it.
 
     In the result `photo` and `rerender` are filled alike: their difference is what the fit misses of the
@@ -40,27 +44,43 @@ def remove(
     Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
     of the photo; a background of another aspect. SetupError, WeightsError: a library or model that is not there.
     """
-    options, fitted = Removal.given(options, **values), fitted or scene
+    options = Removal.given(options, **values)
+    fitted = fitted or scene
     photographed = replace(scene, bodies=fitted.bodies)
-    bodies = body_coverage(photographed) > 0 if photographed.bodies else np.zeros(scene.depth.shape, bool)
+    bodies = (
+        body_coverage(photographed) > 0
+        if photographed.bodies
+        else np.zeros(scene.depth.shape, bool)
+    )
     hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow, bodies=bodies)
     front = np.where(hole.object, scene.depth, 0)
-    found = behind(scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera)
+    found = behind(
+        scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera
+    )
     picture, how, warnings = picture_behind(scene, options, hole.painted, ~bodies, found)
     photo = with_hole(scene.photo, picture, hole.painted)
     old = scene.materials
     shown = denoised(scene.rerender, old.albedo, scene.normal)
     spanned = (membrane(np.clip(v, 0, 1), ~hole.painted) for v in (old.roughness, old.metallic))
     removed = replace(
-        scene, photo=photo, depth=found.depth, normal=found.normal,
+        scene,
+        photo=photo,
+        depth=found.depth,
+        normal=found.normal,
         geometry=rebuilt(scene, found.depth, found.normal, scene.camera),
-        materials=Materials(np.minimum(carried(old.albedo, photo.linear, hole.painted), 1), *spanned),
-        rerender=np.where(hole.painted[..., None], carried(shown, photo.linear, hole.painted), scene.rerender),
-    )  # fmt: skip
+        materials=Materials(
+            np.minimum(carried(old.albedo, photo.linear, hole.painted), 1), *spanned
+        ),
+        rerender=np.where(
+            hole.painted[..., None], carried(shown, photo.linear, hole.painted), scene.rerender
+        ),
+    )
     what = {
-        "filled_by": how, "pixels": int(hole.object.sum()), "grow": options.grow,
+        "filled_by": how,
+        "pixels": int(hole.object.sum()),
+        "grow": options.grow,
         "shadow": "auto" if options.shadow is None else options.shadow,
-    }  # fmt: skip
+    }
     if how == "patches":
         warnings += evidence_notes(hole)
     return noted(warned(removed, *warnings), "remove", what)
@@ -78,11 +98,15 @@ def carried(values: Array, photo: Array, hole: Array) -> Array:
 
 def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
     """The photo with a picture [h, w, 3] linear of any size in the hole [H, W] bool; elsewhere bit for bit itself."""
-    original, share = photo.original.copy(), _outline(hole, photo.original.shape[:2])
+    original = photo.original.copy()
+    share = _outline(hole, photo.original.shape[:2])
     box = window(hole, share.shape)
-    over, large = share[box][..., None], resample.values(picture, share.shape)[box]
+    over = share[box][..., None]
+    large = resample.values(picture, share.shape)[box]
     original[box] = np.where(over > 0, over * large + (1 - over) * original[box], original[box])
-    linear = np.where(hole[..., None], resample.values(picture, hole.shape), photo.linear).astype(np.float32)
+    linear = np.where(hole[..., None], resample.values(picture, hole.shape), photo.linear).astype(
+        np.float32
+    )
     return replace(photo, linear=linear, original=original)
 
 
@@ -93,6 +117,8 @@ def _outline(mask: Array, native: tuple[int, ...]) -> Array:
         return hard.astype(np.float32)
     smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
     share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
-    thin = mask & (cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0)
+    thin = mask & (
+        cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0
+    )
     thin = cv2.resize(thin.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
     return np.where(thin > 0, 1, hard * share).astype(np.float32)

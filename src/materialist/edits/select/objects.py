@@ -22,17 +22,25 @@ from materialist.types import Array, Scene
 class SelectSettings:
     """Where ClickNet and GrabCut look; lengths in longer sides; tuned by eye unless said otherwise."""
 
-    least: float = 0.25  # overlap of an object's own box with the given one below which the box is misplaced
+    least: float = (
+        0.25  # overlap of an object's own box with the given one below which the box is misplaced
+    )
     core: float = 0.01  # radius around a click that is certainly of the object
-    probable: float = 0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
-    possible: float = 0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
+    probable: float = (
+        0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
+    )
+    possible: float = (
+        0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
+    )
     gap: float = 0.015  # half of the gap across which two parts are one
     # Likelihood from which a pixel is of the object, and above 1 - sure it may be; 74 clicks, 12 photos.
     sure: float = 0.9
     side: int = 256  # longer side at which the unsure pixels are shared out
     edge: float = 2000.0  # weight of the photo's edges in that; larger keeps to them more; 74 clicks, 12 photos
     reach: float = 0.02  # how far the outline may move to an edge of the photo; tuned on 206 clicks
-    grain: float = 0.01  # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
+    grain: float = (
+        0.01  # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
+    )
 
 
 SETTINGS = SelectSettings()
@@ -56,7 +64,9 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
         photo = linear_to_srgb(scene.photo.linear)
-        found = outlined(photo, segment.object_at(photo, scene.normal, scene.depth, box=box) * inside, ())
+        found = outlined(
+            photo, segment.object_at(photo, scene.normal, scene.depth, box=box) * inside, ()
+        )
     else:
         found = tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
     return found if box_overlap(found, box) >= SETTINGS.least else np.zeros_like(found)
@@ -66,7 +76,8 @@ def box_overlap(mask: Array, box: Box) -> float:
     """Intersection over union of the bounding box of a mask [H, W] bool with a box; 0 for an empty mask."""
     if not mask.any():
         return 0.0
-    own, given = np.zeros(mask.shape, bool), np.zeros(mask.shape, bool)
+    own = np.zeros(mask.shape, bool)
+    given = np.zeros(mask.shape, bool)
     own[window(mask)] = True
     given[box[1] : box[3], box[0] : box[2]] = True
     return overlap(own, given)
@@ -101,14 +112,19 @@ def _divided(photo: Array, likely: Array) -> Array:
     scale = min(1.0, SETTINGS.side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     small, seen = (
-        np.asarray(cv2.resize(v.astype(np.float32), size, interpolation=cv2.INTER_AREA)) for v in (likely, photo)
+        np.asarray(cv2.resize(v.astype(np.float32), size, interpolation=cv2.INTER_AREA))
+        for v in (likely, photo)
     )
     seeds = np.where(small > SETTINGS.sure, 1, np.where(small < 1 - SETTINGS.sure, 2, 0))
     if len(np.unique(seeds)) < 3:  # one side has none, or nothing is unsure
         return likely.astype(np.float32)
     with warnings.catch_warnings(action="ignore"):  # that other solvers are faster
-        share = random_walker(seen, seeds, beta=SETTINGS.edge, mode="cg_j", channel_axis=-1, return_full_prob=True)[0]
-    return np.asarray(cv2.resize(share.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR))
+        share = random_walker(
+            seen, seeds, beta=SETTINGS.edge, mode="cg_j", channel_axis=-1, return_full_prob=True
+        )[0]
+    return np.asarray(
+        cv2.resize(share.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    )
 
 
 def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:

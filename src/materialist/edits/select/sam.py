@@ -12,13 +12,18 @@ from materialist.predict.protocol import on_gpu
 from materialist.types import Array
 
 REPO = "facebook/sam2.1-hiera-tiny"
-_MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
+_MEAN = (0.485, 0.456, 0.406)
+_STD = (0.229, 0.224, 0.225)
 
 
 def segment(
-    linear: Array, points: Sequence[tuple[int, int]], box: tuple[int, int, int, int] | None = None, *,
-    where: str = REPO, device: str = "auto",
-) -> Array:  # fmt: skip
+    linear: Array,
+    points: Sequence[tuple[int, int]],
+    box: tuple[int, int, int, int] | None = None,
+    *,
+    where: str = REPO,
+    device: str = "auto",
+) -> Array:
     """[H, W] bool of the object at the clicks (column, row) or in the box, by SAM 2.
 
     linear: [H, W, 3] photo. where: a folder that holds the model, or a hub id that was downloaded.
@@ -35,7 +40,9 @@ def segment(
     scale = np.array([side / width, side / height])
     corners = [] if box is None else [box[:2], box[2:]]
     spots = (np.array([*points, *corners], np.float32) + 0.5 * (box is None)) * scale
-    labels = [1] * len(points) + ([] if box is None else [2, 3])  # clicks on the object, the two corners
+    labels = [1] * len(points) + (
+        [] if box is None else [2, 3]
+    )  # clicks on the object, the two corners
     with torch.inference_mode():
         output = model(
             pixel_values=_pixels(linear, side).to(target),
@@ -43,9 +50,12 @@ def segment(
             input_labels=torch.tensor(labels, dtype=torch.int32, device=target)[None, None],
             multimask_output=len(spots) == 1,
         )
-    masks, scores = output.pred_masks[0, 0].float(), output.iou_scores[0, 0]
+    masks = output.pred_masks[0, 0].float()
+    scores = output.iou_scores[0, 0]
     best = masks[int(scores.argmax())][None, None]
-    large = torch.nn.functional.interpolate(best, (height, width), mode="bilinear", align_corners=False)
+    large = torch.nn.functional.interpolate(
+        best, (height, width), mode="bilinear", align_corners=False
+    )
     return (large[0, 0] > 0).cpu().numpy()
 
 

@@ -5,7 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.edits.core.region import HIDDEN, PLACED, body_coverage, checked_pixel, checked_region
+from materialist.edits.core.region import (
+    HIDDEN,
+    PLACED,
+    body_coverage,
+    checked_pixel,
+    checked_region,
+)
 from materialist.edits.select.objects import object_at, object_in
 from materialist.errors import InputError
 from materialist.forks import check_process
@@ -18,10 +24,14 @@ METHODS = ("network", "grabcut", "sam2")
 
 
 def select(
-    scene: Scene, *, click: Sequence[float] | Sequence[Sequence[float]] | None = None,
-    box: Sequence[float] | None = None, mask: Array | str | Path | None = None, method: str = "network",
+    scene: Scene,
+    *,
+    click: Sequence[float] | Sequence[Sequence[float]] | None = None,
+    box: Sequence[float] | None = None,
+    mask: Array | str | Path | None = None,
+    method: str = "network",
     device: str = "auto",
-) -> Array:  # fmt: skip
+) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or the given mask, checked.
 
     Args:
@@ -54,7 +64,11 @@ def select(
         found = object_at(scene, points, network=method == "network")
     found = found & (scene.depth > 0)
     if not found.any():
-        other = "draw the box a little larger" if frame is not None else "click another place on the object"
+        other = (
+            "draw the box a little larger"
+            if frame is not None
+            else "click another place on the object"
+        )
         raise InputError(f"Nothing was found there; {other}, or give a mask.")
     return found
 
@@ -67,7 +81,9 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
     hidden = body_coverage(scene) > HIDDEN if scene.bodies else np.zeros(scene.depth.shape, bool)
     for x, y in points:
         if scene.depth[y, x] <= 0:
-            raise InputError(f"The click {x},{y} is on the sky, where there is no surface; click on an object.")
+            raise InputError(
+                f"The click {x},{y} is on the sky, where there is no surface; click on an object."
+            )
         if hidden[y, x]:
             raise InputError(f"The click {x},{y} is on {PLACED}, or click on something else.")
     return points
@@ -75,7 +91,8 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
 
 def _box(scene: Scene, box: Sequence[float]) -> Box:
     x0, y0, x1, y1 = numbers(box, 4, "box")
-    width, height = scene.camera.width, scene.camera.height
+    width = scene.camera.width
+    height = scene.camera.height
     left, right = np.clip(sorted((x0, x1)), 0, width)
     top, bottom = np.clip(sorted((y0, y1)), 0, height)
     if not (right - left >= 3 and bottom - top >= 3):

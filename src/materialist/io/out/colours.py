@@ -21,7 +21,9 @@ from materialist.io.out.icc import profile_of, srgb_profile
 from materialist.types import Array, Photo
 
 UNKEPT = "The photo's colours are of a kind that is not written ({}); the picture is sRGB."
-CLIPPED = "Colours beyond sRGB are clipped, as of all transparent photos and of HEIC of more than 8 bits."
+CLIPPED = (
+    "Colours beyond sRGB are clipped, as of all transparent photos and of HEIC of more than 8 bits."
+)
 _TOLERANCE = 1e-6
 """Linear difference up to which a pixel is the photo's: far less than a level of 16 bits but in the darkest."""
 _MOVED = 0.25
@@ -76,7 +78,9 @@ class PhotoColours:
         top = np.iinfo(self.stored.dtype).max
         return [curve(np.arange(top + 1) / top).astype(np.float32) for curve in self.space.curves]
 
-    def _of_the_photo(self, rows: slice, picture: Array, shape: tuple[int, ...]) -> tuple[Array, Array]:
+    def _of_the_photo(
+        self, rows: slice, picture: Array, shape: tuple[int, ...]
+    ) -> tuple[Array, Array]:
         """(which pixels [h, W] are the photo's, [h, W, 3] those rows with what clipping took from the photo).
 
         A pixel that an edit made darker has less of it, by its most darkened channel. A channel that was below 0 and is
@@ -84,7 +88,9 @@ class PhotoColours:
         """
         if self.space is None or self.stored is None or self.stored.shape != shape:
             return np.zeros(picture.shape[:2], bool), picture
-        unclipped = np.stack([table[self.stored[rows][..., k]] for k, table in enumerate(self._tables)], -1)
+        unclipped = np.stack(
+            [table[self.stored[rows][..., k]] for k, table in enumerate(self._tables)], -1
+        )
         transformed(unclipped, self.space.matrix)
         inside = np.clip(unclipped, 0, 1)
         lost = unclipped - inside
@@ -95,7 +101,9 @@ class PhotoColours:
         share[kept] = 1
         at_end = np.clip(1 - picture / np.maximum(-_MOVED * lost, _TOLERANCE), 0, 1)
         at_end[lost > 0] = 1
-        return kept, np.where(lost != 0, picture + share * at_end * lost, picture).astype(np.float32)
+        return kept, np.where(lost != 0, picture + share * at_end * lost, picture).astype(
+            np.float32
+        )
 
 
 SRGB = PhotoColours(srgb_profile())
@@ -111,7 +119,10 @@ def photo_colours(photo: Photo) -> PhotoColours:
         file.write_bytes(photo.source)
         try:
             return _of_file(file, deep=is_deep(photo))
-        except (OSError, ValueError):  # formats that Pillow does not know: EXR, float and CIELab TIFF
+        except (
+            OSError,
+            ValueError,
+        ):  # formats that Pillow does not know: EXR, float and CIELab TIFF
             return SRGB
 
 
@@ -120,7 +131,9 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
 
     register_heif_opener()
     with pixel_limit_lifted(), file.open("rb") as opened, Image.open(opened) as image:
-        tags, kind, mode = image_tags(image), image.format, image.mode
+        tags = image_tags(image)
+        kind = image.format
+        mode = image.mode
         chunks = png_chunks(file) if kind == "PNG" else {}
         embedded = jp2_profile(file) if kind == "JPEG2000" else image.info.get("icc_profile")
         profile = None if b"cICP" in chunks else embedded
@@ -137,7 +150,9 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
         if not deep:
             return PhotoColours(own, colours, upright(np.asarray(image.convert("RGB")), tags))
     levels = rgb_levels(file)[0]
-    return PhotoColours(own, colours, levels if is_tiff(file.read_bytes()) else upright(levels, tags))
+    return PhotoColours(
+        own, colours, levels if is_tiff(file.read_bytes()) else upright(levels, tags)
+    )
 
 
 def _reason(mode: str, profile: bytes | None) -> str:

@@ -10,7 +10,9 @@ from materialist.io.decode import RAW_SUFFIXES
 from materialist.types import Photo
 
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_HEIC = tuple(b"ftyp" + brand for brand in (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"))
+_HEIC = tuple(
+    b"ftyp" + brand for brand in (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")
+)
 """How files of these formats begin, HEIC from its fifth byte on."""
 
 

@@ -47,9 +47,14 @@ _IN_PNG_BEFORE = 33
 
 
 def save_image(
-    path: str | Path, picture: Array, photo: Photo | Scene | None = None, *, quality: int | None = None,
-    bits: int | None = None, force: bool = False,
-) -> tuple[str, ...]:  # fmt: skip
+    path: str | Path,
+    picture: Array,
+    photo: Photo | Scene | None = None,
+    *,
+    quality: int | None = None,
+    bits: int | None = None,
+    force: bool = False,
+) -> tuple[str, ...]:
     """Write a picture to PATH.png, .jpg, .tif, .webp, .avif (display values) or .exr (linear float32).
 
     With the `photo` that it was made of, the file has that photo's colour space and profile, its bits a channel and its
@@ -67,12 +72,15 @@ def save_image(
     file exists without `force`, or cannot be written; SetupError for AVIF without its encoder.
     """
     check_image_output(path, quality=quality, bits=bits, force=force)
-    kind, photo = KINDS[Path(path).suffix.lower()], photo.photo if isinstance(photo, Scene) else photo
+    kind = KINDS[Path(path).suffix.lower()]
+    photo = photo.photo if isinstance(photo, Scene) else photo
     picture = np.asarray(picture, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:
         raise InputError(f"The picture is {list(picture.shape)}; give linear RGB [H, W, 3].")
     if max(picture.shape[:2]) > LONGEST.get(kind, max(picture.shape)):
-        raise InputError(f"{kind} has at most {LONGEST[kind]} pixels on a side; write {path} as PNG or TIFF.")
+        raise InputError(
+            f"{kind} has at most {LONGEST[kind]} pixels on a side; write {path} as PNG or TIFF."
+        )
     colours = SRGB if photo is None else photo_colours(photo)
     if kind == "EXR":
         light = colours.whole(picture)
@@ -80,7 +88,9 @@ def save_image(
         with whole_file(path, force) as temporary:
             write_exr(temporary, light * np.float32(2.0**-stops) if stops else light)
         return ()
-    deep = kind in ("PNG", "TIFF") and (bits == 16 or (bits is None and photo is not None and is_deep(photo)))
+    deep = kind in ("PNG", "TIFF") and (
+        bits == 16 or (bits is None and photo is not None and is_deep(photo))
+    )
     levels = colours.levels(picture, np.uint16 if deep else np.uint8)
     content, notes = _encoded(kind, levels, colours, photo, quality)
     with whole_file(path, force) as temporary:
@@ -98,11 +108,19 @@ def check_image_output(
             f"The output {path} must end in .png, .jpg, .tif, .webp or .avif (for looking), or .exr (linear, for "
             "further work)."
         )
-    if quality is not None and (kind not in QUALITY or not 1 <= quality <= 100 or quality != int(quality)):
+    if quality is not None and (
+        kind not in QUALITY or not 1 <= quality <= 100 or quality != int(quality)
+    ):
         known = " and ".join((", ".join(list(QUALITY)[:-1]), list(QUALITY)[-1]))
-        raise InputError(f"The quality is {quality} for {path}; {known} take whole numbers from 1 to 100.")
-    if bits is not None and (bits not in (8, 16) or (bits == 16 and kind not in ("PNG", "TIFF")) or kind == "EXR"):
-        raise InputError(f"{path} cannot have {bits} bits a channel; PNG and TIFF have 8 or 16, EXR has floats of 32.")
+        raise InputError(
+            f"The quality is {quality} for {path}; {known} take whole numbers from 1 to 100."
+        )
+    if bits is not None and (
+        bits not in (8, 16) or (bits == 16 and kind not in ("PNG", "TIFF")) or kind == "EXR"
+    ):
+        raise InputError(
+            f"{path} cannot have {bits} bits a channel; PNG and TIFF have 8 or 16, EXR has floats of 32."
+        )
     if kind == "AVIF" and not features.check("avif"):
         raise SetupError(f"AVIF needs a Pillow with its encoder: {install_command('pillow>=11.3')}")
     ensure_writable(path, force, None)
@@ -147,4 +165,9 @@ def _deep_png(levels: Array, exif: bytes, profile: bytes) -> bytes:
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
+    return (
+        struct.pack(">I", len(content))
+        + kind
+        + content
+        + struct.pack(">I", zlib.crc32(kind + content))
+    )

@@ -14,8 +14,26 @@ from materialist.io.out.depth import is_tiff
 from materialist.types import Photo
 
 _KEPT = (
-    *("ImageDescription", "Make", "Model", "DateTime", "Artist", "Copyright", "HostComputer", "Rating"),
-    *("XResolution", "YResolution", "ResolutionUnit", "XPTitle", "XPComment", "XPAuthor", "XPKeywords", "XPSubject"),
+    *(
+        "ImageDescription",
+        "Make",
+        "Model",
+        "DateTime",
+        "Artist",
+        "Copyright",
+        "HostComputer",
+        "Rating",
+    ),
+    *(
+        "XResolution",
+        "YResolution",
+        "ResolutionUnit",
+        "XPTitle",
+        "XPComment",
+        "XPAuthor",
+        "XPKeywords",
+        "XPSubject",
+    ),
 )
 """Tags of the main directory that are of the photograph and not of how its file lays out pixels."""
 _NUMBER = {name: number for number, name in ExifTags.TAGS.items()}
@@ -30,7 +48,8 @@ def copied_exif(photo: Photo | None, *, srgb: bool = True) -> Image.Exif:
 
     The camera, the lens, dates and the place are kept; a preview and the layout of the file are not.
     """
-    old, new = _of_file(photo), Image.Exif()
+    old = _of_file(photo)
+    new = Image.Exif()
     for name in _KEPT:
         if _NUMBER[name] in old:
             new[_NUMBER[name]] = old[_NUMBER[name]]

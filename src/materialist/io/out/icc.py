@@ -49,18 +49,26 @@ def srgb_profile() -> bytes:
 
 def _name(colours: ColourSpace) -> str:
     """What people call the space, by its primaries."""
-    known = (name for name, primaries in _NAMES.items() if np.allclose(to_rec709(primaries), colours.matrix, atol=1e-3))
+    known = (
+        name
+        for name, primaries in _NAMES.items()
+        if np.allclose(to_rec709(primaries), colours.matrix, atol=1e-3)
+    )
     name = next(known, None)
     if name is None:
         return colours.name
     usual = power_curve(0) if name == "Adobe RGB" else srgb_curve
-    same_kind = getattr(colours.curves[0], "func", colours.curves[0]) is getattr(usual, "func", usual)
+    same_kind = getattr(colours.curves[0], "func", colours.curves[0]) is getattr(
+        usual, "func", usual
+    )
     return name if same_kind else f"{name} primaries"
 
 
 def _file(tags: dict[bytes, bytes]) -> bytes:
     """The header, the table and the tags, each from a multiple of four bytes."""
-    start, table, body = 132 + 12 * len(tags), b"", b""
+    start = 132 + 12 * len(tags)
+    table = b""
+    body = b""
     for name, content in tags.items():
         table += struct.pack(">4sII", name, start + len(body), len(content))
         body += content + b"\0" * (-len(content) % 4)

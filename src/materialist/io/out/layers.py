@@ -26,7 +26,11 @@ _RANKS = 2
 
 
 def write_layers(
-    path: str | Path, layers: Mapping[str, Array], things: Mapping[str, Array] | None = None, *, force: bool = False
+    path: str | Path,
+    layers: Mapping[str, Array],
+    things: Mapping[str, Array] | None = None,
+    *,
+    force: bool = False,
 ) -> None:
     """Write [H, W, 3] and [H, W] arrays of one size as the parts of an EXR, the first of them the picture.
 
@@ -35,14 +39,18 @@ def write_layers(
     Raises OutputError.
     """
     if not is_utf8(str(path)):
-        raise OutputError(f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another.")
+        raise OutputError(
+            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
+        )
     parts = [_part(name, values, plain=k == 0) for k, (name, values) in enumerate(layers.items())]
     parts += _cryptomatte(things) if things else []
     with whole_file(path, force) as temporary:
         try:
             with OpenEXR.File(parts) as file:
                 file.write(str(temporary))
-        except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
+        except (
+            Exception
+        ) as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
             raise OutputError(f"{temporary} cannot be written: {error}") from error
 
 
@@ -55,9 +63,13 @@ def _part(name: str, values: Array, *, plain: bool) -> Any:
     else:
         prefix = "" if plain else f"{name}."
         letters = "XYZ" if name in _AXES else "RGB"
-        channels = {f"{prefix}{c}": np.ascontiguousarray(pixels[..., k]) for k, c in enumerate(letters)}
+        channels = {
+            f"{prefix}{c}": np.ascontiguousarray(pixels[..., k]) for k, c in enumerate(letters)
+        }
     is_colour = pixels.ndim == 3 and name not in _AXES
-    return OpenEXR.Part(_header(colorInteropID=LINEAR_REC709 if is_colour else DATA), channels, name)
+    return OpenEXR.Part(
+        _header(colorInteropID=LINEAR_REC709 if is_colour else DATA), channels, name
+    )
 
 
 def _header(**attributes: str) -> dict[str, Any]:
@@ -74,13 +86,17 @@ def _header(**attributes: str) -> dict[str, Any]:
 
 def _cryptomatte(things: Mapping[str, Array]) -> list[Any]:
     """The preview part and the parts of ids and coverage, each pixel's things by their coverage."""
-    names, coverage = list(things), np.stack([np.asarray(share, np.float32) for share in things.values()])
+    names = list(things)
+    coverage = np.stack([np.asarray(share, np.float32) for share in things.values()])
     order = np.argsort(-coverage, 0, kind="stable")
     shares = np.take_along_axis(coverage, order, 0)
     ids = np.array([cryptomatte_id(name) for name in names], np.float32)[order]
     ids = np.where(shares > 0, ids, np.float32(0))
     key = f"{murmur3(b'CryptoObject'):08x}"[:7]
-    manifest = {name: f"{struct.unpack('<I', struct.pack('<f', cryptomatte_id(name)))[0]:08x}" for name in names}
+    manifest = {
+        name: f"{struct.unpack('<I', struct.pack('<f', cryptomatte_id(name)))[0]:08x}"
+        for name in names
+    }
     facts = {
         f"cryptomatte/{key}/name": "CryptoObject",
         f"cryptomatte/{key}/hash": "MurmurHash3_32",
@@ -95,8 +111,14 @@ def _cryptomatte(things: Mapping[str, Array]) -> list[Any]:
             empty = np.zeros(coverage.shape[1:], np.float32)
             part = f"CryptoObject{level:02d}"
             channels[f"{part}.{id_channel}"] = ids[rank].copy() if rank < len(names) else empty
-            channels[f"{part}.{share_channel}"] = shares[rank].copy() if rank < len(names) else empty
-        parts.append(OpenEXR.Part(_header(colorInteropID=DATA, **facts), channels, f"CryptoObject{level:02d}"))
+            channels[f"{part}.{share_channel}"] = (
+                shares[rank].copy() if rank < len(names) else empty
+            )
+        parts.append(
+            OpenEXR.Part(
+                _header(colorInteropID=DATA, **facts), channels, f"CryptoObject{level:02d}"
+            )
+        )
     return parts
 
 

@@ -9,7 +9,9 @@ from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from materialist.types import Array
 
-_DEFLATE, _RGB, _PREDICTED = 8, 2, 2
+_DEFLATE = 8
+_RGB = 2
+_PREDICTED = 2
 _ROWS = 64
 """Rows of a strip."""
 
@@ -36,7 +38,10 @@ def tiff_bytes(levels: Array, exif: Image.Exif, profile: bytes) -> bytes:
         "InterColorProfile": profile,
     }
     directory = ImageFileDirectory_v2(prefix=b"II")
-    numbers = {name: number for number, name in ExifTags.TAGS.items()} | {"Predictor": 317, "InterColorProfile": 34675}
+    numbers = {name: number for number, name in ExifTags.TAGS.items()} | {
+        "Predictor": 317,
+        "InterColorProfile": 34675,
+    }
     for name, value in layout.items():
         directory[numbers[name]] = value
     for number, value in exif.items():

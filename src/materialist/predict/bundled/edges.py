@@ -62,15 +62,22 @@ class GuidedFilter:
             entry = self._box(self.planes[i] * self.planes[j]) - self.mean[i] * self.mean[j]
             covariance[..., i, j] = covariance[..., j, i] = entry
         inverse = np.linalg.inv(covariance + eps * np.eye(3))
-        self.inverse = [[np.ascontiguousarray(inverse[..., i, j], np.float32) for j in range(3)] for i in range(3)]
+        self.inverse = [
+            [np.ascontiguousarray(inverse[..., i, j], np.float32) for j in range(3)]
+            for i in range(3)
+        ]
 
     def share(self, members: Array) -> Array:
         """[H, W] weighted share of `members` [H, W] float32 in [0, 1] around each pixel: sum_j W_ij members_j."""
         level = self._box(members)
-        with_colour = [self._box(c * members) - m * level for c, m in zip(self.planes, self.mean, strict=True)]
+        with_colour = [
+            self._box(c * members) - m * level for c, m in zip(self.planes, self.mean, strict=True)
+        ]
         slopes = [sum(r * c for r, c in zip(row, with_colour, strict=True)) for row in self.inverse]
         offset = level - sum(s * m for s, m in zip(slopes, self.mean, strict=True))
-        return self._box(offset) + sum(self._box(s) * c for s, c in zip(slopes, self.planes, strict=True))
+        return self._box(offset) + sum(
+            self._box(s) * c for s, c in zip(slopes, self.planes, strict=True)
+        )
 
     def _box(self, plane: Array) -> Array:
         """[H, W] means of a plane over the windows."""
@@ -86,8 +93,12 @@ def weighted_median(values: Array, guide: GuidedFilter, known: Array, *, bins: i
     low, high = np.percentile(values[known], [0.5, 99.5]) if known.any() else (0.0, 0.0)
     if not high > low:
         return values.astype(np.float32)
-    place = np.where(known, np.clip((values - low) / (high - low) * (bins - 1), 0, bins - 1), -1).astype(np.float32)
-    shares = np.stack([np.maximum(guide.share(np.maximum(1 - np.abs(place - k), 0)), 0) for k in range(bins)])
+    place = np.where(
+        known, np.clip((values - low) / (high - low) * (bins - 1), 0, bins - 1), -1
+    ).astype(np.float32)
+    shares = np.stack(
+        [np.maximum(guide.share(np.maximum(1 - np.abs(place - k), 0)), 0) for k in range(bins)]
+    )
     total = np.cumsum(shares, axis=0)  # [bins, H, W]
     half = total[-1] / 2
     index = np.argmax(total >= half, axis=0)
@@ -112,7 +123,10 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
         return sharp
     index = np.cumsum(known.ravel()).reshape(known.shape) - 1
     pairs = []
-    neighbours: list[tuple[Any, Any]] = [(np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])]  # in rows, in columns
+    neighbours: list[tuple[Any, Any]] = [
+        (np.s_[:, :-1], np.s_[:, 1:]),
+        (np.s_[:-1], np.s_[1:]),
+    ]  # in rows, in columns
     for demanded, (near, far) in zip(slopes(normal, rays), neighbours, strict=True):
         both = known[near] & known[far]
         change = (sharp[far] - sharp[near])[both].astype(np.float64)
@@ -122,7 +136,9 @@ def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
     first, second, wanted, weight = (np.concatenate(column) for column in zip(*pairs, strict=True))
     pull = np.full(int(known.sum()), LENGTH**-2)
     found = np.array(sharp, np.float32)
-    found[known] += least_squares_change(first, second, wanted, weight, pull, rtol=1e-3, maxiter=100)
+    found[known] += least_squares_change(
+        first, second, wanted, weight, pull, rtol=1e-3, maxiter=100
+    )
     return found
 
 
@@ -132,25 +148,38 @@ def slopes(normal: Array, rays: Array) -> tuple[Array, Array]:
     n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). normal: [H, W, 3] unit, camera frame.
     rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
     """
-    x, y = rays[..., 0], rays[..., 1]
+    x = rays[..., 0]
+    y = rays[..., 1]
     across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
     down = float(y[-1, 0] - y[0, 0]) / max(y.shape[0] - 1, 1)
     facing = normal[..., 0] * x + normal[..., 1] * y - normal[..., 2]
-    facing = np.minimum(facing, -STEEPEST * np.sqrt(x**2 + y**2 + 1))  # n . r < 0 where the surface is seen
+    facing = np.minimum(
+        facing, -STEEPEST * np.sqrt(x**2 + y**2 + 1)
+    )  # n . r < 0 where the surface is seen
     return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
 
 
 def least_squares_change(
-    first: Array, second: Array, wanted: Array, weight: Array, pull: Array, *, rtol: float, maxiter: int
+    first: Array,
+    second: Array,
+    wanted: Array,
+    weight: Array,
+    pull: Array,
+    *,
+    rtol: float,
+    maxiter: int,
 ) -> Array:
     """[N] float64, min over u of sum of weight |u_second - u_first - wanted|^2 + sum of pull |u|^2.
 
     Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say. first, second: [P] which
     of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
     """
-    rows, root = np.tile(np.arange(len(first)), 2), np.sqrt(weight)
+    rows = np.tile(np.arange(len(first)), 2)
+    root = np.sqrt(weight)
     entries = (np.concatenate([-root, root]), (rows, np.concatenate([first, second])))
     step = coo_matrix(entries, (len(first), len(pull))).tocsr()
     system = (step.T @ step + diags(pull)).tocsr()
-    change, _ = cg(system, step.T @ (root * wanted), rtol=rtol, maxiter=maxiter, M=diags(1 / system.diagonal()))
+    change, _ = cg(
+        system, step.T @ (root * wanted), rtol=rtol, maxiter=maxiter, M=diags(1 / system.diagonal())
+    )
     return change

@@ -25,22 +25,37 @@ _MIRROR = np.array([-1, 1, 1], np.float32)
 class InferenceSettings:
     """How the network sees a photo and how its answers become a prior."""
 
-    sides: tuple[int, ...] = (192, 384)  # longest sides, pixels, of large photos and small: whole, details; 16 pictures
+    sides: tuple[int, ...] = (
+        192,
+        384,
+    )  # longest sides, pixels, of large photos and small: whole, details; 16 pictures
     edge_side: int = 768  # longest side at which edges are sought in the photo, pixels; by eye
-    edge_reach: float = 0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
-    median_depth: float = 3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
+    edge_reach: float = (
+        0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
+    )
+    median_depth: float = (
+        3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
+    )
     depth_span: float = 50.0  # largest ratio of a depth to the median, either way
     likely_sky: float = 0.0  # logit of a surface below which a pixel is likely sky; derived
-    sure_sky: float = -5.0  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
+    sure_sky: float = (
+        -5.0
+    )  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
     sure_surface: float = 2.0  # logit above which a pixel surely is a surface; by eye
-    unsure_told: float = 0.03  # share of the picture that may be sky from which a note says so; by eye
-    least_island: float = 0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
+    unsure_told: float = (
+        0.03  # share of the picture that may be sky from which a note says so; by eye
+    )
+    least_island: float = (
+        0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
+    )
 
 
 SETTINGS = InferenceSettings()
 
 
-def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu") -> Prediction:
+def infer(
+    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu"
+) -> Prediction:
     """Maps of a photo [H, W, 3] float32 linear, white about 1, at its own size, as a Prediction without a name.
 
     The network, in evaluation mode on `device`, sees the photo, clipped to [0, 1], and its mirror image at two sizes;
@@ -56,15 +71,25 @@ def infer(network: BundledNetwork, linear: Array, rays: Array, *, device: Any = 
         surface[:] = True
     unsure = _unsure_sky(maps["mask"], surface)
     depth = _scaled(maps["depth"], surface)
-    albedo, roughness, metallic = (resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic"))
+    albedo, roughness, metallic = (
+        resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic")
+    )
     depth, normal = with_edges(depth, maps["normal"], linear, rays)
     depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
-    normal = np.where((depth > 0)[..., None], unit(normal), np.array([0, 0, 1], np.float32)).astype(np.float32)
-    materials = Materials(srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1))
+    normal = np.where((depth > 0)[..., None], unit(normal), np.array([0, 0, 1], np.float32)).astype(
+        np.float32
+    )
+    materials = Materials(
+        srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1)
+    )
     sky = float((depth == 0).mean())
-    notes: tuple[str, ...] = (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
+    notes: tuple[str, ...] = (
+        (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
+    )
     if unsure > SETTINGS.unsure_told:
-        notes += (f"{unsure:.0%} of the picture, at its top, may be sky and was taken for a far surface.",)
+        notes += (
+            f"{unsure:.0%} of the picture, at its top, may be sky and was taken for a far surface.",
+        )
     spread = {name: resample.values(values, size) for name, values in spread.items()}
     return Prediction(materials, normal, depth, warnings=notes, light=light, spread=spread)
 
@@ -79,18 +104,23 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     photo = linear_to_srgb(resample.values(linear, middle))
     reach = max(2, round(SETTINGS.edge_reach * max(middle)))
     guide = GuidedFilter(photo, radius=reach)
-    depth, normal = resample.depth(depth, middle), resample.normals(normal, middle)
+    depth = resample.depth(depth, middle)
+    normal = resample.normals(normal, middle)
     depth = with_sky(depth, guide)
     known = depth > 0
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
     sharp = weighted_median(coarse, guide, known)
-    planes = [weighted_median(np.ascontiguousarray(c), guide, known, bins=16) for c in np.moveaxis(normal, -1, 0)]
+    planes = [
+        weighted_median(np.ascontiguousarray(c), guide, known, bins=16)
+        for c in np.moveaxis(normal, -1, 0)
+    ]
     normal = unit(np.stack(planes, -1))
     logarithm = with_relief(np.where(known, sharp, np.nan), normal, seen)
     depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
     if middle != size:
-        depth, normal = resample.depth(depth, size), resample.normals(normal, size)
+        depth = resample.depth(depth, size)
+        normal = resample.normals(normal, size)
     return depth, normal
 
 
@@ -100,7 +130,9 @@ def with_sky(depth: Array, guide: GuidedFilter) -> Array:
     if known.all():
         return depth
     surface = guide.share(known.astype(np.float32)) > 0.5
-    return np.where(surface, depth[nearest(known)], 0).astype(np.float32) if surface.any() else depth
+    return (
+        np.where(surface, depth[nearest(known)], 0).astype(np.float32) if surface.any() else depth
+    )
 
 
 def _mean_answer(
@@ -116,15 +148,24 @@ def _mean_answer(
         photo = resample.values(linear, size)
         seen = rays_at(rays, *photo.shape[:2])
         answers.append(_run(network, photo, seen, device))
-        mirrored = np.ascontiguousarray(photo[:, ::-1]), np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2])
-        found = {name: np.ascontiguousarray(m[:, ::-1]) for name, m in _run(network, *mirrored, device).items()}
+        mirrored = (
+            np.ascontiguousarray(photo[:, ::-1]),
+            np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2]),
+        )
+        found = {
+            name: np.ascontiguousarray(m[:, ::-1])
+            for name, m in _run(network, *mirrored, device).items()
+        }
         answers.append(found | {"normal": found["normal"] * _MIRROR})
     for answer in answers:  # what depth is relative to is every answer's own
         answer["depth"] = answer["depth"] - np.median(answer["depth"])
     lights = [answer.pop("light") for answer in answers if "light" in answer]
     light = np.exp(np.mean(lights, axis=0)).astype(np.float32) if lights else None
     size = sizes[-1]
-    maps = {name: np.mean([resample.values(answer[name], size) for answer in answers], axis=0) for name in answers[0]}
+    maps = {
+        name: np.mean([resample.values(answer[name], size) for answer in answers], axis=0)
+        for name in answers[0]
+    }
     expected = np.exp(maps.pop("spread")).astype(np.float32) if "spread" in maps else None
     spread = {}
     if expected is not None:
@@ -135,7 +176,8 @@ def _mean_answer(
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:
     """The network's maps at the size of `photo` [h, w, 3]: [h, w] or [h, w, 3] float32."""
     height, width = photo.shape[:2]
-    below, right = -height % STRIDE, -width % STRIDE
+    below = -height % STRIDE
+    right = -width % STRIDE
     padded = np.pad(photo, ((0, below), (0, right), (0, 0)), mode="edge")
     # Rays are linear in the pixel, and their point reflection at the border goes on as such.
     extended = np.pad(rays, ((0, below), (0, right), (0, 0)), mode="reflect", reflect_type="odd")
@@ -144,14 +186,18 @@ def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dic
         maps = network(tensors[0].contiguous(memory_format=torch.channels_last), tensors[1])
     rows = {name: m[0] if name == "light" else m[0, :, :height, :width] for name, m in maps.items()}
     arrays = {name: m.permute(1, 2, 0).float().cpu().numpy() for name, m in rows.items()}
-    return {n: np.ascontiguousarray(a[..., 0] if a.shape[-1] == 1 else a) for n, a in arrays.items()}
+    return {
+        n: np.ascontiguousarray(a[..., 0] if a.shape[-1] == 1 else a) for n, a in arrays.items()
+    }
 
 
 def _scaled(log_depth: Array, surface: Array) -> Array:
     """Depth [h, w] with the median of the settings over the surface, 0 elsewhere."""
     relative = log_depth - np.median(log_depth[surface])
     limit = np.log(SETTINGS.depth_span)
-    return np.where(surface, SETTINGS.median_depth * np.exp(np.clip(relative, -limit, limit)), 0).astype(np.float32)
+    return np.where(
+        surface, SETTINGS.median_depth * np.exp(np.clip(relative, -limit, limit)), 0
+    ).astype(np.float32)
 
 
 def _surface(logit: Array, photo: Array) -> Array:

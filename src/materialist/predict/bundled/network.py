@@ -14,7 +14,13 @@ from torch.nn import functional as F
 
 from materialist.envmap import texel_directions
 from materialist.predict.efficientnet import shipped, unit_power, zero_convolutions
-from materialist.predict.network import STRIDE, Architecture, ResidualBlock, StoredNetwork, group_norm
+from materialist.predict.network import (
+    STRIDE,
+    Architecture,
+    ResidualBlock,
+    StoredNetwork,
+    group_norm,
+)
 
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
 """Maps that the network answers with, and their channels."""
@@ -53,21 +59,26 @@ class BundledArchitecture(Architecture):
 class BundledNetwork(StoredNetwork):
     """Photo and camera rays in, all maps out."""
 
-    FORMAT, COMMAND = "materialist-bundled-1", "materialist train matnet"
+    FORMAT = "materialist-bundled-1"
+    COMMAND = "materialist train matnet"
     ARCHITECTURE = BundledArchitecture
 
     def __init__(self, architecture: BundledArchitecture | None = None):
         super().__init__(architecture or BundledArchitecture())
-        a, w = self.architecture, self.architecture.widths
+        a = self.architecture
+        w = self.architecture.widths
         self.stem = nn.Sequential(_conv(6 * 16 + 2, w[0]), group_norm(w[0]), nn.SiLU())
-        self.levels = nn.ModuleList(nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.blocks[k]))) for k in range(4))
+        self.levels = nn.ModuleList(
+            nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.blocks[k]))) for k in range(4)
+        )
         self.downs = nn.ModuleList(nn.Conv2d(w[k] * 4, w[k + 1], 1) for k in range(3))
         self.place = nn.Conv2d(4, w[3], 1)
         self.attention = nn.ModuleList(_AttentionBlock(w[3]) for _ in range(a.attention))
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(3))
         self.skips = nn.ModuleList(nn.Conv2d(w[k], w[k], 1) for k in range(3))
         self.decoders = nn.ModuleList(
-            nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.decoder_blocks[k]))) for k in range(3)
+            nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.decoder_blocks[k])))
+            for k in range(3)
         )
         self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
         self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), group_norm(a.fine), nn.SiLU())
@@ -92,7 +103,8 @@ class BundledNetwork(StoredNetwork):
         [B, 1, H, W] the logit of there being a surface; metallic_logit, the metallic before its sigmoid; where the
         architecture has it, light [B, 4, h, 2h], see `LightHead`, and spread [B, 5, H, W], see `SpreadHead`.
         """
-        picture, more = encode(image), self._told(image)
+        picture = encode(image)
+        more = self._told(image)
         x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), F.avg_pool2d(rays, 4)], 1))
         x, skips, told = self.levels[0](x + more[0]), [], x
         for k in range(3):
@@ -134,7 +146,9 @@ class BundledNetwork(StoredNetwork):
 def srgb(image: Tensor) -> Tensor:
     """sRGB encoding of linear radiance of any shape, clipped to [0, 1]."""
     image = image.clamp(0, 1)
-    return torch.where(image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055)
+    return torch.where(
+        image <= 0.0031308, image * 12.92, 1.055 * image.clamp(min=1e-6) ** (1 / 2.4) - 0.055
+    )
 
 
 def encode(image: Tensor) -> Tensor:
@@ -160,7 +174,9 @@ def _maps(raw: Tensor, curve: Tensor) -> dict[str, Tensor]:
         "roughness": maps["roughness"].sigmoid(),
         "metallic": maps["metallic"].sigmoid(),
         "metallic_logit": maps["metallic"],
-        "normal": F.normalize(maps["normal"] + ahead, dim=1, eps=1e-4),  # raw zero looks at the viewer
+        "normal": F.normalize(
+            maps["normal"] + ahead, dim=1, eps=1e-4
+        ),  # raw zero looks at the viewer
         "depth": maps["depth"],
         "mask": maps["mask"],
     }
@@ -184,9 +200,12 @@ class _AttentionBlock(nn.Module):
     def __init__(self, channels: int, head_size: int = 32):
         super().__init__()
         self.heads = channels // head_size
-        self.norm1, self.norm2 = nn.LayerNorm(channels), nn.LayerNorm(channels)
-        self.qkv, self.out = nn.Linear(channels, 3 * channels), nn.Linear(channels, channels)
-        self.up, self.down = nn.Linear(channels, 3 * channels), nn.Linear(3 * channels, channels)
+        self.norm1 = nn.LayerNorm(channels)
+        self.norm2 = nn.LayerNorm(channels)
+        self.qkv = nn.Linear(channels, 3 * channels)
+        self.out = nn.Linear(channels, channels)
+        self.up = nn.Linear(channels, 3 * channels)
+        self.down = nn.Linear(3 * channels, channels)
 
     def forward(self, x: Tensor) -> Tensor:
         batch, cells, channels = x.shape
@@ -236,15 +255,20 @@ class LightHead(nn.Module):
         super().__init__()
         self.rows = rows
         self.cells = nn.Linear(features + self.TOLD, channels)
-        self.directions = nn.Sequential(nn.Linear(_HARMONICS, channels), nn.GELU(), nn.Linear(channels, channels))
+        self.directions = nn.Sequential(
+            nn.Linear(_HARMONICS, channels), nn.GELU(), nn.Linear(channels, channels)
+        )
         self.blocks = nn.ModuleList(_LightBlock(channels) for _ in range(blocks))
-        self.norm, self.out = nn.LayerNorm(channels), nn.Linear(channels, 4)
+        self.norm = nn.LayerNorm(channels)
+        self.out = nn.Linear(channels, 4)
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
         harmonics = _harmonics(torch.from_numpy(texel_directions(rows, 2 * rows)).reshape(-1, 3))
         self.register_buffer("harmonics", harmonics, persistent=False)
 
-    def forward(self, features: Tensor, picture: Tensor, rays: Tensor, maps: dict[str, Tensor]) -> Tensor:
+    def forward(
+        self, features: Tensor, picture: Tensor, rays: Tensor, maps: dict[str, Tensor]
+    ) -> Tensor:
         """[B, 4, h, 2h] float32 of features [B, C, H / 16, W / 16] and the photo's own maps [B, ., H, W].
 
         Natural logarithm of radiance in the photo's units (white 1), camera frame, equirectangular; last the logarithm
@@ -253,7 +277,9 @@ class LightHead(nn.Module):
         depth = maps["depth"] - maps["depth"].flatten(1).mean(1).view(-1, 1, 1, 1)
         slant = rays.square().sum(1, True)
         told = [picture, rays, maps["albedo"], maps["normal"], maps["mask"].sigmoid(), depth, slant]
-        cells = F.avg_pool2d(torch.cat([t.detach().to(features.dtype) for t in told], 1), self.STRIDE)
+        cells = F.avg_pool2d(
+            torch.cat([t.detach().to(features.dtype) for t in told], 1), self.STRIDE
+        )
         x = self.cells(torch.cat([features, cells], 1).flatten(2).transpose(1, 2))
         asked = self.directions(self.harmonics.to(x.dtype)).expand(len(x), -1, -1)
         for block in self.blocks:
@@ -268,16 +294,23 @@ class _LightBlock(nn.Module):
     def __init__(self, channels: int, head_size: int = 32):
         super().__init__()
         self.heads = channels // head_size
-        self.norm, self.cell_norm = nn.LayerNorm(channels), nn.LayerNorm(channels)
-        self.query, self.keys = nn.Linear(channels, channels), nn.Linear(channels, 2 * channels)
+        self.norm = nn.LayerNorm(channels)
+        self.cell_norm = nn.LayerNorm(channels)
+        self.query = nn.Linear(channels, channels)
+        self.keys = nn.Linear(channels, 2 * channels)
         self.out = nn.Linear(channels, channels)
         self.among = _AttentionBlock(channels, head_size)
 
     def forward(self, asked: Tensor, cells: Tensor) -> Tensor:
         batch, count, channels = asked.shape
-        split = lambda t: t.view(batch, t.shape[1], self.heads, -1).transpose(1, 2)  # noqa: E731
+
+        def split(t):
+            return t.view(batch, t.shape[1], self.heads, -1).transpose(1, 2)
+
         key, value = self.keys(self.cell_norm(cells)).chunk(2, -1)
-        seen = F.scaled_dot_product_attention(split(self.query(self.norm(asked))), split(key), split(value))
+        seen = F.scaled_dot_product_attention(
+            split(self.query(self.norm(asked))), split(key), split(value)
+        )
         return self.among(asked + self.out(seen.transpose(1, 2).reshape(batch, count, channels)))
 
 

@@ -32,19 +32,27 @@ class BundledPredictor(Predictor):
         own = "" if path == WEIGHTS else f" {path.name}"
         self.name = f"bundled{own} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted of the network's maps at the photo's size; deterministic, `seed` changes nothing.
 
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        found = infer(self.network, photo.linear, pixel_rays(photo.camera)[..., :2].copy(), device=self.device)
+        found = infer(
+            self.network, photo.linear, pixel_rays(photo.camera)[..., :2].copy(), device=self.device
+        )
         maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
         if not all(np.isfinite(maps[name]).all() for name in MAPS):
-            raise WeightsError(f"The network gave values that are not finite; check its weights ({self.name}).")
+            raise WeightsError(
+                f"The network gave values that are not finite; check its weights ({self.name})."
+            )
         warnings = found.warnings
         if "depth" not in wanted:  # there may be a surface in the depth of another source
-            maps["normal"] = np.where(found.depth[..., None] > 0, found.normal, 0).astype(np.float32)
+            maps["normal"] = np.where(found.depth[..., None] > 0, found.normal, 0).astype(
+                np.float32
+            )
             warnings = ()
         light = found.light if "albedo" in wanted else None
         spread = {name: values for name, values in found.spread.items() if name in wanted}

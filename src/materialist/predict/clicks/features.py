@@ -22,7 +22,11 @@ DEEP = 2.0
 
 
 def features(
-    rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]] = (), box: Box | None = None
+    rgb: Array,
+    normal: Array,
+    depth: Array,
+    clicks: Sequence[tuple[int, int]] = (),
+    box: Box | None = None,
 ) -> Array:
     """The maps [CHANNELS, H, W] float32 that ClickNet reads of rgb [H, W, 3] sRGB in [0, 1], normal [H, W, 3] unit,
     depth [H, W] planar in any unit, 0 = no surface, and either clicks (column, row) on one object or a box around it.
@@ -35,15 +39,20 @@ def features(
     surface = depth > 0
     log = np.log(np.where(surface, depth, 1.0))
     rows, columns = np.indices(depth.shape)
-    level, colour = np.full(depth.shape, np.inf), np.full(rgb.shape, np.inf)
-    cosine, away = np.full(depth.shape, -1.0), np.full(depth.shape, np.inf)
+    level = np.full(depth.shape, np.inf)
+    colour = np.full(rgb.shape, np.inf)
+    cosine = np.full(depth.shape, -1.0)
+    away = np.full(depth.shape, np.inf)
     inside = np.zeros(depth.shape)
     places = [(x, y, np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]) for x, y in clicks]
     if box is not None:
         x0, y0, x1, y1 = box
         inside[y0:y1, x0:x1] = 1
-        right, down = (x1 - x0) // 4, (y1 - y0) // 4
-        places = [((x0 + x1) // 2, (y0 + y1) // 2, np.s_[y0 + down : y1 - down, x0 + right : x1 - right])]
+        right = (x1 - x0) // 4
+        down = (y1 - y0) // 4
+        places = [
+            ((x0 + x1) // 2, (y0 + y1) // 2, np.s_[y0 + down : y1 - down, x0 + right : x1 - right])
+        ]
     for x, y, near in places:
         here = np.median(log[near][surface[near]]) if surface[near].any() else 0.0
         other = np.clip(log - here, -DEEP, DEEP)
@@ -55,7 +64,14 @@ def features(
         away = np.minimum(away, np.hypot(rows - y, columns - x))
     spot = np.exp(-((away / NEAR) ** 2) / 2) if box is None else np.zeros(depth.shape)
     parts = [
-        rgb - 0.5, normal, np.where(surface, level, DEEP)[..., None], surface[..., None], colour, cosine[..., None],
-        spot[..., None], (away / max(height, width))[..., None], inside[..., None],
-    ]  # fmt: skip
+        rgb - 0.5,
+        normal,
+        np.where(surface, level, DEEP)[..., None],
+        surface[..., None],
+        colour,
+        cosine[..., None],
+        spot[..., None],
+        (away / max(height, width))[..., None],
+        inside[..., None],
+    ]
     return np.ascontiguousarray(np.moveaxis(np.concatenate(parts, -1), -1, 0), np.float32)

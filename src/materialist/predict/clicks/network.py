@@ -18,7 +18,8 @@ DEFAULT = UNetArchitecture((24, 48, 80, 112, 144), (1, 1, 2, 2, 2), "lite2")
 class ClickNet(UNet):
     """Features in, one logit a pixel out."""
 
-    FORMAT, COMMAND = "materialist-clicks-2", "materialist train clicks"
+    FORMAT = "materialist-clicks-2"
+    COMMAND = "materialist train clicks"
 
     def __init__(self, architecture: UNetArchitecture | None = None):
         a = architecture or DEFAULT
@@ -35,7 +36,9 @@ class ClickNet(UNet):
             features = self.encoder((maps[:, :3] + 0.5).clamp(0, 1))
             meant = maps[:, SPOT : SPOT + 1] + maps[:, BOX : BOX + 1]
             seen = [related(unit_power(found), meant) for found in features]
-        return self.raw(maps, [part(found) for part, found in zip(self.told, seen, strict=True)])[:, 0]
+        return self.raw(maps, [part(found) for part, found in zip(self.told, seen, strict=True)])[
+            :, 0
+        ]
 
 
 def related(features: Tensor, meant: Tensor) -> Tensor:
@@ -43,7 +46,11 @@ def related(features: Tensor, meant: Tensor) -> Tensor:
 
     meant: [B, 1, S, S] weights of the pixels whose mean they are: high at the clicks, or in the box.
     """
-    weight = F.adaptive_avg_pool2d(meant, (features.shape[-2], features.shape[-1])).to(features.dtype)
-    here = (features * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp(min=1e-6)
+    weight = F.adaptive_avg_pool2d(meant, (features.shape[-2], features.shape[-1])).to(
+        features.dtype
+    )
+    here = (features * weight).sum((2, 3), keepdim=True) / weight.sum((2, 3), keepdim=True).clamp(
+        min=1e-6
+    )
     cosine = F.cosine_similarity(features.float(), here.float(), dim=1)[:, None]
     return torch.cat([features, (features - here).abs(), cosine.to(features.dtype)], 1)

@@ -19,9 +19,14 @@ SIDE = 224
 
 
 def object_at(
-    rgb: Array, normal: Array, depth: Array, clicks: Sequence[tuple[int, int]] = (), *, box: Box | None = None,
+    rgb: Array,
+    normal: Array,
+    depth: Array,
+    clicks: Sequence[tuple[int, int]] = (),
+    *,
+    box: Box | None = None,
     weights: str | Path = "",
-) -> Array:  # fmt: skip
+) -> Array:
     """[H, W] float32 in [0, 1]: how likely each pixel belongs to the object that all clicks lie on, or in the box.
 
     The mean over the photo and its mirror image. rgb: [H, W, 3] sRGB in [0, 1]. normal: [H, W, 3] unit. depth: [H, W]
@@ -35,19 +40,35 @@ def object_at(
     from materialist.predict.network import STRIDE, loaded
 
     height, width = depth.shape
-    if bool(clicks) == (box is not None) or not all(0 <= x < width and 0 <= y < height for x, y in clicks):
-        raise InputError(f"The clicks are {list(clicks)}; give some inside {width} x {height} pixels, or a box.")
+    if bool(clicks) == (box is not None) or not all(
+        0 <= x < width and 0 <= y < height for x, y in clicks
+    ):
+        raise InputError(
+            f"The clicks are {list(clicks)}; give some inside {width} x {height} pixels, or a box."
+        )
     if box is not None and not (0 <= box[0] < box[2] <= width and 0 <= box[1] < box[3] <= height):
-        raise InputError(f"The box is {box}; give (x0, y0, x1, y1) inside {width} x {height} pixels.")
+        raise InputError(
+            f"The box is {box}; give (x0, y0, x1, y1) inside {width} x {height} pixels."
+        )
     network = loaded(ClickNet, Path(weights) if str(weights) else WEIGHTS)
     scale = SIDE / max(height, width)
     rows, columns = size = resample.with_longer_side(depth.shape, SIDE)
     whole = [np.ascontiguousarray(v, np.float32) for v in (rgb, normal, depth)]
     nearest = np.asarray(cv2.resize(whole[2], (columns, rows), interpolation=cv2.INTER_NEAREST))
-    places = [(min(int((x + 0.5) * scale), columns - 1), min(int((y + 0.5) * scale), rows - 1)) for x, y in clicks]
+    places = [
+        (min(int((x + 0.5) * scale), columns - 1), min(int((y + 0.5) * scale), rows - 1))
+        for x, y in clicks
+    ]
     frame = None if box is None else _scaled(box, scale, (columns, rows))
-    maps = features(resample.values(whole[0], size), unit(resample.values(whole[1], size)), nearest, places, frame)
-    below, beside = -maps.shape[1] % STRIDE, -maps.shape[2] % STRIDE
+    maps = features(
+        resample.values(whole[0], size),
+        unit(resample.values(whole[1], size)),
+        nearest,
+        places,
+        frame,
+    )
+    below = -maps.shape[1] % STRIDE
+    beside = -maps.shape[2] % STRIDE
     padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
     mirrored = padded.flip(-1)
     mirrored[:, NORMAL_X] *= -1
@@ -60,5 +81,7 @@ def object_at(
 def _scaled(box: Box, scale: float, size: tuple[int, int]) -> Box:
     """The box in a picture that is `scale` times as large, of that (width, height); at least a pixel."""
     x0, y0 = (min(int(box[k] * scale), size[k] - 1) for k in (0, 1))
-    x1, y1 = (min(max(round(box[2 + k] * scale), low + 1), size[k]) for k, low in ((0, x0), (1, y0)))
+    x1, y1 = (
+        min(max(round(box[2 + k] * scale), low + 1), size[k]) for k, low in ((0, x0), (1, y0))
+    )
     return x0, y0, x1, y1

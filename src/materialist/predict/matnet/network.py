@@ -50,7 +50,8 @@ class MatNet(StoredNetwork):
     The state dict has the names of the published checkpoint, so `load_state_dict(..., strict=True)` takes it.
     """
 
-    FORMAT, COMMAND = "materialist-matnet-1", "materialist train matnet --config paper"
+    FORMAT = "materialist-matnet-1"
+    COMMAND = "materialist train matnet --config paper"
     ARCHITECTURE = Size
 
     def __init__(self, size: str | Size = "vitb"):
@@ -70,9 +71,16 @@ class MatNet(StoredNetwork):
         features = self.pretrained(image, self.architecture.layers)
         materials = self.material_head(features)
         positive = F.relu(materials[:, :5])
-        depth, normal = F.relu(self.depth_head(features)), F.normalize(torch.tanh(materials[:, 5:]), dim=1, eps=1e-6)
+        depth = F.relu(self.depth_head(features))
+        normal = F.normalize(torch.tanh(materials[:, 5:]), dim=1, eps=1e-6)
         albedo, roughness, metallic = positive.split([3, 1, 1], 1)
-        return {"depth": depth, "albedo": albedo, "roughness": roughness, "metallic": metallic, "normal": normal}
+        return {
+            "depth": depth,
+            "albedo": albedo,
+            "roughness": roughness,
+            "metallic": metallic,
+            "normal": normal,
+        }
 
 
 class Encoder(nn.Module):
@@ -94,8 +102,11 @@ class Encoder(nn.Module):
         """The patch features after each block in `layers` (ascending), normalised, as pictures [B, width, H / 14, W /
         14] of an image [B, 3, H, W], whose sides are multiples of 14.
         """
-        rows, columns = image.shape[-2] // PATCH, image.shape[-1] // PATCH
-        patches = self.patch_embed["proj"](image).flatten(2).transpose(1, 2)  # [B, rows * columns, width]
+        rows = image.shape[-2] // PATCH
+        columns = image.shape[-1] // PATCH
+        patches = (
+            self.patch_embed["proj"](image).flatten(2).transpose(1, 2)
+        )  # [B, rows * columns, width]
         tokens = torch.cat([self.cls_token.expand(len(patches), -1, -1), patches], 1)
         tokens = tokens + self._positions(rows, columns)
         found = []
@@ -126,7 +137,11 @@ class _Block(nn.Module):
         self.attn = _Attention(width, heads)
         self.ls1 = nn.ParameterDict({"gamma": torch.ones(width)})
         self.norm2 = nn.LayerNorm(width, eps=1e-6)
-        layers = {"fc1": nn.Linear(width, 4 * width), "gelu": nn.GELU(), "fc2": nn.Linear(4 * width, width)}
+        layers = {
+            "fc1": nn.Linear(width, 4 * width),
+            "gelu": nn.GELU(),
+            "fc2": nn.Linear(4 * width, width),
+        }
         self.mlp = nn.Sequential(OrderedDict(layers))
         self.ls2 = nn.ParameterDict({"gamma": torch.ones(width)})
 
@@ -159,7 +174,10 @@ class Head(nn.Module):
     def __init__(self, width: int, pyramid: Sequence[int], fused: int, outputs: int):
         super().__init__()
         self.projects = nn.ModuleList(nn.Conv2d(width, channels, 1) for channels in pyramid)
-        enlarge = [nn.ConvTranspose2d(channels, channels, n, stride=n) for channels, n in zip(pyramid, (4, 2))]
+        enlarge = [
+            nn.ConvTranspose2d(channels, channels, n, stride=n)
+            for channels, n in zip(pyramid, (4, 2))
+        ]
         shrink = nn.Conv2d(pyramid[3], pyramid[3], 3, stride=2, padding=1)
         self.resize_layers = nn.ModuleList([*enlarge, nn.Identity(), shrink])
         self.scratch = nn.ModuleDict()  # the name is the checkpoints'
@@ -204,7 +222,11 @@ class _Fusion(nn.Module):
 
 def _convolutions(channels: int) -> nn.Sequential:
     """What a residual unit adds to its input."""
-    relu, conv = nn.ReLU, lambda: nn.Conv2d(channels, channels, 3, padding=1)
+    relu = nn.ReLU
+
+    def conv():
+        return nn.Conv2d(channels, channels, 3, padding=1)
+
     return nn.Sequential(OrderedDict(relu1=relu(), conv1=conv(), relu2=relu(), conv2=conv()))
 
 

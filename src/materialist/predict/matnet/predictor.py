@@ -27,22 +27,30 @@ class MatNetPredictor(Predictor):
     `input_size`: shorter side that it sees, pixels. Raises WeightsError for missing, damaged or other weights.
     """
 
-    def __init__(self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE):
+    def __init__(
+        self, where: str | Path = "", *, device: str = "auto", input_size: int = INPUT_SIZE
+    ):
         path = weights_file(locate(str(where), "matnet"))
         digest = verify_file(path)
         state = read_state(path)
-        self.trained_here = metadata(path).get("format") == MatNet.FORMAT  # its depth output is depth
+        self.trained_here = (
+            metadata(path).get("format") == MatNet.FORMAT
+        )  # its depth output is depth
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
-        with torch.random.fork_rng(devices=[]):  # the start values are replaced; nobody's random numbers change
+        with torch.random.fork_rng(
+            devices=[]
+        ):  # the start values are replaced; nobody's random numbers change
             network = MatNet(size)
         load_weights(network, state, path)
         self.network = network.to("cuda" if on_gpu(device) else "cpu").eval()
         self.input_size = input_size
         self.name = f"matnet {size} {path.name} sha256:{digest[:16]}"
 
-    def parts(self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None) -> MapSet:
+    def parts(
+        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+    ) -> MapSet:
         """The wanted of the network's maps, as docs/predictors.md has them; `seed` changes nothing.
 
         It sees linear values, as in training. For depth see `planar_depth`; weights of `train matnet --config paper`
@@ -50,11 +58,17 @@ class MatNetPredictor(Predictor):
         """
         maps = infer(self.network, photo.linear, input_size=self.input_size)
         if not all(np.isfinite(values).all() for values in maps.values()):
-            raise WeightsError(f"MatNet gave values that are not finite; check the weights ({self.name}).")
+            raise WeightsError(
+                f"MatNet gave values that are not finite; check the weights ({self.name})."
+            )
         length = np.linalg.norm(maps["normal"], axis=-1, keepdims=True)
         found = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
-        found["normal"] = np.where(length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), 0).astype(np.float32)
-        found["depth"] = np.maximum(maps["depth"], 1e-3) if self.trained_here else planar_depth(maps["depth"])
+        found["normal"] = np.where(
+            length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), 0
+        ).astype(np.float32)
+        found["depth"] = (
+            np.maximum(maps["depth"], 1e-3) if self.trained_here else planar_depth(maps["depth"])
+        )
         return MapSet({name: found[name] for name in wanted}, dict.fromkeys(wanted, self.name))
 
 
@@ -67,7 +81,10 @@ def infer(network: MatNet, linear: Array, *, input_size: int = INPUT_SIZE) -> di
 
 
 def at_network_size(
-    run: Callable[[Tensor], dict[str, Tensor]], picture: Array, device: Any, input_size: int = INPUT_SIZE
+    run: Callable[[Tensor], dict[str, Tensor]],
+    picture: Array,
+    device: Any,
+    input_size: int = INPUT_SIZE,
 ) -> dict[str, Array]:
     """What `run` makes of a picture [H, W, 3] at the size of its encoder, as maps [H, W, C] or [H, W] float32.
 
@@ -80,8 +97,13 @@ def at_network_size(
     image = torch.from_numpy(small).permute(2, 0, 1)[None].to(device, torch.float32)
     with torch.inference_mode():
         outputs = run(image)
-        full = [F.interpolate(x, (height, width), mode="bilinear", align_corners=True)[0] for x in outputs.values()]
-    maps = (np.ascontiguousarray(x.permute(1, 2, 0).squeeze(-1).float().cpu().numpy()) for x in full)
+        full = [
+            F.interpolate(x, (height, width), mode="bilinear", align_corners=True)[0]
+            for x in outputs.values()
+        ]
+    maps = (
+        np.ascontiguousarray(x.permute(1, 2, 0).squeeze(-1).float().cpu().numpy()) for x in full
+    )
     return dict(zip(outputs, maps))
 
 

@@ -60,13 +60,20 @@ class Window:
     def moved(self, larger: float, right: float, down: float) -> Window:
         """The window `larger` times as large about its middle, and that many of its sides aside."""
         edge = (larger - 1) / 2
-        return Window(self.left + (right - edge) * self.side, self.top + (down - edge) * self.side, larger * self.side)
+        return Window(
+            self.left + (right - edge) * self.side,
+            self.top + (down - edge) * self.side,
+            larger * self.side,
+        )
 
     def cut(self, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array) -> View:
         """The window of maps [H, W, ...] at SIDE x SIDE pixels; means over the object alone."""
         weight = inside.astype(np.float32)
         share = self._cut(weight)
-        mean = lambda x: self._cut(x * _like(weight, x)) / _like(np.maximum(share, 1e-6), x)  # noqa: E731
+
+        def mean(x):
+            return self._cut(x * _like(weight, x)) / _like(np.maximum(share, 1e-6), x)
+
         seen = share > 0.5
         if not seen.any():
             seen = share >= share.max()
@@ -76,15 +83,21 @@ class Window:
     def put_back(self, values: Array, seen: Array, inside: Array) -> Array:
         """[H, W] float32: values [S, S] known where `seen`, brought back to the mask `inside` [H, W], 0 outside."""
         known = self._spread(seen.astype(np.float32), inside.shape)
-        spread = self._spread(np.where(seen, values, 0).astype(np.float32), inside.shape) / np.maximum(known, 1e-6)
+        spread = self._spread(
+            np.where(seen, values, 0).astype(np.float32), inside.shape
+        ) / np.maximum(known, 1e-6)
         filled = np.where(known > 1e-3, spread, float(np.median(values[seen])))
         return np.where(inside, filled, 0).astype(np.float32)
 
     def _cut(self, values: Array) -> Array:
         """[SIDE, SIDE, ...] of values [H, W, ...], 0 beyond the border: means down, bilinear up."""
-        fine = SIDE * max(1, int(np.ceil(self.side / SIDE)))  # a whole number of places in every pixel
+        fine = SIDE * max(
+            1, int(np.ceil(self.side / SIDE))
+        )  # a whole number of places in every pixel
         places = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
-        large = cv2.warpAffine(np.ascontiguousarray(values, np.float32), self._map(fine), (fine, fine), flags=places)
+        large = cv2.warpAffine(
+            np.ascontiguousarray(values, np.float32), self._map(fine), (fine, fine), flags=places
+        )
         return cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
 
     def _spread(self, values: Array, shape: tuple[int, ...]) -> Array:
@@ -94,7 +107,9 @@ class Window:
     def _map(self, side: int) -> Array:
         """[2, 3] from pixels of the window at side x side to those of the picture, their centres being whole."""
         step = self.side / side
-        return np.array([[step, 0, self.left + step / 2 - 0.5], [0, step, self.top + step / 2 - 0.5]])
+        return np.array(
+            [[step, 0, self.left + step / 2 - 0.5], [0, step, self.top + step / 2 - 0.5]]
+        )
 
     def _rays(self, rays: Array) -> Array:
         """[SIDE, SIDE, 3] rays of the window, which go on evenly beyond the border."""
@@ -122,8 +137,12 @@ def features(view: View) -> Array:
     border = border_distance(view.inside) / np.sqrt(view.inside.sum())
     mirror = mirrored(view.depth, view.normal, view.inside, view.rays) / size
     flat = [view.inside.astype(np.float32), facing, np.clip(relief, -3, 3), mirror, border]
-    stacked = np.concatenate([linear_to_srgb(view.photo) - 0.5, normal, np.stack(flat, -1)], -1)  # [S, S, CHANNELS]
-    return np.ascontiguousarray(np.moveaxis(np.where(view.inside[..., None], stacked, 0), -1, 0), np.float32)
+    stacked = np.concatenate(
+        [linear_to_srgb(view.photo) - 0.5, normal, np.stack(flat, -1)], -1
+    )  # [S, S, CHANNELS]
+    return np.ascontiguousarray(
+        np.moveaxis(np.where(view.inside[..., None], stacked, 0), -1, 0), np.float32
+    )
 
 
 MIRROR = 9

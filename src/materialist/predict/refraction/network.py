@@ -20,7 +20,8 @@ LEAST = 0.05
 class RefractionNet(UNet):
     """Features of an object in, solid and hollow thickness and normals of the back out."""
 
-    FORMAT, COMMAND = "materialist-refraction-1", "materialist train refraction"
+    FORMAT = "materialist-refraction-1"
+    COMMAND = "materialist train refraction"
 
     def __init__(self, architecture: UNetArchitecture | None = None):
         super().__init__(CHANNELS, ANSWERS, architecture or UNetArchitecture())
@@ -35,5 +36,7 @@ class RefractionNet(UNet):
         inside = maps[:, MASK : MASK + 1]
         solid = (maps[:, MIRROR : MIRROR + 1] + LEAST) * (3 * torch.tanh(raw[:, :1] / 3)).exp()
         normal = maps[:, NORMAL_X : NORMAL_X + 3]
-        back = F.normalize(torch.cat([normal[:, :2], -normal[:, 2:]], 1) + raw[:, 2:], dim=1, eps=1e-4)
+        back = F.normalize(
+            torch.cat([normal[:, :2], -normal[:, 2:]], 1) + raw[:, 2:], dim=1, eps=1e-4
+        )
         return torch.cat([solid, solid * raw[:, 1:2].sigmoid(), back], 1) * inside

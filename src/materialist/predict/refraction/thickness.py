@@ -37,7 +37,13 @@ class Thickness:
 
 
 def thickness(
-    photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, weights: str | Path = ""
+    photo_linear: Array,
+    mask: Array,
+    normal: Array,
+    depth: Array,
+    camera: Camera,
+    *,
+    weights: str | Path = "",
 ) -> Thickness:
     """The thickness and the back of the object under a mask, as RefractionNet predicts them.
 
@@ -54,21 +60,33 @@ def thickness(
     inside = surface_in(mask, depth, camera)
     for name, value in (("photo", photo_linear), ("normals", normal)):
         if value.shape != (*inside.shape, 3):
-            raise InputError(f"The {name} has shape {value.shape}, the camera needs {(*inside.shape, 3)}.")
+            raise InputError(
+                f"The {name} has shape {value.shape}, the camera needs {(*inside.shape, 3)}."
+            )
     network = loaded(RefractionNet, Path(weights) if str(weights) else WEIGHTS)
     maps = (photo_linear, inside, normal, depth, pixel_rays(camera))
     answers = [_answer(network, Window.around(inside).moved(*frame), *maps) for frame in FRAMES]
     found = np.mean(answers, axis=0)  # [H, W, 5]
     if not np.isfinite(found).all():
-        raise WeightsError(f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS}).")
-    solid, hollow, back = found[..., 0], found[..., 1], unit(found[..., BACK_X:])
+        raise WeightsError(
+            f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS})."
+        )
+    solid = found[..., 0]
+    hollow = found[..., 1]
+    back = unit(found[..., BACK_X:])
     return Thickness(solid, np.minimum(hollow, solid), back)
 
 
 def best_thickness(
-    photo_linear: Array, mask: Array, normal: Array, depth: Array, camera: Camera, *, up: Array | None = None,
+    photo_linear: Array,
+    mask: Array,
+    normal: Array,
+    depth: Array,
+    camera: Camera,
+    *,
+    up: Array | None = None,
     behind: Array | None = None,
-) -> Thickness:  # fmt: skip
+) -> Thickness:
     """The thickness of the object under a mask: of a surface of revolution by itself, else as `thickness` has it.
 
     `back` is None for surfaces of revolution, whose `revolution` tells more. `up`: [3] unit, the upright direction in
@@ -76,7 +94,9 @@ def best_thickness(
     nothing.
     """
     guess = thickness(photo_linear, mask, normal, depth, camera)
-    found = surface_of_revolution(depth, normal, surface_in(mask, depth, camera), camera, up=up, behind=behind)
+    found = surface_of_revolution(
+        depth, normal, surface_in(mask, depth, camera), camera, up=up, behind=behind
+    )
     if found is None:
         return guess
     body, solid = found
@@ -84,7 +104,13 @@ def best_thickness(
 
 
 def _answer(
-    network: Any, window: Window, photo: Array, inside: Array, normal: Array, depth: Array, rays: Array
+    network: Any,
+    window: Window,
+    photo: Array,
+    inside: Array,
+    normal: Array,
+    depth: Array,
+    rays: Array,
 ) -> Array:
     """[H, W, 5] float32 of one window, 0 outside the mask: both thicknesses in scene units, and the back's normal."""
     import torch
@@ -92,6 +118,8 @@ def _answer(
     view = window.cut(photo, inside, normal, depth, rays)
     with torch.inference_mode():  # [5, S, S], lengths in units of the object's size
         found = network(torch.from_numpy(features(view))[None])[0].numpy()
-    turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(view.rays)  # [S, S, 3] in the camera's frame
+    turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(
+        view.rays
+    )  # [S, S, 3] in the camera's frame
     channels = [*(found[:BACK_X] * view.size), *np.moveaxis(turned, -1, 0)]
     return np.stack([window.put_back(channel, view.inside, inside) for channel in channels], -1)

@@ -40,7 +40,9 @@ def entries(archive: Path) -> list[CatalogEntry]:
         with zipfile.ZipFile(archive) as file:
             text = file.read(CATALOG).decode("latin-1")
     except (OSError, KeyError, zipfile.BadZipFile) as error:
-        raise InputError(f"{archive} is no catalogue of furniture ({error}); install it again.") from error
+        raise InputError(
+            f"{archive} is no catalogue of furniture ({error}); install it again."
+        ) from error
     return list(_entries(archive.stem, text))
 
 
@@ -54,7 +56,10 @@ def _entries(archive: str, text: str) -> Iterator[CatalogEntry]:
     for number, facts in sorted(models.items()):
         if not {"model", "width", "depth", "height"} <= set(facts):
             continue
-        metres = {name: float(facts.get(name, 0)) / 100 for name in ("width", "height", "depth", "elevation")}
+        metres = {
+            name: float(facts.get(name, 0)) / 100
+            for name in ("width", "height", "depth", "elevation")
+        }
         turn = facts.get("modelRotation", "1 0 0 0 1 0 0 0 1").split()
         yield CatalogEntry(
             key=f"{archive}-{number:03d}",

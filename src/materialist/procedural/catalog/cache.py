@@ -27,7 +27,8 @@ from materialist.types import Array, Progress
 
 VERSION = 3
 """Counts the changes of what the cache holds."""
-LIST, CREDITS = "catalog.json", "ATTRIBUTION.txt"
+LIST = "catalog.json"
+CREDITS = "ATTRIBUTION.txt"
 """The list of what a cache holds, and who made it."""
 JPEG_QUALITY = 93
 PHOTOGRAPH_SIDE = 1024
@@ -72,13 +73,19 @@ class Listing:
 
 def cache_folder() -> Path:
     """Where caches lie unless another place is named."""
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "materialist" / "furniture"
+    return (
+        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        / "materialist"
+        / "furniture"
+    )
 
 
 def listing(
-    archives: Sequence[Path], photographs: Sequence[Path] = (), folder: Path | None = None,
+    archives: Sequence[Path],
+    photographs: Sequence[Path] = (),
+    folder: Path | None = None,
     progress: Progress = lambda *_: None,
-) -> Listing:  # fmt: skip
+) -> Listing:
     """The models of archives, and photographs; the cache in `folder` is built where there is none of them.
 
     Raises InputError for a damaged archive, OutputError where the folder cannot be written.
@@ -88,11 +95,16 @@ def listing(
     found = described(folder / LIST)
     if found is None or found.get("version") != VERSION or found.get("made_of") != made_of:
         found = _build(archives, folder, progress) | {"photographs": _shrink(photographs, folder)}
-        write_whole(folder / LIST, json.dumps({"version": VERSION, "made_of": made_of, **found}, indent=1) + "\n")
+        write_whole(
+            folder / LIST,
+            json.dumps({"version": VERSION, "made_of": made_of, **found}, indent=1) + "\n",
+        )
     by_role: dict[str, list[str]] = {}
     for key, role in found["roles"].items():
         by_role.setdefault(role, []).append(key)
-    textures = {family: tuple((key, k) for key, k in places) for family, places in found["textures"].items()}
+    textures = {
+        family: tuple((key, k) for key, k in places) for family, places in found["textures"].items()
+    }
     roles = {role: tuple(sorted(keys)) for role, keys in by_role.items()}
     return Listing(folder, roles, textures, tuple(found["photographs"]))
 
@@ -145,7 +157,9 @@ def _shrink(photographs: Sequence[Path], folder: Path) -> list[str]:
 def _photograph(path: Path) -> Array:
     found = cv2.imread(str(path), cv2.IMREAD_COLOR)
     if found is None:
-        raise InputError(f"The photograph {path} cannot be read; delete the folder, and it will be made again.")
+        raise InputError(
+            f"The photograph {path} cannot be read; delete the folder, and it will be made again."
+        )
     return np.ascontiguousarray(found[..., ::-1])
 
 
@@ -159,14 +173,26 @@ def _credits(used: Sequence[CatalogEntry]) -> str:
 
 
 def _store(folder: Path, entry: CatalogEntry, role: str, parts: ModelParts) -> None:
-    facts: dict[str, Any] = {"entry": asdict(entry), "role": role, "looks": [asdict(look) for look in parts.looks]}
+    facts: dict[str, Any] = {
+        "entry": asdict(entry),
+        "role": role,
+        "looks": [asdict(look) for look in parts.looks],
+    }
     facts["places"] = [list(place) for place in level_places(parts.solids)]
     arrays: dict[str, Array] = {"facts": np.array(json.dumps(facts))}
     for k, solid in enumerate(parts.solids):
-        arrays[f"vertices{k}"], arrays[f"uv{k}"] = solid.vertices.astype("f4"), solid.uv.astype("f4")
-        arrays[f"normals{k}"], arrays[f"faces{k}"] = solid.normals.astype("f2"), solid.faces.astype("i4")
+        arrays[f"vertices{k}"], arrays[f"uv{k}"] = (
+            solid.vertices.astype("f4"),
+            solid.uv.astype("f4"),
+        )
+        arrays[f"normals{k}"], arrays[f"faces{k}"] = (
+            solid.normals.astype("f2"),
+            solid.faces.astype("i4"),
+        )
     for name, pixels in parts.pictures.items():
-        packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+        packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[
+            1
+        ]
         arrays[f"picture {name}"] = packed.ravel()
     memory = io.BytesIO()
     np.savez(memory, **arrays)  # type: ignore[arg-type]
@@ -179,7 +205,9 @@ def _load(folder: Path, key: str) -> CatalogModel:
         with np.load(folder / f"{key}.npz", allow_pickle=False) as stored:
             arrays = dict(stored)
     except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise InputError(f"The model {key} in {folder} cannot be read ({error}); delete the folder.") from error
+        raise InputError(
+            f"The model {key} in {folder} cannot be read ({error}); delete the folder."
+        ) from error
     facts = json.loads(str(arrays["facts"]))
     entry = facts["entry"]
     lights = tuple(tuple(place) for place in entry.pop("lights"))
@@ -192,15 +220,21 @@ def _load(folder: Path, key: str) -> CatalogModel:
     }
     solids = tuple(
         Solid(
-            arrays[f"vertices{k}"].astype(float), arrays[f"faces{k}"], arrays[f"normals{k}"].astype(float),
+            arrays[f"vertices{k}"].astype(float),
+            arrays[f"faces{k}"],
+            arrays[f"normals{k}"].astype(float),
             arrays[f"uv{k}"].astype(float),
         )
         for k in range(len(looks))
-    )  # fmt: skip
+    )
     return CatalogModel(
-        CatalogEntry(lights=lights, **entry), facts["role"], solids, looks,
-        tuple(pictures.get(look.picture) for look in looks), tuple(LevelPlace(*one) for one in facts["places"]),
-    )  # fmt: skip
+        CatalogEntry(lights=lights, **entry),
+        facts["role"],
+        solids,
+        looks,
+        tuple(pictures.get(look.picture) for look in looks),
+        tuple(LevelPlace(*one) for one in facts["places"]),
+    )
 
 
 def _decoded(packed: Array) -> Array:

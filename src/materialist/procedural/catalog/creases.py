@@ -18,11 +18,13 @@ def creased(vertices: Array, faces: Array, angle: float) -> tuple[Array, Array, 
     scale = max(float(np.ptp(vertices, axis=0).max()), 1e-12)
     keys = np.round(vertices / scale * 1e5).astype(np.int64) @ np.array([1, 2**21, 2**42])
     _, place = np.unique(keys, return_inverse=True)
-    corner_place, corner_face = place[faces].ravel(), np.repeat(np.arange(len(faces)), 3)
+    corner_place = place[faces].ravel()
+    corner_face = np.repeat(np.arange(len(faces)), 3)
     count = len(corner_face)
     at = sparse.csr_matrix((np.ones(count, np.int8), (np.arange(count), corner_place)))
     pairs = (at @ at.T).tocoo()
-    own, other = corner_face[pairs.row], corner_face[pairs.col]
+    own = corner_face[pairs.row]
+    other = corner_face[pairs.col]
     cosine = np.einsum("pc,pc->p", direction[own], direction[other])
     weight = np.sign(cosine) * (np.abs(cosine) > np.cos(angle))
     total = [np.bincount(pairs.row, weight * flat[other, k], count) for k in range(3)]

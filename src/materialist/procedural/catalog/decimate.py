@@ -35,7 +35,9 @@ def _merged(solid: Solid, cell: float) -> Solid:
     _, group = np.unique((keys * factors).sum(1), return_inverse=True)
     vertices, uv = (_means(group, values) for values in (solid.vertices, solid.uv))
     faces = group[solid.faces].astype(np.int32)
-    distinct = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])
+    distinct = (
+        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 0] != faces[:, 2])
+    )
     faces = np.unique(faces[distinct], axis=0) if distinct.any() else faces[:0]
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
     return Solid(vertices, faces[area > 1e-12 * cell**2], np.zeros_like(vertices), uv)

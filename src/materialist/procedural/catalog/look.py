@@ -13,22 +13,40 @@ FAMILIES: tuple[tuple[str, str], ...] = (
     ("glass", r"glass|crist|vidr|verre|water|agua|liquid|transpar|lens|window|pane"),
     ("screen", r"screen|display|pantalla|lcd|monitor"),
     ("bulb", r"bulb|flame|ampoul|bombilla|neon|emit|lumier|^light$|^lights$|fluoresc"),
-    ("cloth", r"fabric|cloth|tissu|cushion|pillow|mattress|matela|sheet|tela|couch|sofa|curtain|towel|carpet|rug|"
-              r"velvet|cotton|coussin|seat|cojin|shade|wool|felt|hair|fur|blanket|cover|upper|lower|shirt|short|jean"),
+    (
+        "cloth",
+        r"fabric|cloth|tissu|cushion|pillow|mattress|matela|sheet|tela|couch|sofa|curtain|towel|carpet|rug|"
+        r"velvet|cotton|coussin|seat|cojin|shade|wool|felt|hair|fur|blanket|cover|upper|lower|shirt|short|jean",
+    ),
     ("leather", r"leather|cuir|piel|cuero"),
-    ("paint", r"(white|black).?metal|metal.?(white|black|red|blue|green)|paint|lacquer|(white|black)(ex|in)terior"),
-    ("metal", r"metal|chrome|cromo|alum|steel|acero|inox|brass|gold|silver|iron|hierro|copper|handle|screw|nickel|"
-              r"argent|zinc|tap$|faucet|bronze|blade|spring|fork|knife|spoon"),
-    ("wood", r"wood|madera|bois|oak|teak|pear|alder|walnut|pine|parquet|plank|trunk|bark|branch|wicker|rattan|cane|"
-             r"roble|wenge|haya|tabla|drawer|cabinet|cupboard|legs|table|bambu|bamboo"),
-    ("ceramic", r"ceramic|porcel|china|vase|plate|toilet|basin|bath|tile|enamel|cup|bowl|sink|pot$|^pot"),
+    (
+        "paint",
+        r"(white|black).?metal|metal.?(white|black|red|blue|green)|paint|lacquer|(white|black)(ex|in)terior",
+    ),
+    (
+        "metal",
+        r"metal|chrome|cromo|alum|steel|acero|inox|brass|gold|silver|iron|hierro|copper|handle|screw|nickel|"
+        r"argent|zinc|tap$|faucet|bronze|blade|spring|fork|knife|spoon",
+    ),
+    (
+        "wood",
+        r"wood|madera|bois|oak|teak|pear|alder|walnut|pine|parquet|plank|trunk|bark|branch|wicker|rattan|cane|"
+        r"roble|wenge|haya|tabla|drawer|cabinet|cupboard|legs|table|bambu|bamboo",
+    ),
+    (
+        "ceramic",
+        r"ceramic|porcel|china|vase|plate|toilet|basin|bath|tile|enamel|cup|bowl|sink|pot$|^pot",
+    ),
     ("leaf", r"leaf|leaves|hoja|plant|petal|flower|grass|stem|needle|green$|tallo|flor"),
     ("skin", r"skin|face|head|hand|body_|lips|rlskin"),
     ("rubber", r"rubber|tire|tyre|caucho|goma|wheel"),
-    ("stone", r"stone|marble|granit|concrete|brick|rock|worktop|counter|soil|sand|terra|clay|pottery|marmol"),
+    (
+        "stone",
+        r"stone|marble|granit|concrete|brick|rock|worktop|counter|soil|sand|terra|clay|pottery|marmol",
+    ),
     ("paper", r"paper|book|card|page|label|box|news"),
     ("plastic", r"plast|button|knob|key|switch|cable|wire"),
-)  # fmt: skip
+)
 """Family of materials -> the names that speak of it, the first one that fits."""
 _COMPILED = tuple((family, re.compile(pattern)) for family, pattern in FAMILIES)
 CLEAR = 0.75
@@ -51,7 +69,9 @@ class CatalogLook:
     """Whether one sees through it."""
 
 
-def catalog_look(name: str, mtl: dict[str, Any], picture: str, mean: tuple[float, float, float] | None) -> CatalogLook:
+def catalog_look(
+    name: str, mtl: dict[str, Any], picture: str, mean: tuple[float, float, float] | None
+) -> CatalogLook:
     """The look of a material by its name and the entries of its MTL, as trimesh gives them."""
     family = _family(name)
     opacity = _number(mtl.get("d"), 1.0)

@@ -26,8 +26,14 @@ def photographs() -> tuple[Path, ...]:
             if path.suffix.lower() not in (".jpg", ".jpeg", ".png", ".webp") or path.is_symlink():
                 continue
             size = path.stat().st_size
-            name = path.parent.parent.parent.name if path.parent.name.startswith("images") else _plain(path.stem)
-            if size >= _LEAST_BYTES and (name not in largest or size > largest[name].stat().st_size):
+            name = (
+                path.parent.parent.parent.name
+                if path.parent.name.startswith("images")
+                else _plain(path.stem)
+            )
+            if size >= _LEAST_BYTES and (
+                name not in largest or size > largest[name].stat().st_size
+            ):
                 largest[name] = path
     return tuple(sorted(largest.values()))
 
@@ -41,7 +47,10 @@ def missing(furniture: Path | None = None) -> str:
 
     furniture: folder of catalogues, that of the package by default.
     """
-    there = (("3D models (sweethome3d-furniture)", archives(furniture)), ("photographs", photographs()))
+    there = (
+        ("3D models (sweethome3d-furniture)", archives(furniture)),
+        ("photographs", photographs()),
+    )
     lacks = [name for name, found in there if not found]
     if not lacks:
         return ""

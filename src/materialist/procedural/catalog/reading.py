@@ -27,7 +27,9 @@ class ReadingSettings:
 
     faces: int = 40_000  # triangles of a model; larger ones are decimated
     picture: int = 512  # pixels along the longer side of a picture
-    crease: float = 0.7  # radians: where a file has no normals, faces that meet at a sharper angle keep an edge
+    crease: float = (
+        0.7  # radians: where a file has no normals, faces that meet at a sharper angle keep an edge
+    )
     glass: float = 0.35  # share of the surface that may be clear; it is left out
     holes: float = 0.12  # share of the surface that may have holes painted in its picture
 
@@ -46,13 +48,17 @@ class ModelParts:
     """Name -> [h, w, 3] uint8 sRGB."""
 
 
-def read_catalog_model(file: zipfile.ZipFile, entry: CatalogEntry, s: ReadingSettings = SETTINGS) -> ModelParts:
+def read_catalog_model(
+    file: zipfile.ZipFile, entry: CatalogEntry, s: ReadingSettings = SETTINGS
+) -> ModelParts:
     """The model of an entry, from its archive. Raises InputError where it cannot be used: the reason in words."""
     pieces = _pieces(file, entry)
     solids: list[Solid] = []
     looks: list[CatalogLook] = []
     pictures: dict[str, Array] = {}
-    clear, holed, whole = 0.0, 0.0, 0.0
+    clear = 0.0
+    holed = 0.0
+    whole = 0.0
     for piece in pieces:
         area = float(piece.area)
         whole += area
@@ -75,7 +81,9 @@ def read_catalog_model(file: zipfile.ZipFile, entry: CatalogEntry, s: ReadingSet
         raise InputError("its picture has holes")
     solids = _fitted(_lighter(solids, s), entry)
     textured = [bool(look.picture) for look in looks]
-    return ModelParts([one if t else from_the_sides(one) for one, t in zip(solids, textured)], looks, pictures)
+    return ModelParts(
+        [one if t else from_the_sides(one) for one, t in zip(solids, textured)], looks, pictures
+    )
 
 
 def _pieces(file: zipfile.ZipFile, entry: CatalogEntry) -> list[trimesh.Trimesh]:
@@ -83,8 +91,12 @@ def _pieces(file: zipfile.ZipFile, entry: CatalogEntry) -> list[trimesh.Trimesh]
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     try:
         data = file.read(entry.path)
-        resolver = ZipResolver({name: file.read(name) for name in _beside(file, folder)}, namespace=folder)
-        loaded = trimesh.load(io.BytesIO(data), file_type="obj", resolver=resolver, process=False, group_material=True)
+        resolver = ZipResolver(
+            {name: file.read(name) for name in _beside(file, folder)}, namespace=folder
+        )
+        loaded = trimesh.load(
+            io.BytesIO(data), file_type="obj", resolver=resolver, process=False, group_material=True
+        )
     except Exception as error:
         raise InputError(f"it cannot be read ({type(error).__name__}: {error})") from error
     meshes = list(loaded.geometry.values()) if isinstance(loaded, trimesh.Scene) else [loaded]
@@ -92,7 +104,11 @@ def _pieces(file: zipfile.ZipFile, entry: CatalogEntry) -> list[trimesh.Trimesh]
 
 
 def _beside(file: zipfile.ZipFile, folder: str) -> list[str]:
-    return [name for name in file.namelist() if name.startswith(f"{folder}/") and not name.endswith(("/", ".obj"))]
+    return [
+        name
+        for name in file.namelist()
+        if name.startswith(f"{folder}/") and not name.endswith(("/", ".obj"))
+    ]
 
 
 def _material(
@@ -101,7 +117,8 @@ def _material(
     """(look, opacity [h, w] in [0, 1] where the picture is transparent anywhere); adds to `pictures`."""
     material: Any = getattr(piece.visual, "material", None)
     mtl = dict(getattr(material, "kwargs", None) or {})
-    image, uv = getattr(material, "image", None), getattr(piece.visual, "uv", None)
+    image = getattr(material, "image", None)
+    uv = getattr(piece.visual, "uv", None)
     name = str(getattr(material, "name", "") or "")
     if image is None or uv is None:
         return catalog_look(name, mtl, "", None), None
@@ -109,7 +126,9 @@ def _material(
     small.thumbnail((s.picture, s.picture), Image.Resampling.BOX)
     pixels = np.asarray(small)
     key = f"{entry.key}-{len(pictures)}"
-    same = next((k for k, known in pictures.items() if np.array_equal(known, pixels[..., :3])), None)
+    same = next(
+        (k for k, known in pictures.items() if np.array_equal(known, pixels[..., :3])), None
+    )
     pictures[same or key] = np.ascontiguousarray(pixels[..., :3])
     opacity = pixels[..., 3] / 255.0
     linear = (pixels[..., :3][opacity > 0.5] / 255.0) ** 2.2
@@ -119,7 +138,8 @@ def _material(
 
 def _solid(piece: trimesh.Trimesh, s: ReadingSettings) -> Solid:
     """The faces of a piece; texture coordinates as in the file, 0 where it has none."""
-    vertices, faces = np.asarray(piece.vertices, float), np.asarray(piece.faces, np.int32)
+    vertices = np.asarray(piece.vertices, float)
+    faces = np.asarray(piece.faces, np.int32)
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
     faces = faces[area > 1e-14 * max(float(np.ptp(vertices, axis=0).max()), 1e-9) ** 2]
     found = getattr(piece.visual, "uv", None)
@@ -128,18 +148,21 @@ def _solid(piece: trimesh.Trimesh, s: ReadingSettings) -> Solid:
         normals = unit(np.nan_to_num(np.asarray(piece.vertex_normals, float)))
     else:
         source, faces, normals = creased(vertices, faces, s.crease)
-        vertices, uv = vertices[source], None if uv is None else uv[source]
+        vertices = vertices[source]
+        uv = None if uv is None else uv[source]
     return Solid(vertices, faces, normals, np.zeros((len(vertices), 2)) if uv is None else uv)
 
 
 def from_the_sides(solid: Solid) -> Solid:
     """The solid with texture coordinates in metres, on each face along the axis that it faces most."""
-    vertices, faces = solid.vertices, solid.faces
+    vertices = solid.vertices
+    faces = solid.faces
     axis = np.abs(face_normals(vertices, faces)).argmax(-1)
     _, group = np.unique(faces.astype(np.int64) * 3 + axis[:, None], return_inverse=True)
     group = group.reshape(-1, 3)
     count = int(group.max(initial=-1)) + 1
-    source, facing = np.zeros(count, int), np.zeros(count, int)
+    source = np.zeros(count, int)
+    facing = np.zeros(count, int)
     source[group], facing[group] = faces, axis[:, None]
     other = np.array([[2, 1], [0, 2], [0, 1]])[facing]
     uv = np.take_along_axis(vertices[source], other, -1)
@@ -152,7 +175,8 @@ def _without_holes(solid: Solid, opacity: Array) -> tuple[Solid, float]:
     weights = np.random.default_rng(0).dirichlet((1, 1, 1), 24)
     place = np.einsum("kc,fcx->fkx", weights, corners) % 1
     h, w = opacity.shape
-    column, row = (place[..., 0] * w).astype(int).clip(0, w - 1), ((1 - place[..., 1]) * h).astype(int).clip(0, h - 1)
+    column = (place[..., 0] * w).astype(int).clip(0, w - 1)
+    row = ((1 - place[..., 1]) * h).astype(int).clip(0, h - 1)
     share = (opacity[row, column] > 0.5).mean(1)
     area = np.linalg.norm(face_normals(solid.vertices, solid.faces), axis=-1) / 2
     mixed = (share > 0.08) & (share < 0.92)
@@ -167,11 +191,17 @@ def _lighter(solids: list[Solid], s: ReadingSettings) -> list[Solid]:
 def _fitted(solids: list[Solid], entry: CatalogEntry) -> list[Solid]:
     """The solids turned and stretched to the size of the entry."""
     turn = np.array(entry.turn).reshape(3, 3) if len(entry.turn) == 9 else np.eye(3)
-    solids = [replace(one, vertices=one.vertices @ turn.T, normals=one.normals @ turn.T) for one in solids]
+    solids = [
+        replace(one, vertices=one.vertices @ turn.T, normals=one.normals @ turn.T) for one in solids
+    ]
     used = joined(solids)
     corners = used.vertices[used.faces.ravel()]
-    low, high = corners.min(0), corners.max(0)
+    low = corners.min(0)
+    high = corners.max(0)
     scale = np.array(entry.size) / np.maximum(high - low, 1e-9)
     scale = np.where(high - low < 1e-6 * (high - low).max(), np.median(scale), scale)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    return [replace(one, vertices=(one.vertices - base) * scale, normals=unit(one.normals / scale)) for one in solids]
+    return [
+        replace(one, vertices=(one.vertices - base) * scale, normals=unit(one.normals / scale))
+        for one in solids
+    ]

@@ -20,9 +20,22 @@ NAMES: tuple[tuple[str, str], ...] = (
 )
 _NAMES = tuple((role, re.compile(pattern, re.IGNORECASE)) for role, pattern in NAMES)
 ROLES = (
-    "chair", "sofa", "bed", "rug", "table", "shelf", "storage", "lamp", "small", "thing", "wall", "ceiling", "outdoor",
-    "vehicle", "person",
-)  # fmt: skip
+    "chair",
+    "sofa",
+    "bed",
+    "rug",
+    "table",
+    "shelf",
+    "storage",
+    "lamp",
+    "small",
+    "thing",
+    "wall",
+    "ceiling",
+    "outdoor",
+    "vehicle",
+    "person",
+)
 """Storage: what stands by walls. Small: things on tables. Thing: things on floors."""
 
 

@@ -37,10 +37,13 @@ def level_places(solids: list[Solid]) -> list[LevelPlace]:
     if not len(centres):
         return []
     order = np.argsort(centres)
-    centres, areas, corners = centres[order], areas[order], corners[order]
+    centres = centres[order]
+    areas = areas[order]
+    corners = corners[order]
     groups = np.split(np.arange(len(centres)), np.flatnonzero(np.diff(centres) > STEP) + 1)
     everything = np.concatenate([solid.vertices[solid.faces] for solid in solids])
-    low, high = everything.min(1), everything.max(1)
+    low = everything.min(1)
+    high = everything.max(1)
     found = [_place(corners[g], areas[g]) for g in groups]
     return [_with_clearance(place, low, high) for place in found if place is not None]
 
@@ -65,7 +68,8 @@ def _place(corners: Array, areas: Array) -> LevelPlace | None:
         return None
     # A few far faces must not stretch it: the outermost hundredth of the area is left out.
     middle = corners.mean(1)
-    low, high = corners[..., [0, 2]].min((0, 1)), corners[..., [0, 2]].max((0, 1))
+    low = corners[..., [0, 2]].min((0, 1))
+    high = corners[..., [0, 2]].max((0, 1))
     if areas.sum() / max(np.prod(high - low), 1e-9) < FILLED or (high - low).min() < LEAST_SIDE:
         return None
     height = float(np.average(middle[:, 1], weights=areas))

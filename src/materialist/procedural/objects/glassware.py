@@ -40,7 +40,8 @@ def make_shape(index: int, split: str = "train", seed: int = 0) -> Shape:
 
 def centred(solid: Solid) -> Solid:
     """The solid about the origin, its longest side 1."""
-    low, high = solid.vertices.min(0), solid.vertices.max(0)
+    low = solid.vertices.min(0)
+    high = solid.vertices.max(0)
     return replace(solid, vertices=(solid.vertices - (low + high) / 2) / (high - low).max())
 
 
@@ -61,8 +62,11 @@ def _body(rng: np.random.Generator) -> Solid:
     """Solid of revolution: balusters, chess men, drops, bulbs; some with round ends."""
     outline = _profile(rng, int(rng.integers(1, 7)), 0.12)
     if rng.random() < 0.6:
-        t, ends = outline[:, 1], rng.uniform(0.02, 0.5, 2)
-        outline[:, 0] *= np.sqrt(np.clip(t / ends[0], 0, 1) * np.clip((1 - t) / ends[1], 0, 1)) + 1e-3
+        t = outline[:, 1]
+        ends = rng.uniform(0.02, 0.5, 2)
+        outline[:, 0] *= (
+            np.sqrt(np.clip(t / ends[0], 0, 1) * np.clip((1 - t) / ends[1], 0, 1)) + 1e-3
+        )
     return _turned(outline)
 
 
@@ -92,20 +96,28 @@ def _cup(rng: np.random.Generator) -> Solid:
 def _mug(rng: np.random.Generator) -> Solid:
     """A cup with a handle: a bent tube that ends in the wall."""
     solid = _cup(rng)
-    width, t = np.abs(solid.vertices[:, 0]).max(), np.linspace(-1.3, 1.3, 24)
-    reach, high = width * rng.uniform(0.3, 0.6), rng.uniform(0.2, 0.35)
-    line = np.stack([width * 0.9 + reach * np.cos(t), rng.uniform(0.45, 0.55) + high * np.sin(t), 0 * t], -1)
+    width = np.abs(solid.vertices[:, 0]).max()
+    t = np.linspace(-1.3, 1.3, 24)
+    reach = width * rng.uniform(0.3, 0.6)
+    high = rng.uniform(0.2, 0.35)
+    line = np.stack(
+        [width * 0.9 + reach * np.cos(t), rng.uniform(0.45, 0.55) + high * np.sin(t), 0 * t], -1
+    )
     return shapes.joined([solid, shapes.tube(line, width * rng.uniform(0.06, 0.14), 12)])
 
 
 def _goblet(rng: np.random.Generator) -> Solid:
     """Foot, stem and bowl."""
-    foot, stem, bowl, rise, wall = rng.uniform([0.2, 0.025, 0.2, 0.3, 0.015], [0.32, 0.06, 0.38, 0.55, 0.04])
+    foot, stem, bowl, rise, wall = rng.uniform(
+        [0.2, 0.025, 0.2, 0.3, 0.015], [0.32, 0.06, 0.38, 0.55, 0.04]
+    )
     y = np.linspace(0, 1, 24)
     curve = np.sin(np.pi / 2 * np.clip(y * rng.uniform(1.0, 1.4), 0, 1.35)) ** rng.uniform(0.5, 0.9)
     cup = np.stack([np.maximum(bowl * curve, stem), rise + (1 - rise) * y], -1)
     outline = [[foot, 0], [foot, 0.02], [stem * 1.5, 0.06], [stem, 0.12], [stem, rise - 0.03]]
-    return _turned(np.concatenate([outline, cup, np.maximum(cup[6:][::-1] - [wall, 0], [0.005, 0])]))
+    return _turned(
+        np.concatenate([outline, cup, np.maximum(cup[6:][::-1] - [wall, 0], [0.005, 0])])
+    )
 
 
 def _bottle(rng: np.random.Generator) -> Solid:
@@ -119,11 +131,15 @@ def _bottle(rng: np.random.Generator) -> Solid:
     keep = (y > wall) & (y < 1 - wall) & (radius > 1.3 * wall)
     inside = _turned(np.stack([radius - wall, y], -1)[keep])
     outside = _turned(np.stack([radius, y], -1))
-    return shapes.joined([outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)])
+    return shapes.joined(
+        [outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)]
+    )
 
 
 def _superquadric(rng: np.random.Generator) -> Solid:
-    return shapes.superquadric(rng.uniform(0.35, 1, 3), rng.uniform(0.15, 1.6), rng.uniform(0.15, 1.6), 36)
+    return shapes.superquadric(
+        rng.uniform(0.35, 1, 3), rng.uniform(0.15, 1.6), rng.uniform(0.15, 1.6), 36
+    )
 
 
 def _box(rng: np.random.Generator) -> Solid:
@@ -133,13 +149,18 @@ def _box(rng: np.random.Generator) -> Solid:
 
 def _frustum(rng: np.random.Generator) -> Solid:
     """Pyramids, cones, prisms and what is left of them when the top is cut off, upright or on their heads."""
-    low, high, deep = rng.uniform(0.25, 0.7), rng.choice([1e-2, rng.uniform(0.05, 0.7)]), rng.uniform(0.4, 1)
+    low = rng.uniform(0.25, 0.7)
+    high = rng.choice([1e-2, rng.uniform(0.05, 0.7)])
+    deep = rng.uniform(0.4, 1)
     profile = np.array([(1e-3, 0), (low, 0), (high, 1), (1e-3, 1)])
     solid = shapes.lathe(profile, int(rng.choice([3, 4, 4, 5, 6, 48])))
     vertices = solid.vertices * [1, 1, deep]
-    corners, flat = vertices[solid.faces], unit(shapes.face_normals(vertices, solid.faces))
+    corners = vertices[solid.faces]
+    flat = unit(shapes.face_normals(vertices, solid.faces))
     own = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
-    return Solid(corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2)))
+    return Solid(
+        corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2))
+    )
 
 
 def _blob(rng: np.random.Generator) -> Solid:
@@ -160,8 +181,10 @@ def _twisted(rng: np.random.Generator) -> Solid:
     twist, bend, taper = rng.uniform([-3, -0.5, -0.6], [3, 0.5, 0.6])
 
     def warp(p: Array) -> Array:
-        angle, scale = twist * p[:, 1], 1 + taper * (p[:, 1] - 0.5)
-        x, z = (p[:, 0] * np.cos(angle) - p[:, 2] * np.sin(angle), p[:, 0] * np.sin(angle) + p[:, 2] * np.cos(angle))
+        angle = twist * p[:, 1]
+        scale = 1 + taper * (p[:, 1] - 0.5)
+        x = p[:, 0] * np.cos(angle) - p[:, 2] * np.sin(angle)
+        z = p[:, 0] * np.sin(angle) + p[:, 2] * np.cos(angle)
         return np.stack([x * scale + bend * p[:, 1] ** 2, p[:, 1], z * scale], -1)
 
     return shapes.warped(solid, warp)
@@ -169,7 +192,8 @@ def _twisted(rng: np.random.Generator) -> Solid:
 
 def _stick(rng: np.random.Generator) -> Solid:
     """Bars, tubes, cones, hooks: round along a bent line."""
-    t, knots = np.linspace(0, 1, 28), np.linspace(0, 1, 4)
+    t = np.linspace(0, 1, 28)
+    knots = np.linspace(0, 1, 4)
     line = CubicSpline(knots, np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0))(t)
     radius = np.interp(t, [0, rng.uniform(0.2, 0.8), 1], rng.uniform(0.06, 0.3, 3))
     radius[[0, -1]] = 1e-3
@@ -186,14 +210,19 @@ def creature(rng: np.random.Generator) -> Solid:
         head = rng.uniform(0.08, 0.2)
         limbs += [(0.5 * neck, neck, 0.7 * head, 0.8 * head), (neck, neck * 1.1, head, head)]
         ear = neck + head * rng.uniform([0.4, 0.5, -0.4], [1.2, 2.2, 0.4])
-        limbs += [(neck, ear * [side, 1, 1], 0.3 * head, 0.15 * head) for side in (-1, 1) if rng.random() < 0.5]
+        limbs += [
+            (neck, ear * [side, 1, 1], 0.3 * head, 0.15 * head)
+            for side in (-1, 1)
+            if rng.random() < 0.5
+        ]
     for _ in range(int(rng.integers(1, 5))):
         start = rng.uniform([0, -0.8, -0.8], 0.8) * build
         end = start + rng.uniform([0.0, -0.45, -0.3], [0.35, 0.25, 0.35])
         first, last = rng.uniform(0.03, 0.11, 2)
         sides = (-1, 1) if rng.random() < 0.75 else (1,)
         limbs += [(start * [side, 1, 1], end * [side, 1, 1], first, last) for side in sides]
-    melt, skin = rng.uniform(0.015, 0.07), shapes.lumps(rng, rng.uniform(0, 0.018), rng.uniform(2, 8))
+    melt = rng.uniform(0.015, 0.07)
+    skin = shapes.lumps(rng, rng.uniform(0, 0.018), rng.uniform(2, 8))
     foot = -build[1] - rng.uniform(0, 0.1)
 
     def field(p: Array) -> Array:
@@ -220,16 +249,32 @@ def level_set(field: Callable[[Array], Array], reach: float, points: int = 72) -
     values = field(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1))
     closed = np.pad(values[1:-1, 1:-1, 1:-1], 1, constant_values=1e-3)
     vertices, faces, *_ = marching_cubes(closed, 0.0, spacing=(axis[1] - axis[0],) * 3)
-    vertices, faces = vertices.astype(np.float64) - reach, faces.astype(np.int32)
+    vertices = vertices.astype(np.float64) - reach
+    faces = faces.astype(np.int32)
     return Solid(vertices, faces, shapes.smooth_normals(vertices, faces), vertices[:, :2].copy())
 
 
 _KINDS: tuple[tuple[Callable[[np.random.Generator], Solid], bool, bool], ...] = (
-    (_body, False, True), (_vase, True, True), (_superquadric, False, False), (creature, False, True),
-    (_cup, True, True), (_blob, False, True), (_bottle, True, True), (_twisted, False, False), (_box, False, False),
-    (_mug, True, True), (_goblet, True, True), (creature, False, False), (_body, False, True), (_ring, False, False),
-    (_stick, False, False), (_blob, False, False), (creature, False, True), (creature, False, False),
-    (_vase, True, True), (_frustum, False, True),
-)  # fmt: skip
+    (_body, False, True),
+    (_vase, True, True),
+    (_superquadric, False, False),
+    (creature, False, True),
+    (_cup, True, True),
+    (_blob, False, True),
+    (_bottle, True, True),
+    (_twisted, False, False),
+    (_box, False, False),
+    (_mug, True, True),
+    (_goblet, True, True),
+    (creature, False, False),
+    (_body, False, True),
+    (_ring, False, False),
+    (_stick, False, False),
+    (_blob, False, False),
+    (creature, False, True),
+    (creature, False, False),
+    (_vase, True, True),
+    (_frustum, False, True),
+)
 """What makes a shape, whether the shape is hollow, and whether it stands."""
 KINDS = len(_KINDS)

@@ -27,7 +27,8 @@ def box(size: Array) -> Solid:
     """Sharp box of extent `size` [3] standing on y = 0; the texture covers each side once."""
     sides = []
     for axis in range(3):
-        u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+        u = np.eye(3)[(axis + 1) % 3]
+        v = np.eye(3)[(axis + 2) % 3]
         for sign in (-1, 1):
             corner = (sign * (np.eye(3)[axis] - u) - v) / 2
             sides.append(panel(corner * size, sign * u * size, v * size, (1, 1)))
@@ -36,7 +37,10 @@ def box(size: Array) -> Solid:
 
 def superquadric(size: Array, e1: float, e2: float, n: int = 64) -> Solid:
     """Superellipsoid of extent `size` [3]: exponents 1 are an ellipsoid, towards 0 a box, (0.1, 1) a cylinder."""
-    power = lambda x, e: np.sign(x) * np.abs(x) ** e  # noqa: E731
+
+    def power(x, e):
+        return np.sign(x) * np.abs(x) ** e
+
     # Samples bunch up at the corners of small exponents when the angle is spaced evenly: space them by the exponent.
     t = np.linspace(-1, 1, n + 1)
     eta = (np.pi / 2 * power(t, 1 / max(e1, 0.3) if e1 < 1 else 1))[:, None]
@@ -51,8 +55,11 @@ def superquadric(size: Array, e1: float, e2: float, n: int = 64) -> Solid:
 def lathe(profile: Array, n: int = 96) -> Solid:
     """Surface of revolution of a profile [P, 2] (radius, height), walked upwards on the outside, y up."""
     phi = np.linspace(0, 2 * np.pi, n + 1)
-    radius, height = profile[:, :1], profile[:, 1:]
-    return _grid(np.stack(np.broadcast_arrays(radius * np.cos(phi), height, radius * np.sin(phi)), axis=-1))
+    radius = profile[:, :1]
+    height = profile[:, 1:]
+    return _grid(
+        np.stack(np.broadcast_arrays(radius * np.cos(phi), height, radius * np.sin(phi)), axis=-1)
+    )
 
 
 def capsule(radius: float, length: float) -> Solid:
@@ -70,7 +77,10 @@ def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Sol
     inner = np.maximum(radius - thickness, np.minimum(0.02, radius / 2))
     keep = height > thickness
     t = np.linspace(0, np.pi, 8)[1:-1, None]
-    rim = np.concatenate([np.cos(t), np.sin(t)], -1) * thickness / 2 + [radius[-1] - thickness / 2, height[-1]]
+    rim = np.concatenate([np.cos(t), np.sin(t)], -1) * thickness / 2 + [
+        radius[-1] - thickness / 2,
+        height[-1],
+    ]
     outside = np.stack([radius, height], -1)
     inside = np.stack([inner, height], -1)[keep][::-1]
     bottom = np.stack([np.linspace(0, radius[0], 6), np.zeros(6)], -1)[:-1]
@@ -97,11 +107,18 @@ def load(path: Path) -> Solid:
         faces = np.array(params["faces"], np.int32).reshape(-1, 3)
         used = vertices[faces]
     except (RuntimeError, LookupError, ValueError) as error:
-        raise InputError(f"The mesh {path} cannot be read; mend it, or take it out of the folder.") from error
+        raise InputError(
+            f"The mesh {path} cannot be read; mend it, or take it out of the folder."
+        ) from error
     if not len(faces) or not 0 < np.ptp(used, axis=(0, 1)).max() < np.inf:
-        raise InputError(f"The mesh {path} has no faces, or no size; mend it, or take it out of the folder.")
-    low, high = vertices.min(0), vertices.max(0)
-    vertices = (vertices - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) / (high - low).max()
+        raise InputError(
+            f"The mesh {path} has no faces, or no size; mend it, or take it out of the folder."
+        )
+    low = vertices.min(0)
+    high = vertices.max(0)
+    vertices = (vertices - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) / (
+        high - low
+    ).max()
     normals = _exact_normals(vertices, faces)
     # Each face gets corners of its own, so that the texture can close around the axis without a seam.
     corners = vertices[faces]  # [F, 3, 3]
@@ -112,7 +129,9 @@ def load(path: Path) -> Solid:
     return Solid(corners.reshape(-1, 3), own, normals[faces].reshape(-1, 3), uv)
 
 
-def placed(solid: Solid, *, scale: float = 1.0, turn: float = 0.0, at: tuple[float, float] = (0.0, 0.0)) -> Solid:
+def placed(
+    solid: Solid, *, scale: float = 1.0, turn: float = 0.0, at: tuple[float, float] = (0.0, 0.0)
+) -> Solid:
     """The solid as `moved` to (x, z) on the ground, its texture as many times on it as before."""
     return replace(moved(solid, (at[0], 0, at[1]), turn, scale=scale), uv=solid.uv)
 
@@ -125,14 +144,21 @@ def _grid(points: Array) -> Solid:
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
     faces = faces[area > 1e-12]  # the triangles at poles that have no area
     u, v = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n))
-    return Solid(vertices, faces, _exact_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2))
+    return Solid(
+        vertices, faces, _exact_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2)
+    )
 
 
 def grid_faces(n: int, m: int, flip: bool = False) -> Array:
     """[2 (n - 1)(m - 1), 3] int32 triangles of an n x m grid of vertices, rows along the first axis."""
     index = np.arange(n * m).reshape(n, m)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    a = index[:-1, :-1]
+    b = index[1:, :-1]
+    c = index[1:, 1:]
+    d = index[:-1, 1:]
+    faces = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
     return (faces[:, ::-1] if flip else faces).astype(np.int32)
 
 
@@ -145,8 +171,11 @@ def face_normals(vertices: Array, faces: Array) -> Array:
 def _exact_normals(vertices: Array, faces: Array) -> Array:
     """[V, 3] area-weighted unit normals, shared by vertices at one place (seams and poles stay invisible)."""
     scale = np.ptp(vertices, axis=0).max()
-    _, place = np.unique(np.round(vertices / scale * 1e6).astype(np.int64), axis=0, return_inverse=True)
-    flat, corners = np.tile(face_normals(vertices, faces), (3, 1)), place.reshape(-1)[faces].T.ravel()
+    _, place = np.unique(
+        np.round(vertices / scale * 1e6).astype(np.int64), axis=0, return_inverse=True
+    )
+    flat = np.tile(face_normals(vertices, faces), (3, 1))
+    corners = place.reshape(-1)[faces].T.ravel()
     return vertex_normals(corners, flat)[place.reshape(-1)]
 
 
@@ -176,26 +205,40 @@ def slab(size: ArrayLike, radius: float = 0.0) -> Solid:
             mirrored = np.linalg.det(np.eye(3)[[u, v, axis]]) * sign < 0
             uv = np.stack([a, b], -1).reshape(-1, 2)
             sides.append(
-                Solid(inner.reshape(-1, 3) + radius * normal, grid_faces(len(a), a.shape[1], mirrored), normal, uv)
+                Solid(
+                    inner.reshape(-1, 3) + radius * normal,
+                    grid_faces(len(a), a.shape[1], mirrored),
+                    normal,
+                    uv,
+                )
             )
     return moved(joined(sides), (0, half[1], 0))
 
 
 def sheet(origin: ArrayLike, right: ArrayLike, up: ArrayLike, n: int = 1) -> Solid:
     """Rectangle from `origin` along `right` and `up` (all [3], metres), facing right x up, in n x n pieces."""
-    right, up, t = np.asarray(right, float), np.asarray(up, float), np.linspace(0, 1, n + 1)
+    right = np.asarray(right, float)
+    up = np.asarray(up, float)
+    t = np.linspace(0, 1, n + 1)
     a, b = np.meshgrid(t, t, indexing="ij")
     vertices = np.asarray(origin) + a[..., None] * right + b[..., None] * up
     normal = np.cross(right, up)
     normal = np.broadcast_to(normal / np.linalg.norm(normal), vertices.shape)
     uv = np.stack([a * np.linalg.norm(right), b * np.linalg.norm(up)], -1)
-    return Solid(vertices.reshape(-1, 3), grid_faces(n + 1, n + 1), normal.reshape(-1, 3).copy(), uv.reshape(-1, 2))
+    return Solid(
+        vertices.reshape(-1, 3),
+        grid_faces(n + 1, n + 1),
+        normal.reshape(-1, 3).copy(),
+        uv.reshape(-1, 2),
+    )
 
 
 def warped(solid: Solid, function) -> Solid:
     """The solid with its vertices [V, 3] sent through `function`, and new smooth normals."""
     vertices = function(solid.vertices)
-    return replace(solid, vertices=vertices, normals=smooth_normals(vertices, solid.faces, solid.vertices))
+    return replace(
+        solid, vertices=vertices, normals=smooth_normals(vertices, solid.faces, solid.vertices)
+    )
 
 
 def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -> Array:
@@ -207,13 +250,16 @@ def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -
     scale = max(float(np.ptp(places, axis=0).max()), 1e-9)
     keys = np.round(places / scale * 1e5).astype(np.int64) @ np.array([1, 2**21, 2**42])
     _, place = np.unique(keys, return_inverse=True)
-    return vertex_normals(place[faces].ravel(), np.repeat(face_normals(vertices, faces), 3, axis=0))[place]
+    return vertex_normals(
+        place[faces].ravel(), np.repeat(face_normals(vertices, faces), 3, axis=0)
+    )[place]
 
 
 def lumps(rng: np.random.Generator, amount: float, waves: float, count: int = 6):
     """A function [..., 3] -> [...] of smooth noise with about that amplitude and that many waves a metre."""
     wave = rng.normal(size=(count, 3)) * waves * 2 * np.pi / np.sqrt(3)
-    phase, weight = rng.uniform(0, 2 * np.pi, count), rng.uniform(0.4, 1, count) * amount / np.sqrt(count)
+    phase = rng.uniform(0, 2 * np.pi, count)
+    weight = rng.uniform(0.4, 1, count) * amount / np.sqrt(count)
     return lambda p: np.sin(p @ wave.T + phase) @ weight
 
 
@@ -226,7 +272,8 @@ def ball(n: int = 48) -> Solid:
 
 def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 48) -> Solid:
     """Smooth lumpy body of about extent `size` [3] standing on y = 0: stones, fruit, bread, bushes."""
-    bump, fine = lumps(rng, roughness, 0.35), lumps(rng, roughness * 0.35, 1.2)
+    bump = lumps(rng, roughness, 0.35)
+    fine = lumps(rng, roughness * 0.35, 1.2)
     half = np.asarray(size, float) / 2
     body = warped(ball(n), lambda p: p * (1 + bump(p) + fine(p))[..., None] * half)
     return grounded(replace(body, uv=body.uv * half.mean()))
@@ -234,7 +281,8 @@ def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 4
 
 def pot(control: Array, thickness: float) -> Solid:
     """`vessel` with an eighth of its faces; texture coordinates in metres."""
-    radius, height = control[:, 0].mean(), control[-1, 1]
+    radius = control[:, 0].mean()
+    height = control[-1, 1]
     return metric(vessel(control, thickness, rows=18, n=40), np.pi * radius, 2 * height)
 
 
@@ -246,7 +294,9 @@ def disc(radius: float) -> Solid:
 def drum(radius: float, height: float, top: float | None = None) -> Solid:
     """A cylinder about the Y axis, its middle at the origin; or a cone, whose upper radius is `top`."""
     h = height / 2
-    return lathe(np.array([(1e-3, -h), (radius, -h), (radius if top is None else top, h), (1e-3, h)]), 24)
+    return lathe(
+        np.array([(1e-3, -h), (radius, -h), (radius if top is None else top, h), (1e-3, h)]), 24
+    )
 
 
 def torus(major: float, minor: float, n: int) -> Solid:
@@ -280,7 +330,9 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     """Round tube along points [P, 3] with one radius or [P] radii; open ends."""
     line = np.asarray(points, float)
     along = unit(np.gradient(line, axis=0))
-    side = unit(np.cross(along, np.where(np.abs(along[:, 1:2]) > 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]])))
+    side = unit(
+        np.cross(along, np.where(np.abs(along[:, 1:2]) > 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]]))
+    )
     other = np.cross(along, side)
     phi = np.linspace(0, 2 * np.pi, n + 1)[None, :, None]
     normal = np.cos(phi) * side[:, None] + np.sin(phi) * other[:, None]
@@ -292,7 +344,9 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
 
-def leaves(rng: np.random.Generator, roots: Array, directions: Array, length: float, width: float) -> Solid:
+def leaves(
+    rng: np.random.Generator, roots: Array, directions: Array, length: float, width: float
+) -> Solid:
     """Bent leaves of six triangles each, from roots [N, 3] along unit directions [N, 3]."""
     n = len(roots)
     directions = unit(directions)
@@ -301,27 +355,50 @@ def leaves(rng: np.random.Generator, roots: Array, directions: Array, length: fl
     rows = []
     for t, w in ((0.0, 0.1), (0.35, 1.0), (0.7, 0.8), (1.0, 0.05)):
         spine = roots + directions * size * t + np.array([0, -1, 0]) * size * 0.35 * t * t
-        rows += [spine - side * width / 2 * w * size / length, spine + side * width / 2 * w * size / length]
+        rows += [
+            spine - side * width / 2 * w * size / length,
+            spine + side * width / 2 * w * size / length,
+        ]
     vertices = np.stack(rows, 1)  # [N, 8, 3]
     one = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
     faces = (one[None] + 8 * np.arange(n)[:, None, None]).reshape(-1, 3).astype(np.int32)
     flat = vertices.reshape(-1, 3)
-    uv = np.tile(np.stack([np.tile([0, width], 4), np.repeat([0, 0.35, 0.7, 1], 2) * length], -1), (n, 1))
-    return Solid(flat, faces, smooth_normals(flat, faces, flat + np.repeat(np.arange(n), 8)[:, None] * 1e3), uv)
+    uv = np.tile(
+        np.stack([np.tile([0, width], 4), np.repeat([0, 0.35, 0.7, 1], 2) * length], -1), (n, 1)
+    )
+    return Solid(
+        flat,
+        faces,
+        smooth_normals(flat, faces, flat + np.repeat(np.arange(n), 8)[:, None] * 1e3),
+        uv,
+    )
 
 
 def joined(parts: list[Solid]) -> Solid:
     """Several solids as one."""
     vertices, faces = joined_faces(parts)
-    normals, uv = (np.concatenate([getattr(part, name) for part in parts]) for name in ("normals", "uv"))
+    normals, uv = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("normals", "uv")
+    )
     return Solid(vertices, faces, normals, uv)
 
 
 def moved(
-    solid: Solid, at: ArrayLike = (0.0, 0.0, 0.0), turn: float = 0.0, tip: float = 0.0, scale: float = 1.0
+    solid: Solid,
+    at: ArrayLike = (0.0, 0.0, 0.0),
+    turn: float = 0.0,
+    tip: float = 0.0,
+    scale: float = 1.0,
 ) -> Solid:
     """The solid scaled, tipped about X, turned about Y (radians) and moved by `at` [3]."""
-    c, s, ct, st = np.cos(turn), np.sin(turn), np.cos(tip), np.sin(tip)
-    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array([[1, 0, 0], [0, ct, -st], [0, st, ct]])
+    c = np.cos(turn)
+    s = np.sin(turn)
+    ct = np.cos(tip)
+    st = np.sin(tip)
+    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array(
+        [[1, 0, 0], [0, ct, -st], [0, st, ct]]
+    )
     vertices = solid.vertices @ rotation.T * scale + np.asarray(at, float)
-    return replace(solid, vertices=vertices, normals=solid.normals @ rotation.T, uv=solid.uv * scale)
+    return replace(
+        solid, vertices=vertices, normals=solid.normals @ rotation.T, uv=solid.uv * scale
+    )

@@ -12,11 +12,24 @@ from materialist.procedural.staged.stock import Stock
 from materialist.types import Array
 
 ROUGHNESS: dict[str, tuple[float, float]] = {
-    "mirror": (0.05, 0.06), "glass": (0.05, 0.15), "bulb": (0.2, 0.5), "cloth": (0.65, 1.0), "leather": (0.3, 0.6),
-    "paint": (0.12, 0.55), "metal": (0.1, 0.45), "wood": (0.2, 0.75), "ceramic": (0.06, 0.4), "leaf": (0.3, 0.65),
-    "skin": (0.4, 0.65), "rubber": (0.5, 0.9), "stone": (0.25, 0.95), "paper": (0.45, 0.95), "plastic": (0.12, 0.6),
-    "screen": (0.06, 0.3), "other": (0.2, 0.7),
-}  # fmt: skip
+    "mirror": (0.05, 0.06),
+    "glass": (0.05, 0.15),
+    "bulb": (0.2, 0.5),
+    "cloth": (0.65, 1.0),
+    "leather": (0.3, 0.6),
+    "paint": (0.12, 0.55),
+    "metal": (0.1, 0.45),
+    "wood": (0.2, 0.75),
+    "ceramic": (0.06, 0.4),
+    "leaf": (0.3, 0.65),
+    "skin": (0.4, 0.65),
+    "rubber": (0.5, 0.9),
+    "stone": (0.25, 0.95),
+    "paper": (0.45, 0.95),
+    "plastic": (0.12, 0.6),
+    "screen": (0.06, 0.3),
+    "other": (0.2, 0.7),
+}
 OUR_FINISHES: dict[str, tuple[m.Maker, ...]] = {
     "wood": (m.wood,),
     "cloth": (m.fabric, m.woven),
@@ -58,7 +71,7 @@ RELIEFS: dict[str, tuple[ReliefRange, ...]] = {
     "plastic": (ReliefRange(0.15, "grain", (0.01, 0.05), (0.04, 0.15)),),
     "paint": (ReliefRange(0.2, "grain rough", (0.02, 0.2), (0.03, 0.12)),),
     "other": (ReliefRange(0.2, "rough grain", (0.05, 0.4), (0.05, 0.2)),),
-}  # fmt: skip
+}
 
 
 def relief_of(rng: np.random.Generator, family: str, scale: float = 1.0) -> Relief | None:
@@ -89,11 +102,17 @@ class Style:
 def style(rng: np.random.Generator) -> Style:
     even = np.exp(rng.normal(0, 0.3)) if rng.random() < 0.6 else 1.0
     tint = np.exp(rng.normal(0, 0.25, 3)) if rng.random() < 0.3 else np.ones(3)
-    return Style(even * tint, rng.normal(0, 0.08), rng.random() < 0.6, rng.choice([0.0, 1.0], p=[0.3, 0.7]))
+    return Style(
+        even * tint, rng.normal(0, 0.08), rng.random() < 0.6, rng.choice([0.0, 1.0], p=[0.3, 0.7])
+    )
 
 
 def finish(
-    rng: np.random.Generator, look: CatalogLook, picture: ColourPicture | None, one: Style, stock: Stock
+    rng: np.random.Generator,
+    look: CatalogLook,
+    picture: ColourPicture | None,
+    one: Style,
+    stock: Stock,
 ) -> Material:
     """The material of one surface of a model."""
     family = look.family
@@ -109,7 +128,8 @@ def finish(
         made = _own(rng, family, stock)
         if made is not None:
             return replace(made, relief=relief)
-    metallic, colour = 0.0, np.clip(np.array(look.colour) * one.gain, 0.015, 0.85)
+    metallic = 0.0
+    colour = np.clip(np.array(look.colour) * one.gain, 0.015, 0.85)
     if family == "metal":
         metallic, colour = _metal(rng, colour)
     made = m.uniform(_triple(colour), rough, metallic, grain=rng.uniform(0, 0.15))
@@ -121,9 +141,15 @@ def pictured(picture: ColourPicture, gain: Array, rough: float, metallic: float 
     """A material whose picture lies by the texture coordinates of a model: v points up."""
     colour = _triple(np.clip(gain, 0.3, 1.4))
     return Material(
-        0, (colour,) * 3, 0.0, (rough, min(rough + 0.1, 1.0)), (metallic, metallic), repeat=(1.0, -1.0),
-        offset=(0.0, 0.0), picture=picture,
-    )  # fmt: skip
+        0,
+        (colour,) * 3,
+        0.0,
+        (rough, min(rough + 0.1, 1.0)),
+        (metallic, metallic),
+        repeat=(1.0, -1.0),
+        offset=(0.0, 0.0),
+        picture=picture,
+    )
 
 
 def covered(rng: np.random.Generator, picture: ColourPicture, size: float, family: str) -> Material:

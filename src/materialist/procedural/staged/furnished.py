@@ -11,10 +11,30 @@ from materialist.procedural.relief import Relief
 from materialist.procedural.staged.finishes import covered, pictured
 from materialist.procedural.staged.pieces import backdrop_of, furnished_piece, piece
 from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, ScenePart, World, block, bounds, moved, one_thing, placed
+from materialist.procedural.world import (
+    Parts,
+    ScenePart,
+    World,
+    block,
+    bounds,
+    moved,
+    one_thing,
+    placed,
+)
 from materialist.types import Array
 
-BY_WALLS = ("sofa", "storage", "storage", "shelf", "shelf", "table", "bed", "thing", "chair", "lamp")
+BY_WALLS = (
+    "sofa",
+    "storage",
+    "storage",
+    "shelf",
+    "shelf",
+    "table",
+    "bed",
+    "thing",
+    "chair",
+    "lamp",
+)
 """Roles of what stands by walls, one named twice as often."""
 IN_THE_MIDDLE = ("thing", "chair", "table", "person", "sofa")
 
@@ -29,11 +49,16 @@ def furnished_room(rng: np.random.Generator, stock: Stock) -> World:
         standing.add(placed(group, (x, 0, z), rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)))
     standing.along_walls(rng, some_pieces(rng, stock, int(rng.integers(7, 17)), BY_WALLS))
     standing.in_the_middle(rng, some_pieces(rng, stock, int(rng.integers(0, 5)), IN_THE_MIDDLE))
-    return furnished_world(rng, size, stock, standing.parts, rooms.view_of(rng, size, standing), "furnished")
+    return furnished_world(
+        rng, size, stock, standing.parts, rooms.view_of(rng, size, standing), "furnished"
+    )
 
 
 def some_pieces(
-    rng: np.random.Generator, stock: Stock, count: int, roles: tuple[str, ...] = ("sofa", "storage", "shelf", "thing")
+    rng: np.random.Generator,
+    stock: Stock,
+    count: int,
+    roles: tuple[str, ...] = ("sofa", "storage", "shelf", "thing"),
 ) -> list[Parts]:
     """That many models of the roles, with things on them."""
     clutter = rng.uniform(0, 8)
@@ -42,11 +67,21 @@ def some_pieces(
 
 
 def furnished_world(
-    rng: np.random.Generator, size: Array, stock: Stock, furniture: Parts, view: world.Viewpoint, kind: str
+    rng: np.random.Generator,
+    size: Array,
+    stock: Stock,
+    furniture: Parts,
+    view: world.Viewpoint,
+    kind: str,
 ) -> World:
     """The room around its furniture: walls, floor, windows, what hangs there, rugs and lamps."""
     parts, portals, envmap = rooms.shell(rng, size, stock.captures, _on_wall(stock))
-    parts = _recovered(rng, parts, stock) + furniture + _rug(rng, stock, size) + _from_ceiling(rng, stock, size)
+    parts = (
+        _recovered(rng, parts, stock)
+        + furniture
+        + _rug(rng, stock, size)
+        + _from_ceiling(rng, stock, size)
+    )
     parts += rooms.lamps(rng, size, portals, envmap)
     backdrop = None
     if portals and rng.random() < 0.5:  # the view through the windows
@@ -65,7 +100,8 @@ def _group(rng: np.random.Generator, stock: Stock) -> Parts:
     if chair is None:
         return parts
     one = piece(rng, chair, stock)
-    wide, deep = chair.entry.size[0], chair.entry.size[2]
+    wide = chair.entry.size[0]
+    deep = chair.entry.size[2]
     if height <= 0.6:
         return parts + placed(one, (0, 0, -depth / 2 - deep / 2 - 0.35))
     for side in (-1, 1):
@@ -85,15 +121,25 @@ def _copy(parts: Parts) -> Parts:
 
 def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
     """Walls, floor and ceiling with pictures of real surfaces on some, and relief on others."""
-    floor = stock.texture(rng, str(rng.choice(["wood", "wood", "stone"]))) if rng.random() < 0.55 else None
+    floor = (
+        stock.texture(rng, str(rng.choice(["wood", "wood", "stone"])))
+        if rng.random() < 0.55
+        else None
+    )
     wall = stock.texture(rng, "stone") if rng.random() < 0.1 else None
     paper = stock.repeating(rng) if wall is None and rng.random() < 0.1 else None
-    plaster = Relief("rough", (rng.uniform(0.1, 0.8),) * 3, rng.uniform(0.02, 0.12)) if rng.random() < 0.4 else None
+    plaster = (
+        Relief("rough", (rng.uniform(0.1, 0.8),) * 3, rng.uniform(0.02, 0.12))
+        if rng.random() < 0.4
+        else None
+    )
     on_floor = covered(rng, floor, rng.uniform(0.8, 2.0), "wood") if floor else None
     hanging = wall or paper
     on_wall = covered(rng, hanging, rng.uniform(0.5, 1.6), "paint") if hanging else None
     if on_wall:
-        on_wall = replace(on_wall, offset=tuple(rng.random(2).tolist()))  # one for all pieces of the walls
+        on_wall = replace(
+            on_wall, offset=tuple(rng.random(2).tolist())
+        )  # one for all pieces of the walls
     made = []
     for part in parts:
         flat = part.thing is None and len(part.solid.vertices) == 4
@@ -113,7 +159,8 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     if rng.random() < 0.5:
         return []
     model = stock.model(rng, "rug", high=3.0) if rng.random() < 0.4 else None
-    at, turn = (rng.normal() * 0.4, 0.002, rng.normal() * 0.5), rng.normal(0, 0.3)
+    at = (rng.normal() * 0.4, 0.002, rng.normal() * 0.5)
+    turn = rng.normal(0, 0.3)
     if model is not None:
         return placed(piece(rng, model, stock), at, turn)
     wide, deep = size[:2] * rng.uniform(0.3, 0.6, 2)
@@ -122,7 +169,9 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     if picture is not None:
         rug = replace(pictured(picture, np.ones(3), 0.9), repeat=(wide, deep), offset=(0.5, 0.5))
     fibre = Relief("grain", (0.12,) * 3, rng.uniform(0.1, 0.5))
-    return placed([block((wide, 0.012, deep), (0, 0, 0), replace(rug, relief=fibre), 0.004)], at, turn)
+    return placed(
+        [block((wide, 0.012, deep), (0, 0, 0), replace(rug, relief=fibre), 0.004)], at, turn
+    )
 
 
 def _on_wall(stock: Stock) -> rooms.Hangings:
@@ -159,7 +208,10 @@ def _from_ceiling(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     if model is None:
         return []
     at = rng.uniform(-0.25, 0.2, 2) * size[:2]
-    return placed(piece(rng, model, stock, lit=rng.random() < 0.7), (at[0], size[2] - model.entry.size[1], at[1]))
+    return placed(
+        piece(rng, model, stock, lit=rng.random() < 0.7),
+        (at[0], size[2] - model.entry.size[1], at[1]),
+    )
 
 
 def _photograph(rng: np.random.Generator, stock: Stock, at: float, width: float) -> Parts:
@@ -171,9 +223,14 @@ def _photograph(rng: np.random.Generator, stock: Stock, at: float, width: float)
     bottom = max(rng.uniform(1.3, 1.7) - height / 2, 0.7)
     left = at - width / 2
     print_ = replace(
-        pictured(picture, np.ones(3) * rng.uniform(0.8, 1.1), float(rng.choice([0.08, rng.uniform(0.3, 0.9)]))),
-        repeat=(width, -height), offset=(0.0, 0.0),
-    )  # fmt: skip
+        pictured(
+            picture,
+            np.ones(3) * rng.uniform(0.8, 1.1),
+            float(rng.choice([0.08, rng.uniform(0.3, 0.9)])),
+        ),
+        repeat=(width, -height),
+        offset=(0.0, 0.0),
+    )
     sheet = s.sheet((left, bottom, 0.014), (width, 0, 0), (0, height, 0))
     parts = [ScenePart(sheet, print_)]
     if rng.random() < 0.75:

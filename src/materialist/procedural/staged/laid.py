@@ -26,10 +26,14 @@ def laid_table(rng: np.random.Generator, stock: Stock) -> World:
     standing.along_walls(rng, some_pieces(rng, stock, int(rng.integers(1, 4))))
     if not at_wall:
         standing.in_the_middle(rng, some_pieces(rng, stock, int(rng.integers(0, 3)), ("chair",)))
-    middle = np.array([(place.left + place.right) / 2 + x, place.height, (place.back + place.front) / 2 + z])
+    middle = np.array(
+        [(place.left + place.right) / 2 + x, place.height, (place.back + place.front) / 2 + z]
+    )
     half = np.array([place.right - place.left, 0, place.front - place.back]) / 2
     target = middle + rng.uniform(-0.4, 0.4, 3) * half + [0, rng.uniform(0.0, 0.12), 0]
-    distance, up, turn, fov = rng.uniform([0.45, np.radians(6), -0.9, 22], [1.5, np.radians(58), 0.9, 58])
+    distance, up, turn, fov = rng.uniform(
+        [0.45, np.radians(6), -0.9, 22], [1.5, np.radians(58), 0.9, 58]
+    )
     w, d, h = size
     inside = np.array([[-w / 2 + 0.1, 0.15, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
     eye = np.clip(world.orbit(target, distance, turn, up, fov).position, *inside)
@@ -43,7 +47,11 @@ def _table(rng: np.random.Generator, stock: Stock) -> tuple[Parts, LevelPlace]:
     draw = rng.random()
     for _ in range(6 if draw < 0.75 else 0):
         model = stock.model(rng, "table", "table", "shelf", "storage", "storage")
-        places = [] if model is None else [p for p in model.places if p.height < 1.4 and p.clearance > 0.2]
+        places = (
+            []
+            if model is None
+            else [p for p in model.places if p.height < 1.4 and p.clearance > 0.2]
+        )
         if places and model is not None:
             areas = np.array([(p.right - p.left) * (p.front - p.back) for p in places])
             place = places[rng.choice(len(places), p=areas / areas.sum())]

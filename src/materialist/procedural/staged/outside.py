@@ -15,13 +15,24 @@ from materialist.procedural.world import Parts, ScenePart, World, bounds, look, 
 
 GROUND = 60.0
 """Metres to the edge of the ground."""
-THINGS = ("outdoor", "outdoor", "outdoor", "vehicle", "vehicle", "person", "person", "thing", "chair")
+THINGS = (
+    "outdoor",
+    "outdoor",
+    "outdoor",
+    "vehicle",
+    "vehicle",
+    "person",
+    "person",
+    "thing",
+    "chair",
+)
 
 
 def outside(rng: np.random.Generator, stock: Stock) -> World:
     """Things on open ground, at times before houses or a photograph, under a sky."""
     parts = [_ground(rng, stock)]
-    behind, at = rng.random(), -rng.uniform(6, 16)
+    behind = rng.random()
+    at = -rng.uniform(6, 16)
     if behind < 0.45:
         for x, house in houses(rng, -rng.uniform(6, 14), 14, 4):
             parts += placed(house, (x, 0, at + rng.normal() * 0.3))
@@ -58,7 +69,8 @@ def _standing(rng: np.random.Generator, stock: Stock, count: int, back: float) -
         low, high = bounds(one)
         radius = float(np.hypot(*(high - low)[[0, 2]]) / 2)
         for _ in range(10):
-            x, z = rng.uniform(-4.5, 4.5), rng.uniform(back + radius, max(3.0 - radius, back + radius))
+            x = rng.uniform(-4.5, 4.5)
+            z = rng.uniform(back + radius, max(3.0 - radius, back + radius))
             if all(np.hypot(x - a, z - b) > 0.8 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
                 parts += placed(one, (x, 0, z), rng.uniform(0, 2 * np.pi))

@@ -19,12 +19,16 @@ GLOW = (4.0, 60.0)
 """Radiance of what glows in a lamp, log-uniform; the light of a day is about 1."""
 
 
-def piece(rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: bool = False) -> Parts:
+def piece(
+    rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: bool = False
+) -> Parts:
     """A model as one thing at the origin, in materials of its own. lit: its lamps shine."""
     one = style(rng)
     finished: dict[tuple[object, ...], m.Material] = {}
     parts: Parts = []
-    glow = np.exp(rng.uniform(*np.log(GLOW))) * np.array([1.0, rng.uniform(0.6, 0.95), rng.uniform(0.3, 0.9)])
+    glow = np.exp(rng.uniform(*np.log(GLOW))) * np.array(
+        [1.0, rng.uniform(0.6, 0.95), rng.uniform(0.3, 0.9)]
+    )
     for solid, look, picture in zip(model.solids, model.looks, model.pictures):
         if look.family == "screen" and picture is None and rng.random() < 0.5:
             parts.append(ScenePart(solid, _screen(rng, solid, stock)))
@@ -32,18 +36,23 @@ def piece(rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: b
         key = (look, id(picture))
         if key not in finished:
             shines = lit and look.family == "bulb"
-            finished[key] = m.light(rng, tuple(glow)) if shines else finish(rng, look, picture, one, stock)
+            finished[key] = (
+                m.light(rng, tuple(glow)) if shines else finish(rng, look, picture, one, stock)
+            )
         parts.append(ScenePart(solid, finished[key]))
     if lit and not any(look.family == "bulb" for look in model.looks):
         width, _, depth = model.entry.size
         for x, y, z in model.entry.lights[:3]:
-            parts.append(orb((x - width / 2, y, z - depth / 2), 0.035, m.light(rng, tuple(3 * glow)), 12))
+            parts.append(
+                orb((x - width / 2, y, z - depth / 2), 0.035, m.light(rng, tuple(3 * glow)), 12)
+            )
     return one_thing(parts)
 
 
 def _screen(rng: np.random.Generator, solid: s.Solid, stock: Stock) -> m.Material:
     """A screen that shows a photograph, lit or printed, or is off."""
-    low, high = solid.uv.min(0), solid.uv.max(0)
+    low = solid.uv.min(0)
+    high = solid.uv.max(0)
     width, height = np.maximum(high - low, 1e-3)
     picture = stock.printed(rng, float(width / height)) if 0.3 < width / height < 3.5 else None
     if picture is None:
@@ -51,7 +60,9 @@ def _screen(rng: np.random.Generator, solid: s.Solid, stock: Stock) -> m.Materia
     shown = pictured(picture, np.ones(3), 0.15)
     glow = rng.uniform(0.5, 3.0) if rng.random() < 0.5 else 0.0
     offset = float(-low[0] / width), float(high[1] / height)
-    return replace(shown, repeat=(float(width), float(-height)), offset=offset, emission=(glow, glow, glow))
+    return replace(
+        shown, repeat=(float(width), float(-height)), offset=offset, emission=(glow, glow, glow)
+    )
 
 
 def small_thing(rng: np.random.Generator, stock: Stock, high: float, tall: float = 1.0) -> Parts:
@@ -65,7 +76,9 @@ def small_thing(rng: np.random.Generator, stock: Stock, high: float, tall: float
     return piece(rng, model, stock, lit=model.role == "lamp" and rng.random() < 0.6)
 
 
-def laid(rng: np.random.Generator, place: LevelPlace, count: int, stock: Stock, crowd: float = 0.0) -> Parts:
+def laid(
+    rng: np.random.Generator, place: LevelPlace, count: int, stock: Stock, crowd: float = 0.0
+) -> Parts:
     """Up to `count` small things on a level place that do not touch each other.
 
     crowd: 0 anywhere on it, 1 close to its middle.
@@ -96,7 +109,9 @@ def _turn(rng: np.random.Generator) -> float:
     return rng.normal(0, 0.35) if rng.random() < 0.6 else rng.uniform(0, 2 * np.pi)
 
 
-def furnished_piece(rng: np.random.Generator, model: CatalogModel, stock: Stock, clutter: float) -> Parts:
+def furnished_piece(
+    rng: np.random.Generator, model: CatalogModel, stock: Stock, clutter: float
+) -> Parts:
     """A model with things on its level places, about `clutter` a square metre and place at least."""
     parts = piece(rng, model, stock, lit=model.role == "lamp" and rng.random() < 0.6)
     for place in model.places:
@@ -106,7 +121,9 @@ def furnished_piece(rng: np.random.Generator, model: CatalogModel, stock: Stock,
     return parts
 
 
-def backdrop_of(rng: np.random.Generator, stock: Stock, level: float, least: float, blur: float = 0.0) -> Array | None:
+def backdrop_of(
+    rng: np.random.Generator, stock: Stock, level: float, least: float, blur: float = 0.0
+) -> Array | None:
     """[h, w, 3] linear radiance about `level` of a part of a photograph, at least `least` of its shorter side, blurred
     by `blur` pixels of 256; None where there is none."""
     part = stock.crop(rng, 1.0, 256, least)

@@ -33,7 +33,9 @@ def sculpture(rng: np.random.Generator, stock: Stock) -> Parts:
         (0.1 if stock.meshes else 0.0, _captured),
     )
     solid = m.pick(rng, makers)(rng, stock)
-    family = str(rng.choice(["stone", "stone", "ceramic", "ceramic", "wood", "metal", "paint", "leather"]))
+    family = str(
+        rng.choice(["stone", "stone", "ceramic", "ceramic", "wood", "metal", "paint", "leather"])
+    )
     solid = from_the_sides(_standing(rng, solid))
     return one_thing([ScenePart(solid, _material(rng, family, stock))])
 
@@ -50,13 +52,22 @@ def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material
             return covered(rng, picture, rng.uniform(0.15, 0.6), family)
     if draw < 0.55:
         grey = rng.uniform(0.2, 0.8)
-        made = m.uniform((grey, grey * rng.uniform(0.9, 1), grey * rng.uniform(0.75, 1)), rng.uniform(0.4, 0.95))
+        made = m.uniform(
+            (grey, grey * rng.uniform(0.9, 1), grey * rng.uniform(0.75, 1)), rng.uniform(0.4, 0.95)
+        )
     else:
-        makers: dict[str, m.Maker] = {"stone": m.stone, "ceramic": m.ceramic, "wood": m.wood, "metal": m.metal}
+        makers: dict[str, m.Maker] = {
+            "stone": m.stone,
+            "ceramic": m.ceramic,
+            "wood": m.wood,
+            "metal": m.metal,
+        }
         made = makers.get(family, m.lacquer)(rng)
     shrink = rng.uniform(0.2, 0.6)
     repeat = (made.repeat[0] * shrink, made.repeat[1] * shrink)
-    return replace(made, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001))
+    return replace(
+        made, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001)
+    )
 
 
 def _displaced(rng: np.random.Generator, solid: Solid, amount: float) -> Solid:
@@ -96,7 +107,8 @@ def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
 def _body(rng: np.random.Generator, stock: Stock) -> Solid:
     """Balls and limbs melted into each other: animals, figures, toys, roots."""
     ends, radii = _skeleton(rng)
-    low, high = (ends - radii[:, None, None]).min((0, 1)) - 0.1, (ends + radii[:, None, None]).max((0, 1)) + 0.1
+    low = (ends - radii[:, None, None]).min((0, 1)) - 0.1
+    high = (ends + radii[:, None, None]).max((0, 1)) + 0.1
     step = float((high - low).max()) / GRID
     counts = np.maximum(((high - low) / step).astype(int) + 2, 8)
     axes = [low[k] + step * np.arange(counts[k]) for k in range(3)]
@@ -120,7 +132,8 @@ def _of(vertices: Array, faces: Array) -> Solid:
 
 def _skeleton(rng: np.random.Generator) -> tuple[Array, Array]:
     """([n, 2, 3] ends, [n] radii) of a trunk with limbs, often the same on both sides."""
-    ends, radii = [], []
+    ends = []
+    radii = []
     trunk = rng.uniform(0.15, 0.4)
     along = rng.normal(size=3) * [0.5, 1.0, 0.5]
     along *= rng.uniform(0.2, 1.0) / np.linalg.norm(along)
@@ -152,9 +165,15 @@ def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
         height = gaussian_filter(grey, 1.5) * rng.uniform(0.05, 0.2)
     else:
         block = rng.uniform(0.4, 1.5)
-        places = np.concatenate([sheet.vertices[:, :2] / block, np.full((rows * rows, 1), rng.random())], -1)
+        places = np.concatenate(
+            [sheet.vertices[:, :2] / block, np.full((rows * rows, 1), rng.random())], -1
+        )
         kind = str(rng.choice(["carved", "carved", "ridges", "hammered", "folds", "rough"]))
-        height = relief.height(kind, places + rng.random(3)).reshape(rows, rows) * block * _depth(rng, 0.01, 0.05)
+        height = (
+            relief.height(kind, places + rng.random(3)).reshape(rows, rows)
+            * block
+            * _depth(rng, 0.01, 0.05)
+        )
     t = np.linspace(-1, 1, rows)
     edge = np.maximum(np.abs(t)[:, None], np.abs(t)[None])
     if rng.random() < 0.4:
@@ -162,14 +181,17 @@ def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
         height = np.where(edge < 1, height, -0.1)
     rim = np.clip((edge - rng.uniform(0.8, 0.95)) * 20, 0, 1) * (edge < 1)
     height = height + rim * rng.uniform(-0.04, 0.05)
-    solid = _of(sheet.vertices + np.stack([0 * height, 0 * height, height], -1).reshape(-1, 3), sheet.faces)
+    solid = _of(
+        sheet.vertices + np.stack([0 * height, 0 * height, height], -1).reshape(-1, 3), sheet.faces
+    )
     back = s.slab((1.0, float(np.ptp(sheet.vertices[:, 1])), 0.12))
     return s.joined([solid, s.moved(back, (0, 0, -0.18))])
 
 
 def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
     """A vase, column or bell: fluted, twisted or hammered."""
-    rows, columns = 150, 260
+    rows = 150
+    columns = 260
     levels = np.linspace(0, 1, int(rng.integers(4, 8)))
     radius = np.interp(np.linspace(0, 1, rows), levels, rng.uniform(0.12, 0.5, len(levels)))
     radius = np.convolve(np.pad(radius, 12, mode="edge"), np.ones(25) / 25, "valid")
@@ -189,13 +211,18 @@ def _captured(rng: np.random.Generator, stock: Stock) -> Solid:
     """A mesh from a file, weathered."""
     solid = s.load(stock.meshes[rng.integers(len(stock.meshes))])
     smooth = _of(solid.vertices, solid.faces)
-    return smooth if len(smooth.faces) < 4000 else _displaced(rng, smooth, _depth(rng, 0.0003, 0.003))
+    return (
+        smooth if len(smooth.faces) < 4000 else _displaced(rng, smooth, _depth(rng, 0.0003, 0.003))
+    )
 
 
 def _standing(rng: np.random.Generator, solid: Solid) -> Solid:
     """The solid 0.2 to 0.45 m large, turned anyhow, on y = 0."""
     size = float(np.ptp(solid.vertices, axis=0).max())
     tip = rng.normal(0, 0.2) if rng.random() < 0.7 else rng.uniform(0, 2 * np.pi)
-    turned = s.moved(solid, turn=rng.uniform(-0.6, 0.6), tip=tip, scale=rng.uniform(0.2, 0.45) / size)
-    low, high = turned.vertices.min(0), turned.vertices.max(0)
+    turned = s.moved(
+        solid, turn=rng.uniform(-0.6, 0.6), tip=tip, scale=rng.uniform(0.2, 0.45) / size
+    )
+    low = turned.vertices.min(0)
+    high = turned.vertices.max(0)
     return s.grounded(replace(turned, vertices=turned.vertices - (low + high) / 2))

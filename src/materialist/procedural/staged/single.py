@@ -10,13 +10,38 @@ from materialist.procedural.staged.finishes import covered
 from materialist.procedural.staged.pieces import backdrop_of, laid, piece
 from materialist.procedural.staged.sculptures import sculpture
 from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, ScenePart, World, bounds, look, orbit, placed, through_lens
+from materialist.procedural.world import (
+    Parts,
+    ScenePart,
+    World,
+    bounds,
+    look,
+    orbit,
+    placed,
+    through_lens,
+)
 from materialist.types import Array
 
 SUBJECTS = (
-    "small", "small", "small", "small", "chair", "sofa", "thing", "thing", "storage", "lamp", "person", "person",
-    "vehicle", "outdoor", "shelf", "table", "bed", "wall",
-)  # fmt: skip
+    "small",
+    "small",
+    "small",
+    "small",
+    "chair",
+    "sofa",
+    "thing",
+    "thing",
+    "storage",
+    "lamp",
+    "person",
+    "person",
+    "vehicle",
+    "outdoor",
+    "shelf",
+    "table",
+    "bed",
+    "wall",
+)
 """Roles of single things, one named twice as often as one named once."""
 
 
@@ -36,7 +61,9 @@ def single(rng: np.random.Generator, stock: Stock) -> World:
     view = through_lens(rng, view, distance, 0.2)
     to_camera = (around.position - target) / distance
     hard = rng.random() < 0.65
-    envmap = studio_light.hard_lamps(rng, to_camera) if hard else studio_light.soft_light(rng, stock)
+    envmap = (
+        studio_light.hard_lamps(rng, to_camera) if hard else studio_light.soft_light(rng, stock)
+    )
     ground = m.pick(rng, ((0.45, "none"), (0.25, "sweep"), (0.3, "flat")))
     if up < np.radians(4):
         ground = "none"
@@ -53,22 +80,32 @@ def _subject(rng: np.random.Generator, stock: Stock) -> Parts:
     if draw < 0.45:
         return sculpture(rng, stock)
     if draw < 0.6:  # a few things together
-        parts = laid(rng, LevelPlace(0.0, -0.3, 0.3, -0.2, 0.2, 10.0), int(rng.integers(2, 6)), stock, crowd=1.0)
+        parts = laid(
+            rng,
+            LevelPlace(0.0, -0.3, 0.3, -0.2, 0.2, 10.0),
+            int(rng.integers(2, 6)),
+            stock,
+            crowd=1.0,
+        )
         return parts or sculpture(rng, stock)
     model = stock.model(rng, str(rng.choice(SUBJECTS)))
     return sculpture(rng, stock) if model is None else placed(piece(rng, model, stock), (0, 0, 0))
 
 
-def _ground(rng: np.random.Generator, stock: Stock, kind: str, low: Array, high: Array, turn: float) -> Parts:
+def _ground(
+    rng: np.random.Generator, stock: Stock, kind: str, low: Array, high: Array, turn: float
+) -> Parts:
     """A wide ground under the thing; a sweep bends up behind it."""
     reach = float((high - low).max())
-    half, y = 14 * reach, low[1] - 0.001 * reach
+    half = 14 * reach
+    y = low[1] - 0.001 * reach
     material = _cloth(rng, stock, reach)
     if kind == "flat":
         sheet = s.sheet((-half, y, half), (2 * half, 0, 0), (0, 0, -2 * half), 1)
         return [ScenePart(sheet, material)]
     t = np.linspace(0, np.pi / 2, 20)
-    start, bend = rng.uniform(0.7, 1.6) * reach, rng.uniform(0.4, 1.2) * reach
+    start = rng.uniform(0.7, 1.6) * reach
+    bend = rng.uniform(0.4, 1.2) * reach
     curve = np.stack([-start - bend * np.sin(t), y + bend * (1 - np.cos(t)), 0 * t], -1)
     line = np.concatenate([[[half, y, 0]], curve, [[-start - bend, y + half, 0]]])
     sweep = s.strip(line, 2 * half, flip=True)
@@ -79,8 +116,12 @@ def _cloth(rng: np.random.Generator, stock: Stock, reach: float) -> m.Material:
     """Paper, cloth, wood, stone, or a glossy dark plate."""
     draw = rng.random()
     if draw < 0.4:
-        grey = float(rng.choice([rng.uniform(0.02, 0.08), rng.uniform(0.1, 0.5), rng.uniform(0.6, 0.88)]))
-        return m.uniform((grey,) * 3, float(rng.choice([rng.uniform(0.06, 0.25), rng.uniform(0.4, 1.0)])))
+        grey = float(
+            rng.choice([rng.uniform(0.02, 0.08), rng.uniform(0.1, 0.5), rng.uniform(0.6, 0.88)])
+        )
+        return m.uniform(
+            (grey,) * 3, float(rng.choice([rng.uniform(0.06, 0.25), rng.uniform(0.4, 1.0)]))
+        )
     if draw < 0.7:
         family = str(rng.choice(["wood", "cloth", "stone"]))
         picture = stock.texture(rng, family)
@@ -98,4 +139,6 @@ def _backdrop(rng: np.random.Generator, stock: Stock, level: float, black: float
         return np.full((4, 4, 3), level * float(np.exp(rng.normal(0.5, 0.5))), np.float32)
     blur = float(np.exp(rng.uniform(np.log(1.5), np.log(16))))
     picture = backdrop_of(rng, stock, level, 0.3, blur)
-    return np.full((4, 4, 3), level * rng.uniform(0.05, 1), np.float32) if picture is None else picture
+    return (
+        np.full((4, 4, 3), level * rng.uniform(0.05, 1), np.float32) if picture is None else picture
+    )

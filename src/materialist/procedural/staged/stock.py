@@ -37,7 +37,9 @@ class Stock:
     def _mine(self, names: tuple[str, ...]) -> list[str]:
         return [name for name in names if self._is_mine(name)]
 
-    def model(self, rng: np.random.Generator, *roles: str, low: float = 0.0, high: float = 9.0) -> CatalogModel | None:
+    def model(
+        self, rng: np.random.Generator, *roles: str, low: float = 0.0, high: float = 9.0
+    ) -> CatalogModel | None:
         """A model of one of the roles whose longest side is between two lengths, metres; None where there is none."""
         keys = [key for role in roles for key in self._mine(self.listing.models.get(role, ()))]
         for _ in range(12 if keys else 0):
@@ -48,7 +50,9 @@ class Stock:
 
     def texture(self, rng: np.random.Generator, family: str) -> ColourPicture | None:
         """A picture that repeats, of a surface of that family of materials; None where there is none."""
-        places = [place for place in self.listing.textures.get(family, ()) if self._is_mine(place[0])]
+        places = [
+            place for place in self.listing.textures.get(family, ()) if self._is_mine(place[0])
+        ]
         if len(places) < FEWEST_TEXTURES:
             return None
         key, solid = places[rng.integers(len(places))]
@@ -59,7 +63,9 @@ class Stock:
         names = self._mine(self.listing.photographs)
         return self.listing.photograph(names[rng.integers(len(names))]) if names else None
 
-    def crop(self, rng: np.random.Generator, aspect: float, side: int, least: float = SMALLEST_CROP) -> Array | None:
+    def crop(
+        self, rng: np.random.Generator, aspect: float, side: int, least: float = SMALLEST_CROP
+    ) -> Array | None:
         """[h, w, 3] uint8 sRGB, its longer side `side` pixels: a part of a photograph of that width over height."""
         whole = self.photograph(rng)
         if whole is None:
@@ -68,13 +74,16 @@ class Stock:
         most = min(h, w / aspect)
         height = most * rng.uniform(least, 1.0)
         width = height * aspect
-        top, left = rng.uniform(0, h - height), rng.uniform(0, w - width)
+        top = rng.uniform(0, h - height)
+        left = rng.uniform(0, w - width)
         part = whole[int(top) : int(top + height) + 1, int(left) : int(left + width) + 1]
         if rng.random() < 0.5:
             part = part[:, ::-1]
         scale = side / max(part.shape[:2])
         size = max(4, round(part.shape[1] * scale)), max(4, round(part.shape[0] * scale))
-        return cv2.resize(part, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+        return cv2.resize(
+            part, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+        )
 
     def printed(self, rng: np.random.Generator, aspect: float) -> ColourPicture | None:
         """A part of a photograph as a picture of that width over height."""
@@ -92,8 +101,13 @@ class Stock:
 
 @lru_cache(maxsize=4)
 def stock(
-    archives: tuple[Path, ...], photographs: tuple[Path, ...], folder: Path | None, *, held_out: bool = False,
-    meshes: Meshes = (), captures: tuple[Path, ...] = (),
-) -> Stock:  # fmt: skip
+    archives: tuple[Path, ...],
+    photographs: tuple[Path, ...],
+    folder: Path | None,
+    *,
+    held_out: bool = False,
+    meshes: Meshes = (),
+    captures: tuple[Path, ...] = (),
+) -> Stock:
     """The stock of archives and photographs, made once a process."""
     return Stock(listing(archives, photographs, folder), held_out, meshes, captures)

@@ -41,7 +41,12 @@ def produce(folder: Path, plan: ViewPlan, progress: Progress = lambda *_: None) 
 
     Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
     """
-    claim(folder, DESCRIPTION, {"format": FORMAT, **asdict(plan)}, ("format", "views", "split", "seed"))
+    claim(
+        folder,
+        DESCRIPTION,
+        {"format": FORMAT, **asdict(plan)},
+        ("format", "views", "split", "seed"),
+    )
     paths = [folder / f"{index:05d}.npz" for index in range(plan.shapes)]
     complete(paths, lambda index: make_views(index, plan), "shapes", progress)
 
@@ -58,14 +63,20 @@ def draw_views(
 ) -> dict[str, Array]:
     """Random views of the shape as `make_views` has them; see `draw_view`."""
     maps, target = zip(*(draw_view(shape, tracer, rng, exact=exact) for _ in range(count)))
-    return {"maps": np.stack(maps), "target": np.stack(target), "hollow": np.full(count, shape.hollow)}
+    return {
+        "maps": np.stack(maps),
+        "target": np.stack(target),
+        "hollow": np.full(count, shape.hollow),
+    }
 
 
 def load(folder: Path) -> dict[str, Array]:
     """All views of a set, as `make_views` has them. Raises InputError when FOLDER holds no set, or a damaged file."""
     files = sorted(folder.glob("[0-9]*.npz"))
     if not files or not (folder / DESCRIPTION).is_file():
-        raise InputError(f"{folder} holds no views to learn from; make some: materialist train refraction.")
+        raise InputError(
+            f"{folder} holds no views to learn from; make some: materialist train refraction."
+        )
     parts = [read_arrays(file, "maps", "target", "hollow") for file in files]
     return {name: np.concatenate([p[name] for p in parts]) for name in ("maps", "target", "hollow")}
 
@@ -102,13 +113,24 @@ def draw_view(
     while True:
         pose = draw_pose(rng, upright=shape.upright, plain=exact)
         vertices = shape.solid.vertices @ pose.stretch.T @ pose.to_camera.T + pose.centre
-        view = _seen(rng, tracer, pose, window_rays(vertices)) if exact else _cut(rng, tracer, pose, vertices)
+        view = (
+            _seen(rng, tracer, pose, window_rays(vertices))
+            if exact
+            else _cut(rng, tracer, pose, vertices)
+        )
         if view.inside.mean() >= LEAST_PIXELS:
             break
     paths, _, back = look(tracer, pose, view.rays)
     there = np.isfinite(paths.first).reshape(SIDE, SIDE)
-    picture = lambda x: np.where(there, x.reshape(SIDE, SIDE), 0).astype(np.float32)  # noqa: E731
-    target = np.stack([picture(paths.solid), picture(paths.material)]) * np.linalg.norm(view.rays, axis=-1) / view.size
+
+    def picture(x):
+        return np.where(there, x.reshape(SIDE, SIDE), 0).astype(np.float32)
+
+    target = (
+        np.stack([picture(paths.solid), picture(paths.material)])
+        * np.linalg.norm(view.rays, axis=-1)
+        / view.size
+    )
     back = np.moveaxis(np.where(there[..., None], back @ to_window(view.rays).T, 0), -1, 0)
     target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
     return features(view).astype(np.float16), target
@@ -117,10 +139,13 @@ def draw_view(
 def _cut(rng: np.random.Generator, tracer: ShapeTracer, pose: CameraPose, vertices: Array) -> View:
     """A window of a larger or smaller picture, with maps as imperfect as predicted ones."""
     side = round(float(np.exp(rng.uniform(*np.log(SIDES)))))
-    seen = _imperfect(rng, _seen(rng, tracer, pose, window_rays(vertices, side, rng.uniform(0.05, 0.15))))
+    seen = _imperfect(
+        rng, _seen(rng, tracer, pose, window_rays(vertices, side, rng.uniform(0.05, 0.15)))
+    )
     if not seen.inside.any():
         return seen
-    larger, aside = float(np.exp(rng.normal(0, OFF[0]))), rng.normal(0, OFF[1], 2)
+    larger = float(np.exp(rng.normal(0, OFF[0])))
+    aside = rng.normal(0, OFF[1], 2)
     window = Window.around(seen.inside).moved(larger, float(aside[0]), float(aside[1]))
     return window.cut(seen.photo, seen.inside, seen.normal, seen.depth, seen.rays)
 
@@ -151,12 +176,17 @@ def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -
 def window_rays(vertices: Array, side: int = SIDE, margin: float = MARGIN) -> Array:
     """[S, S, 3] float32 rays through a square window around the shape [V, 3] in the camera frame, S = `side`."""
     place = vertices[:, :2] / -vertices[:, 2:]
-    low, high = place.min(0), place.max(0)
+    low = place.min(0)
+    high = place.max(0)
     half = (high - low).max() / 2 * (1 + 2 * margin) + 1e-6
     x = (np.arange(side) + 0.5) / side * 2 - 1
     centre = (low + high) / 2
     rays = np.empty((side, side, 3), np.float32)
-    rays[..., 0], rays[..., 1], rays[..., 2] = centre[0] + half * x[None, :], centre[1] - half * x[:, None], -1
+    rays[..., 0], rays[..., 1], rays[..., 2] = (
+        centre[0] + half * x[None, :],
+        centre[1] - half * x[:, None],
+        -1,
+    )
     return rays
 
 
@@ -170,15 +200,22 @@ def look(tracer: ShapeTracer, pose: CameraPose, rays: Array) -> tuple[Paths, Arr
     paths = tracer.trace(np.broadcast_to(-back @ pose.centre, direction.shape), direction)
     # The inverse transpose, as for every normal.
     flat = rays.reshape(-1, 3)
-    first, last = towards(paths.normal @ back, flat, -1), towards(paths.exit_normal @ back, flat, 1)
-    return paths, first.reshape(rays.shape).astype(np.float32), last.reshape(rays.shape).astype(np.float32)
+    first = towards(paths.normal @ back, flat, -1)
+    last = towards(paths.exit_normal @ back, flat, 1)
+    return (
+        paths,
+        first.reshape(rays.shape).astype(np.float32),
+        last.reshape(rays.shape).astype(np.float32),
+    )
 
 
 def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -> Array:
     """[S, S, 3] float32 linear in [0, 1]: the shape in some colour, plain or with waves through it."""
     albedo = rng.uniform(0.1, 0.9, 3) * rng.uniform(0.4, 1)
     if rng.random() < 0.3:
-        wave = np.sin(point @ rng.normal(size=3) * rng.uniform(5, 40) + rng.uniform(0, 6))[..., None]
+        wave = np.sin(point @ rng.normal(size=3) * rng.uniform(5, 40) + rng.uniform(0, 6))[
+            ..., None
+        ]
         albedo = albedo * np.clip(1 + wave * rng.uniform(0.1, 1.5), 0.3, 1.6)
     up = rng.normal(size=3) * [0.4, 0.2, 0.4] + [0, 1, 0.3]
     light = rng.uniform(0.15, 0.6) * (1 + 0.6 * (normal @ (up / np.linalg.norm(up))))[..., None]
@@ -187,7 +224,9 @@ def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -
     for _ in range(int(rng.integers(1, 3))):
         towards = unit(rng.normal(size=3) + np.array([0, 0.7, 0.7]))
         colour = rng.uniform(0.7, 1.0, 3) * rng.uniform(0.2, 0.9)
-        highlight = gloss * np.clip(np.sum(normal * unit(towards + view), -1), 0, 1) ** rng.uniform(20, 200)
+        highlight = gloss * np.clip(np.sum(normal * unit(towards + view), -1), 0, 1) ** rng.uniform(
+            20, 200
+        )
         light = light + colour * (np.clip(normal @ towards, 0, None) + highlight)[..., None]
     noise = rng.normal(0, rng.uniform(0, 0.02), normal.shape)
     return np.clip(albedo * light + noise, 0, 1).astype(np.float32)
@@ -195,10 +234,14 @@ def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -
 
 def _imperfect(rng: np.random.Generator, view: View) -> View:
     """The view with maps as a predictor gives them: bent, flattened or exaggerated, smoothed, a mask that is off."""
-    normal, depth, inside = view.normal, view.depth.copy(), view.inside
+    normal = view.normal
+    depth = view.depth.copy()
+    inside = view.inside
     if not inside.any():
         return view
-    size, middle, side = view.size, float(np.median(view.depth[inside])), len(inside)
+    size = view.size
+    middle = float(np.median(view.depth[inside]))
+    side = len(inside)
     if rng.random() < 0.6:
         depth = middle + (depth - middle) * rng.uniform(0.85, 1.15)
         depth = depth + size * rng.uniform(0, 0.05) * _smooth_noise(rng, 1, side)[..., 0]
@@ -209,13 +252,19 @@ def _imperfect(rng: np.random.Generator, view: View) -> View:
         blurred = cv2.GaussianBlur(normal * inside[..., None], (0, 0), sigma)
         normal = np.where(inside[..., None], blurred, normal)
     if rng.random() < 0.35:
-        kernel = np.ones((2 * int(rng.integers(1, max(2, round(2 * side / SIDE)) + 1)) + 1,) * 2, np.uint8)
+        kernel = np.ones(
+            (2 * int(rng.integers(1, max(2, round(2 * side / SIDE)) + 1)) + 1,) * 2, np.uint8
+        )
         smaller = cv2.erode(inside.astype(np.uint8), kernel, borderValue=0) > 0
         inside = smaller if smaller.sum() > 0.5 * inside.sum() else inside
-    return View(view.photo, inside, unit(normal).astype(np.float32), depth.astype(np.float32), view.rays)
+    return View(
+        view.photo, inside, unit(normal).astype(np.float32), depth.astype(np.float32), view.rays
+    )
 
 
 def _smooth_noise(rng: np.random.Generator, channels: int, side: int) -> Array:
     """[S, S, channels] float32 with waves about a third of the window long, of amplitude about 1."""
     coarse = rng.normal(size=(5, 5, channels)).astype(np.float32)
-    return cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC).reshape(side, side, channels)
+    return cv2.resize(coarse, (side, side), interpolation=cv2.INTER_CUBIC).reshape(
+        side, side, channels
+    )

@@ -30,9 +30,13 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     of the mirrored thickness as the solid one; `back`, `back_symmetry`: degrees by which the back's normals are off,
     those predicted and those of the front mirrored.
     """
-    maps, target = views["maps"].astype(np.float32), views["target"].astype(np.float32)
+    maps = views["maps"].astype(np.float32)
+    target = views["target"].astype(np.float32)
     with torch.inference_mode():
-        parts = [network(torch.from_numpy(maps[k : k + batch])).numpy() for k in range(0, len(maps), batch)]
+        parts = [
+            network(torch.from_numpy(maps[k : k + batch])).numpy()
+            for k in range(0, len(maps), batch)
+        ]
     found = np.concatenate(parts)
     # Where the mask that the network got is wider than the object, there is nothing to compare with.
     inside = (maps[:, MASK] > 0.5) & (target[:, 0] > 0)
@@ -46,5 +50,7 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     }
     hollow = views["hollow"].astype(bool)
     if hollow.any():
-        figures["hollow"] = np.where(hollow, relative_error(found[:, 1], target[:, 1], inside), np.nan)
+        figures["hollow"] = np.where(
+            hollow, relative_error(found[:, 1], target[:, 1], inside), np.nan
+        )
     return figures

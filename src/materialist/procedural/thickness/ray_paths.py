@@ -54,23 +54,37 @@ class ShapeTracer:
 
     def __init__(self, solid: Solid):
         setup()
-        scene = {"type": "scene", "embree_use_robust_intersections": True, "shape": shape(mi, solid)}
+        scene = {
+            "type": "scene",
+            "embree_use_robust_intersections": True,
+            "shape": shape(mi, solid),
+        }
         self._scene = mi.load_dict(scene)
-        self._faces, self._normals = solid.faces, solid.normals
+        self._faces = solid.faces
+        self._normals = solid.normals
         self._flat = face_normals(solid.vertices, solid.faces)
 
     def trace(self, origin: Array, direction: Array) -> Paths:
         """Follow straight rays (origin and direction [N, 3]) through everything they meet."""
         count = len(direction)
-        first, last, material = np.full(count, np.inf), np.zeros(count), np.zeros(count)
-        normal, leaving = np.zeros((count, 3)), np.zeros((count, 3))
+        first = np.full(count, np.inf)
+        last = np.zeros(count)
+        material = np.zeros(count)
+        normal = np.zeros((count, 3))
+        leaving = np.zeros((count, 3))
         depth = np.zeros(count, int)  # how many surfaces the ray is inside of
-        alive, at = np.arange(count), np.zeros(count)
+        alive = np.arange(count)
+        at = np.zeros(count)
         step = AHEAD / np.linalg.norm(direction, axis=-1)
         for k in range(MOST):
-            t, face, uv = self._nearest(origin[alive] + at[alive, None] * direction[alive], direction[alive])
+            t, face, uv = self._nearest(
+                origin[alive] + at[alive, None] * direction[alive], direction[alive]
+            )
             hit = np.isfinite(t)
-            alive, t, face, uv = alive[hit], t[hit], face[hit], uv[hit]
+            alive = alive[hit]
+            t = t[hit]
+            face = face[hit]
+            uv = uv[hit]
             if not len(alive):
                 break
             reached = at[alive] + t
@@ -96,5 +110,6 @@ class ShapeTracer:
         ray = mi.Ray3f(mi.Point3f(start), way)
         found = self._scene.ray_intersect_preliminary(ray, coherent=False)
         hit = found.is_valid()  # where nothing is hit, Mitsuba leaves face and place unwritten
-        face, uv = dr.select(hit, found.prim_index, 0), dr.select(hit, found.prim_uv, 0)
+        face = dr.select(hit, found.prim_index, 0)
+        uv = dr.select(hit, found.prim_uv, 0)
         return np.array(found.t, np.float64), np.array(face), np.array(uv, np.float64).T

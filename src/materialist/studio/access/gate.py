@@ -30,14 +30,19 @@ LOCAL = ("localhost", "127.0.0.1", "::1")
 _API = "/gradio_api/"
 _BEAT = f"{_API}heartbeat/"
 """A page holds a request to this place, and its name, as long as it is open."""
-_UPLOAD, _FILE = f"{_API}upload", f"{_API}file="
+_UPLOAD = f"{_API}upload"
+_FILE = f"{_API}file="
 _EVENTS = (f"{_API}queue/join", f"{_API}run/predict")
 """Places whose bodies may name files."""
 _READ = re.compile(
     rf"/|/(config|theme\.css|favicon\.ico|robots\.txt)|/(assets|static)/.+|{_FILE}[^\0]+|{_BEAT}\w+"
     rf"|{_API}(queue/data|upload_progress|app_id)"
 )
-_PLACES = {"GET": _READ, "HEAD": _READ, "POST": re.compile(rf"{_API}(queue/join|run/predict|upload)")}
+_PLACES = {
+    "GET": _READ,
+    "HEAD": _READ,
+    "POST": re.compile(rf"{_API}(queue/join|run/predict|upload)"),
+}
 """Method -> what the page asks for. Gradio has more: places that fetch from other machines, record and write."""
 _FORM_BYTES = 4096
 _LENGTHS = (b"content-length", b"transfer-encoding")
@@ -66,15 +71,23 @@ class Gate:
     """
 
     def __init__(
-        self, app: Application, studio: Studio, *, host: str | None = None, proxy: str | None = None,
-        password: str | None = None, port: int = 0,
-    ) -> None:  # fmt: skip
+        self,
+        app: Application,
+        studio: Studio,
+        *,
+        host: str | None = None,
+        proxy: str | None = None,
+        password: str | None = None,
+        port: int = 0,
+    ) -> None:
         """host: what a studio for this machine only is bound to. proxy: HOST[:PORT] of the proxy before the studio."""
-        self.app, self.studio = app, studio
+        self.app = app
+        self.studio = studio
         own = None if host is None else {*LOCAL, host.lower().strip("[]")}
         self.names = own if proxy is None else {_place(f"http://{proxy}")[0]}
         """Host names that may be asked for; None for all."""
-        self.proxy, self.password = proxy, password
+        self.proxy = proxy
+        self.password = password
         self._cookie = f"materialist_login_{port}"
         self._logins: dict[str, str] = {}
         """Login -> the cookie of the person who logged in: no other cookie counts for it."""
@@ -100,9 +113,16 @@ class Gate:
                 headers = MutableHeaders(scope=message)
                 headers.update(HEADERS)
                 for name, value in cookies.items():
-                    secure = "; Secure" if self.proxy and request.headers["x-forwarded-proto"] == "https" else ""
+                    secure = (
+                        "; Secure"
+                        if self.proxy and request.headers["x-forwarded-proto"] == "https"
+                        else ""
+                    )
                     kept = f"; Max-Age={SETTINGS.person_seconds}" if name == PERSON else ""
-                    headers.append("set-cookie", f"{name}={value}; Path=/; HttpOnly; SameSite=Lax{kept}{secure}")
+                    headers.append(
+                        "set-cookie",
+                        f"{name}={value}; Path=/; HttpOnly; SameSite=Lax{kept}{secure}",
+                    )
             await send(message)
 
         await app(scope, request.receive, answer)
@@ -117,12 +137,19 @@ class Gate:
     def allows(self, headers: dict[bytes, bytes]) -> bool:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
         told = {name.decode(): value.decode("latin-1").lower() for name, value in headers.items()}
-        asked = told.get("x-forwarded-host", told.get("host", "")) if self.proxy else told.get("host", "")
+        asked = (
+            told.get("x-forwarded-host", told.get("host", ""))
+            if self.proxy
+            else told.get("host", "")
+        )
         origin = told.get("origin", "")
         place = _place(f"{origin.partition('://')[0] or 'http'}://{asked}")
         if self.names is not None and place[0] not in self.names:
             return False
-        if told.get("sec-fetch-site") in ("cross-site", "same-site") and told.get("sec-fetch-mode") != "navigate":
+        if (
+            told.get("sec-fetch-site") in ("cross-site", "same-site")
+            and told.get("sec-fetch-mode") != "navigate"
+        ):
             return False
         return not origin or (_place(origin) == place and "" not in place)
 
@@ -135,7 +162,10 @@ class Gate:
         kept = [(k, v) for k, v in headers if not k.startswith(b"x-forwarded") and k not in dropped]
         if self.proxy:
             scheme = b"http" if told.get(b"x-forwarded-proto") == b"http" else b"https"
-            kept += [(b"x-forwarded-host", told[b"x-forwarded-host"]), (b"x-forwarded-proto", scheme)]
+            kept += [
+                (b"x-forwarded-host", told[b"x-forwarded-host"]),
+                (b"x-forwarded-proto", scheme),
+            ]
         return kept
 
     async def _answer(self, request: Request, cookies: dict[str, str], address: str) -> Any:
@@ -252,7 +282,9 @@ class Gate:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
 
 
-async def _held(app: Application, studio: Studio, page: str, scope: Any, receive: Any, send: Any) -> None:
+async def _held(
+    app: Application, studio: Studio, page: str, scope: Any, receive: Any, send: Any
+) -> None:
     """Let a page hold its request; it is closed when that ends."""
     try:
         await app(scope, receive, send)
@@ -279,10 +311,13 @@ async def _upload(
     app: Application, studio: Studio, person: str, size: int, scope: Any, receive: Any, send: Any
 ) -> None:
     """Let Gradio store an upload of a promised size, and answer with ids of ours in place of its paths."""
-    quota, sender = studio.quota, studio.sender(person)
+    quota = studio.quota
+    sender = studio.sender(person)
     try:
         with quota.uploading(sender):
-            await _stored_upload(app, studio, person, quota.claim(sender, size), scope, receive, send)
+            await _stored_upload(
+                app, studio, person, quota.claim(sender, size), scope, receive, send
+            )
     except InputError as error:
         await PlainTextResponse(f"{error}\n", 403)(scope, receive, send)
 

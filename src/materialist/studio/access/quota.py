@@ -85,21 +85,29 @@ class Quota:
         own = "Another file of yours is being opened; wait until it is there."
         with self._place("opening", sender, 1, own):
             with self._lock:
-                opening = sum(count for (what, _), count in self._running.items() if what == "opening")
+                opening = sum(
+                    count for (what, _), count in self._running.items() if what == "opening"
+                )
             if opening > SETTINGS.openings:
-                raise InputError("The studio is opening the files of others; try again in a moment.")
+                raise InputError(
+                    "The studio is opening the files of others; try again in a moment."
+                )
             yield
 
     @contextmanager
     def uploading(self, sender: str) -> Iterator[None]:
         """A place among the uploads of a sender. Raises InputError where there is none."""
-        with self._place("upload", sender, SETTINGS.uploads, "Too many uploads at once; send them one by one."):
+        with self._place(
+            "upload", sender, SETTINGS.uploads, "Too many uploads at once; send them one by one."
+        ):
             yield
 
     @contextmanager
     def request(self, sender: str) -> Iterator[None]:
         """A place among the requests of a sender. Raises InputError where there is none."""
-        with self._place("request", sender, SETTINGS.requests, "Too many changes at once; wait for the picture."):
+        with self._place(
+            "request", sender, SETTINGS.requests, "Too many changes at once; wait for the picture."
+        ):
             yield
 
     @contextmanager
@@ -124,7 +132,8 @@ class Allowance:
 
     def __init__(self, quota: Quota | None = None, sender: Callable[[], str] = str) -> None:
         """sender: gives the person's sender. Without a quota everything is allowed."""
-        self._quota, self._sender = quota, sender
+        self._quota = quota
+        self._sender = sender
 
     def claim(self, size: int) -> None:
         """Count bytes that are about to be stored; raises InputError as `Quota.claim`."""

@@ -23,7 +23,8 @@ class TextureLayout:
 
     def placed(self, uv: Array) -> Array:
         """uv [V, 2], v DOWN, under the transform."""
-        cos, sin = np.cos(self.rotation), np.sin(self.rotation)
+        cos = np.cos(self.rotation)
+        sin = np.sin(self.rotation)
         return uv * self.scale @ np.array([[cos, -sin], [sin, cos]]) + self.offset
 
 
@@ -87,7 +88,9 @@ def joined_part(parts: list[MeshPart]) -> MeshPart:
     first = np.cumsum(sizes) - sizes
     uv = None
     if any(part.uv is not None for part in parts):
-        uv = np.concatenate([np.zeros((n, 2)) if p.uv is None else p.uv for p, n in zip(parts, sizes)])
+        uv = np.concatenate(
+            [np.zeros((n, 2)) if p.uv is None else p.uv for p, n in zip(parts, sizes)]
+        )
     return MeshPart(
         np.concatenate([part.vertices for part in parts]),
         np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32),
@@ -95,7 +98,9 @@ def joined_part(parts: list[MeshPart]) -> MeshPart:
         parts[0].name,
         None if parts[0].normals is None else np.concatenate([part.normals for part in parts]),
         uv,
-        None if parts[0].face_colours is None else np.concatenate([part.face_colours for part in parts]),
+        None
+        if parts[0].face_colours is None
+        else np.concatenate([part.face_colours for part in parts]),
         np.repeat(np.arange(len(parts), dtype=np.int32), sizes),
     )
 
@@ -117,4 +122,6 @@ def strip_faces(corners: Array) -> Array:
 
 def fan_faces(corners: Array) -> Array:
     """[n - 2, 3] triangles of a fan of corners [n] about the first."""
-    return np.stack([np.broadcast_to(corners[:1], len(corners) - 2), corners[1:-1], corners[2:]], -1)
+    return np.stack(
+        [np.broadcast_to(corners[:1], len(corners) - 2), corners[1:-1], corners[2:]], -1
+    )

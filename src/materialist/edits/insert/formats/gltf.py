@@ -20,7 +20,9 @@ from materialist.edits.insert.formats.gltf_nodes import GltfNodes
 from materialist.edits.insert.formats.source import MeshSource
 from materialist.types import Array
 
-TRIANGLES, STRIP, FAN = 4, 5, 6
+TRIANGLES = 4
+STRIP = 5
+FAN = 6
 """Modes of primitives; those below are points and lines."""
 CHUNK = 1 << 16
 """Vertices of a skin that are moved in one go: bounds the memory."""
@@ -106,13 +108,17 @@ def _drawn(file: GltfFile, nodes: GltfNodes, content: MeshContent) -> list[Drawn
                 continue
             file.source.check("targets", len(primitive.get("targets", [])))
             corners = file.count(primitive.get("indices", primitive["attributes"]["POSITION"]))
-            one = Drawn(node, mesh, primitive, corners // 3 if mode == TRIANGLES else max(corners - 2, 0))
+            one = Drawn(
+                node, mesh, primitive, corners // 3 if mode == TRIANGLES else max(corners - 2, 0)
+            )
             drawn.append(one)
             copies += count
             triangles += count * one.triangles
             file.source.check("copies", copies)
     file.source.check("faces", triangles)
-    content.left_out += ["its lighting"] * ("KHR_lights_punctual" in (file.tree.get("extensions") or {}))
+    content.left_out += ["its lighting"] * (
+        "KHR_lights_punctual" in (file.tree.get("extensions") or {})
+    )
     content.left_out += ["its animation"] * bool(file.tree.get("animations"))
     content.left_out += ["what is in its other scenes"] * (len(file.tree["scenes"]) > 1)
     return drawn
@@ -128,9 +134,11 @@ def _parts(file: GltfFile, nodes: GltfNodes, content: MeshContent, one: Drawn) -
     if "skin" in nodes.nodes[one.node] and "JOINTS_0" in one.attributes:
         points, normals = _skinned(file, nodes, one, rows, points, normals)
         places = np.eye(4)[None]  # a skin stands where its joints are, wherever its node is
-    uv, colours = _uv(file, content, one, rows), _colours(file, content, one, rows)
+    uv = _uv(file, content, one, rows)
+    colours = _colours(file, content, one, rows)
     face_colours = None if colours is None else mean_of_corners(colours, faces)
-    key, name = one.primitive.get("material"), str(one.mesh.get("name", f"mesh{nodes.nodes[one.node]['mesh']}"))
+    key = one.primitive.get("material")
+    name = str(one.mesh.get("name", f"mesh{nodes.nodes[one.node]['mesh']}"))
     parts = []
     for place in places:
         linear = place[:3, :3]
@@ -149,7 +157,9 @@ def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
         corners = file.accessor(one.primitive["indices"], 1)[:, 0]
         if corners.dtype.kind == "f":
             raise file.source.damaged("its indices are no whole numbers")
-        if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < file.count(position):
+        if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < file.count(
+            position
+        ):
             raise file.source.damaged("it has faces of vertices that do not exist")
         corners = corners.astype(np.int32)
     else:
@@ -193,14 +203,17 @@ def _skinned(
             raise file.source.damaged("a skin has fewer matrices than joints")
         joints = joints @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
     turns = np.linalg.pinv(joints[:, :3, :3])
-    moved, facing = np.zeros_like(points), None if normals is None else np.zeros_like(normals)
+    moved = np.zeros_like(points)
+    facing = None if normals is None else np.zeros_like(normals)
     for start in range(0, len(points), CHUNK):
         chunk = slice(start, start + CHUNK)
         numbers, weights = _joint_weights(file, one, rows[chunk])
         if int(numbers.max()) >= len(joints):
             raise file.source.damaged("it names joints that do not exist")
         for joint, weight in zip(numbers.T, weights.T):
-            bent = np.einsum("nij,nj->ni", joints[joint, :3, :3], points[chunk]) + joints[joint, :3, 3]
+            bent = (
+                np.einsum("nij,nj->ni", joints[joint, :3, :3], points[chunk]) + joints[joint, :3, 3]
+            )
             moved[chunk] += weight[:, None] * bent
             if facing is not None and normals is not None:
                 turned = np.einsum("nj,nji->ni", normals[chunk], turns[joint])
@@ -212,11 +225,17 @@ def _joint_weights(file: GltfFile, one: Drawn, rows: Array) -> tuple[Array, Arra
     """(joints [V, n], their weights [V, n], which sum to 1)."""
     sets = [k for k in range(len(one.attributes)) if f"JOINTS_{k}" in one.attributes]
     file.source.check("joint_sets", len(sets))
-    numbers = np.concatenate([file.accessor(one.attributes[f"JOINTS_{k}"], 4, rows) for k in sets], -1)
-    weights = np.concatenate([file.accessor(one.attributes[f"WEIGHTS_{k}"], 4, rows) for k in sets], -1)
+    numbers = np.concatenate(
+        [file.accessor(one.attributes[f"JOINTS_{k}"], 4, rows) for k in sets], -1
+    )
+    weights = np.concatenate(
+        [file.accessor(one.attributes[f"WEIGHTS_{k}"], 4, rows) for k in sets], -1
+    )
     total = weights.astype(np.float64).sum(-1, keepdims=True)
     first = np.eye(1, weights.shape[1])
-    return numbers.astype(np.int64), np.where(total > 0, weights / np.where(total > 0, total, 1), first)
+    return numbers.astype(np.int64), np.where(
+        total > 0, weights / np.where(total > 0, total, 1), first
+    )
 
 
 def _uv(file: GltfFile, content: MeshContent, one: Drawn, rows: Array) -> Array | None:

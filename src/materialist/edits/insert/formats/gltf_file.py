@@ -56,7 +56,9 @@ class GltfFile:
             raise source.damaged("its JSON is no object")
         self.tree: dict[str, Any] = tree
         if not str((tree.get("asset") or {}).get("version", "2.")).startswith("2"):
-            raise source.damaged(f"version {str(tree['asset']['version'])[:20]} of glTF; 2.0 is read")
+            raise source.damaged(
+                f"version {str(tree['asset']['version'])[:20]} of glTF; 2.0 is read"
+            )
         for name, limit in LISTS.items():
             entries = tree.setdefault(name, [])
             if not isinstance(entries, list):
@@ -77,14 +79,22 @@ class GltfFile:
 
     def _check_unbacked(self) -> None:
         """Numbers that no bytes stand behind are bounded by nothing else."""
-        unbacked = [one for one in self.tree["accessors"] if "bufferView" not in one or "sparse" in one]
+        unbacked = [
+            one for one in self.tree["accessors"] if "bufferView" not in one or "sparse" in one
+        ]
         self.source.check("vertices", sum(_whole(one["count"]) for one in unbacked))
 
     def entry(self, kind: str, number: Any) -> dict[str, Any]:
         """An entry of a list of the document."""
         entries = self.tree[kind]
-        if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(entries):
-            raise self.source.damaged(f"it names number {str(number)[:20]} of {len(entries)} {kind}")
+        if (
+            isinstance(number, bool)
+            or not isinstance(number, int)
+            or not 0 <= number < len(entries)
+        ):
+            raise self.source.damaged(
+                f"it names number {str(number)[:20]} of {len(entries)} {kind}"
+            )
         if not isinstance(entries[number], dict):
             raise self.source.damaged(f"number {number} of its {kind} is no object")
         return dict(entries[number])
@@ -101,30 +111,42 @@ class GltfFile:
         entry = self.entry("accessors", number)
         stored = COLUMNS[entry["type"]]
         if stored != columns and not (stored > columns > 1):
-            raise self.source.damaged(f"accessor {number} is a {entry['type']}, where {columns} numbers are needed")
-        values = self._sparse_values(number, entry) if "sparse" in entry else self._values(number, entry)
+            raise self.source.damaged(
+                f"accessor {number} is a {entry['type']}, where {columns} numbers are needed"
+            )
+        values = (
+            self._sparse_values(number, entry) if "sparse" in entry else self._values(number, entry)
+        )
         if rows is not None:
             if len(rows) and int(rows.max()) >= len(values):
-                raise self.source.damaged(f"row {int(rows.max())} of accessor {number}, which has {len(values)}")
+                raise self.source.damaged(
+                    f"row {int(rows.max())} of accessor {number}, which has {len(values)}"
+                )
             values = values[rows]
         return _normalised(values[:, :columns]) if entry.get("normalized") else values[:, :columns]
 
     def _values(self, number: Any, entry: dict[str, Any]) -> Array:
-        count, columns = _whole(entry["count"]), COLUMNS[entry["type"]]
+        count = _whole(entry["count"])
+        columns = COLUMNS[entry["type"]]
         kind = np.dtype(COMPONENTS[entry["componentType"]])
         if "bufferView" not in entry:
             return np.zeros((count, columns), kind)
         return self._table(f"accessor {number}", entry, count, columns, kind)
 
-    def _table(self, name: str, entry: dict[str, Any], count: int, columns: int, kind: np.dtype) -> Array:
+    def _table(
+        self, name: str, entry: dict[str, Any], count: int, columns: int, kind: np.dtype
+    ) -> Array:
         """[count, columns] view of a buffer view."""
         view = self.entry("bufferViews", entry["bufferView"])
         data = self.view(entry["bufferView"])
-        offset, width = _whole(entry.get("byteOffset", 0)), columns * kind.itemsize
+        offset = _whole(entry.get("byteOffset", 0))
+        width = columns * kind.itemsize
         stride = _whole(view.get("byteStride", 0)) or width
         needed = offset + (count - 1) * stride + width if count else 0
         if stride < width or needed > len(data):
-            raise self.source.damaged(f"{name} takes {needed} bytes of a buffer view of {len(data)}")
+            raise self.source.damaged(
+                f"{name} takes {needed} bytes of a buffer view of {len(data)}"
+            )
         if not count:
             return np.zeros((0, columns), kind)
         return np.ndarray((count, columns), kind, data.data, offset, (stride, kind.itemsize))
@@ -132,13 +154,19 @@ class GltfFile:
     def _sparse_values(self, number: Any, entry: dict[str, Any]) -> Array:
         """The values of an accessor, some of which are replaced."""
         if number not in self._sparse:
-            sparse, columns = entry["sparse"], COLUMNS[entry["type"]]
+            sparse = entry["sparse"]
+            columns = COLUMNS[entry["type"]]
             count = _whole(sparse["count"])
             values = np.array(self._values(number, entry))
             name = f"sparse accessor {number}"
-            indices, replaced = sparse["indices"], sparse["values"]
-            places = self._table(name, indices, count, 1, np.dtype(COMPONENTS[indices["componentType"]]))[:, 0]
-            if places.dtype.kind == "f" or (count and not 0 <= int(places.min()) <= int(places.max()) < len(values)):
+            indices = sparse["indices"]
+            replaced = sparse["values"]
+            places = self._table(
+                name, indices, count, 1, np.dtype(COMPONENTS[indices["componentType"]])
+            )[:, 0]
+            if places.dtype.kind == "f" or (
+                count and not 0 <= int(places.min()) <= int(places.max()) < len(values)
+            ):
                 raise self.source.damaged(f"{name} replaces rows that it does not have")
             values[places] = self._table(name, replaced, count, columns, values.dtype)
             self._sparse[number] = values
@@ -148,7 +176,8 @@ class GltfFile:
         """[n] uint8 of a buffer view."""
         view = self.entry("bufferViews", number)
         data = self._buffer(view["buffer"])
-        offset, length = _whole(view.get("byteOffset", 0)), _whole(view["byteLength"])
+        offset = _whole(view.get("byteOffset", 0))
+        length = _whole(view["byteLength"])
         if offset + length > len(data):
             raise self.source.damaged(
                 f"damaged: buffer view {number} ends at byte {offset + length} of a buffer of {len(data)}"
@@ -161,7 +190,9 @@ class GltfFile:
             data = self.chunk if "uri" not in entry and number == 0 else self.file(entry.get("uri"))
             if data is None:
                 name = str(entry.get("uri", "a buffer"))[:200]
-                raise InputError(f"{self.source.path} needs {name}, which is not beside it; add that file.")
+                raise InputError(
+                    f"{self.source.path} needs {name}, which is not beside it; add that file."
+                )
             self._buffers[number] = np.frombuffer(data, np.uint8)
         return self._buffers[number]
 
@@ -173,7 +204,9 @@ class GltfFile:
             return self.source.folder.get(address)
         kind, _, content = address.partition(",")
         try:
-            return base64.b64decode(content) if kind.endswith(";base64") else unquote_to_bytes(content)
+            return (
+                base64.b64decode(content) if kind.endswith(";base64") else unquote_to_bytes(content)
+            )
         except (binascii.Error, ValueError) as error:
             raise self.source.damaged("a data address in it is no base64") from error
 
@@ -202,7 +235,9 @@ def _chunks(source: MeshSource) -> tuple[bytes, bytes | None]:
     if version != 2 or kind != 0x4E4F534A:
         raise source.damaged(f"version {version} of GLB; 2 is read")
     if max(20 + length, total) > len(data):
-        raise source.damaged(f"truncated: it should have {max(20 + length, total)} bytes, and has {len(data)}")
+        raise source.damaged(
+            f"truncated: it should have {max(20 + length, total)} bytes, and has {len(data)}"
+        )
     after = 20 + length
     if after + 8 > len(data):
         return data[20:after], None
@@ -210,13 +245,20 @@ def _chunks(source: MeshSource) -> tuple[bytes, bytes | None]:
     if kind != 0x004E4942:
         return data[20:after], None
     if after + 8 + length > len(data):
-        raise source.damaged(f"truncated: it should have {after + 8 + length} bytes, and has {len(data)}")
+        raise source.damaged(
+            f"truncated: it should have {after + 8 + length} bytes, and has {len(data)}"
+        )
     return data[20:after], data[after + 8 : after + 8 + length]
 
 
 def _whole(value: Any) -> int:
     """A count of the document. Raises ValueError for none."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value) or value < 0:
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, int | float)
+        or value != int(value)
+        or value < 0
+    ):
         raise ValueError(f"{str(value)[:40]} is no count")
     return int(value)
 

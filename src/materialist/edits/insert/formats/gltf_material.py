@@ -12,7 +12,8 @@ from materialist.edits.insert.formats.gltf_file import GltfFile, extension
 from materialist.edits.insert.formats.textures import Textures, clipped_surface, unit_range
 from materialist.types import Array, Surface
 
-TRANSMISSION, TRANSFORM = "KHR_materials_transmission", "KHR_texture_transform"
+TRANSMISSION = "KHR_materials_transmission"
+TRANSFORM = "KHR_texture_transform"
 GLOSS = "KHR_materials_pbrSpecularGlossiness"
 SHOWN = {TRANSMISSION, GLOSS, "KHR_materials_ior", "KHR_materials_emissive_strength"}
 """Extensions of materials that are shown."""
@@ -59,7 +60,9 @@ class GltfMaterials:
     def _texture(self, info: dict[str, Any]) -> dict[str, Any]:
         """The texture of a textureInfo; empty for one that the file does not have."""
         number = int(info.get("index", 0))
-        return self.file.entry("textures", number) if number < len(self.file.tree["textures"]) else {}
+        return (
+            self.file.entry("textures", number) if number < len(self.file.tree["textures"]) else {}
+        )
 
     def _pixels(self, info: Any) -> Array | None:
         image = self._image(info)
@@ -86,7 +89,8 @@ class GltfMaterials:
         Transmitted light is tinted by the base colour, and an emissive strength of 1 is the white of the photo.
         """
         colour_info, packed_info = _infos(entry)
-        colour, packed = self._pixels(colour_info), self._pixels(packed_info)
+        colour = self._pixels(colour_info)
+        packed = self._pixels(packed_info)
         leads = packed_info if colour is None and packed is not None else colour_info
         layout = self._layout(leads)
         if colour is not None and packed is not None and self._layout(packed_info) != layout:
@@ -145,10 +149,12 @@ def _tinted(colour: Array | None, factor: Any) -> Array:
 def _metallic(entry: dict[str, Any], colour: Array | None, packed: Array | None) -> Surface:
     pbr = entry.get("pbrMetallicRoughness") or {}
     albedo = _tinted(colour, pbr.get("baseColorFactor"))
-    rough, metal = float(pbr.get("roughnessFactor", 1)), float(pbr.get("metallicFactor", 1))
+    rough = float(pbr.get("roughnessFactor", 1))
+    metal = float(pbr.get("metallicFactor", 1))
     if packed is None:
         return clipped_surface(albedo, np.full((1, 1), rough), np.full((1, 1), metal))
-    roughness, metallic = unit_range(packed[..., 1], rough), unit_range(packed[..., 2], metal)
+    roughness = unit_range(packed[..., 1], rough)
+    metallic = unit_range(packed[..., 2], metal)
     return clipped_surface(albedo, roughness, metallic)
 
 
@@ -162,7 +168,9 @@ def _shining(entry: dict[str, Any], surface: Surface) -> Surface:
     share = float(np.clip(entering.get("transmissionFactor", 0.0), 0, 1))
     if share > 0 and "transmissionTexture" not in entering:
         ior = float(np.clip(extension(entry, "KHR_materials_ior").get("ior", 1.5), 1, 3))
-        surface = replace(surface, transmission=share, ior=ior, tint=triple(surface.albedo.mean((0, 1))))
+        surface = replace(
+            surface, transmission=share, ior=ior, tint=triple(surface.albedo.mean((0, 1)))
+        )
     return surface
 
 

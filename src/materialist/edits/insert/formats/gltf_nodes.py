@@ -47,7 +47,9 @@ class GltfNodes:
         local = np.tile(np.eye(4), (count, 1, 1))
         read = {name: self._instances(number, name) for name, number in attributes.items()}
         if any(len(values) != count for values in read.values()):
-            raise self.file.source.damaged(f"node {node} has places of other counts for its instances")
+            raise self.file.source.damaged(
+                f"node {node} has places of other counts for its instances"
+            )
         if "ROTATION" in read:
             local[:, :3, :3] = rotations(read["ROTATION"])
         if "SCALE" in read:
@@ -102,7 +104,9 @@ class GltfNodes:
         level = roots
         while level:
             reached.update(dict.fromkeys(level))
-            level = [child for number in level for child in self.children[number] if child not in reached]
+            level = [
+                child for number in level for child in self.children[number] if child not in reached
+            ]
         return list(reached)
 
 

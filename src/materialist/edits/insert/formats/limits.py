@@ -58,10 +58,14 @@ class MeshLimits:
         limit = getattr(self, name)
         if value > limit:
             things, remedy = _WORDS[name]
-            raise InputError(f"{path} has {_number(value)} {things}, more than {_number(limit)}; {remedy}.")
+            raise InputError(
+                f"{path} has {_number(value)} {things}, more than {_number(limit)}; {remedy}."
+            )
 
 
-_REDUCE = "reduce it first (Blender: Modifier > Decimate; MeshLab: Quadric Edge Collapse Decimation)"
+_REDUCE = (
+    "reduce it first (Blender: Modifier > Decimate; MeshLab: Quadric Edge Collapse Decimation)"
+)
 _JOIN = "join its objects first (Blender: Object > Join)"
 _SHRINK = "shrink its textures first"
 _EXPORT = "export it again, in Blender for example"

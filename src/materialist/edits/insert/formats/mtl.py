@@ -107,7 +107,9 @@ class MtlLibrary:
 
 def _map(words: list[str]) -> tuple[str, TextureLayout]:
     """(file, where it lies) of the words of a map: options with their values, and a name that may hold spaces."""
-    scale, offset, wrap = (1.0, 1.0), (0.0, 0.0), "repeat"
+    scale = (1.0, 1.0)
+    offset = (0.0, 0.0)
+    wrap = "repeat"
     rest = list(words)
     while len(rest) > 1 and rest[0].lower() in OPTIONS:
         option = rest.pop(0).lower()
@@ -142,8 +144,15 @@ def _pair(values: list[str], otherwise: float) -> tuple[float, float]:
 def _left_out(entries: dict[str, list[str]]) -> list[str]:
     """Parts of a material that are not shown."""
     clear = _numbers(entries.get("d"), (1.0,))[0] < 1 or _numbers(entries.get("tr"), (0.0,))[0] > 0
-    maps = [key for key in entries if key.startswith(("map_", "bump", "norm", "disp")) and key != "map_kd"]
-    return [*["its transparency (taken as opaque)"] * bool(clear), *(f"its {key[:40]}" for key in maps)]
+    maps = [
+        key
+        for key in entries
+        if key.startswith(("map_", "bump", "norm", "disp")) and key != "map_kd"
+    ]
+    return [
+        *["its transparency (taken as opaque)"] * bool(clear),
+        *(f"its {key[:40]}" for key in maps),
+    ]
 
 
 def _numbers(value: Any, otherwise: tuple[float, ...]) -> Array:

@@ -7,7 +7,12 @@ from itertools import chain
 import numpy as np
 
 from materialist.color import srgb_to_linear
-from materialist.edits.insert.formats.content import MeshContent, MeshPart, compacted, mean_of_corners
+from materialist.edits.insert.formats.content import (
+    MeshContent,
+    MeshPart,
+    compacted,
+    mean_of_corners,
+)
 from materialist.edits.insert.formats.mtl import MtlLibrary
 from materialist.edits.insert.formats.polygons import triangulated
 from materialist.edits.insert.formats.source import MeshSource
@@ -30,7 +35,9 @@ LEFT_OUT = {
 class _Lines:
     """What the lines of one block say, sorted by kind."""
 
-    values: dict[bytes, list[list[bytes]]] = field(default_factory=lambda: {b"v": [], b"vt": [], b"vn": []})
+    values: dict[bytes, list[list[bytes]]] = field(
+        default_factory=lambda: {b"v": [], b"vt": [], b"vn": []}
+    )
     """Words of vertices, texture coordinates and normals."""
     corners: list[bytes] = field(default_factory=list)
     """As in `3/1/2`, polygon after polygon."""
@@ -44,7 +51,9 @@ class _Lines:
 class _Obj:
     """The file as far as it is read."""
 
-    values: dict[bytes, list[Array]] = field(default_factory=lambda: {b"v": [], b"vt": [], b"vn": []})
+    values: dict[bytes, list[Array]] = field(
+        default_factory=lambda: {b"v": [], b"vt": [], b"vn": []}
+    )
     """Blocks of [n, 3] or [n, 6] (position, and colour), [n, 2] and [n, 3]; NaN for what a line does not have."""
     sizes: dict[bytes, int] = field(default_factory=lambda: {b"v": 0, b"vt": 0, b"vn": 0})
     corners: list[Array] = field(default_factory=list)
@@ -164,7 +173,9 @@ def _corner_numbers(source: MeshSource, corners: list[bytes]) -> Array:
             numbers = floats(source, words).reshape(-1, slashes + 1)
             return _whole(source, np.pad(numbers, ((0, 0), (0, 2 - slashes))))
     parts = [[*corner.split(b"/"), b"0", b"0"][:3] for corner in corners]
-    return _whole(source, floats(source, [word or b"0" for part in parts for word in part]).reshape(-1, 3))
+    return _whole(
+        source, floats(source, [word or b"0" for part in parts for word in part]).reshape(-1, 3)
+    )
 
 
 def _whole(source: MeshSource, numbers: Array) -> Array:
@@ -180,7 +191,9 @@ def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
     obj.corners.clear()
     for column, table in enumerate(tables.values()):
         if len(corners) and corners[:, column].max() >= len(table):
-            raise source.damaged("a face has a vertex, texture coordinate or normal that does not exist")
+            raise source.damaged(
+                "a face has a vertex, texture coordinate or normal that does not exist"
+            )
     positions = tables[b"v"][:, :3]
     colours = tables[b"v"][:, 3:] if tables[b"v"].shape[1] == 6 else None
     faces, polygon = triangulated(source, positions, np.concatenate(obj.counts), corners[:, 0])
@@ -224,7 +237,9 @@ def _joined_blocks(blocks: list[Array], columns: int) -> Array:
     return table
 
 
-def _part(corners: Array, positions: Array, tables: dict[bytes, Array], colours: Array | None) -> MeshPart:
+def _part(
+    corners: Array, positions: Array, tables: dict[bytes, Array], colours: Array | None
+) -> MeshPart:
     """The part of corners [3 F, 3]; corners that agree in everything become one vertex."""
     has_uv = bool((corners[:, 1] != NONE).all())
     has_normals = bool((corners[:, 2] != NONE).all())

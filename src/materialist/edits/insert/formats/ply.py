@@ -6,7 +6,13 @@ import numpy as np
 
 from materialist.color import srgb_to_linear
 from materialist.edits.core.surfaces import uniform_surface
-from materialist.edits.insert.formats.content import MeshContent, MeshPart, Paint, mean_of_corners, strip_faces
+from materialist.edits.insert.formats.content import (
+    MeshContent,
+    MeshPart,
+    Paint,
+    mean_of_corners,
+    strip_faces,
+)
 from materialist.edits.insert.formats.ply_file import PlyElement, read_elements
 from materialist.edits.insert.formats.polygons import triangulated
 from materialist.edits.insert.formats.source import MeshSource
@@ -14,7 +20,11 @@ from materialist.edits.insert.formats.textures import GREY, Textures
 from materialist.types import Array
 
 INDICES = ("vertex_indices", "vertex_index")
-COLOURS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
+COLOURS = (
+    ("red", "green", "blue"),
+    ("diffuse_red", "diffuse_green", "diffuse_blue"),
+    ("r", "g", "b"),
+)
 UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UNREAD = ("edge", "multi_texture_vertex", "multi_texture_face", "range_grid")
 """Elements that are left out with a word."""
@@ -38,22 +48,32 @@ def read_ply_mesh(source: MeshSource) -> MeshContent:
     if not len(faces):
         return content
     colours = _face_colours(elements, faces, polygon)
-    normals, uv = vertex.table(("nx", "ny", "nz")), _vertex_uv(vertex)
+    normals = vertex.table(("nx", "ny", "nz"))
+    uv = _vertex_uv(vertex)
     wedge = _corner_uv(elements, len(corners))
     if wedge is not None:
-        points, normals = points[faces.ravel()], None if normals is None else normals[faces.ravel()]
-        uv, faces = wedge[places.ravel()], np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
+        points = points[faces.ravel()]
+        normals = None if normals is None else normals[faces.ravel()]
+        uv = wedge[places.ravel()]
+        faces = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
     paint = _texture(source, textures, content) if textures and uv is not None else None
     if paint and colours is not None:
         content.left_out.append("its colours")
-    content.parts.append(MeshPart(points, faces, paint, source.path.stem, normals, uv, None if paint else colours))
+    content.parts.append(
+        MeshPart(points, faces, paint, source.path.stem, normals, uv, None if paint else colours)
+    )
     return content
 
 
-def _faces(source: MeshSource, elements: dict[str, PlyElement], points: Array) -> tuple[Array, Array, Array]:
+def _faces(
+    source: MeshSource, elements: dict[str, PlyElement], points: Array
+) -> tuple[Array, Array, Array]:
     """(corners [C], triangles [F, 3] as positions among them, polygon [F] of each)."""
-    face, strips = elements.get("face"), elements.get("tristrips")
-    lists = next((face.lists[name] for name in INDICES if name in face.lists), None) if face else None
+    face = elements.get("face")
+    strips = elements.get("tristrips")
+    lists = (
+        next((face.lists[name] for name in INDICES if name in face.lists), None) if face else None
+    )
     if lists is None and strips is not None:
         return _strips(source, strips, len(points))
     if lists is None:
@@ -97,12 +117,15 @@ def _face_colours(elements: dict[str, PlyElement], faces: Array, polygon: Array)
 
 def _linear(element: PlyElement) -> Array | None:
     """[n, 3] linear float32 colours of an element's rows."""
-    names = next((names for names in COLOURS if all(name in element.columns for name in names)), None)
+    names = next(
+        (names for names in COLOURS if all(name in element.columns for name in names)), None
+    )
     if names is None or not element.count:
         return None
     channels = []
     for name in names:
-        values, kind = element.columns[name], element.kind(name)
+        values = element.columns[name]
+        kind = element.kind(name)
         if kind == np.uint8:
             channels.append(srgb_to_linear(np.clip(values, 0, 255).astype(np.uint8)))
             continue

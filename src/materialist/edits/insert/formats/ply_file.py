@@ -83,7 +83,8 @@ def read_elements(source: MeshSource) -> tuple[dict[str, PlyElement], list[str]]
     if order:
         data = np.frombuffer(source.data, np.uint8)
     else:
-        data, start = _text_numbers(source, start), 0
+        data = _text_numbers(source, start)
+        start = 0
     for element in elements.values():
         _check_size(source, element, len(data) - start)
         start = _read(source, data, start, element)
@@ -107,7 +108,9 @@ def _header(source: MeshSource) -> tuple[dict[str, PlyElement], list[str], str, 
                 order = ORDERS.get(name)
             case ["comment", "TextureFile", *_]:
                 textures.append(line.split(None, 2)[2].strip())
-            case ["element", name, count] if count.isascii() and count.isdigit() and name not in elements:
+            case ["element", name, count] if (
+                count.isascii() and count.isdigit() and name not in elements
+            ):
                 elements[name] = PlyElement(name, int(count[:18]))
             case ["property", *_] if elements and order is not None:
                 list(elements.values())[-1].properties.append(_property(source, words[1:], order))
@@ -212,7 +215,9 @@ def _ragged(source: MeshSource, data: Array, start: int, element: PlyElement) ->
     """Fill an element whose lists differ in length, row by row."""
     starts = [array("q") for _ in element.properties]
     lengths = [array("q") for _ in element.properties]
-    formats = [one.stored_count and struct.Struct(_struct(one.stored_count)) for one in element.properties]
+    formats = [
+        one.stored_count and struct.Struct(_struct(one.stored_count)) for one in element.properties
+    ]
     sizes = [one.stored.itemsize for one in element.properties]
     bytes_ = data.data
     end = start
@@ -232,7 +237,9 @@ def _ragged(source: MeshSource, data: Array, start: int, element: PlyElement) ->
                 raise ValueError("beyond the end")
     except (struct.error, ValueError, OverflowError) as error:
         row = len(starts[0])
-        raise source.damaged(f"damaged: row {row} of '{element.name[:40]}' does not end within the file") from error
+        raise source.damaged(
+            f"damaged: row {row} of '{element.name[:40]}' does not end within the file"
+        ) from error
     for k, one in enumerate(element.properties):
         begin = np.frombuffer(starts[k], np.int64)
         size = np.frombuffer(lengths[k], np.int64)

@@ -14,7 +14,9 @@ REFLEX = -1e-6
 """Sine of the turn at a corner below which it points inwards; rounding of flat corners stays above."""
 
 
-def triangulated(source: MeshSource, points: Array, counts: Array, corners: Array) -> tuple[Array, Array]:
+def triangulated(
+    source: MeshSource, points: Array, counts: Array, corners: Array
+) -> tuple[Array, Array]:
     """(triangles [F, 3] as positions in `corners`, polygon [F] of each) of polygons of `counts` [P] corners.
 
     points [V, 3]; corners [C] numbers of points, polygon after polygon. Polygons below three corners have none.
@@ -36,7 +38,9 @@ def triangulated(source: MeshSource, points: Array, counts: Array, corners: Arra
     return np.concatenate(faces), np.concatenate(owners)
 
 
-def _cut(source: MeshSource, points: Array, corners: Array, index: Array) -> Iterator[tuple[Array, Array]]:
+def _cut(
+    source: MeshSource, points: Array, corners: Array, index: Array
+) -> Iterator[tuple[Array, Array]]:
     """(triangles [F, 3], row [F]) of polygons of one size, whose corners are at `index` [P, n]."""
     size = index.shape[1]
     if size == 3:
@@ -75,13 +79,18 @@ def _ears(outline: Array, normal: Array) -> tuple[Array, Array]:
     right = np.cross(across, normal)
     plane = np.stack([right, np.cross(normal, right)], -1)
     plane = plane / np.maximum(np.linalg.norm(plane, axis=1, keepdims=True), 1e-300)
-    flat = np.nan_to_num(outline @ plane, posinf=0, neginf=0)  # [P, n, 2]; such vertices are refused later
+    flat = np.nan_to_num(
+        outline @ plane, posinf=0, neginf=0
+    )  # [P, n, 2]; such vertices are refused later
     ring = np.array([outline.shape[1]], np.uint32)
-    ears = [np.asarray(mapbox_earcut.triangulate_float64(corners, ring), np.int64) for corners in flat]
+    ears = [
+        np.asarray(mapbox_earcut.triangulate_float64(corners, ring), np.int64) for corners in flat
+    ]
     triangles = np.concatenate(ears).reshape(-1, 3)
     row = np.repeat(np.arange(len(flat)), [len(ear) // 3 for ear in ears])
     corner = flat[row[:, None], triangles]
-    first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    first = corner[:, 1] - corner[:, 0]
+    second = corner[:, 2] - corner[:, 0]
     behind = first[:, 0] * second[:, 1] < first[:, 1] * second[:, 0]
     triangles[behind] = triangles[behind, ::-1]
     return triangles, row

@@ -46,7 +46,9 @@ class MeshFolder:
     def _inside(self, name: str) -> Path:
         """The path of a reference; glTF's percent-encoding is decoded. Raises InputError where it leads outside."""
         spellings = [one.replace("\\", "/") for one in (name, unquote(name))]
-        absolute = any(one.startswith("/") or ":" in one.split("/", 1)[0] or "\0" in one for one in spellings)
+        absolute = any(
+            one.startswith("/") or ":" in one.split("/", 1)[0] or "\0" in one for one in spellings
+        )
         paths = [] if absolute else [(self.folder / one).resolve() for one in spellings]
         if absolute or not all(path.is_relative_to(self.folder) for path in paths):
             raise InputError(
@@ -92,4 +94,6 @@ class MeshSource:
     def material_error(self, reason: str) -> InputError:
         """The error for a material that says nonsense."""
         reason = " ".join(reason.split())[:160]
-        return InputError(f"{self.path} has a material that cannot be read: {reason}; export it again.")
+        return InputError(
+            f"{self.path} has a material that cannot be read: {reason}; export it again."
+        )

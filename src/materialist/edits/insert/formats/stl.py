@@ -21,13 +21,16 @@ def read_stl(source: MeshSource) -> MeshContent:
     fits = len(data) >= HEADER + count * FACET.itemsize
     exact = len(data) == HEADER + count * FACET.itemsize
     is_text = (
-        data[:512].lstrip(b"\xef\xbb\xbf \t\r\n").lower().startswith(b"solid") and b"vertex" in data[:65536].lower()
+        data[:512].lstrip(b"\xef\xbb\xbf \t\r\n").lower().startswith(b"solid")
+        and b"vertex" in data[:65536].lower()
     )
     if is_text and not exact:
         return _content(source, _text_corners(source))
     if not fits or count == 0:
         room = max(len(data) - HEADER, 0) // FACET.itemsize
-        raise source.damaged(f"damaged: its header counts {count} facets, and it has bytes for {room}")
+        raise source.damaged(
+            f"damaged: its header counts {count} facets, and it has bytes for {room}"
+        )
     source.check("faces", count)
     facets = np.frombuffer(data, FACET, count, HEADER)
     content = _content(source, facets["corners"].reshape(-1, 3).copy())
@@ -46,7 +49,9 @@ def _text_corners(source: MeshSource) -> Array:
     blocks = [np.zeros((0, 3))]
     count = 0
     for lines in line_blocks(source, source.data):
-        rows = [words for words in map(bytes.split, lines) if words and words[0].lower() == b"vertex"]
+        rows = [
+            words for words in map(bytes.split, lines) if words and words[0].lower() == b"vertex"
+        ]
         if any(len(words) != 4 for words in rows):
             raise source.damaged("a vertex has not three numbers")
         count += len(rows)

@@ -70,9 +70,12 @@ class Textures:
     @property
     def side(self) -> int:
         """Longest side that is kept, pixels: the limit, halved until the maps made of all keep theirs."""
-        limits, side = self.source.limits, self.source.limits.texture
+        limits = self.source.limits
+        side = self.source.limits.texture
         images = [(size, self._uses[key]) for key, size in self._sizes.items()]
-        while side > 16 and sum(n * _kept(size, side) for size, n in images) > limits.texture_pixels:
+        while (
+            side > 16 and sum(n * _kept(size, side) for size, n in images) > limits.texture_pixels
+        ):
             side //= 2
         return side
 
@@ -80,8 +83,12 @@ class Textures:
         """Sentences on what could not be kept as it is in the file."""
         notes = ["a texture cannot be read; a constant takes its place."] * bool(self.damaged)
         side = self.side
-        if side < self.source.limits.texture and any(max(size) > side for size in self._sizes.values()):
-            notes.append(f"its textures are shrunk to {side} pixels, because they are large together.")
+        if side < self.source.limits.texture and any(
+            max(size) > side for size in self._sizes.values()
+        ):
+            notes.append(
+                f"its textures are shrunk to {side} pixels, because they are large together."
+            )
         return notes
 
     def _decoded(self, image: Any, mode: str) -> Array:
