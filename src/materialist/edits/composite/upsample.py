@@ -16,24 +16,17 @@ class MatteSettings:
     """Shares of a surface in the photo's pixels along its outline; tuned by eye unless derived."""
 
     tile: int = 32  # working pixels: side of the parts in which a matte is made; derived: memory
-    border: int = (
-        4  # working pixels from the mask's border up to which a matte may reach; derived: `near`
-    )
+    # working pixels from the mask's border up to which a matte may reach; derived: `near`
+    border: int = 4
     near: float = 2.5  # standard deviation of the windows of mean colours, working pixels; larger averages texture
-    grain: float = (
-        0.03  # standard deviation of an even surface's colour, sRGB-encoded, channels added
-    )
-    apart: tuple[float, float] = (
-        2.0,
-        5.0,
-    )  # mean colours' distance, standard deviations: not told apart, and clearly
-    beside: tuple[float, float] = (
-        0.3,
-        0.6,
-    )  # a colour's distance from the line between both: a mixture, and none
-    beyond: float = (
-        0.75  # continuation of that line beyond its ends, as the halos of sharpened edges need
-    )
+    # standard deviation of an even surface's colour, sRGB-encoded, channels added
+    grain: float = 0.03
+    # mean colours' distance, standard deviations: not told apart, and clearly
+    apart: tuple[float, float] = (2.0, 5.0)
+    # a colour's distance from the line between both: a mixture, and none
+    beside: tuple[float, float] = (0.3, 0.6)
+    # continuation of that line beyond its ends, as the halos of sharpened edges need
+    beyond: float = 0.75
 
 
 @dataclass(frozen=True)
