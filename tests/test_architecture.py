@@ -17,6 +17,7 @@ NOUNS = {
     "metrics",
     "buffers",
     "forks",
+    "threads",
     "install",
     "records",
 }
