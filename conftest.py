@@ -70,7 +70,7 @@ def mitsuba():
 @pytest.fixture(scope="session")
 def sample(mitsuba):
     """A small synthetic sample: scene 0 (a table top under the sky), not square."""
-    from materialist.procedural.synthetic import make_sample
+    from materialist_lab.procedural.synthetic import make_sample
 
     return make_sample(0, 0, 0, size=(40, 56), seed=0, spp=64)
 

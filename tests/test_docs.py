@@ -8,11 +8,11 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from materialist.cli.bench import parse_extra
 from typer.main import get_command
 
-from materialist.bench import BENCHMARKS, benchmark_class
 from materialist.cli import app
-from materialist.cli.bench import parse_extra
+from materialist_lab.bench import BENCHMARKS, benchmark_class
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src" / "materialist"

@@ -18,7 +18,7 @@ POOLS = {
     "io/samples.py": """
 import sys, pathlib
 from made_pools import slow_arrays
-from materialist.io.samples import complete
+from materialist_lab.data.samples import complete
 folder = pathlib.Path(sys.argv[1]) / "samples"
 complete([folder / f"{k}.npz" for k in range(8)], slow_arrays, "samples", lambda *_: None, 2)
 """,
@@ -34,7 +34,7 @@ time.sleep(60)
     "train/stream.py": """
 from made_pools import SlowNumbers
 from torch.utils.data import DataLoader
-from materialist.train.stream import _init_worker
+from materialist_lab.train.stream import _init_worker
 list(DataLoader(SlowNumbers(), num_workers=2, worker_init_fn=_init_worker))
 """,
 }

@@ -9,7 +9,7 @@ import pytest
 @pytest.fixture
 def measured(mitsuba, tmp_path):
     """Run a benchmark: its folder, and what is in report.json."""
-    from materialist import bench
+    from materialist_lab import bench
 
     def run(name, **options):
         folder = bench.run(name, **{"output": tmp_path / "report", "force": True, **options})

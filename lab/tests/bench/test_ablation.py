@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from materialist import bench
-from materialist.bench import ablation
 from materialist.fit.settings import PAPER
+from materialist_lab import bench
+from materialist_lab.bench import ablation
 
 pytestmark = pytest.mark.slow
 

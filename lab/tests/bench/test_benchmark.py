@@ -3,7 +3,7 @@
 import subprocess
 import sys
 
-from materialist.bench.benchmark import timed
+from materialist_lab.bench.benchmark import timed
 
 BUSY = "import time\nwhile time.process_time() < 0.3: pass"
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from materialist import metrics
-from materialist.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
 from materialist.camera import project
-from materialist.procedural.synthetic import make_sample
+from materialist_lab.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
+from materialist_lab.procedural.synthetic import make_sample
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,7 @@
 import pytest
 from export_scenes import room
 
-from materialist.bench import export
+from materialist_lab.bench import export
 
 
 @pytest.mark.slow

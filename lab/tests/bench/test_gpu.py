@@ -2,8 +2,8 @@ import json
 from pathlib import Path
 from types import SimpleNamespace
 
-from materialist import bench
-from materialist.bench import gpu
+from materialist_lab import bench
+from materialist_lab.bench import gpu
 
 
 def test_each_device_is_a_column(tmp_path, monkeypatch):

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from materialist.bench import invert
-from materialist.bench.benchmark import materialist
 from materialist.errors import MaterialistError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.io.photo import read_photo
+from materialist_lab.bench import invert
+from materialist_lab.bench.benchmark import materialist
 
 STAGES = {
     "geometry": 1.0,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from materialist import metrics
-from materialist.bench import light
+from materialist_lab.bench import light
 
 
 @pytest.mark.slow

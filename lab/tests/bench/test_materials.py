@@ -5,12 +5,12 @@ import made_samples
 import numpy as np
 import pytest
 
-from materialist.bench import materials
-from materialist.bench.report import Report
 from materialist.color import linear_to_srgb
 from materialist.io.exr import write_exr
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Camera
+from materialist_lab.bench import materials
+from materialist_lab.bench.report import Report
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from materialist import bench
-from materialist.bench import benchmark_class, edits, paper
 from materialist.errors import InputError
+from materialist_lab import bench
+from materialist_lab.bench import benchmark_class, edits, paper
 
 MEASURES, TABLES = paper.published()
 

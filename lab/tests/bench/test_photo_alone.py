@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.bench.edits import true_scene
-from materialist.bench.photo_alone import (
+from materialist.errors import InputError
+from materialist.fit.settings import PAPER
+from materialist_lab.bench.edits import true_scene
+from materialist_lab.bench.photo_alone import (
     SCENE_SEED,
     PhotoAloneBench,
     light_error,
     unseen_sample,
     with_truth,
 )
-from materialist.errors import InputError
-from materialist.fit.settings import PAPER
-from materialist.procedural import arrangements, lights
-from materialist.procedural.options import HELD_OUT
-from materialist.procedural.synthetic import make_sample
+from materialist_lab.procedural import arrangements, lights
+from materialist_lab.procedural.options import HELD_OUT
+from materialist_lab.procedural.synthetic import make_sample
 
 
 def test_captures_are_those_that_no_training_set_may_use(monkeypatch, tmp_path):

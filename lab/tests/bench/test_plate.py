@@ -2,8 +2,8 @@
 
 import pytest
 
-from materialist.bench.plate import PHOTO, PlateBench, orange
 from materialist.io.photo import read_photo
+from materialist_lab.bench.plate import PHOTO, PlateBench, orange
 
 
 def test_the_mask_is_the_jug(real_data):

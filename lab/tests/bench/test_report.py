@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from materialist import bench
-from materialist.bench.glass import GlassBench
-from materialist.bench.report import Column, Report, claim, markdown, write
-from materialist.bench.select import SelectBench
 from materialist.errors import InputError, OutputError
+from materialist_lab import bench
+from materialist_lab.bench.glass import GlassBench
+from materialist_lab.bench.report import Column, Report, claim, markdown, write
+from materialist_lab.bench.select import SelectBench
 
 REPORT = Report(
     title="Trial",

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from materialist.bench.screen_space import shadowed, strongest
 from materialist.camera import project, unproject
 from materialist.types import Camera
+from materialist_lab.bench.screen_space import shadowed, strongest
 
 
 def test_a_shadow_lies_where_the_line_through_the_body_and_the_light_meets_the_floor():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from materialist.bench.select import clickable, drawn, outlines
+from materialist_lab.bench.select import clickable, drawn, outlines
 
 
 @pytest.mark.slow

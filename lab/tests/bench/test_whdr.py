@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from materialist import bench
-from materialist.bench.whdr import whdr
 from materialist.errors import InputError
+from materialist_lab import bench
+from materialist_lab.bench.whdr import whdr
 
 
 def _points(*places, opaque=True):

@@ -6,9 +6,9 @@ import pytest
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.io.datasets import InteriorVerse, open_sources
 from materialist.io.exr import write_exr
 from materialist.types import Camera
+from materialist_lab.data.datasets import InteriorVerse, open_sources
 
 
 @pytest.fixture
@@ -93,7 +93,7 @@ def test_one_part_alone_and_what_is_wrong(folder, tmp_path):
 
 
 def test_scores_are_taken_on_the_validation_split(folder):
-    from materialist.train.maps import held_out
+    from materialist_lab.train.maps import held_out
 
     assert InteriorVerse(folder).validation() is None, "there is none"
     scene = folder / "dataset_85" / "L3D9"

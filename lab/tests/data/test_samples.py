@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.io.datasets import open_sources
-from materialist.io.samples import read_sample
+from materialist_lab.data.datasets import open_sources
+from materialist_lab.data.samples import read_sample
 
 
 def test_a_sample_in_our_conventions(tmp_path):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.metrics.maps import (
+from materialist.types import Materials, Prediction
+from materialist_lab.metrics.maps import (
     aligned_psnr,
     depth_abs_rel,
     depth_figures,
@@ -15,7 +16,6 @@ from materialist.metrics.maps import (
     spread_calibration,
     summary,
 )
-from materialist.types import Materials, Prediction
 
 
 @pytest.fixture

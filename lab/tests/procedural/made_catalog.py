@@ -6,8 +6,8 @@ import zipfile
 import numpy as np
 from PIL import Image
 
-from materialist.procedural.catalog.cache import listing
-from materialist.procedural.staged.stock import Stock
+from materialist_lab.procedural.catalog.cache import listing
+from materialist_lab.procedural.staged.stock import Stock
 
 HEAD = "id=made#up\nname=Made up\nlicense=CC0\n\n"
 MODELS = (

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.walls import Opening, RoomWall, surface
-from materialist.procedural.world import Portal, ScenePart, World, block, look, moved
 from materialist.render.envmap import half_turn, on_mitsuba_grid
 from materialist.render.scene import look_along, sensor, shape
 from materialist.types import Camera
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.walls import Opening, RoomWall, surface
+from materialist_lab.procedural.world import Portal, ScenePart, World, block, look, moved
 
 X, Y, Z = np.eye(3)
 

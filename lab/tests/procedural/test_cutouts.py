@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from materialist.errors import InputError
-from materialist.procedural import cutouts
+from materialist_lab.procedural import cutouts
 
 
 def test_a_cut_out_has_no_margin_and_linear_colours(tmp_path):

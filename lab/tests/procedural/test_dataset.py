@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from materialist.errors import InputError
-from materialist.procedural.dataset import identity, produce, sample_path
-from materialist.procedural.objects import shapes
-from materialist.procedural.options import HELD_OUT, DataSetOptions
-from materialist.procedural.sample import make_sample
+from materialist_lab.procedural.dataset import identity, produce, sample_path
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.options import HELD_OUT, DataSetOptions
+from materialist_lab.procedural.sample import make_sample
 
 SIZE = 32
 CONTRACT = {

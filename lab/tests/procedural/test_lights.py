@@ -6,7 +6,7 @@ import pytest
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle
 from materialist.metrics import sh_coefficients
-from materialist.procedural import lights
+from materialist_lab.procedural import lights
 
 
 def test_a_tilted_camera_sees_the_sky_tilted():

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from materialist.procedural import photographic
+from materialist_lab.procedural import photographic
 
 
 def test_development_keeps_a_photo_a_photo():

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from made_worlds import X, Z, plain, still
 
-from materialist.procedural import packing, relief, sample, tiles, tracer
-from materialist.procedural.defocus import defocused
-from materialist.procedural.materials import ColourPicture, Material
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera
+from materialist_lab.procedural import packing, relief, sample, tiles, tracer
+from materialist_lab.procedural.defocus import defocused
+from materialist_lab.procedural.materials import ColourPicture, Material
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.world import ScenePart, World, look
 
 SIZE = 32
 

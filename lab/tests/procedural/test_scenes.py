@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from materialist.procedural import materials, outdoors, packing, rooms
-from materialist.procedural.objects import things
-from materialist.procedural.sample import exposure
+from materialist_lab.procedural import materials, outdoors, packing, rooms
+from materialist_lab.procedural.objects import things
+from materialist_lab.procedural.sample import exposure
 
 
 def test_materials_are_physical():

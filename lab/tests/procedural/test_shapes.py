@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from solid_scenes import volume
 
-from materialist.bench.glass_scenes import is_closed
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects.glassware import creature, level_set
+from materialist_lab.bench.glass_scenes import is_closed
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.objects.glassware import creature, level_set
 
 SOLIDS = {
     "box": (shapes.box(np.array([1.0, 2.0, 3.0])), 6.0),

@@ -4,8 +4,8 @@ import numpy as np
 
 from materialist import metrics
 from materialist.camera import pixel_rays
-from materialist.procedural import arrangements as scenes
-from materialist.procedural.synthetic import make_sample
+from materialist_lab.procedural import arrangements as scenes
+from materialist_lab.procedural.synthetic import make_sample
 
 
 def test_the_same_numbers_give_the_same_sample(sample):

@@ -9,12 +9,12 @@ from made_worlds import X, Y, Z, plain, reference, room, still
 
 from materialist.camera import pixel_rays
 from materialist.envmap import texel_directions
-from materialist.procedural import packing, sample, tiles, tracer
-from materialist.procedural.materials import Material
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.options import DataSetOptions
-from materialist.procedural.world import ScenePart, World, look
 from materialist.types import Camera
+from materialist_lab.procedural import packing, sample, tiles, tracer
+from materialist_lab.procedural.materials import Material
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.options import DataSetOptions
+from materialist_lab.procedural.world import ScenePart, World, look
 
 SIZE = 32
 

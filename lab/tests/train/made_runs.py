@@ -4,16 +4,16 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.io.datasets import open_sources
 from materialist.predict.bundled.network import BundledArchitecture
 from materialist.predict.network import UNetArchitecture
-from materialist.train.bundled import RECIPE, BundledTask
-from materialist.train.clicks import RECIPE as CLICKS
-from materialist.train.clicks import ClickTask
-from materialist.train.refraction import RECIPE as REFRACTION
-from materialist.train.refraction import RefractionTask
-from materialist.train.schedule import Budget
-from materialist.train.trainer import RunOptions, Trainer
+from materialist_lab.data.datasets import open_sources
+from materialist_lab.train.bundled import RECIPE, BundledTask
+from materialist_lab.train.clicks import RECIPE as CLICKS
+from materialist_lab.train.clicks import ClickTask
+from materialist_lab.train.refraction import RECIPE as REFRACTION
+from materialist_lab.train.refraction import RefractionTask
+from materialist_lab.train.schedule import Budget
+from materialist_lab.train.trainer import RunOptions, Trainer
 
 NETWORK = BundledArchitecture(
     widths=(8, 8, 16, 32),

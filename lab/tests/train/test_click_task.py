@@ -12,9 +12,9 @@ from made_samples import write_set
 
 from materialist.errors import InputError
 from materialist.predict.clicks.features import BOX, CHANNELS, SPOT
-from materialist.procedural.dataset import produce as produce_set
-from materialist.procedural.options import DataSetOptions
-from materialist.train.clicks import PASTED, click_losses, draw_click, load_views, produce_views
+from materialist_lab.procedural.dataset import produce as produce_set
+from materialist_lab.procedural.options import DataSetOptions
+from materialist_lab.train.clicks import PASTED, click_losses, draw_click, load_views, produce_views
 
 
 def test_clicks_lie_on_what_they_ask_for():

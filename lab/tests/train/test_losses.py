@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from materialist.camera import pixel_rays
-from materialist.train import losses
 from materialist.types import Camera
+from materialist_lab.train import losses
 
 
 def _random(*shape, seed=0):

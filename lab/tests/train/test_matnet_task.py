@@ -9,11 +9,11 @@ from made_matnet import TINY, made_network
 from numpy.lib.stride_tricks import sliding_window_view
 
 from materialist.errors import WeightsError
-from materialist.io.samples import SampleFolder
 from materialist.predict.matnet.network import MatNet
 from materialist.predict.weights import metadata
-from materialist.train.matnet import MAPS, PaperTask, enlarged, freeze, load_start
-from materialist.train.stream import epoch
+from materialist_lab.data.samples import SampleFolder
+from materialist_lab.train.matnet import MAPS, PaperTask, enlarged, freeze, load_start
+from materialist_lab.train.stream import epoch
 
 
 @pytest.fixture

@@ -5,9 +5,9 @@ import numpy as np
 import torch
 from torch.utils.data import default_collate
 
-from materialist.io.samples import SampleFolder
-from materialist.train import pictures
-from materialist.train.pictures import AugmentSettings
+from materialist_lab.data.samples import SampleFolder
+from materialist_lab.train import pictures
+from materialist_lab.train.pictures import AugmentSettings
 
 SIZE = 64
 

@@ -11,10 +11,10 @@ from torch.utils.data import default_collate
 
 from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
-from materialist.procedural.thickness import dataset
-from materialist.procedural.thickness.errors import mean_errors
-from materialist.train import checkpoint
-from materialist.train.trainer import Trainer
+from materialist_lab.procedural.thickness import dataset
+from materialist_lab.procedural.thickness.errors import mean_errors
+from materialist_lab.train import checkpoint
+from materialist_lab.train.trainer import Trainer
 
 
 @pytest.fixture(scope="module")

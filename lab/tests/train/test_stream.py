@@ -7,9 +7,9 @@ import made_samples
 import pytest
 
 from materialist.errors import InputError
-from materialist.io.samples import SampleFolder
-from materialist.train import maps
-from materialist.train.stream import epoch
+from materialist_lab.data.samples import SampleFolder
+from materialist_lab.train import maps
+from materialist_lab.train.stream import epoch
 
 ARGS = {"number": 1, "side": 32, "seed": 0}
 

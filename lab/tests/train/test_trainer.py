@@ -12,11 +12,11 @@ import torch
 
 from materialist.errors import InputError, OutputError, WeightsError
 from materialist.predict.bundled.predictor import BundledPredictor
-from materialist.procedural.thickness.dataset import ViewPlan, produce
-from materialist.train import checkpoint
-from materialist.train.bundled import RECIPE
-from materialist.train.schedule import Budget, TrainingSchedule
-from materialist.train.trainer import RunOptions
+from materialist_lab.procedural.thickness.dataset import ViewPlan, produce
+from materialist_lab.train import checkpoint
+from materialist_lab.train.bundled import RECIPE
+from materialist_lab.train.schedule import Budget, TrainingSchedule
+from materialist_lab.train.trainer import RunOptions
 
 
 @pytest.fixture(scope="module")

@@ -14,8 +14,8 @@ from materialist.option_kinds import OperationOptions, Option, declarations
 TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": Path}
 
 
-def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
-    """A group of commands, of `app` where one is given."""
+def group(name: str, help: str, app: typer.Typer | None = None, **settings: Any) -> typer.Typer:
+    """A group of commands, of `app` where one is given; `settings` are other ones of typer."""
     made = typer.Typer(
         name=name,
         help=help,
@@ -23,6 +23,7 @@ def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        **settings,
     )
     if app is not None:
         app.add_typer(made)

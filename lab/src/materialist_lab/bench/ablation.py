@@ -21,10 +21,6 @@ from typing import Any, ClassVar
 import torch
 
 from materialist import metrics
-from materialist.bench.batch import chosen
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
-from materialist.bench.edits import sample_and_light, true_scene
-from materialist.bench.report import Column, Report
 from materialist.buffers import placed
 from materialist.edits.core.renderer import rendered
 from materialist.errors import InputError
@@ -35,8 +31,12 @@ from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Sch
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
-from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Photo, Prediction
+from materialist_lab.bench.batch import chosen
+from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
+from materialist_lab.bench.edits import sample_and_light, true_scene
+from materialist_lab.bench.report import Column, Report
+from materialist_lab.procedural.synthetic import SyntheticSample
 
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
 EACH = ("roughness", "metallic"), ("albedo", "roughness", "metallic")

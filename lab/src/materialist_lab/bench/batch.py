@@ -18,10 +18,18 @@ from pathlib import Path
 from materialist.batches.photos import list_photos
 from materialist.batches.results import package_hash
 from materialist.batches.task import SINGLE_THREAD
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers, spread
-from materialist.bench.report import Column, Report
 from materialist.errors import MaterialistError
 from materialist.option_kinds import option
+from materialist_lab.bench.benchmark import (
+    COUNT,
+    SIZE,
+    Benchmark,
+    Row,
+    materialist,
+    numbers,
+    spread,
+)
+from materialist_lab.bench.report import Column, Report
 
 EXAMPLES = ("example:cat", "example:coffee", "example:rocket", "example:astronaut")
 """The photos without `data`."""

@@ -14,10 +14,10 @@ from typing import Any, ClassVar
 from rich.console import Console
 from rich.progress import track
 
-from materialist.bench.report import Column, Report, write
 from materialist.errors import InputError, MaterialistError
 from materialist.option_kinds import OperationOptions, option
 from materialist.render.variant import setup
+from materialist_lab.bench.report import Column, Report, write
 
 Row = dict[str, Any]
 """'method', 'sample' and the keys of columns; a figure that does not apply is absent."""

@@ -17,18 +17,6 @@ import cv2
 import numpy as np
 
 from materialist import metrics, pipeline
-from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import (
-    KINDS,
-    Edit,
-    awaited,
-    cup,
-    edits,
-    free_place,
-    sample_and_light,
-    true_scene,
-)
-from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.edits.composite.composite import composite, pictures
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
@@ -41,8 +29,20 @@ from materialist.edits.material import material
 from materialist.edits.preview import Preview
 from materialist.edits.remove.remove import remove
 from materialist.option_kinds import option
-from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Scene
+from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
+from materialist_lab.bench.edits import (
+    KINDS,
+    Edit,
+    awaited,
+    cup,
+    edits,
+    free_place,
+    sample_and_light,
+    true_scene,
+)
+from materialist_lab.bench.report import CEILING, Column, Report, strip
+from materialist_lab.procedural.synthetic import SyntheticSample
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,11 +19,11 @@ from materialist.edits.material.material import edit, shifted_hsv
 from materialist.edits.remove.remove import remove
 from materialist.geometry.build import build_geometry
 from materialist.options import Glass
-from materialist.procedural.arrangements import Item
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 from materialist.types import Array, Body, Photo, Prediction, Scene
+from materialist_lab.procedural.arrangements import Item
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.objects.shapes import Solid
+from materialist_lab.procedural.synthetic import SyntheticSample, TrueScene, make_sample
 
 SHIFTS = {
     f"{name}{sign}": (name, float(f"{sign}0.5"))

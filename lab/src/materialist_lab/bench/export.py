@@ -18,9 +18,6 @@ import trimesh
 from PIL import Image
 
 from materialist import pipeline
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
-from materialist.bench.invert import photo_case
-from materialist.bench.report import Column, Report, strip
 from materialist.color import srgb_to_linear
 from materialist.edits.light.relight import read_envmap
 from materialist.exporters.blender import find_blender, run_script
@@ -31,6 +28,9 @@ from materialist.io.exr import read_exr
 from materialist.metrics import psnr
 from materialist.option_kinds import option
 from materialist.types import Array, Materials, Mesh, Scene
+from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row
+from materialist_lab.bench.invert import photo_case
+from materialist_lab.bench.report import Column, Report, strip
 
 
 @dataclass(frozen=True, kw_only=True)

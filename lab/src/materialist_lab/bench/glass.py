@@ -22,19 +22,19 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics
-from materialist.bench import glass_models as models
-from materialist.bench import glass_scenes as scenes
-from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, numbers, timed
-from materialist.bench.edits import awaited, true_scene
-from materialist.bench.glass_models import Background, Case
-from materialist.bench.report import CEILING, Column, Report, strip
 from materialist.edits.glass.preview import GlassPreview
 from materialist.geometry.silhouette import window
-from materialist.metrics.lpips import lpips
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness
-from materialist.procedural.synthetic import photographed
 from materialist.types import Array
+from materialist_lab.bench import glass_models as models
+from materialist_lab.bench import glass_scenes as scenes
+from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, numbers, timed
+from materialist_lab.bench.edits import awaited, true_scene
+from materialist_lab.bench.glass_models import Background, Case
+from materialist_lab.bench.report import CEILING, Column, Report, strip
+from materialist_lab.metrics.lpips import lpips
+from materialist_lab.procedural.synthetic import photographed
 
 DRAWN = (
     "two_interface, true d",

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.edits import staged
-from materialist.bench.glass_scenes import PROTOCOL, GlassScene
 from materialist.edits.core.renderer import denoised
 from materialist.edits.glass import two_interface as interfaces
 from materialist.edits.glass.thickness import object_thickness
@@ -20,10 +18,12 @@ from materialist.geometry.build import build_geometry, part
 from materialist.geometry.silhouette import grown, window
 from materialist.options import Glass
 from materialist.predict.refraction.thickness import Thickness
-from materialist.procedural.arrangements import Item
-from materialist.procedural.synthetic import TrueScene
 from materialist.solids.closed import closed_proxy
 from materialist.types import Array, Camera, Prediction, Scene
+from materialist_lab.bench.edits import staged
+from materialist_lab.bench.glass_scenes import PROTOCOL, GlassScene
+from materialist_lab.procedural.arrangements import Item
+from materialist_lab.procedural.synthetic import TrueScene
 
 
 @dataclass(frozen=True)

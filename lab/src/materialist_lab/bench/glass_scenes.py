@@ -11,20 +11,20 @@ import cv2
 import numpy as np
 import trimesh
 
-from materialist.bench.edits import LIFT, staged
 from materialist.camera import pixel_rays
 from materialist.color import luminance
 from materialist.errors import InputError
-from materialist.procedural import lights, patterns
-from materialist.procedural.arrangements import Item, in_camera
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects.glassware import KINDS, make_shape
-from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.synthetic import TrueScene
-from materialist.procedural.thickness.dataset import CameraPose, look
-from materialist.procedural.thickness.ray_paths import ShapeTracer
-from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array, Camera
+from materialist_lab.bench.edits import LIFT, staged
+from materialist_lab.procedural import lights, patterns
+from materialist_lab.procedural.arrangements import Item, in_camera
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.objects.glassware import KINDS, make_shape
+from materialist_lab.procedural.objects.shapes import Solid
+from materialist_lab.procedural.synthetic import TrueScene
+from materialist_lab.procedural.thickness.dataset import CameraPose, look
+from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
+from materialist_lab.procedural.world import Viewpoint, orbit
 
 GROUPS = ("symmetric", "asymmetric")
 """Whether an object's back is its front mirrored, as the paper sorts its objects."""

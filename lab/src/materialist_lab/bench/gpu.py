@@ -15,16 +15,16 @@ from typing import Any
 import torch
 
 from materialist import pipeline
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers, timed
-from materialist.bench.invert import STAGES, stages, step_row
-from materialist.bench.predictor import PredictorBench
-from materialist.bench.report import Column, Report
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import glass
 from materialist.edits.material.material import edit
 from materialist.edits.select.select import select
 from materialist.option_kinds import option
 from materialist.render.variant import usable_gpus
+from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, materialist, numbers, timed
+from materialist_lab.bench.invert import STAGES, stages, step_row
+from materialist_lab.bench.predictor import PredictorBench
+from materialist_lab.bench.report import Column, Report
 
 
 @dataclass(frozen=True, kw_only=True)

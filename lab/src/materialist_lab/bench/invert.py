@@ -22,16 +22,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.bench.benchmark import (
-    COUNT,
-    COUNT_OR_0,
-    Benchmark,
-    Row,
-    materialist,
-    numbers,
-    timed,
-)
-from materialist.bench.report import Column, Report
 from materialist.buffers import placed
 from materialist.errors import InputError
 from materialist.fit.engine import PathEngine, TransportEngine
@@ -42,10 +32,20 @@ from materialist.io.image import write_png
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
-from materialist.procedural.synthetic import make_sample
 from materialist.render.scene import RenderScene
 from materialist.render.variant import setup
 from materialist.types import Photo, Prediction
+from materialist_lab.bench.benchmark import (
+    COUNT,
+    COUNT_OR_0,
+    Benchmark,
+    Row,
+    materialist,
+    numbers,
+    timed,
+)
+from materialist_lab.bench.report import Column, Report
+from materialist_lab.procedural.synthetic import make_sample
 
 NATIVE = 512
 """Longer side of the synthetic photo; larger working sizes enlarge it."""

@@ -21,9 +21,6 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics, pipeline
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import sample_and_light, staged, true_scene
-from materialist.bench.report import CEILING, Column, Report
 from materialist.buffers import placed
 from materialist.edits.core.renderer import rendered
 from materialist.fit.invert import FitSetup, prepare
@@ -31,8 +28,11 @@ from materialist.fit.light import start_light
 from materialist.fit.settings import preset
 from materialist.option_kinds import option
 from materialist.predict import NEUTRAL_METALLIC, get_predictor
-from materialist.procedural.synthetic import SyntheticSample, photographed
 from materialist.types import Array, Geometry, Materials, Prediction, Scene
+from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
+from materialist_lab.bench.edits import sample_and_light, staged, true_scene
+from materialist_lab.bench.report import CEILING, Column, Report
+from materialist_lab.procedural.synthetic import SyntheticSample, photographed
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
 """Albedo, roughness and metallic of the paper's runs without given materials."""
@@ -111,7 +111,10 @@ class LightBench(Benchmark):
     methods: str = option("default,paper", "Names of METHODS, with commas.", kind="name")
     completion: str = option("auto", "That of `invert`.", kind="name")
     relight: bool = option(
-        True, "Relight whole inversions, with and without continued planes.", kind="switch"
+        True,
+        "Relight whole inversions, with and without continued planes.",
+        kind="switch",
+        flag="--relight/--no-relight",
     )
     spp: int = option(256, "Samples a pixel of all pictures that are compared.", **COUNT)
     unseen: bool = option(

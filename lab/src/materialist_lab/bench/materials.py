@@ -20,20 +20,20 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, spread, timed
-from materialist.bench.report import Column, Report
 from materialist.errors import InputError
-from materialist.io.datasets import InteriorVerse, open_sources
 from materialist.io.display import strip
 from materialist.io.photo import read_photo
-from materialist.io.samples import Sample, SampleFolder
-from materialist.metrics.maps import ordinal_accuracy, score, summary
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.predict.maps import MapsPredictor
 from materialist.predict.protocol import MAPS
-from materialist.procedural.photographic import as_photo
 from materialist.types import Camera, Photo, Prediction
+from materialist_lab.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, spread, timed
+from materialist_lab.bench.report import Column, Report
+from materialist_lab.data.datasets import InteriorVerse, open_sources
+from materialist_lab.data.samples import Sample, SampleFolder
+from materialist_lab.metrics.maps import ordinal_accuracy, score, summary
+from materialist_lab.procedural.photographic import as_photo
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +67,10 @@ class MaterialsBench(Benchmark):
     limit: int = option(0, "At most so many samples, spread over the set; 0: all.", **COUNT_OR_0)
     split: str = option("test", "InteriorVerse's.", kind="name")
     photographic: bool = option(
-        True, "Tone, noise, blur and JPEG for procedural pictures.", kind="switch"
+        True,
+        "Tone, noise, blur and JPEG for procedural pictures.",
+        kind="switch",
+        flag="--photographic/--no-photographic",
     )
     pictures: int = option(8, "Samples in sheet.png.", **COUNT_OR_0)
 

@@ -20,14 +20,15 @@ import cv2
 import yaml
 from jinja2 import Environment
 
-from materialist import __version__
-from materialist.bench import benchmark_class
-from materialist.bench.benchmark import names, timed
-from materialist.bench.report import Column
+import materialist
+import materialist_lab
 from materialist.errors import MaterialistError
 from materialist.io.atomic import make_folder, write_whole
 from materialist.option_kinds import OperationOptions, option
 from materialist.plain import plain
+from materialist_lab.bench import benchmark_class
+from materialist_lab.bench.benchmark import names, timed
+from materialist_lab.bench.report import Column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +96,7 @@ class Table:
 def published() -> tuple[dict[str, Measure], list[Table]]:
     """What is measured, and the paper's tables in its order."""
     content = yaml.safe_load(
-        (files("materialist.bench") / "assets" / "paper.yaml").read_text("utf-8")
+        (files("materialist_lab.bench") / "assets" / "paper.yaml").read_text("utf-8")
     )
     measures = {name: Measure(**told) for name, told in content["measures"].items()}
     return measures, [Table(**told) for told in content["tables"]]
@@ -165,18 +166,17 @@ class PaperBench(OperationOptions):
 
 @cache
 def commit() -> str:
-    """The last commit of the package, `+` and a digest where it has changes since; without Git its version."""
-    git: Any = partial(
-        subprocess.run, cwd=Path(__file__).parent.parent, capture_output=True, check=True
-    )
+    """The last commit of product and laboratory, `+` and a digest where they have changes since; else the version."""
+    folders = [str(Path(package.__file__).parent) for package in (materialist, materialist_lab)]
+    git: Any = partial(subprocess.run, cwd=folders[-1], capture_output=True, check=True)
     try:
         last, since = (
-            git(["git", *words, "--", "."]).stdout
+            git(["git", *words, "--", *folders]).stdout
             for words in (("log", "-1", "--format=%h"), ("diff", "HEAD"))
         )
     except (OSError, subprocess.CalledProcessError):
-        return __version__
-    return (last.decode().strip() or __version__) + (
+        return materialist.__version__
+    return (last.decode().strip() or materialist.__version__) + (
         f"+{hashlib.sha256(since).hexdigest()[:6]}" if since else ""
     )
 
@@ -217,7 +217,7 @@ def write_page(
         "commit": commit(),
         "minutes": sum(row.get("seconds", 0) for row in rows.values()) / 60,
     }
-    assets = files("materialist.bench") / "assets"
+    assets = files("materialist_lab.bench") / "assets"
     for kind in ("html", "md"):
         page = Environment(autoescape=kind == "html", trim_blocks=True, lstrip_blocks=True)
         text = page.from_string((assets / f"paper.{kind}").read_text("utf-8")).render(told)

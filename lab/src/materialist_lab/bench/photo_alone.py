@@ -24,17 +24,17 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics, pipeline
-from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.edits import KINDS, Edit, edits, sample_and_light, true_scene
-from materialist.bench.report import CEILING, Column, Report, strip
-from materialist.bench.screen_space import screen_space
 from materialist.edits.composite.composite import composite
 from materialist.errors import InputError
 from materialist.fit.settings import PAPER
-from materialist.metrics.maps import aligned_psnr, best_scale, score
 from materialist.option_kinds import option
-from materialist.procedural.synthetic import SyntheticSample
 from materialist.types import Array, Prediction, Scene
+from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
+from materialist_lab.bench.edits import KINDS, Edit, edits, sample_and_light, true_scene
+from materialist_lab.bench.report import CEILING, Column, Report, strip
+from materialist_lab.bench.screen_space import screen_space
+from materialist_lab.metrics.maps import aligned_psnr, best_scale, score
+from materialist_lab.procedural.synthetic import SyntheticSample
 
 SCENE_SEED = 38_000
 """Of the arrangements, apart from the seeds of all other benchmarks."""

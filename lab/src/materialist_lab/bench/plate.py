@@ -17,8 +17,6 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from materialist import metrics, pipeline
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row, timed
-from materialist.bench.report import Column, Report, strip
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.composite.composite import composite
 from materialist.edits.remove.remove import remove
@@ -26,6 +24,8 @@ from materialist.errors import InputError
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.types import Array
+from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, timed
+from materialist_lab.bench.report import Column, Report, strip
 
 PLATE, PHOTO = (f"photos/tabletop/materialist_indoor{k}.png" for k in (1, 2))
 ALIGNED = np.array([[1.17386, 0.00042, 6.523], [0.00028, 1.17358, 3.178]])

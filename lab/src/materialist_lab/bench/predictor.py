@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.report import Column, Report
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.predict.bundled.network import STRIDE, BundledNetwork
 from materialist.types import Camera, Photo
+from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
+from materialist_lab.bench.report import Column, Report
 
 
 @dataclass(frozen=True, kw_only=True)

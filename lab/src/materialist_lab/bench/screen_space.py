@@ -13,9 +13,9 @@ from materialist.camera import project, unproject
 from materialist.color import luminance
 from materialist.edits.core.renderer import EditRenderer
 from materialist.envmap import row_solid_angle, texel_directions
-from materialist.procedural.packing import resample
 from materialist.render.pixels import first_hits
 from materialist.types import Array, Scene
+from materialist_lab.procedural.packing import resample
 
 
 @dataclass(frozen=True)

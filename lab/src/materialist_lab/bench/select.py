@@ -20,9 +20,6 @@ import yaml
 from scipy.ndimage import distance_transform_edt
 from skimage.draw import polygon
 
-from materialist.bench.benchmark import COUNT, SIZE, Benchmark, Row
-from materialist.bench.edits import scene_of, true_scene
-from materialist.bench.report import Column, Report
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.geometry.silhouette import window
@@ -30,9 +27,12 @@ from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import Box
-from materialist.procedural.arrangements import arrangement
-from materialist.procedural.synthetic import make_sample
 from materialist.types import Array, Scene
+from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row
+from materialist_lab.bench.edits import scene_of, true_scene
+from materialist_lab.bench.report import Column, Report
+from materialist_lab.procedural.arrangements import arrangement
+from materialist_lab.procedural.synthetic import make_sample
 
 METHODS = ("network", "grabcut")
 """Ways to select that need nothing but the package."""
@@ -119,7 +119,7 @@ class SelectBench(Benchmark):
 
 def outlines() -> dict[str, list[dict[str, Any]]]:
     """Photo -> its objects, each with an `outline` and perhaps `holes`: (x, y) where the longer side is 512 pixels."""
-    text = (files("materialist.bench") / "assets" / "outlines.yaml").read_text("utf-8")
+    text = (files("materialist_lab.bench") / "assets" / "outlines.yaml").read_text("utf-8")
     return dict(yaml.safe_load(text))
 
 

@@ -26,12 +26,12 @@ from typing import Any
 import numpy as np
 import psutil
 
-from materialist.bench.benchmark import SIZE, Benchmark, Row
-from materialist.bench.report import Column, Report
 from materialist.errors import InputError, MaterialistError, SetupError
 from materialist.install import install_command
 from materialist.io.photo import PREFIX, example_path
 from materialist.option_kinds import option
+from materialist_lab.bench.benchmark import SIZE, Benchmark, Row
+from materialist_lab.bench.report import Column, Report
 
 _MOVE = """([name, value, waits]) => new Promise((done, fail) => {
   const view = document.querySelector('#stage .view'), picture = view.querySelector('.photo'), before = picture.src;

@@ -14,20 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.benchmark import COUNT, Benchmark, Row
-from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.option_kinds import option
 from materialist.predict.refraction.network import RefractionNet
 from materialist.predict.refraction.thickness import WEIGHTS
-from materialist.procedural.objects.glassware import Shape, centred
-from materialist.procedural.objects.shapes import load
-from materialist.procedural.options import captures
-from materialist.procedural.thickness.dataset import ViewPlan, draw_views, make_views
-from materialist.procedural.thickness.errors import errors
-from materialist.procedural.thickness.ray_paths import ShapeTracer
 from materialist.render.variant import setup
 from materialist.types import Array
+from materialist_lab.bench.benchmark import COUNT, Benchmark, Row
+from materialist_lab.bench.report import Column, Report
+from materialist_lab.procedural.objects.glassware import Shape, centred
+from materialist_lab.procedural.objects.shapes import load
+from materialist_lab.procedural.options import captures
+from materialist_lab.procedural.thickness.dataset import ViewPlan, draw_views, make_views
+from materialist_lab.procedural.thickness.errors import errors
+from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
 
 
 @dataclass(frozen=True, kw_only=True)

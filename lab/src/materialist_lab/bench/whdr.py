@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
-from materialist.bench.report import Column, Report
 from materialist.errors import InputError
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.types import Array
+from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
+from materialist_lab.bench.report import Column, Report
 
 BASELINES = ("constant", "photo")
 """Albedos that need no predictor: the same everywhere, and the photo itself."""

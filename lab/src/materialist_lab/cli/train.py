@@ -8,12 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
-from materialist.cli.options import Computing, Learning, Training, output_option
+from materialist.cli.generate import add_command, group
+from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import Progress, stage_progress
 from materialist.errors import Interrupted
 from materialist.option_kinds import OperationOptions, option
-from materialist.procedural.options import DataSetOptions
+from materialist_lab.cli.options import Learning, Training
+from materialist_lab.procedural.options import DataSetOptions
 
 SETS = (
     "A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."
@@ -62,7 +64,7 @@ def data(
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
     if sheet is not None:
         from materialist.io.image import ensure_image_writable
-        from materialist.procedural.dataset import write_data_sheet
+        from materialist_lab.procedural.dataset import write_data_sheet
 
         ensure_image_writable(sheet, force=force)
         shown = write_data_sheet(output, sheet, seed=computing.seed)
@@ -71,8 +73,8 @@ def data(
         )
         return
     from materialist.io.atomic import require_parent
-    from materialist.procedural.catalog.packages import missing
-    from materialist.procedural.dataset import produce
+    from materialist_lab.procedural.catalog.packages import missing
+    from materialist_lab.procedural.dataset import produce
 
     require_parent(output)
     start = time.monotonic()
@@ -104,9 +106,9 @@ def matnet(
     workers: Annotated[int, typer.Option(help="Processes that load data.")] = 1,
 ) -> None:
     """Train a network of all maps; RUN/weights.safetensors holds it, ready to use."""
-    from materialist.io.datasets import open_sources
-    from materialist.train import bundled
-    from materialist.train import matnet as paper
+    from materialist_lab.data.datasets import open_sources
+    from materialist_lab.train import bundled
+    from materialist_lab.train import matnet as paper
 
     make: Any
     make, base = {
@@ -129,8 +131,8 @@ def refraction(
 ) -> None:
     """Train RefractionNet on procedural shapes; RUN/weights.safetensors holds it, ready to use."""
     from materialist.predict.refraction.network import RefractionNet
-    from materialist.procedural.thickness.dataset import ViewPlan, produce
-    from materialist.train.refraction import RECIPE, RefractionTask
+    from materialist_lab.procedural.thickness.dataset import ViewPlan, produce
+    from materialist_lab.train.refraction import RECIPE, RefractionTask
 
     folder = views.data or output / "views"
     lessons = folder / "train"
@@ -166,7 +168,7 @@ def clicks(
     ] = None,
 ) -> None:
     """Train ClickNet on procedural pictures as the bundled network sees them; RUN/weights.safetensors holds it."""
-    from materialist.train.clicks import RECIPE, ClickTask, produce_views
+    from materialist_lab.train.clicks import RECIPE, ClickTask, produce_views
 
     recipe = learning.recipe(RECIPE)
 
@@ -194,9 +196,9 @@ def _train(
     """
     from materialist.io.atomic import require_parent
     from materialist.predict.protocol import on_gpu
-    from materialist.train import checkpoint
-    from materialist.train.schedule import Budget
-    from materialist.train.trainer import RunOptions, Trainer
+    from materialist_lab.train import checkpoint
+    from materialist_lab.train.schedule import Budget
+    from materialist_lab.train.trainer import RunOptions, Trainer
 
     unlimited = training.steps is None and training.minutes is None
     budget = Budget(training.steps, minutes if unlimited else training.minutes)
@@ -228,3 +230,8 @@ def _train(
         lines.insert(1, f"The figures are of {scores['of']}.")
     facts = {"run": str(output), "step": step, "scored_on": scores.pop("of", None)}
     report_success(f"train {kind}", training.as_json, lines, **facts, **scores)
+
+
+app = group("train", "Make training data, and train the networks that predict materials.")
+for command in (data, matnet, refraction, clicks):
+    add_command(app, command)

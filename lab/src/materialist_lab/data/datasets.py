@@ -27,8 +27,8 @@ import numpy as np
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
 from materialist.io.exr import read_exr
-from materialist.io.samples import Sample, SampleFolder, Source
 from materialist.types import Array, Camera
+from materialist_lab.data.samples import Sample, SampleFolder, Source
 
 SPLITS = ("train", "val", "test")
 PARTS = ("dataset_85", "dataset_120", "scenes_85", "scenes_120")

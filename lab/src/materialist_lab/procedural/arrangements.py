@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.procedural import patterns
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.options import captures
-from materialist.procedural.world import Viewpoint, orbit
 from materialist.types import Array
+from materialist_lab.procedural import patterns
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.objects.shapes import Solid
+from materialist_lab.procedural.options import captures
+from materialist_lab.procedural.world import Viewpoint, orbit
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,13 @@ from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import write_whole
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import SampleFolder, claim, complete, described
-from materialist.procedural.catalog.cache import CREDITS, Listing, listing
-from materialist.procedural.objects import shapes
-from materialist.procedural.options import DataSetOptions
-from materialist.procedural.sample import make_sample
 from materialist.render.variant import setup
 from materialist.types import Progress
+from materialist_lab.data.samples import SampleFolder, claim, complete, described
+from materialist_lab.procedural.catalog.cache import CREDITS, Listing, listing
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.options import DataSetOptions
+from materialist_lab.procedural.sample import make_sample
 
 FORMAT = 1
 CONTENT = 11

@@ -16,9 +16,9 @@ from materialist.camera import turn_upright
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.io.exr import read_exr
-from materialist.procedural import tiles
-from materialist.procedural.options import captures
 from materialist.types import Array
+from materialist_lab.procedural import tiles
+from materialist_lab.procedural.options import captures
 
 ROWS = 256
 """Rows of an envmap (the paper's 512 x 256), as many as the captures have."""

@@ -7,9 +7,9 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from materialist.procedural import tiles
-from materialist.procedural.relief import Relief
 from materialist.types import Array
+from materialist_lab.procedural import tiles
+from materialist_lab.procedural.relief import Relief
 
 Colour = tuple[float, float, float]
 Range = tuple[float, float]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from materialist.errors import InputError
 from materialist.option_kinds import OperationOptions, option
-from materialist.procedural.catalog import packages
+from materialist_lab.procedural.catalog import packages
 
 TOY_KINDS = ("room", "table", "still-life", "outdoor")
 """Kinds of scenes of procedural things."""

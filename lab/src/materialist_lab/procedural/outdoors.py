@@ -4,13 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.procedural import lights
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects import street_things as street
-from materialist.procedural.objects import things
-from materialist.procedural.objects.things import Meshes
-from materialist.procedural.world import Parts, ScenePart, World, block, bounds, look, orbit, placed
+from materialist_lab.procedural import lights
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects import street_things as street
+from materialist_lab.procedural.objects import things
+from materialist_lab.procedural.objects.things import Meshes
+from materialist_lab.procedural.world import (
+    Parts,
+    ScenePart,
+    World,
+    block,
+    bounds,
+    look,
+    orbit,
+    placed,
+)
 
 GROUNDS: tuple[tuple[float, m.Maker], ...] = (
     (0.2, m.wood),

@@ -8,10 +8,10 @@ import numpy as np
 from materialist.color import luminance
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.geometry.boundary import joined_faces
-from materialist.procedural.materials import ColourPicture
-from materialist.procedural.objects.shapes import face_normals
-from materialist.procedural.world import World
 from materialist.types import Array
+from materialist_lab.procedural.materials import ColourPicture
+from materialist_lab.procedural.objects.shapes import face_normals
+from materialist_lab.procedural.world import World
 
 FACE = 28
 MATERIAL = 36

@@ -4,9 +4,9 @@ import colorsys
 
 import numpy as np
 
-from materialist.procedural.materials import ANY_COLOUR, shade
-from materialist.procedural.tiles import SIZE, X, Y, noise
 from materialist.types import Array
+from materialist_lab.procedural.materials import ANY_COLOUR, shade
+from materialist_lab.procedural.tiles import SIZE, X, Y, noise
 
 UNSATURATED = ANY_COLOUR[:3]
 """The shades of `natural` patterns."""

@@ -10,9 +10,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from materialist.color import LUMINANCE
-from materialist.io.samples import Sample
 from materialist.predict.bundled.network import srgb
 from materialist.types import Array
+from materialist_lab.data.samples import Sample
 
 
 def photographic(image: Array, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -11,8 +11,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from materialist.procedural import tiles
 from materialist.types import Array
+from materialist_lab.procedural import tiles
 
 SIDE = 64
 """Voxels on a side of a block of solid noise, which repeats."""

@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from materialist.procedural import lights, walls, world
-from materialist.procedural import materials as m
-from materialist.procedural.objects import furniture as f
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects.things import Meshes
-from materialist.procedural.walls import RoomWall
-from materialist.procedural.world import Parts, ScenePart, block, moved, placed, rod
 from materialist.types import Array
+from materialist_lab.procedural import lights, walls, world
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import furniture as f
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects.things import Meshes
+from materialist_lab.procedural.walls import RoomWall
+from materialist_lab.procedural.world import Parts, ScenePart, block, moved, placed, rod
 
 Size = Array
 """[3] width, depth and height of a room, metres; its floor is centred on the origin."""

@@ -6,20 +6,20 @@ import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb, luminance
-from materialist.io.samples import LIGHT_ROWS
-from materialist.procedural import outdoors, packing, rooms
-from materialist.procedural.defocus import defocused
-from materialist.procedural.options import SPLITS, DataSetOptions
-from materialist.procedural.staged.furnished import furnished_room
-from materialist.procedural.staged.laid import laid_table
-from materialist.procedural.staged.outside import outside
-from materialist.procedural.staged.single import single
-from materialist.procedural.staged.stock import Stock, stock
-from materialist.procedural.tracer import CENTRE, SampleTracer
-from materialist.procedural.world import World
 from materialist.render.denoise import denoise
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
+from materialist_lab.data.samples import LIGHT_ROWS
+from materialist_lab.procedural import outdoors, packing, rooms
+from materialist_lab.procedural.defocus import defocused
+from materialist_lab.procedural.options import SPLITS, DataSetOptions
+from materialist_lab.procedural.staged.furnished import furnished_room
+from materialist_lab.procedural.staged.laid import laid_table
+from materialist_lab.procedural.staged.outside import outside
+from materialist_lab.procedural.staged.single import single
+from materialist_lab.procedural.staged.stock import Stock, stock
+from materialist_lab.procedural.tracer import CENTRE, SampleTracer
+from materialist_lab.procedural.world import World
 
 DENOISING = "balanced"
 """Quality of the filter: less than half of the time of 'high'."""

@@ -12,8 +12,8 @@ from materialist.bsdf import lobes
 from materialist.bsdf.disney import base_reflectance, specular_probability
 from materialist.bsdf.ggx import alpha_of
 from materialist.buffers import floats, integers, tensor
-from materialist.procedural import relief, tiles
-from materialist.procedural.packing import (
+from materialist_lab.procedural import relief, tiles
+from materialist_lab.procedural.packing import (
     ENV_ROWS,
     ENV_TABLE,
     FACE,

@@ -18,13 +18,13 @@ import numpy as np
 from materialist.buffers import floats, tensor
 from materialist.color import luminance
 from materialist.envmap import bilinear
-from materialist.procedural import arrangements as scenes
-from materialist.procedural import lights
-from materialist.procedural.world import Viewpoint
 from materialist.render.envmap import emitter, on_mitsuba_grid
 from materialist.render.scene import look_along, sensor, shape
 from materialist.render.variant import recording
 from materialist.types import Array, Camera, Materials, Photo, Prediction
+from materialist_lab.procedural import arrangements as scenes
+from materialist_lab.procedural import lights
+from materialist_lab.procedural.world import Viewpoint
 
 PHOTO_SPP = 576
 """Samples a pixel of a reference picture: two seeds then agree to about 40 dB. A square, for the stratified sampler."""

@@ -17,12 +17,12 @@ import numpy as np
 from materialist.buffers import floats
 from materialist.camera import project, unproject
 from materialist.errors import InputError
-from materialist.procedural import shading
-from materialist.procedural.packing import Packed
-from materialist.procedural.shading import Hit
 from materialist.render.scene import shape
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
+from materialist_lab.procedural import shading
+from materialist_lab.procedural.packing import Packed
+from materialist_lab.procedural.shading import Hit
 
 MAX_DEPTH = 5
 """Surfaces a path may meet."""

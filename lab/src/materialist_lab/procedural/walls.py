@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects import things
-from materialist.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects import things
+from materialist_lab.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
 
 X = np.array([1.0, 0, 0])
 Y = np.array([0.0, 1, 0])

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from materialist.camera import turn_upright
-from materialist.procedural.materials import Material
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
+from materialist_lab.procedural.materials import Material
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.objects.shapes import Solid
 
 
 @dataclass(frozen=True)

@@ -7,14 +7,14 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from materialist.io.samples import Sample, Source
 from materialist.predict.bundled.inference import infer
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
-from materialist.train import losses
-from materialist.train.maps import MapsTask
-from materialist.train.pictures import AugmentSettings, stored, varied
-from materialist.train.task import Batch, Recipe
 from materialist.types import Array, Prediction
+from materialist_lab.data.samples import Sample, Source
+from materialist_lab.train import losses
+from materialist_lab.train.maps import MapsTask
+from materialist_lab.train.pictures import AugmentSettings, stored, varied
+from materialist_lab.train.task import Batch, Recipe
 
 RECIPE = Recipe(
     side=256,

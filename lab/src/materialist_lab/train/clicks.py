@@ -14,16 +14,16 @@ from torch.nn import functional as F
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
-from materialist.io.samples import SampleFolder, claim, complete, read_arrays, read_sample
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import Box, features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.network import UNetArchitecture
-from materialist.procedural.cutouts import cutout_files, load_cutout, paste
-from materialist.procedural.dataset import identity
-from materialist.procedural.photographic import photographic
-from materialist.train.task import Batch, Recipe, Task
 from materialist.types import Array, Camera, Photo, Progress
+from materialist_lab.data.samples import SampleFolder, claim, complete, read_arrays, read_sample
+from materialist_lab.procedural.cutouts import cutout_files, load_cutout, paste
+from materialist_lab.procedural.dataset import identity
+from materialist_lab.procedural.photographic import photographic
+from materialist_lab.train.task import Batch, Recipe, Task
 
 DESCRIPTION = "views.json"
 """Of which data set the views beside it are."""

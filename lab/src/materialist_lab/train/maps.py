@@ -10,11 +10,11 @@ from torch import nn
 
 from materialist.errors import InputError
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import Sample, Source
-from materialist.metrics.maps import score, summary
-from materialist.procedural.photographic import as_photo
-from materialist.train.task import Recipe, Task
 from materialist.types import Prediction
+from materialist_lab.data.samples import Sample, Source
+from materialist_lab.metrics.maps import score, summary
+from materialist_lab.procedural.photographic import as_photo
+from materialist_lab.train.task import Recipe, Task
 
 HELD_OUT_EVERY = 40
 """Of every so many samples the last one is never trained on, but scored."""

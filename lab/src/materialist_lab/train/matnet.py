@@ -9,16 +9,16 @@ from torch.nn import functional as F
 
 from materialist.camera import unit
 from materialist.errors import WeightsError
-from materialist.io.samples import Sample, Source
-from materialist.metrics.lpips import backbone
 from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.network import PATCH, MatNet, Size
 from materialist.predict.matnet.predictor import infer
 from materialist.predict.weights import read_state
-from materialist.train import losses
-from materialist.train.maps import MapsTask
-from materialist.train.task import Batch, Recipe
 from materialist.types import Array, Materials, Prediction
+from materialist_lab.data.samples import Sample, Source
+from materialist_lab.metrics.lpips import backbone
+from materialist_lab.train import losses
+from materialist_lab.train.maps import MapsTask
+from materialist_lab.train.task import Batch, Recipe
 
 RECIPE = Recipe(
     side=512,

@@ -10,10 +10,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from materialist.io.samples import LIGHT_ROWS, Sample
-from materialist.procedural.photographic import developed
-from materialist.train.task import Batch
 from materialist.types import Array
+from materialist_lab.data.samples import LIGHT_ROWS, Sample
+from materialist_lab.procedural.photographic import developed
+from materialist_lab.train.task import Batch
 
 _PLANES = ("image", "shading", "albedo", "roughness", "metallic", "normal", "depth", "mask")
 

@@ -13,10 +13,10 @@ from torch.nn import functional as F
 from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
-from materialist.procedural.thickness.dataset import load
-from materialist.procedural.thickness.errors import mean_errors
-from materialist.train.task import Batch, Recipe, Task
 from materialist.types import Array
+from materialist_lab.procedural.thickness.dataset import load
+from materialist_lab.procedural.thickness.errors import mean_errors
+from materialist_lab.train.task import Batch, Recipe, Task
 
 RECIPE = Recipe(side=SIDE, batch=32, rate=2e-3, growth=((0.6, 32),))
 """Small views train faster, and most can be learnt on them."""

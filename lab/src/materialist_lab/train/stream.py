@@ -12,9 +12,9 @@ import torch
 from torch.utils.data import DataLoader, default_collate
 
 from materialist.errors import InputError
-from materialist.io.samples import end_with_parent
-from materialist.train.task import Batch, Task
 from materialist.types import Array
+from materialist_lab.data.samples import end_with_parent
+from materialist_lab.train.task import Batch, Task
 
 ATTEMPTS = 4
 """Examples tried in place of one that cannot be read, before the run ends with its error."""

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from materialist import pipeline
-from materialist.bench.edits import scene_of
-from materialist.bench.real.layouts import LAYOUTS
-from materialist.bench.real.measures import light_figures, map_figures
-from materialist.bench.real.photos import OtherLight, Reading, RealPhoto, with_depth
 from materialist.types import Camera, Materials, Photo, Prediction
+from materialist_lab.bench.edits import scene_of
+from materialist_lab.bench.real.layouts import LAYOUTS
+from materialist_lab.bench.real.measures import light_figures, map_figures
+from materialist_lab.bench.real.photos import OtherLight, Reading, RealPhoto, with_depth
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import made_real
 import numpy as np
 import pytest
 
-from materialist.bench.real.layouts import LAYOUTS, located
-from materialist.bench.real.lights import mean_direction
-from materialist.bench.real.photos import Reading
 from materialist.errors import InputError
+from materialist_lab.bench.real.layouts import LAYOUTS, located
+from materialist_lab.bench.real.lights import mean_direction
+from materialist_lab.bench.real.photos import Reading
 
 BY_FOLDER = {layout.folder: layout for layout in LAYOUTS}
 

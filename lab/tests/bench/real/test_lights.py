@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from materialist.bench.real.lights import ball_light, farthest, lamp_light, mean_direction
 from materialist.camera import unit
 from materialist.envmap import environment, texel_directions
+from materialist_lab.bench.real.lights import ball_light, farthest, lamp_light, mean_direction
 
 
 @pytest.mark.parametrize("direction", [[0, 0, 1], [0.5, 0.5, 0.7], [-0.3, 0.2, -0.9]])

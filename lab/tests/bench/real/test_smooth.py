@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from materialist.bench.real.smooth import smooth_normals
 from materialist.camera import pixel_rays
 from materialist.types import Camera
+from materialist_lab.bench.real.smooth import smooth_normals
 
 CAMERA = Camera(160, 120, 60.0)
 

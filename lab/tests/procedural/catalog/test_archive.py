@@ -4,8 +4,8 @@ import pytest
 from made_catalog import MODELS, make_archive
 
 from materialist.errors import InputError
-from materialist.procedural.catalog.archive import entries
-from materialist.procedural.catalog.roles import role_of
+from materialist_lab.procedural.catalog.archive import entries
+from materialist_lab.procedural.catalog.roles import role_of
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from made_catalog import grain, make_archive, make_photographs
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.procedural.catalog import packages
-from materialist.procedural.catalog.cache import CREDITS, LIST, as_roots, listing
+from materialist_lab.procedural.catalog import packages
+from materialist_lab.procedural.catalog.cache import CREDITS, LIST, as_roots, listing
 
 
 @pytest.fixture(scope="module")

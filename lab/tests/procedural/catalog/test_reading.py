@@ -7,12 +7,12 @@ import pytest
 from made_catalog import grain, make_archive
 
 from materialist.errors import InputError
-from materialist.procedural.catalog.archive import entries
-from materialist.procedural.catalog.creases import creased
-from materialist.procedural.catalog.decimate import decimated
-from materialist.procedural.catalog.reading import read_catalog_model
-from materialist.procedural.catalog.support import level_places
-from materialist.procedural.objects import shapes as s
+from materialist_lab.procedural.catalog.archive import entries
+from materialist_lab.procedural.catalog.creases import creased
+from materialist_lab.procedural.catalog.decimate import decimated
+from materialist_lab.procedural.catalog.reading import read_catalog_model
+from materialist_lab.procedural.catalog.support import level_places
+from materialist_lab.procedural.objects import shapes as s
 
 
 @pytest.fixture(scope="module")

@@ -6,16 +6,16 @@ from made_catalog import make_archive, make_stock
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.procedural import options as o
-from materialist.procedural import packing, sample
-from materialist.procedural.catalog import packages
-from materialist.procedural.catalog.look import CatalogLook
-from materialist.procedural.catalog.support import LevelPlace
-from materialist.procedural.dataset import produce
-from materialist.procedural.staged import finishes, pieces, sculptures, studio_light
-from materialist.procedural.staged import stock as stocks
-from materialist.procedural.world import bounds
 from materialist.types import Camera
+from materialist_lab.procedural import options as o
+from materialist_lab.procedural import packing, sample
+from materialist_lab.procedural.catalog import packages
+from materialist_lab.procedural.catalog.look import CatalogLook
+from materialist_lab.procedural.catalog.support import LevelPlace
+from materialist_lab.procedural.dataset import produce
+from materialist_lab.procedural.staged import finishes, pieces, sculptures, studio_light
+from materialist_lab.procedural.staged import stock as stocks
+from materialist_lab.procedural.world import bounds
 
 
 @pytest.fixture(scope="module")

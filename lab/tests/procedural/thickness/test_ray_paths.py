@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from materialist.procedural.objects import shapes
-from materialist.procedural.thickness.ray_paths import ShapeTracer
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
 
 RADIUS = 0.5
 

@@ -16,10 +16,10 @@ from materialist.predict.refraction.crop import (
     NORMAL_X,
     SIDE,
 )
-from materialist.procedural.objects import shapes as solids
-from materialist.procedural.objects.glassware import Shape, make_shape
-from materialist.procedural.thickness import dataset
-from materialist.procedural.thickness.ray_paths import ShapeTracer
+from materialist_lab.procedural.objects import shapes as solids
+from materialist_lab.procedural.objects.glassware import Shape, make_shape
+from materialist_lab.procedural.thickness import dataset
+from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
 
 
 @pytest.mark.parametrize("index", range(20))

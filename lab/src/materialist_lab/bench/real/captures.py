@@ -7,15 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.bench.real.lights import lamp_light, views
-from materialist.bench.real.photos import (
-    Reading,
-    RealPhoto,
-    linear_photo,
-    read_array,
-    read_millimetres,
-    with_depth,
-)
 from materialist.errors import InputError
 from materialist.io.exr import read_exr
 from materialist.io.image import read_mask
@@ -23,6 +14,15 @@ from materialist.io.photo import read_photo
 from materialist.predict import resample
 from materialist.predict.maps import MapsPredictor
 from materialist.types import Photo
+from materialist_lab.bench.real.lights import lamp_light, views
+from materialist_lab.bench.real.photos import (
+    Reading,
+    RealPhoto,
+    linear_photo,
+    read_array,
+    read_millimetres,
+    with_depth,
+)
 
 OBJECT_FOV = 10.0
 """Degrees: the camera was far away."""

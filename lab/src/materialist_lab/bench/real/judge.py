@@ -21,18 +21,18 @@ from typing import Any
 import cv2
 
 from materialist import pipeline
-from materialist.bench.benchmark import COUNT_OR_0, SIZE, Benchmark, Row, names, spread, timed
-from materialist.bench.real.layouts import LAYOUTS, Layout, located
-from materialist.bench.real.measures import albedo_figures, light_figures, map_figures
-from materialist.bench.real.photos import Reading, RealPhoto
-from materialist.bench.real.sheet import SheetRow, sheet, truth_row
-from materialist.bench.report import Column, Report
 from materialist.edits.composite.composite import composite
 from materialist.edits.light.relight import relight
 from materialist.errors import InputError
 from materialist.option_kinds import option
 from materialist.predict import Predictor, get_predictor
 from materialist.types import Array, Photo, Prediction, Scene
+from materialist_lab.bench.benchmark import COUNT_OR_0, SIZE, Benchmark, Row, names, spread, timed
+from materialist_lab.bench.real.layouts import LAYOUTS, Layout, located
+from materialist_lab.bench.real.measures import albedo_figures, light_figures, map_figures
+from materialist_lab.bench.real.photos import Reading, RealPhoto
+from materialist_lab.bench.real.sheet import SheetRow, sheet, truth_row
+from materialist_lab.bench.report import Column, Report
 
 
 @dataclass(frozen=True, kw_only=True)

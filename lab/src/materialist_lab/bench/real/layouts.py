@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from materialist.bench.real import captures, public_sets
-from materialist.bench.real.photos import Reading, RealPhoto
-from materialist.bench.whdr import pairs
+from materialist_lab.bench.real import captures, public_sets
+from materialist_lab.bench.real.photos import Reading, RealPhoto
+from materialist_lab.bench.whdr import pairs
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from materialist.bench.benchmark import spread
-from materialist.bench.real.photos import OtherLight
 from materialist.camera import unit
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.types import Array, Photo
+from materialist_lab.bench.benchmark import spread
+from materialist_lab.bench.real.photos import OtherLight
 
 ROWS = 128
 """Rows of the environment maps that are made here."""

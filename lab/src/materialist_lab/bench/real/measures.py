@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from materialist.bench.real.photos import RealPhoto
-from materialist.bench.whdr import judged
-from materialist.metrics.maps import aligned_psnr, depth_abs_rel, mean_angle, ordinal_accuracy
 from materialist.types import Array, Prediction
+from materialist_lab.bench.real.photos import RealPhoto
+from materialist_lab.bench.whdr import judged
+from materialist_lab.metrics.maps import aligned_psnr, depth_abs_rel, mean_angle, ordinal_accuracy
 
 LEVEL = 0.7
 """Least upward part of the normal of a floor or a table top, which are easy: most networks know them."""

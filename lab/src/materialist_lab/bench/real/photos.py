@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.bench.real.smooth import smooth_normals
 from materialist.errors import InputError
 from materialist.io.image import read_map
 from materialist.predict import resample
 from materialist.types import Array, Camera, Photo
+from materialist_lab.bench.real.smooth import smooth_normals
 
 MILLIMETRES = 1e-3
 """Metres in a millimetre."""

@@ -7,19 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.bench.materials import photo_of
-from materialist.bench.real.captures import KINECT_FOV
-from materialist.bench.real.lights import ball_light, views
-from materialist.bench.real.photos import (
+from materialist.edits.light.relight import read_envmap
+from materialist.io.photo import decode_photo, read_photo
+from materialist_lab.bench.materials import photo_of
+from materialist_lab.bench.real.captures import KINECT_FOV
+from materialist_lab.bench.real.lights import ball_light, views
+from materialist_lab.bench.real.photos import (
     Reading,
     RealPhoto,
     read_array,
     read_millimetres,
     with_depth,
 )
-from materialist.edits.light.relight import read_envmap
-from materialist.io.datasets import InteriorVerse, parts
-from materialist.io.photo import decode_photo, read_photo
+from materialist_lab.data.datasets import InteriorVerse, parts
 
 NYU_CROP = (slice(45, 471), slice(41, 601))
 """Rows and columns that count (Eigen et al. 2014)."""

@@ -7,11 +7,11 @@ import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from materialist.bench.real.photos import RealPhoto
 from materialist.color import srgb_levels
 from materialist.io import display
-from materialist.metrics.maps import best_scale
 from materialist.types import Array
+from materialist_lab.bench.real.photos import RealPhoto
+from materialist_lab.metrics.maps import best_scale
 
 WIDTH = 360
 CAPTION = 26

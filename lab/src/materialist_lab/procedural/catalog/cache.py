@@ -15,15 +15,15 @@ import numpy as np
 
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole, writing
-from materialist.io.samples import described
-from materialist.procedural.catalog.archive import CatalogEntry, entries
-from materialist.procedural.catalog.look import CatalogLook
-from materialist.procedural.catalog.reading import ModelParts, read_catalog_model
-from materialist.procedural.catalog.roles import role_of
-from materialist.procedural.catalog.support import LevelPlace, level_places
-from materialist.procedural.materials import ColourPicture
-from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array, Progress
+from materialist_lab.data.samples import described
+from materialist_lab.procedural.catalog.archive import CatalogEntry, entries
+from materialist_lab.procedural.catalog.look import CatalogLook
+from materialist_lab.procedural.catalog.reading import ModelParts, read_catalog_model
+from materialist_lab.procedural.catalog.roles import role_of
+from materialist_lab.procedural.catalog.support import LevelPlace, level_places
+from materialist_lab.procedural.materials import ColourPicture
+from materialist_lab.procedural.objects.shapes import Solid
 
 VERSION = 3
 """Counts the changes of what the cache holds."""

@@ -4,8 +4,8 @@ import numpy as np
 from scipy import sparse
 
 from materialist.camera import unit
-from materialist.procedural.objects.shapes import face_normals
 from materialist.types import Array
+from materialist_lab.procedural.objects.shapes import face_normals
 
 
 def creased(vertices: Array, faces: Array, angle: float) -> tuple[Array, Array, Array]:

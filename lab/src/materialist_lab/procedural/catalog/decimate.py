@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from materialist.procedural.catalog.creases import creased
-from materialist.procedural.objects.shapes import Solid, face_normals
 from materialist.types import Array
+from materialist_lab.procedural.catalog.creases import creased
+from materialist_lab.procedural.objects.shapes import Solid, face_normals
 
 CREASE = 0.9
 """Radians: faces of a coarse mesh that meet at a sharper angle keep an edge."""

@@ -13,12 +13,12 @@ from trimesh.resolvers import ZipResolver
 
 from materialist.camera import unit
 from materialist.errors import InputError
-from materialist.procedural.catalog.archive import CatalogEntry
-from materialist.procedural.catalog.creases import creased
-from materialist.procedural.catalog.decimate import decimated
-from materialist.procedural.catalog.look import CatalogLook, catalog_look
-from materialist.procedural.objects.shapes import Solid, face_normals, joined
 from materialist.types import Array
+from materialist_lab.procedural.catalog.archive import CatalogEntry
+from materialist_lab.procedural.catalog.creases import creased
+from materialist_lab.procedural.catalog.decimate import decimated
+from materialist_lab.procedural.catalog.look import CatalogLook, catalog_look
+from materialist_lab.procedural.objects.shapes import Solid, face_normals, joined
 
 
 @dataclass(frozen=True)

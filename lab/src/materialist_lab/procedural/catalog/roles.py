@@ -2,7 +2,7 @@
 
 import re
 
-from materialist.procedural.catalog.archive import CatalogEntry
+from materialist_lab.procedural.catalog.archive import CatalogEntry
 
 LEFT_OUT = re.compile(
     r"arrow|parking|crossing|sidewalk|rails|swimming|sandpit|jacuzzi|escalator|staircase|elevator|bill |eyelash|"

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from materialist.procedural.objects.shapes import Solid, face_normals
 from materialist.types import Array
+from materialist_lab.procedural.objects.shapes import Solid, face_normals
 
 LEVEL = 0.995
 """Least upward part of the unit normal of a level face."""

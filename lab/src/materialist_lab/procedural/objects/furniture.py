@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects import things
-from materialist.procedural.world import Parts, ScenePart, block, placed, rod
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects import things
+from materialist_lab.procedural.world import Parts, ScenePart, block, placed, rod
 
 
 def _legs(rng, width, depth, height, look) -> Parts:

@@ -12,9 +12,9 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from skimage.measure import marching_cubes
 
 from materialist.camera import unit
-from materialist.procedural.objects import shapes
-from materialist.procedural.objects.shapes import Solid
 from materialist.types import Array
+from materialist_lab.procedural.objects import shapes
+from materialist_lab.procedural.objects.shapes import Solid
 
 SPLITS = {"train": 71, "heldout": 72}
 """Numbers that keep the shapes of training and of testing apart."""

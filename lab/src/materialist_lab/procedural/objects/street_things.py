@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.world import Parts, ScenePart, block, orb, rod
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.world import Parts, ScenePart, block, orb, rod
 
 
 def house(rng) -> Parts:

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
 
 Meshes = tuple[Path, ...]
 

@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.catalog.look import CatalogLook
-from materialist.procedural.materials import Colour, ColourPicture, Material
-from materialist.procedural.relief import Relief
-from materialist.procedural.staged.stock import Stock
 from materialist.types import Array
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.catalog.look import CatalogLook
+from materialist_lab.procedural.materials import Colour, ColourPicture, Material
+from materialist_lab.procedural.relief import Relief
+from materialist_lab.procedural.staged.stock import Stock
 
 ROUGHNESS: dict[str, tuple[float, float]] = {
     "mirror": (0.05, 0.06),

@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural import rooms, walls, world
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.relief import Relief
-from materialist.procedural.staged.finishes import covered, pictured
-from materialist.procedural.staged.pieces import backdrop_of, furnished_piece, piece
-from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import (
+from materialist.types import Array
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural import rooms, walls, world
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.relief import Relief
+from materialist_lab.procedural.staged.finishes import covered, pictured
+from materialist_lab.procedural.staged.pieces import backdrop_of, furnished_piece, piece
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import (
     Parts,
     ScenePart,
     World,
@@ -21,7 +22,6 @@ from materialist.procedural.world import (
     one_thing,
     placed,
 )
-from materialist.types import Array
 
 BY_WALLS = (
     "sofa",

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from materialist.procedural import rooms, world
-from materialist.procedural.catalog.support import LevelPlace
-from materialist.procedural.objects import furniture as f
-from materialist.procedural.staged.furnished import furnished_world, some_pieces
-from materialist.procedural.staged.pieces import laid, piece
-from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, World, placed
+from materialist_lab.procedural import rooms, world
+from materialist_lab.procedural.catalog.support import LevelPlace
+from materialist_lab.procedural.objects import furniture as f
+from materialist_lab.procedural.staged.furnished import furnished_world, some_pieces
+from materialist_lab.procedural.staged.pieces import laid, piece
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import Parts, World, placed
 
 
 def laid_table(rng: np.random.Generator, stock: Stock) -> World:

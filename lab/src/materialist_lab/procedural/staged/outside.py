@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from materialist.procedural import lights
-from materialist.procedural import materials as m
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects import street_things as street
-from materialist.procedural.outdoors import houses
-from materialist.procedural.relief import Relief
-from materialist.procedural.staged.finishes import covered
-from materialist.procedural.staged.pieces import backdrop_of, piece
-from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, ScenePart, World, bounds, look, placed
+from materialist_lab.procedural import lights
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects import street_things as street
+from materialist_lab.procedural.outdoors import houses
+from materialist_lab.procedural.relief import Relief
+from materialist_lab.procedural.staged.finishes import covered
+from materialist_lab.procedural.staged.pieces import backdrop_of, piece
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import Parts, ScenePart, World, bounds, look, placed
 
 GROUND = 60.0
 """Metres to the edge of the ground."""

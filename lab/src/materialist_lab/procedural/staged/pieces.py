@@ -5,15 +5,15 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.catalog.cache import CatalogModel, as_roots
-from materialist.procedural.catalog.support import LevelPlace
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects import things
-from materialist.procedural.staged.finishes import finish, pictured, style
-from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, ScenePart, bounds, one_thing, orb, placed
 from materialist.types import Array
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.catalog.cache import CatalogModel, as_roots
+from materialist_lab.procedural.catalog.support import LevelPlace
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects import things
+from materialist_lab.procedural.staged.finishes import finish, pictured, style
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import Parts, ScenePart, bounds, one_thing, orb, placed
 
 GLOW = (4.0, 60.0)
 """Radiance of what glows in a lamp, log-uniform; the light of a day is about 1."""

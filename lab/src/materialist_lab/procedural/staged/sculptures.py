@@ -8,15 +8,15 @@ import trimesh
 from scipy.ndimage import gaussian_filter
 from skimage.measure import marching_cubes
 
-from materialist.procedural import materials as m
-from materialist.procedural import relief
-from materialist.procedural.catalog.reading import from_the_sides
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.objects.shapes import Solid
-from materialist.procedural.staged.finishes import covered, relief_of
-from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import Parts, ScenePart, one_thing
 from materialist.types import Array
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural import relief
+from materialist_lab.procedural.catalog.reading import from_the_sides
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects.shapes import Solid
+from materialist_lab.procedural.staged.finishes import covered, relief_of
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import Parts, ScenePart, one_thing
 
 Maker = Callable[[np.random.Generator, Stock], Solid]
 GRID = 84

@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from materialist.procedural import materials as m
-from materialist.procedural.catalog.support import LevelPlace
-from materialist.procedural.objects import shapes as s
-from materialist.procedural.staged import studio_light
-from materialist.procedural.staged.finishes import covered
-from materialist.procedural.staged.pieces import backdrop_of, laid, piece
-from materialist.procedural.staged.sculptures import sculpture
-from materialist.procedural.staged.stock import Stock
-from materialist.procedural.world import (
+from materialist.types import Array
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.catalog.support import LevelPlace
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.staged import studio_light
+from materialist_lab.procedural.staged.finishes import covered
+from materialist_lab.procedural.staged.pieces import backdrop_of, laid, piece
+from materialist_lab.procedural.staged.sculptures import sculpture
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import (
     Parts,
     ScenePart,
     World,
@@ -20,7 +21,6 @@ from materialist.procedural.world import (
     placed,
     through_lens,
 )
-from materialist.types import Array
 
 SUBJECTS = (
     "small",

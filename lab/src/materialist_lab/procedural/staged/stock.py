@@ -8,10 +8,10 @@ from zlib import crc32
 import cv2
 import numpy as np
 
-from materialist.procedural.catalog.cache import CatalogModel, Listing, as_roots, listing
-from materialist.procedural.materials import ColourPicture
-from materialist.procedural.objects.things import Meshes
 from materialist.types import Array
+from materialist_lab.procedural.catalog.cache import CatalogModel, Listing, as_roots, listing
+from materialist_lab.procedural.materials import ColourPicture
+from materialist_lab.procedural.objects.things import Meshes
 
 SMALLEST_CROP = 0.2
 """Of a photograph's shorter side."""

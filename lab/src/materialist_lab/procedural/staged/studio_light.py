@@ -4,9 +4,9 @@ import numpy as np
 
 from materialist.color import luminance
 from materialist.envmap import texel_directions
-from materialist.procedural import lights
-from materialist.procedural.staged.stock import Stock
 from materialist.types import Array
+from materialist_lab.procedural import lights
+from materialist_lab.procedural.staged.stock import Stock
 
 ROWS = lights.ROWS
 

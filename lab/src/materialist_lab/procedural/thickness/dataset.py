@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from materialist.camera import unit
 from materialist.errors import InputError
-from materialist.io.samples import claim, complete, read_arrays
 from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
-from materialist.procedural.objects.glassware import SPLITS, Shape, make_shape
-from materialist.procedural.thickness.ray_paths import Paths, ShapeTracer, towards
 from materialist.types import Array, Progress
+from materialist_lab.data.samples import claim, complete, read_arrays
+from materialist_lab.procedural.objects.glassware import SPLITS, Shape, make_shape
+from materialist_lab.procedural.thickness.ray_paths import Paths, ShapeTracer, towards
 
 DESCRIPTION = "views.json"
 FORMAT = 3

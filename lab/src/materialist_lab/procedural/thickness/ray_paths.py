@@ -8,10 +8,10 @@ import numpy as np
 
 from materialist.buffers import floats
 from materialist.camera import unit
-from materialist.procedural.objects.shapes import Solid, face_normals
 from materialist.render.scene import shape
 from materialist.render.variant import setup
 from materialist.types import Array
+from materialist_lab.procedural.objects.shapes import Solid, face_normals
 
 MOST = 24
 """Surfaces that a ray is followed through."""
