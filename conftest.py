@@ -1,4 +1,4 @@
-"""Fixtures for all tests."""
+"""Fixtures for all tests, of the product and of the laboratory."""
 
 import json
 import os
@@ -53,7 +53,7 @@ def real_data():
     """Finds real captures beside the project by their path there; skips where they are not."""
 
     def find(name):
-        path = Path(__file__).resolve().parents[2] / "shared" / name
+        path = Path(__file__).resolve().parents[1] / "shared" / name
         return path if path.exists() else pytest.skip(f"needs ../shared/{name}")
 
     return find

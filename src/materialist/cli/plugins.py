@@ -1,4 +1,4 @@
-"""Commands of other distributions: entry points of the group `materialist.commands`, each a typer application.
+"""Commands of other distributions: entry points of the group `materialist.commands`, each a group of commands.
 
 The benchmarks and the training come so, from the laboratory (materialist-photo-lab); this package never imports it.
 """

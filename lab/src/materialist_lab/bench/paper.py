@@ -21,7 +21,6 @@ import yaml
 from jinja2 import Environment
 
 import materialist
-import materialist_lab
 from materialist.errors import MaterialistError
 from materialist.io.atomic import make_folder, write_whole
 from materialist.option_kinds import OperationOptions, option
@@ -167,7 +166,7 @@ class PaperBench(OperationOptions):
 @cache
 def commit() -> str:
     """The last commit of product and laboratory, `+` and a digest where they have changes since; else the version."""
-    folders = [str(Path(package.__file__).parent) for package in (materialist, materialist_lab)]
+    folders = [str(Path(materialist.__file__).parent), str(Path(__file__).parents[1])]
     git: Any = partial(subprocess.run, cwd=folders[-1], capture_output=True, check=True)
     try:
         last, since = (
