@@ -33,9 +33,8 @@ class BatchSettings:
     """How often a batch does things; tuned by eye."""
 
     tries: int = 3  # how often a photo is begun whose worker dies
-    refresh: float = (
-        30.0  # seconds between two writings of the summary and the page while the batch runs
-    )
+    # seconds between two writings of the summary and the page while the batch runs
+    refresh: float = 30.0
 
 
 SETTINGS = BatchSettings()
@@ -118,9 +117,8 @@ def default_workers(device: str = "auto", size: int = 512) -> int:
     processors = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
-    worker = (
-        720 + 2.9e-3 * size**2
-    )  # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
+    # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
+    worker = 720 + 2.9e-3 * size**2
     return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker)))
 
 

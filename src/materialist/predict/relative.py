@@ -16,10 +16,8 @@ class RelativeSettings:
     ratio: float = 4.0  # the ratio where no normal map tells more: a room seen from inside it
     range: tuple[float, float] = (1.1, 60.0)  # ratios tried against a normal map
     trials: int = 44  # ratios tried, evenly spaced in their logarithm
-    percentiles: tuple[float, float] = (
-        0.5,
-        99.5,
-    )  # the nearest and the farthest surface; outliers lie beyond
+    # the nearest and the farthest surface; outliers lie beyond
+    percentiles: tuple[float, float] = (0.5, 99.5)
     side: int = 96  # longer side of the copy on which ratios are tried, pixels
 
 

@@ -34,9 +34,8 @@ class ClosedSettings:
     grid: int = 300  # grid points along a small object; larger objects have one a pixel
     finest: int = 6  # grid points along a pixel, at most
     clear: float = 0.02  # pixels by which its outline keeps from the points of the grid; derived: no tiny triangles
-    nearest: float = (
-        0.995  # the back keeps before this part of the depth behind the object; tuned by eye
-    )
+    # the back keeps before this part of the depth behind the object; tuned by eye
+    nearest: float = 0.995
     thin: float = 0.004  # least thickness, part of the object's size: front and back never touch; tuned by eye
     least: float = 1e-4  # the same at the border, part of the depth
     smooth: float = 0.01  # standard deviation of the blur of the normals, part of the object's size; tuned by eye

@@ -27,21 +27,18 @@ class OutlineSettings:
     """When an outline is taken for that of a surface of revolution, and how its hull is made."""
 
     fewest: int = 64  # pixels below which an object is too small to tell
-    pierced: float = (
-        1.02  # most of its filled outline, in its area: rings and handles have holes; tuned by eye
-    )
-    alike: float = (
-        0.964  # least share of the mask that lies in its image: boxes have edges where it is round
-    )
+    # most of its filled outline, in its area: rings and handles have holes; tuned by eye
+    pierced: float = 1.02
+    # least share of the mask that lies in its image: boxes have edges where it is round
+    alike: float = 0.964
     covered: float = 0.955  # least share of the mask that the body covers
     leaning: float = 0.12  # least slope of the map's sideways normals over the body's: a face seen straight on has 0
     stepped: float = 0.9  # least `_stepped`, over normals that look up or down by less than `side`
     side: float = 0.5  # see `stepped`
     above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
     standing: float = 0.15  # distance from the ground, in its heights, up to which it is made to reach it where it is
-    elsewhere: float = (
-        0.3  # relative distance from the depth map's place up to which the ground is believed
-    )
+    # relative distance from the depth map's place up to which the ground is believed
+    elsewhere: float = 0.3
     stairs: float = 0.1  # root mean square by which pixels move an outline, pixels: it is smoothed by so much; 4 meshes
     turns: int = 40  # turns at which a place beside the axis must stay inside the outline
     fine: int = 120  # cells of the hull along the object

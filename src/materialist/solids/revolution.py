@@ -17,12 +17,10 @@ class RevolutionSettings:
 
     step: float = 0.5  # least step along a ray, cells
     around: int = 256  # corners of the swept circles
-    side: float = (
-        0.5  # least outward part of the normals of a side; above the last of it is the lid
-    )
-    under: float = (
-        3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
-    )
+    # least outward part of the normals of a side; above the last of it is the lid
+    side: float = 0.5
+    # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
+    under: float = 3.5
     lip: int = 12  # points of the rounded rim of an open vessel
 
 
@@ -181,9 +179,8 @@ def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
         return None
     place, lean = outer
     top = _last_side(outer)
-    rim = (
-        None if top is None else _last_side(outer, place[top, 1] - wall / 2)
-    )  # the round lip ends where the side did
+    # the round lip ends where the side did
+    rim = None if top is None else _last_side(outer, place[top, 1] - wall / 2)
     within = None if rim is None else _last_side(inner, place[rim, 1] - SETTINGS.under * wall)
     if rim is None or within is None:
         return None

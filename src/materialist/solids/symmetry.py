@@ -22,9 +22,8 @@ class SymmetrySettings:
     ring: float = 3.0  # pixels from the silhouette within which the surface tells where its plane is, at least
     ring_share: float = 0.06  # the same as a part of the object's size
     steepest: float = 0.06  # smallest n.v that is believed: maps are not exact at a silhouette
-    grazing: float = (
-        4.0  # power of 1 - n.v by which pixels lose weight where the surface does not turn away
-    )
+    # power of 1 - n.v by which pixels lose weight where the surface does not turn away
+    grazing: float = 4.0
     floor: float = 0.25  # least thickness, part of that of a body as deep as wide: a box seen face on has no silhouette
     deepest: float = 2.0  # largest thickness, in object sizes
 

@@ -19,23 +19,18 @@ class CompositeSettings:
     """How the photo's residual over the fit follows an edit; tuned by eye unless derived."""
 
     floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
-    most_detail: float = (
-        2.0  # largest factor on the photo's detail beyond working size under another light
-    )
-    edge: int = (
-        2  # working pixels to either side of a changed surface's border; derived: the matte's reach
-    )
+    # largest factor on the photo's detail beyond working size under another light
+    most_detail: float = 2.0
+    # working pixels to either side of a changed surface's border; derived: the matte's reach
+    edge: int = 2
     rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
     white: float = 0.995  # channel of a linear photo from which it is clipped; derived: 8 bits
-    clipped: float = (
-        0.97  # least channel of a pixel of an emitter from which it is clipped; derived: 8 bits
-    )
-    nearly: float = (
-        0.9  # least channel from which a pixel of an emitter may be brighter than it looks
-    )
-    threads: int = (
-        4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
-    )
+    # least channel of a pixel of an emitter from which it is clipped; derived: 8 bits
+    clipped: float = 0.97
+    # least channel from which a pixel of an emitter may be brighter than it looks
+    nearly: float = 0.9
+    # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
+    threads: int = 4
 
 
 SETTINGS = CompositeSettings()

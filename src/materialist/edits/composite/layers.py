@@ -23,14 +23,12 @@ class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
     first: int = 16  # one in so many of all paths, in each half, finds out where the edit reaches
-    least_first: int = (
-        8  # paths of each half that do so at the least, below 144 paths; at 16 all of them
-    )
+    # paths of each half that do so at the least, below 144 paths; at 16 all of them
+    least_first: int = 8
     lattice: int = 256  # pixels along the longer side that do so
     window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
-    visible: float = (
-        1 / 255
-    )  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
+    # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
+    visible: float = 1 / 255
     sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
     least_gain: float = 0.25  # gain below which a difference is none
     margin: int = 16  # pixels around them that the denoiser sees

@@ -27,9 +27,8 @@ class NativeSettings:
     most_paths: int = 4  # most paths a native pixel, times those of the picture, and twice that in glass; derived: time
     budget: float = 0.5  # all paths, of those of a whole picture of working size; derived: time
     margin: int = 3  # working pixels around the bodies that the denoiser sees
-    contact: float = (
-        0.05  # share of a body's extent up to which a surface before it is the ground it stands on
-    )
+    # share of a body's extent up to which a surface before it is the ground it stands on
+    contact: float = 0.05
     lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
 
 

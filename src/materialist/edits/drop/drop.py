@@ -28,9 +28,8 @@ from materialist.types import Array, Body, Scene
 class DropSettings:
     """What is a floor, and when things are at rest; tuned by eye."""
 
-    upright: float = (
-        0.5  # cosine to the camera's up from which a plane can be a floor or a table top
-    )
+    # cosine to the camera's up from which a plane can be a floor or a table top
+    upright: float = 0.5
     longest: float = 20.0  # seconds after which a thing that still rolls is left where it is
     looks: int = 24  # looks at the things a second
     still: int = 12  # looks in a row without motion after which things are at rest

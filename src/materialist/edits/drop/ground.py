@@ -21,9 +21,8 @@ class GroundSettings:
     flat: float = 0.004  # how plane a block must be
     deep: float = 2.0  # how far a block reaches below the field
     blocks: int = 1500  # most blocks; `flat` is relaxed until there are no more
-    behind: float = (
-        0.05  # least cosine of a face's normal with a ray for the ray to come from behind
-    )
+    # least cosine of a face's normal with a ray for the ray to come from behind
+    behind: float = 0.05
 
 
 SETTINGS = GroundSettings()

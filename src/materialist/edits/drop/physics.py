@@ -21,19 +21,13 @@ class PhysicsSettings:
 
     step: float = 1e-3  # seconds: at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper; derived
     gravity: float = 9.81  # m / s^2
-    stiff: tuple[float, float] = (
-        4e-3,
-        1.0,
-    )  # of contacts: time constant, as short as the step allows, and damping
-    friction: tuple[float, float, float] = (
-        0.6,
-        0.01,
-        0.0005,
-    )  # sliding, torsional (m) and rolling (m)
+    # of contacts: time constant, as short as the step allows, and damping
+    stiff: tuple[float, float] = (4e-3, 1.0)
+    # sliding, torsional (m) and rolling (m)
+    friction: tuple[float, float, float] = (0.6, 0.01, 0.0005)
     density: float = 600.0  # kg / m^3: wood; things of one density fall alike
-    same: float = (
-        1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
-    )
+    # volume of the hull over that of the shape up to which the hull alone stands for it
+    same: float = 1.05
     concave: float = 0.12  # concavity that is left in a piece (CoACD's threshold)
     pieces: int = 16  # most pieces
     fine: int = 1500  # triangles from which a mesh is thinned out before it is taken apart
@@ -121,9 +115,8 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
     spec.option.timestep = SETTINGS.step
     spec.option.gravity = [0, 0, -SETTINGS.gravity]
-    spec.option.integrator = (
-        mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    )  # stable for things that spin fast
+    # stable for things that spin fast
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if hasattr(
         mujoco.mjtEnableBit, "mjENBL_MULTICCD"

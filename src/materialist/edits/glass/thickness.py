@@ -28,9 +28,8 @@ class WallSettings:
     least: float = 0.015  # bounds on what RefractionNet says
     most: float = 0.12
     thick: float = 0.02  # pixels inside its outline that a part of a mask has to reach, or it gives no body; derived
-    part: float = (
-        0.01  # share of the largest part of a mask from which a part is an object of its own
-    )
+    # share of the largest part of a mask from which a part is an object of its own
+    part: float = 0.01
 
 
 WALL = WallSettings()

@@ -24,18 +24,15 @@ from materialist.types import Array, Body, Scene
 class InsertSettings:
     """Size of an inserted mesh, and the plane that it stands on; tuned by eye."""
 
-    width: float = (
-        1 / 6
-    )  # longest side at scale 1, share of the width that the picture shows at its depth
-    nearest: float = (
-        0.02  # depth that nothing may come nearer than, share of the depth of its place
-    )
+    # longest side at scale 1, share of the width that the picture shows at its depth
+    width: float = 1 / 6
+    # depth that nothing may come nearer than, share of the depth of its place
+    nearest: float = 0.02
     samples: int = 6000  # points that stand for its surface where it falls
     alike: float = 0.7  # cosine from which a neighbour's normal counts as that of the same surface
     fewest: int = 12  # pixels whose median counts, at least; with fewer the one pixel decides
-    nearby: float = (
-        1 / 24
-    )  # radius around the place, share of the picture's width, where no radius is given
+    # radius around the place, share of the picture's width, where no radius is given
+    nearby: float = 1 / 24
     air: float = 0.005  # under glass, share of its longest side: glass and floor without any are one block; derived
 
 

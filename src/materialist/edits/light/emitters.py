@@ -32,17 +32,15 @@ class EmitterSettings:
     beside: float = 0.6  # share of `clipped` from which pixels beside an emitter belong to it, as its shade does
     reach: float = 0.015  # how far beside it, share of the longer side
     gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; share of the longer side
-    upward: float = (
-        0.7  # mean Y of the normals above which a surface reflects a light, or lies in the sun
-    )
+    # mean Y of the normals above which a surface reflects a light, or lies in the sun
+    upward: float = 0.7
     area: float = 0.001  # smallest share of the picture; less is a highlight
     pixels: int = 9  # smallest part of a mask, pixels; derived: a surface needs some triangles
     hdr: float = 4.0  # least multiple of the median of an HDR photo
     known: float = 0.1  # share of clipped pixels up to which the photo tells the radiance
     white: float = 0.5  # share of clipped pixels above which an emitter is taken as white
-    lift: float = (
-        2e-3  # distance of an emitter before its surface, share of the depth; derived: ray offsets
-    )
+    # distance of an emitter before its surface, share of the depth; derived: ray offsets
+    lift: float = 2e-3
     spp: int = 32  # paths a pixel of the rendering that estimates the radiance; derived: sums over the whole picture
 
 

@@ -30,9 +30,8 @@ class AddedLightSettings:
 
     map_rows: int = 256  # of the largest map; derived: memory
     sun_radius: float = 6.0  # of an added sun, degrees: a hard shadow shows each step of a predicted depth; 5 photos
-    lamp_unit: float = (
-        0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
-    )
+    # share of the median depth from which a lamp of power 1 shows a white wall as white
+    lamp_unit: float = 0.25
     lamp_radius: float = 0.015  # radius of a lamp, share of the median depth; tuned by eye
 
 
@@ -283,9 +282,8 @@ def moving_light(
         # Once: finding the lights takes a rendering.
         film = [relight(scene, dim=wanted.dim, lights=wanted.lights)] * count
         wanted = replace(wanted, dim=None, lights=None)
-    closed = (
-        turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2
-    )  # the last frame then meets the first
+    # the last frame then meets the first
+    closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2
     for k in range(count):
         t = k / (count if closed else count - 1)
         sun = tuple(_between(suns, t)) if suns else None

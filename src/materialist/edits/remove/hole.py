@@ -16,16 +16,13 @@ from materialist.types import Array, Scene
 class HoleSettings:
     """When there is no hole, and what else is filled."""
 
-    most: float = (
-        0.9  # part of the photo's surfaces beyond which nothing is left to tell what stood behind
-    )
+    # part of the photo's surfaces beyond which nothing is left to tell what stood behind
+    most: float = 0.9
     shadow: float = 0.15  # how far around the object the ground is filled by default, part of the root of its area
-    island: float = (
-        0.01  # part of the object up to which what is surrounded by filled pixels is filled as well
-    )
-    large: float = (
-        0.15  # part of the photo from which a filled hole is a guess; tuned by eye on 6 photos
-    )
+    # part of the object up to which what is surrounded by filled pixels is filled as well
+    island: float = 0.01
+    # part of the photo from which a filled hole is a guess; tuned by eye on 6 photos
+    large: float = 0.15
     cut: float = 0.1  # part of its outline that the frame cuts from which it is one, too; tuned by eye on 6 photos
 
 

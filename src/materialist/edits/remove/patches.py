@@ -24,20 +24,16 @@ from materialist.types import Array
 class PatchSettings:
     """How a hole is filled; tuned on 6 photos by eye, 10 photos with an object pasted in and 6 made ones."""
 
-    longest: int = (
-        768  # longer side, pixels, at which patches are matched; more: finer texture, slower
-    )
-    radius: float = (
-        1 / 150
-    )  # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
+    # longer side, pixels, at which patches are matched; more: finer texture, slower
+    longest: int = 768
+    # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
+    radius: float = 1 / 150
     near: float = 0.4  # distance to the hole, in its sizes, up to which anything may be copied; more: other things
-    guide: float = (
-        0.25  # weight of the guide beside the patches' colours; more: less from other surfaces
-    )
+    # weight of the guide beside the patches' colours; more: less from other surfaces
+    guide: float = 0.25
     surface: float = 0.1  # guide: from one surface to another
-    floor: float = (
-        0.05  # radiance below which HDR values are compared by difference, above by ratio; by eye
-    )
+    # radiance below which HDR values are compared by difference, above by ratio; by eye
+    floor: float = 0.05
 
 
 SETTINGS = PatchSettings()

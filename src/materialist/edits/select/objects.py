@@ -22,25 +22,21 @@ from materialist.types import Array, Scene
 class SelectSettings:
     """Where ClickNet and GrabCut look; lengths in longer sides; tuned by eye unless said otherwise."""
 
-    least: float = (
-        0.25  # overlap of an object's own box with the given one below which the box is misplaced
-    )
+    # overlap of an object's own box with the given one below which the box is misplaced
+    least: float = 0.25
     core: float = 0.01  # radius around a click that is certainly of the object
-    probable: float = (
-        0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
-    )
-    possible: float = (
-        0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
-    )
+    # the same that GrabCut takes for the object at first; tuned on 54 clicks
+    probable: float = 0.08
+    # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
+    possible: float = 0.24
     gap: float = 0.015  # half of the gap across which two parts are one
     # Likelihood from which a pixel is of the object, and above 1 - sure it may be; 74 clicks, 12 photos.
     sure: float = 0.9
     side: int = 256  # longer side at which the unsure pixels are shared out
     edge: float = 2000.0  # weight of the photo's edges in that; larger keeps to them more; 74 clicks, 12 photos
     reach: float = 0.02  # how far the outline may move to an edge of the photo; tuned on 206 clicks
-    grain: float = (
-        0.01  # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
-    )
+    # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
+    grain: float = 0.01
 
 
 SETTINGS = SelectSettings()

@@ -25,29 +25,22 @@ _MIRROR = np.array([-1, 1, 1], np.float32)
 class InferenceSettings:
     """How the network sees a photo and how its answers become a prior."""
 
-    sides: tuple[int, ...] = (
-        192,
-        384,
-    )  # longest sides, pixels, of large photos and small: whole, details; 16 pictures
+    # longest sides, pixels, of large photos and small: whole, details; 16 pictures
+    sides: tuple[int, ...] = (192, 384)
     edge_side: int = 768  # longest side at which edges are sought in the photo, pixels; by eye
-    edge_reach: float = (
-        0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
-    )
-    median_depth: float = (
-        3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
-    )
+    # error of the network's edges, as a part of the longest side; tuned on 20 pictures
+    edge_reach: float = 0.03
+    # scene units; a photo does not tell scale, and this suits rooms in metres
+    median_depth: float = 3.0
     depth_span: float = 50.0  # largest ratio of a depth to the median, either way
     likely_sky: float = 0.0  # logit of a surface below which a pixel is likely sky; derived
-    sure_sky: float = (
-        -5.0
-    )  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
+    # logit of a surface below which a pixel is surely sky; tuned on 8 photos
+    sure_sky: float = -5.0
     sure_surface: float = 2.0  # logit above which a pixel surely is a surface; by eye
-    unsure_told: float = (
-        0.03  # share of the picture that may be sky from which a note says so; by eye
-    )
-    least_island: float = (
-        0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
-    )
+    # share of the picture that may be sky from which a note says so; by eye
+    unsure_told: float = 0.03
+    # part of the picture below which a speck of sky or surface is filled; by eye
+    least_island: float = 0.0005
 
 
 SETTINGS = InferenceSettings()

@@ -104,9 +104,8 @@ class Encoder(nn.Module):
         """
         rows = image.shape[-2] // PATCH
         columns = image.shape[-1] // PATCH
-        patches = (
-            self.patch_embed["proj"](image).flatten(2).transpose(1, 2)
-        )  # [B, rows * columns, width]
+        # [B, rows * columns, width]
+        patches = self.patch_embed["proj"](image).flatten(2).transpose(1, 2)
         tokens = torch.cat([self.cls_token.expand(len(patches), -1, -1), patches], 1)
         tokens = tokens + self._positions(rows, columns)
         found = []

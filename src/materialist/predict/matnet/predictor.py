@@ -33,9 +33,8 @@ class MatNetPredictor(Predictor):
         path = weights_file(locate(str(where), "matnet"))
         digest = verify_file(path)
         state = read_state(path)
-        self.trained_here = (
-            metadata(path).get("format") == MatNet.FORMAT
-        )  # its depth output is depth
+        # its depth output is depth
+        self.trained_here = metadata(path).get("format") == MatNet.FORMAT
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
