@@ -4,7 +4,7 @@ import os
 
 import pytest
 import typer
-from command_options import options_of
+from made_program import heavy_after, options_of
 
 from materialist.option_kinds import declarations
 from materialist_lab import bench
@@ -74,6 +74,12 @@ def test_help_of_the_group_names_each_benchmark_and_what_it_measures(run):
     code, out, _ = run("bench", "--help")
     shown = " ".join(out.split())
     assert code == 0 and all(f"{name} {about(name)}" in shown for name in BENCHMARKS)
+
+
+def test_listing_the_commands_loads_nothing_heavy():
+    """Help of the program, of bench and of train imports these two, and reads the benchmarks without importing them."""
+    statement = "from materialist_lab.cli import bench, train; bench.benchmarks.about('real')"
+    assert not heavy_after(statement)
 
 
 def test_every_benchmark_takes_its_options_and_those_of_all_commands():

@@ -28,14 +28,13 @@ COMMANDS: tuple[Callable[..., Any], ...] = (
     batch.batch,
     studio.studio,
 )
-app = group("materialist", ABOUT)
+app = group("materialist", ABOUT, cls=plugins.Program)
 for command in COMMANDS:
     add_command(app, command)
 models = group("models", MODELS, app)
 add_command(models, setup.list_models, "list")
 add_command(models, setup.download_model, "download")
 add_command(models, setup.verify_model, "verify")
-plugins.add_to(app)
 
 
 def _show_version(wanted: bool) -> None:
