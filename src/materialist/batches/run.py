@@ -1,5 +1,6 @@
 """`materialist.batch`: the loop that hands photos to workers and records the results."""
 
+import errno
 import os
 import time
 from collections import Counter, deque
@@ -18,7 +19,7 @@ from materialist.batches.outcome import COLUMNS, Outcome, Row, Status, write_pag
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
 from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import DONE, FAILED, PROGRESS
@@ -38,6 +39,10 @@ class BatchSettings:
 
 
 SETTINGS = BatchSettings()
+DISK_PROBLEMS = tuple(
+    os.strerror(code).lower() for code in (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+)
+"""What the system says of a disk to which nothing more can be written."""
 
 
 @documented(BatchOptions)
@@ -278,3 +283,7 @@ def _stop_if_for_all(facts: dict[str, Any]) -> None:
     machine = facts["error"] in ("SetupError", "WeightsError") and facts["stage"] != "read"
     if machine or (facts["error"] == "InputError" and facts["stage"] == "start"):
         raise getattr(errors, facts["error"])(facts["reason"])
+    if facts["error"] == "OutputError" and any(text in facts["reason"] for text in DISK_PROBLEMS):
+        raise OutputError(
+            f"{facts['reason']} What is finished is kept; make room, and add `resume=True`."
+        )
