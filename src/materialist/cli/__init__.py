@@ -6,13 +6,12 @@ from typing import Any
 
 import typer
 
-from materialist.cli import batch, bench, edits, scenes, setup, studio, train
+from materialist.cli import batch, edits, plugins, scenes, setup, studio
 from materialist.cli.generate import add_command, group
 from materialist.cli.outcome import run_to_exit_code
 
 ABOUT = "Physically based editing of a single photograph, by inverse rendering."
 MODELS = "List, download and verify networks from a model hub; no other command ever downloads."
-FREE = {"allow_extra_args": True, "ignore_unknown_options": True}
 COMMANDS: tuple[Callable[..., Any], ...] = (
     scenes.invert,
     scenes.render,
@@ -29,23 +28,13 @@ COMMANDS: tuple[Callable[..., Any], ...] = (
     batch.batch,
     studio.studio,
 )
-TRAINING: tuple[Callable[..., Any], ...] = (
-    train.data,
-    train.matnet,
-    train.refraction,
-    train.clicks,
-)
-app = group("materialist", ABOUT)
+app = group("materialist", ABOUT, cls=plugins.Program)
 for command in COMMANDS:
     add_command(app, command)
-add_command(app, bench.bench, context_settings=FREE)
 models = group("models", MODELS, app)
 add_command(models, setup.list_models, "list")
 add_command(models, setup.download_model, "download")
 add_command(models, setup.verify_model, "verify")
-trainers = group("train", "Make training data, and train the networks that predict materials.", app)
-for command in TRAINING:
-    add_command(trainers, command)
 
 
 def _show_version(wanted: bool) -> None:

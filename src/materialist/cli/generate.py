@@ -2,10 +2,9 @@
 
 import inspect
 from collections.abc import Callable
-from enum import StrEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
 import typer
 
@@ -14,8 +13,8 @@ from materialist.option_kinds import OperationOptions, Option, declarations
 TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": Path}
 
 
-def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
-    """A group of commands, of `app` where one is given."""
+def group(name: str, help: str, app: typer.Typer | None = None, **settings: Any) -> typer.Typer:
+    """A group of commands, of `app` where one is given; `settings` are other ones of typer."""
     made = typer.Typer(
         name=name,
         help=help,
@@ -23,6 +22,7 @@ def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        **settings,
     )
     if app is not None:
         app.add_typer(made)
@@ -106,8 +106,7 @@ def _option_flags(name: str, told: Option, default: Any) -> list[inspect.Paramet
         return [_parameter(key, _flag(bool | None, *text), None) for key, text in texts.items()]
     kind: Any = str if told.choices else TYPES.get(told.kind, str)
     if told.kind == "word":
-        make: Any = StrEnum  # of a name that is not a literal
-        kind = make(name, {word: word for word in told.choices})
+        kind = Literal[told.choices]
     shown = _shown("auto" if default is None and "auto" in told.choices else default)
     help = f"{told.help}  [default: {shown}]" if shown else told.help
     several = list[kind] | None if told.many else kind | None

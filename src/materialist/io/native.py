@@ -94,12 +94,13 @@ def _silent_python() -> Iterator[None]:
 
 @contextmanager
 def _silent_opencv() -> Iterator[None]:
-    level = cv2.getLogLevel()
-    cv2.setLogLevel(_OPENCV_SILENT)
+    log = getattr(cv2.utils, "logging", cv2)  # where OpenCV 5 and 4 have it
+    level = log.getLogLevel()
+    log.setLogLevel(_OPENCV_SILENT)
     try:
         yield
     finally:
-        cv2.setLogLevel(level)
+        log.setLogLevel(level)
 
 
 @contextmanager
