@@ -20,8 +20,8 @@ from materialist.forks import check_process
 from materialist.io.given import PhotoInput, photo_of
 from materialist.io.image import read_mask
 from materialist.io.photo import HDR_CLIP, exposed
+from materialist.io.residual import shading_residual
 from materialist.keywords import InvertKeywords
-from materialist.metrics.residual import shading_residual
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked

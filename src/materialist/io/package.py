@@ -18,7 +18,7 @@ from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, pack
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
-from materialist.metrics.residual import shading_residual
+from materialist.io.residual import shading_residual
 from materialist.plain import plain
 from materialist.types import (
     Array,

@@ -22,7 +22,7 @@ from materialist.geometry.silhouette import (
     window,
 )
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued, sampled
-from materialist.solids.shell import Shell, closed, inside_out, joined, region
+from materialist.solids.shell import Shell, closed_shell, inside_out, joined_shells, region
 from materialist.types import Array, Camera
 
 
@@ -76,7 +76,7 @@ def closed_proxy(
     if wall is None:
         return shell
     inner = _cavity(view, wall, camera)
-    return shell if inner is None else joined([shell, inside_out(inner)])
+    return shell if inner is None else joined_shells([shell, inside_out(inner)])
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ def _closed(view: _View, camera: Camera) -> Shell:
     # --- The wall between them faces down the slope of the outline's distance field ---
     down, right = np.gradient(edge)
     outward = np.stack([-at_points(right), -at_points(down)], -1)
-    return closed(
+    return closed_shell(
         faces,
         place + np.array([view.left, view.top]),
         front_depth,

@@ -7,7 +7,7 @@ import numpy as np
 from materialist.camera import project, unit
 from materialist.geometry.planes import axes
 from materialist.solids.profile import Profile
-from materialist.solids.shell import Shell, inside_out, joined
+from materialist.solids.shell import Shell, inside_out, joined_shells
 from materialist.types import Array, Camera
 
 
@@ -65,7 +65,7 @@ class Revolution:
         inner = (
             [_swept(*line, self.axis, camera) for line in self.profile.lines(wall)] if wall else []
         )
-        return joined([*outer, *map(inside_out, inner)])
+        return joined_shells([*outer, *map(inside_out, inner)])
 
     def vessel(self, camera: Camera, wall: float) -> Shell | None:
         """The body as one surface around a wall (scene units), open at the top; None where the profile has no room."""

@@ -20,7 +20,7 @@ class Shell(Triangles):
     """Whether one of its parts bounds a cavity."""
 
 
-def joined(shells: Sequence[Shell]) -> Shell:
+def joined_shells(shells: Sequence[Shell]) -> Shell:
     """Several surfaces as one; none of them shares a vertex with another."""
     vertices, faces = joined_faces(shells)
     normals = np.concatenate([shell.normals for shell in shells])
@@ -48,7 +48,7 @@ def region(field: Array) -> tuple[Array, Array]:
     return np.asarray(above.vertices[:, :2]), np.asarray(above.faces)
 
 
-def closed(
+def closed_shell(
     region: Array,
     place: Array,
     front: Array,

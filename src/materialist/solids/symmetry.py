@@ -37,10 +37,10 @@ def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera
     Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
-    return mirrored(depth, normal, inside, pixel_rays(camera))
+    return mirrored_thickness(depth, normal, inside, pixel_rays(camera))
 
 
-def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
+def mirrored_thickness(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     """`symmetric_thickness` on any window of a picture.
 
     depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
