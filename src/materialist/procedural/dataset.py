@@ -10,7 +10,7 @@ from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import write_whole
 from materialist.io.display import strip, write_sheet
-from materialist.io.samples import SampleFolder, claim, complete, described
+from materialist.io.samples import SampleFolder, claim_folder, described, make_missing
 from materialist.procedural.catalog.cache import CREDITS, Listing, listing
 from materialist.procedural.objects import shapes
 from materialist.procedural.options import DataSetOptions
@@ -52,11 +52,11 @@ def produce(
         raise InputError(
             f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
         )
-    claim(folder, DESCRIPTION, _description(options), _IDENTITY)
+    claim_folder(folder, DESCRIPTION, _description(options), _IDENTITY)
     if made_of:
         write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
     paths = [sample_path(folder, k) for k in range(count)]
-    return complete(paths, partial(make_sample, options=options), "samples", progress, workers)
+    return make_missing(paths, partial(make_sample, options=options), "samples", progress, workers)
 
 
 def _listed(options: DataSetOptions, progress: Progress) -> Listing | None:

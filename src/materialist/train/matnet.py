@@ -13,7 +13,7 @@ from materialist.io.samples import Sample, Source
 from materialist.metrics.lpips import backbone
 from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.network import PATCH, MatNet, Size
-from materialist.predict.matnet.predictor import infer
+from materialist.predict.matnet.predictor import infer_matnet
 from materialist.predict.weights import read_state
 from materialist.train import losses
 from materialist.train.maps import MapsTask
@@ -135,7 +135,7 @@ class PaperTask(MapsTask):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
         assert isinstance(network, MatNet)
-        maps = infer(
+        maps = infer_matnet(
             network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape))
         )
         materials = Materials(
