@@ -58,6 +58,7 @@ class ColourSpace:
 
         Whole levels are clipped to [0, 1] unless the space holds light; floats never are.
         """
+        # Whole levels go through a table: as exact as the curve, and much faster.
         levels = encoded.dtype.kind == "u"
         out: Array = np.empty(encoded.shape, np.float32)
         tables = self._tables(encoded.dtype) if levels else None
@@ -98,6 +99,7 @@ def space(
 
 def rgb_to_xyz(primaries: Sequence[float]) -> Array:
     """[3, 3] float64: linear RGB to XYZ with white at Y = 1. Raises ValueError for primaries that span no colours."""
+    # --- Colours of the primaries at Y = 1, weighed so that they sum to white ---
     xy = np.array(primaries, np.float64).reshape(4, 2)
     xyz = np.column_stack([xy, 1 - xy.sum(1)])
     colours = xyz[:3].T
@@ -110,6 +112,7 @@ def rgb_to_xyz(primaries: Sequence[float]) -> Array:
 
 def adapted(white: Array, new_white: Array) -> Array:
     """[3, 3] float64: XYZ under one white to XYZ under another (Bradford)."""
+    # Cone responses scale by the ratio of the whites.
     cones = (_BRADFORD @ new_white) / (_BRADFORD @ white)
     return np.linalg.inv(_BRADFORD) @ (cones[:, None] * _BRADFORD)
 
@@ -144,7 +147,7 @@ def srgb_curve(encoded: Array) -> Array:
     return np.where(encoded <= 0.04045, encoded / 12.92, power)
 
 
-def identity(encoded: Array) -> Array:
+def linear_curve(encoded: Array) -> Array:
     return encoded
 
 

@@ -31,7 +31,7 @@ _PRIMARIES: dict[int, Primaries] = {
 _TRANSFERS: dict[int, tuple[str, Curve]] = {
     4: ("gamma 2.2", spaces.power_curve(2.2)),
     5: ("gamma 2.8", spaces.power_curve(2.8)),
-    8: ("linear", spaces.identity),
+    8: ("linear", spaces.linear_curve),
     13: ("sRGB", spaces.srgb_curve),
     16: ("PQ", spaces.pq_curve),
     18: ("HLG", spaces.hlg_curve),
@@ -94,6 +94,7 @@ def cicp_space(
         )
         primaries = 1 if primaries in _VIDEO_PRIMARIES else primaries
         transfer = 13
+    # --- Codes that are not known count as sRGB and Rec.709, with a note ---
     name, curve = _TRANSFERS.get(transfer, _TRANSFERS[13])
     if primaries not in (0, _UNSPECIFIED, *_PRIMARIES) or transfer not in (
         0,
@@ -116,10 +117,12 @@ def cicp_space(
 
 def exif_space(tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
     """The space that EXIF (or TIFF) tags name: Adobe RGB, or primaries of their own; None for sRGB or nothing."""
+    # --- Adobe RGB has no code in EXIF: interoperability index R03 means it ---
     stated = tags.get("ColorSpace")
     index = str(tags.get("InteropIndex", "")).strip("\0 ")
     if stated == _ADOBE_RGB or (index == "R03" and stated != 1):
         return space("Adobe RGB", spaces.ADOBE_RGB, spaces.power_curve(563 / 256))
+    # --- Primaries of its own ---
     primaries = tags.get("PrimaryChromaticities")
     white = tags.get("WhitePoint")
     if stated != 1 and primaries is not None and white is not None:
@@ -159,6 +162,7 @@ def _of_gamma(chunks: Mapping[bytes, bytes]) -> ColourSpace | None:
     """The space of gAMA and cHRM chunks; None for sRGB. Raises struct.error, ValueError or ZeroDivisionError."""
     primaries: Sequence[float] = spaces.REC709
     if b"cHRM" in chunks:
+        # cHRM has white first, in units of 1e-5.
         white_x, white_y, *colours = (
             value / 1e5 for value in struct.unpack(">8I", chunks[b"cHRM"])
         )

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from materialist.io.colour_space import ColourSpace, Curve, d50_to_rec709, identity, power_curve
+from materialist.io.colour_space import ColourSpace, Curve, d50_to_rec709, linear_curve, power_curve
 from materialist.types import Array
 
 
@@ -42,7 +42,7 @@ def _curve(data: bytes) -> Curve:
     if data[:4] == b"curv":
         (count,) = struct.unpack_from(">I", data, 8)
         if count == 0:
-            return identity
+            return linear_curve
         values = np.frombuffer(data, ">u2", count, 12).astype(float)
         return (
             power_curve(float(values[0]) / 256)

@@ -75,6 +75,7 @@ def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
     )
     with writer:
         for picture in pictures:
+            # H.264 stores colour at half resolution.
             height, width = (n - n % 2 for n in picture.shape[:2])
             writer.append_data(srgb_levels(picture[:height, :width]))
             count += 1
