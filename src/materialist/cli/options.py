@@ -193,8 +193,8 @@ class Learning(OperationOptions):
         kind="file",
     )
 
-    def recipe(self, usual: Any) -> Any:
-        """The recipe `usual` with what was given."""
-        return usual.changed(
+    def recipe(self, base: Any) -> Any:
+        """The recipe `base` with what was given."""
+        return base.changed(
             batch=self.batch, side=self.side, rate=self.rate, bfloat16=self.bfloat16
         )
