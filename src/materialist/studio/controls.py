@@ -99,14 +99,14 @@ def slider(name: str, label: str, step: float, **narrower: Any) -> Any:
     """A slider for a control, by the range and default of its option; `narrower` are arguments of Gradio's instead."""
     control = CONTROLS[name]
     declared = declarations(control.operation)[control.option][0]
-    given = {
+    arguments = {
         "minimum": declared.low,
         "maximum": declared.high,
         "value": control.default,
         "elem_id": name,
         **narrower,
     }
-    return gr.Slider(step=step, label=label, buttons=[], **given)
+    return gr.Slider(step=step, label=label, buttons=[], **arguments)
 
 
 def file_field(name: str, label: str, suffixes: Iterable[str]) -> Any:
@@ -123,7 +123,7 @@ def set_option(name: str, session: Session, value: Any) -> None:
     if control.operation is Relight:
         session.light(**{control.option: text})
     elif control.operation is Insertion:
-        objects.set_option(session, control.option, text)
+        objects.set_object_option(session, control.option, text)
     else:
         session.set(control.operation.operation, **{control.option: text})
 
@@ -136,24 +136,29 @@ def control_values(session: Session) -> dict[str, Any]:
     """
     step = session.edits.current_step
     light = session.edits.light
+    # --- The options that each group of controls shows ---
     kind, options = (step.kind, step.options) if step is not None else ("", {})
-    given: dict[type[OperationOptions], dict[str, Any]] = {
+    options_by_kind: dict[type[OperationOptions], dict[str, Any]] = {
         MaterialEdit: options if kind == "edit" else {},
         Glass: options if kind == "glass" else {},
         Relight: session.edits.steps[light].options if light is not None else {},
     }
-    given |= {Insertion: options} if kind in objects.KINDS else {}
-    given |= {Drop: options} if kind == "drop" else {}
+    options_by_kind |= {Insertion: options} if kind in objects.KINDS else {}
+    options_by_kind |= {Drop: options} if kind == "drop" else {}
     values: dict[str, Any] = {}
+    # A value that is not valid, as from a list made by hand, leaves its control as it is.
     for name, control in CONTROLS.items():
-        if control.operation in given:
+        if control.operation in options_by_kind:
             with suppress(TypeError, ValueError, InputError):
                 values[name] = control.value(
-                    given[control.operation].get(control.option, control.default)
+                    options_by_kind[control.operation].get(control.option, control.default)
                 )
-    for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
-        if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit
+    # Sliders of what an edit leaves as it was show what was fitted under the selection.
+    for name, neutral in (("roughness", 0.5), ("metallic", 0.0)):
+        if (
+            str(options_by_kind[MaterialEdit].get(name, "+"))[0] in "+-"
+        ):  # not set, or relative to the fit
             mask = session.selection.mask
             fitted = getattr(session.scene.materials, name)
-            values[name] = usual if mask is None else round(float(fitted[mask].mean()), 2)
+            values[name] = neutral if mask is None else round(float(fitted[mask].mean()), 2)
     return values

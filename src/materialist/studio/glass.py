@@ -120,6 +120,7 @@ class GlassClient:
         """Send a request to the process; start one where none runs."""
         try:
             if self._worker is None:
+                # Tracing needs a scene of its own in memory.
                 if psutil.virtual_memory().available < SETTINGS.free_for_glass:
                     raise InputError(
                         "This machine has too little memory free to trace glass while sliders move; press Final "
@@ -154,6 +155,7 @@ class GlassClient:
             self._worker = None
             if self.state.waiting:
                 self._asked = None
+                # A process that ends without a request at work was idle.
                 words = "The tracing of glass ended by itself; move a slider to start it again."
                 self.state = GlassState(False, words, True)
         elif not self.state.waiting or message.number != self._number:
@@ -168,7 +170,7 @@ class GlassClient:
 
 
 def _request(steps: tuple[Step, ...], step: Step) -> Request:
-    return tuple(one for one in steps if one is not step), with_options(step, skip=None)
+    return tuple(other for other in steps if other is not step), with_options(step, skip=None)
 
 
 def _place(step: Step) -> str:
@@ -195,6 +197,7 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
             apply(loaded, list(others)), region_of(loaded, fixed), options_of(fixed)
         )
 
+    # Building takes half a minute: meanwhile a newer request may have come.
     preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:
         return None

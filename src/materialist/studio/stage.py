@@ -56,15 +56,18 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     shown |= {"width": camera.width, "height": camera.height, "lamps": _lamps(edits)}
     current = edits.current_step
     off = "; the current edit is switched off" if current is not None and current.skipped else ""
+    # --- A path-traced picture of just these edits ---
     if final is not None and final.of(steps):
         badge = f"Path traced{off}"
         picture, before = (
             jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path))
         )
         return {**shown, "picture": picture, "before": before, "badge": badge}
+    # --- Glass is asked for while everything else is shown ---
     if current is not None and client is not None and current in steps and glass.is_traced(current):
         client.ask(steps, current)
     waiting = client is not None and with_edits and client.state.waiting
+    # --- The live preview: not there yet, refused, or shown ---
     if steps and not live.ready:
         del shown["picture"]
         return {**shown, "badge": "Getting the live preview ready …"}
@@ -131,7 +134,7 @@ def jpeg_file(file: Path) -> str:
     return data_url(file.read_bytes(), "jpeg")
 
 
-def maps(scene: Scene) -> list[tuple[Array, str]]:
+def named_maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
     shown = display.maps(scene)
     return [
@@ -153,8 +156,11 @@ def report(scene: Scene) -> str:
     """How good the scene is, in Markdown and plain words."""
     metrics = scene.report.metrics
     value = metrics.get("rerender_psnr_path", float("nan"))
-    told = f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. Edits start from the photo."
-    lines = [told] if np.isfinite(value) else []
+    quality = (
+        f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. "
+        "Edits start from the photo."
+    )
+    lines = [quality] if np.isfinite(value) else []
     camera = scene.camera
     source = {
         "exif": "from the photo's EXIF data",

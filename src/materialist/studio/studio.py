@@ -78,8 +78,8 @@ class Studio:
             last = now - SETTINGS.page_seconds
             gone = [
                 name
-                for name, one in self._sessions.items()
-                if not one.beats and one.seen < last and name != page
+                for name, session in self._sessions.items()
+                if not session.beats and session.seen < last and name != page
             ]
             known = self._sessions.get(page or "")
             if known is None and page:
@@ -98,7 +98,7 @@ class Studio:
         """Raise InputError where a person's sender has too many pages open."""
         sender = self.sender(person)
         if (
-            sum(self.sender(one.person) == sender for one in self._sessions.values())
+            sum(self.sender(session.person) == sender for session in self._sessions.values())
             >= SETTINGS.pages
         ):
             raise InputError(
@@ -149,6 +149,7 @@ class Studio:
         project = self.project(name, session.person)
         if session.left:
             raise InputError("The page was closed.")
+        # The old scene goes first: both at once may not fit into memory.
         had_scene = session.live is not None
         session.close()
         if had_scene:
@@ -172,6 +173,7 @@ class Studio:
         """
         unfinished = self.jobs.unfinished()
         sender = self.sender(session.person)
+        # Counted by sender, not by person: a new cookie is free.
         mine = sum(self.sender(job.owner) == sender for job in unfinished)
         all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
@@ -197,6 +199,7 @@ class Studio:
             if session is not None:
                 session.left = True
                 self._left.append(session)
+                # One closing takes all who left meanwhile: many tabs are often closed together.
                 first = len(self._left) == 1
         if session is not None:
             session.stop(self.jobs, *ENDING)

@@ -17,7 +17,7 @@ from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
 from materialist.types import Array
 
-OWN = "The photo's own"
+PHOTO_LIGHT = "The photo's own"
 
 
 def layout(context: PageContext) -> None:
@@ -126,11 +126,14 @@ def _written(session: Session, name: str) -> str:
     """A computed light as a file in the workspace, so that the recipe can be replayed anywhere."""
     file = session.workspace / f"light-{name.lower()}.exr"
     if not file.is_file():
-        write_image(file, presets.light(name), force=True)
+        write_image(file, presets.preset_light(name), force=True)
     return file.name
 
 
 @cache
 def _gallery() -> list[tuple[Array, str]]:
-    own = np.full((64, 128, 3), 225, np.uint8)
-    return [(own, OWN), *((light(presets.light(name, 64)), name) for name in presets.LIGHTS)]
+    blank = np.full((64, 128, 3), 225, np.uint8)
+    return [
+        (blank, PHOTO_LIGHT),
+        *((light(presets.preset_light(name, 64)), name) for name in presets.LIGHTS),
+    ]

@@ -45,7 +45,7 @@ def invert(
     fov: float | str,
     seed: int,
 ) -> None:
-    """`materialist invert`; maps and light go to `found` as soon as they are there."""
+    """`materialist invert`; maps and light are sent as intermediate results as soon as they are there."""
     from dataclasses import replace
 
     picture = replace(mt.read_photo(photo, size=size, fov=fov), path=title)
@@ -76,7 +76,7 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     for title, pixels in shown.items():
         file = folder / f"found-{title}.jpg"
         write_pixels(file, pixels)
-        report.found(name=title, file=file.name)
+        report.intermediate(name=title, file=file.name)
 
 
 def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
@@ -130,23 +130,25 @@ def mesh(report: Reporter, scene: str, output: str) -> None:
     write_whole(output, glb_bytes(loaded, scene_parts(loaded, PAGE_TRIANGLES)[:1]))
 
 
-def take(report: Reporter, scene: str, steps: Steps, output: str, what: str) -> None:
+def take(report: Reporter, scene: str, steps: Steps, output: str, kind: str) -> None:
     """One thing to take away, as a single file at `output` (its suffix included); several files come as a zip."""
     from materialist.exporters.run import FOLDERS
 
-    (loaded, edited), file = _edited(report, scene, steps), Path(output)
-    if what == "turn":
+    loaded, edited = _edited(report, scene, steps)
+    file = Path(output)
+    if kind == "turn":
         _turntable(report, loaded, edited, file)
-    elif what == "scene":
+    elif kind == "scene":
         with _zipped(file) as folder:
             _package(report, loaded, edited, folder)
     else:
         report("export", 0, 1)
         if file.suffix != ".zip":
-            mt.export(edited, file, to=what, force=True)
+            mt.export(edited, file, to=kind, force=True)
             return
         with _zipped(file) as folder:
-            mt.export(edited, folder / ("scene" if what in FOLDERS else f"scene.{what}"), to=what)
+            name = "scene" if kind in FOLDERS else f"scene.{kind}"
+            mt.export(edited, folder / name, to=kind)
 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:

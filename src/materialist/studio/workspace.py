@@ -105,6 +105,7 @@ class WorkFolder:
 
     def _sweep_caches(self) -> None:
         """Remove the caches of studios that were killed: whoever works holds a lock on theirs."""
+        # A lock ends with its process, however that ended.
         for cache in self.root.glob(f"{_CACHE}*"):
             if not (cache / _CACHE_MARK).is_file():
                 continue  # not ours
@@ -127,14 +128,15 @@ class WorkFolder:
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
-        found = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
-        mine = [p for p in found if p is not None and person in (None, p.owner)]
+        projects = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
+        mine = [p for p in projects if p is not None and person in (None, p.owner)]
         return sorted(mine, key=lambda p: int(p.name[6:]), reverse=True)
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
         """An empty project; with `scene` one that uses a package elsewhere. Old unfinished ones go."""
         self.sweep()
         with self._lock:  # two people may ask at once
+            # Numbers are never used again while a folder has them.
             taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
             for number in count(max(taken, default=0) + 1):
                 folder = self.root / f"photo-{number:03d}"
@@ -144,6 +146,7 @@ class WorkFolder:
         project = Project(
             folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE
         )
+        # Relative: the work folder may be moved.
         place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
         content = {"title": project.title, "owner": project.owner, "scene": place}
         with writing(folder):
