@@ -19,6 +19,7 @@ def srgb_to_linear(srgb: Array) -> Array:
     srgb = np.asarray(srgb)
     if srgb.dtype.kind == "u":  # by table: as exact, and faster
         top = np.iinfo(srgb.dtype).max
+        # A table of all levels.
         return srgb_to_linear(np.arange(top + 1, dtype=np.float32) / np.float32(top))[srgb]
     srgb = np.asarray(srgb, np.float32)
     return np.where(

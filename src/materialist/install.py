@@ -32,6 +32,7 @@ def extra_requirements(extra: str) -> list[str]:
         every = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
         every = []
+    # Metadata has lines such as: rawpy>=0.21; extra == "raw".
     marked = re.compile(rf"(.+?)\s*;.*extra == ['\"]{re.escape(extra)}['\"]")
-    found = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
-    return found or [f"{DISTRIBUTION}[{extra}]"]
+    requirements = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
+    return requirements or [f"{DISTRIBUTION}[{extra}]"]

@@ -56,10 +56,10 @@ def density(wi, wo, alpha, probability):
     return probability * mirrored + (1 - probability) * wo.z * dr.inv_pi
 
 
-def sample_direction(wi, alpha, specular, point):
-    """A direction of the specular lobe where `specular`, else of the cosine lobe, for a point of the unit square."""
+def sample_direction(wi, alpha, take_specular, point):
+    """A direction of the specular lobe where `take_specular`, else of the cosine lobe; point: in the unit square."""
     mirrored = mi.reflect(wi, visible_normal_vector(wi, alpha, point))
-    return dr.select(specular, mirrored, mi.warp.square_to_cosine_hemisphere(point))
+    return dr.select(take_specular, mirrored, mi.warp.square_to_cosine_hemisphere(point))
 
 
 def visible_normal_vector(wi, alpha, point):
