@@ -17,7 +17,7 @@ from materialist.io.image import write_png
 from materialist.studio import SETTINGS, objects
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
-from materialist.studio.preview import LivePreview, free_memory
+from materialist.studio.live_preview import LivePreview, free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import named_maps, report, stage

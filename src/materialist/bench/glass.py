@@ -28,7 +28,7 @@ from materialist.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row,
 from materialist.bench.edits import awaited, true_scene
 from materialist.bench.glass_models import Background, Case
 from materialist.bench.report import CEILING, Column, Report, strip
-from materialist.edits.glass.preview import GlassPreview
+from materialist.edits.glass.glass_preview import GlassPreview
 from materialist.geometry.silhouette import window
 from materialist.metrics.lpips import lpips
 from materialist.option_kinds import option

@@ -190,7 +190,7 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
     fixed = with_options(step, **dict.fromkeys(VALUES))
 
     def build() -> Any:
-        from materialist.edits.glass.preview import GlassPreview
+        from materialist.edits.glass.glass_preview import GlassPreview
 
         loaded = _loaded(scene)
         return GlassPreview(

@@ -16,7 +16,7 @@ from materialist.studio.access.quota import Allowance
 from materialist.studio.archives import read_list, unpack
 from materialist.studio.edit_list import EditList, with_options
 from materialist.studio.glass import GlassClient
-from materialist.studio.preview import LivePreview
+from materialist.studio.live_preview import LivePreview
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.workspace import Project, located, read_steps, write_mask
 from materialist.types import Scene

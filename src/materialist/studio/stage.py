@@ -12,7 +12,7 @@ from materialist.errors import MaterialistError
 from materialist.io import display
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import EditList
-from materialist.studio.preview import LIVE
+from materialist.studio.live_preview import LIVE
 from materialist.studio.selection import Selection, data_url
 from materialist.studio.session import Session
 from materialist.studio.tasks import before_of

@@ -22,7 +22,7 @@ from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
-from materialist.studio.preview import free_memory
+from materialist.studio.live_preview import free_memory
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
 
