@@ -58,6 +58,7 @@ def project(points: Array, camera: Camera) -> tuple[Array, Array]:
 def turn_upright(back: Array) -> Array:
     """[3, 3] rotation whose columns are right, up and the unit direction `back` [3], with right level."""
     right = np.cross([0, 1, 0], back)
+    # Looking straight up or down there is no level direction: any will do.
     right /= max(np.linalg.norm(right), 1e-9)
     return np.stack([right, np.cross(back, right), back], -1)
 

@@ -143,6 +143,7 @@ def _weights() -> Finding:
     """Networks fetched from a hub; none is needed for the main job."""
     from materialist.predict.models import KNOWN, is_complete, models_folder
 
+    # Only complete downloads: an interrupted one cannot be used.
     here = [model.name for model in KNOWN if is_complete(model)]
     if here:
         return Finding("hub models", "ok", f"{', '.join(here)} in {models_folder()}")
@@ -153,6 +154,7 @@ def _weights() -> Finding:
 def _memory() -> Finding:
     import psutil
 
+    # What is available, not what is free: caches give way.
     free = psutil.virtual_memory().available / 2**30
     detail = f"{free:.1f} GB free (an inversion at 512 needs up to 4)"
     if free >= 4:

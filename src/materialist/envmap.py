@@ -96,6 +96,7 @@ def paste_visible_sky(
     # --- Which texels look into the photo, past every surface ---
     place, ahead = project(texel_directions(h, w), camera)
     inside = (ahead > 1e-3) & ((place >= 0) & (place < [camera.width, camera.height])).all(-1)
+    # Columns and rows of the photo; 0 where a texel looks past it.
     c, r = np.moveaxis(np.where(inside[..., None], place, 0).astype(int), -1, 0)
     seen = (inside & ~surface[r, c])[..., None]
 

@@ -16,6 +16,7 @@ def install_command(*requirements: str) -> str:
     Environments of uv have no pip of their own.
     """
     words = shlex.join(requirements)
+    # This very Python's pip, whatever the shell would find first.
     if find_spec("pip") is not None:
         return f"{sys.executable} -m pip install {words}"
     return f"uv pip install --python {sys.executable} {words}"

@@ -114,6 +114,7 @@ class OperationOptions:
         known = declarations(cls)
         for name in values:
             if name not in known:
+                # A misspelt name: say which one is meant.
                 near = difflib.get_close_matches(name, known, 1)
                 meant = f" Do you mean '{near[0]}'?" if near else ""
                 raise InputError(
@@ -244,6 +245,7 @@ def _number(declared: Option, called: str, value: Any) -> Any:
     except (TypeError, ValueError, OverflowError) as error:
         or_else = "".join(f", or {word}" for word in declared.choices)
         raise InputError(f"The {called} must be a number{or_else}, not {value!r}.") from error
+    # Ends that do not belong to the range, by its brackets.
     excluded = [end for end, mark in zip((low, high), ends) if mark in "()"]
     if not (math.isfinite(number) and low <= number <= high) or number in excluded:
         span = (
@@ -261,6 +263,7 @@ def _text(number: float) -> str:
 def _span(declared: Option, called: str, value: Any) -> Any:
     """A number, or the two that a film goes through: a pair, or a text such as 30..90."""
     ends = value.split("..") if isinstance(value, str) else value
+    # So that the message of a wrong value names this form.
     declared = replace(declared, choices=("A..B",))
     if isinstance(ends, list | tuple) and len(ends) == 2:
         return tuple(_number(declared, called, end) for end in ends)
@@ -276,6 +279,7 @@ def _whole(declared: Option, called: str, value: Any) -> int:
 
 def _shift(declared: Option, called: str, value: Any) -> float | str:
     """A number in the range, or a text with a sign that shifts by as much as the range is wide."""
+    # A sign makes it a shift; a number without one sets the value.
     if isinstance(value, str) and value.strip()[:1] in ("+", "-"):
         width = declared.high - declared.low
         _number(replace(declared, low=-width, high=width), f"{called} shift", value)
@@ -337,6 +341,7 @@ def _function(declared: Option, called: str, value: Any) -> Any:
         return value
     from runpy import run_path
 
+    # From the right: Windows paths have a colon, too.
     path, _, name = str(value).rpartition(":")
     if not Path(path).is_file():
         raise InputError(

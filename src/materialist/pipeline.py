@@ -81,6 +81,7 @@ def invert(
         picture = photo_of(
             photo, encoded=encoded, size=choices.size, fov=choices.fov, layer=choices.layer
         )
+    # A photo that was read elsewhere keeps its pixels; only its field of view is replaced.
     if isinstance(photo, Photo) and choices.fov != "auto":
         picture = replace(
             picture,
@@ -191,6 +192,7 @@ def _prior(picture: Photo, choices: InvertOptions) -> tuple[Photo, Prediction]:
             'The predictor found no surface in the photo; give a depth map, as in `depth="maps:DIR"`.'
         )
     middle = float(np.median(result.depth[result.depth > 0]))
+    # Offsets of rays are absolute: in a tiny scene they are as large as its details.
     if middle < MIN_DEPTH:
         note = (
             f"Depth is {middle:.3g} in the median. Rays start about 0.0001 off a surface, which thins out its shadows; "

@@ -40,6 +40,7 @@ def same(first: Any, second: Any) -> bool:
         )
     if isinstance(first, list | tuple) and isinstance(second, list | tuple):
         return len(first) == len(second) and all(map(same, first, second))
+    # NaN differs from itself: two of them count as equal.
     if isinstance(first, float) and isinstance(second, float) and first != first:
         return second != second
     return bool(first == second)

@@ -36,10 +36,12 @@ TRAINING: tuple[Callable[..., Any], ...] = (
     train.refraction,
     train.clicks,
 )
+# --- The commands ---
 app = group("materialist", ABOUT)
 for name, command in COMMANDS.items():
     add_command(app, command, name)
 add_command(app, bench.bench, context_settings=FREE)
+# --- Groups of commands ---
 models = group("models", MODELS, app)
 add_command(models, setup.list_models, "list")
 add_command(models, setup.download_model, "download")

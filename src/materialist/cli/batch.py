@@ -45,6 +45,7 @@ def batch_command(
     chosen: Any = {} if layer is None else {"layer": layer}
     try:
         with stage_progress(quiet=computing.as_json) as bars:
+            # Options of the file's own class go by name; shared ones come from the command line.
             outcome = mt.batch(
                 source,
                 output,

@@ -198,6 +198,7 @@ def relight_command(
     fps: FramesPerSecond = FPS,
 ) -> None:
     """Show the photo under other light."""
+    # In a film several suns are stations; one picture has one.
     suns = options.sun
     if options == MovingLight() and frames is None:
         raise InputError(
@@ -256,6 +257,7 @@ def drop_command(
     from materialist.edits.insert.meshes import read_model
     from materialist.edits.light.relight import moving_light
 
+    # Read as a list of edits would be, so that the same texts are accepted.
     light = Relight.read({} if rotate is None else {"rotate": rotate})
     check_before(output, rendering, video=True)
     places: Any = [parse_numbers(text, 2, "--at") for text in at]

@@ -88,6 +88,7 @@ def _value(
         return flag_values[flags[0].name]
     spelled = {}
     for key, value in flag_values.items():
+        # Flags that were not given say nothing.
         if value is not None and value != []:
             field, _, word = key.partition("__")  # the flag of a word that a switch also takes
             spelled[field] = word or value

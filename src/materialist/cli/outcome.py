@@ -119,6 +119,7 @@ def with_flags(message: str) -> str:
 
 
 def _flag(keyword: re.Match[str]) -> str:
+    # True and False become a flag and its opposite, other values follow their flag.
     name, value = keyword.groups()
     flag = FLAGS.get(name, name).replace("_", "-")
     if value in ("True", "False"):

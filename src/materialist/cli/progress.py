@@ -19,6 +19,7 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
     from rich import progress as rich
     from rich.console import Console
 
+    # On stderr: stdout is for results.
     console = Console(stderr=True)
     tasks = dict[str, rich.TaskID]()
     name = rich.TextColumn("{task.description:<24}")

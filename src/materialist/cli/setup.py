@@ -23,6 +23,7 @@ def doctor(computing: Computing) -> None:
 
     findings = examine(computing.device)
     as_json = computing.as_json
+    # Missing extras are no failure: the main job runs without them.
     broken = [finding for finding in findings if finding.state == "broken"]
     verdict = (
         "The main job cannot run yet; run the commands above."
@@ -100,6 +101,7 @@ def verify_model(
     from materialist.predict.models import downloaded, hub_model, models_folder, require
     from materialist.predict.weights import verify_folder
 
+    # Without names all that are here; none is a question that was misunderstood.
     folders = {name: require(hub_model(name)) for name in names} if names else downloaded()
     if not folders:
         raise InputError(
@@ -111,6 +113,7 @@ def verify_model(
         try:
             digests[name] = verify_folder(folder)
         except WeightsError as error:
+            # The others are checked all the same.
             damaged.append(str(error))
     if damaged:
         raise WeightsError(" ".join(damaged))

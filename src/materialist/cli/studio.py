@@ -16,6 +16,7 @@ from materialist.option_kinds import option
 class Serving(Computing):
     """Who can reach the studio, and what it works with."""
 
+    # Where it is served.
     host: str = option(
         "127.0.0.1",
         "Address to serve on; other than this machine needs a password or --open.",
@@ -25,6 +26,7 @@ class Serving(Computing):
     work: Path = option(
         Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR"
     )
+    # Who may come in.
     password: str | None = option(
         None,
         "Ask everyone for it; `ps` shows an argument, so MATERIALIST_PASSWORD may hold it.",

@@ -246,6 +246,7 @@ def _deep_levels(path: Path, transparent: bytes | None) -> tuple[Array, Array | 
     colour, alpha = rgb_levels(path)
     if transparent is None or colour.dtype != np.uint16 or len(transparent) not in (2, 6):
         return colour, alpha
+    # Exactly this colour is transparent, and nothing else.
     clear = (colour == np.frombuffer(transparent, ">u2")).all(-1, keepdims=True)
     return colour, np.where(clear, np.uint16(0), np.uint16(65535))
 

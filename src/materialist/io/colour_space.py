@@ -83,6 +83,7 @@ class ColourSpace:
 def transformed(pixels: Array, matrix: Array) -> Array:
     """[H, W, 3] float32 times a colour matrix, in place; bit for bit as before where that is the identity."""
     if np.abs(matrix - np.eye(3)).max() > 1e-5:
+        # Rows of pixels times the transposed matrix.
         turned = matrix.T.astype(np.float32)
         for start in range(0, len(pixels), ROWS):
             block = pixels[start : start + ROWS]

@@ -58,6 +58,7 @@ def stated_space(
     if kind == "PNG":
         stated, colours = _png_space(path, notes)
     else:
+        # HEIC and AVIF state it in a box, PNG in chunks, others in EXIF alone.
         codes = nclx(path) if kind in ("AVIF", "HEIF") else None
         stated = codes is not None
         colours = cicp_space(*codes, notes) if codes else None
@@ -69,6 +70,7 @@ def png_chunks(path: Path) -> dict[bytes, bytes]:
     chunks: dict[bytes, bytes] = {}
     with path.open("rb") as file:
         file.seek(8)
+        # Chunks: length, kind, content, checksum.
         while len(head := file.read(8)) == 8:
             size, kind = struct.unpack(">I4s", head)
             if kind in (b"IDAT", b"IEND"):
@@ -148,6 +150,7 @@ def _png_space(path: Path, notes: list[str]) -> tuple[bool, ColourSpace | None]:
         if b"cICP" in chunks:
             primaries, transfer, _, full_range = struct.unpack(">4B", chunks[b"cICP"])
             return True, cicp_space(primaries, transfer, notes, full_range=bool(full_range))
+        # The sRGB chunk goes before gAMA and cHRM, which then only repeat it.
         if b"sRGB" in chunks or not chunks.keys() & {b"gAMA", b"cHRM"}:
             return b"sRGB" in chunks, None
         return True, _of_gamma(chunks)

@@ -108,6 +108,7 @@ def image_size(path: Path) -> tuple[int, int]:
     """
     with path.open("rb") as file:
         head = file.read(32)
+    # Headers alone: no pixel is decoded here.
     if head.startswith(_EXR):
         return max((exr_size(header) for header in exr_headers(path)), key=math.prod)
     if head.startswith(MAGIC):
@@ -200,6 +201,7 @@ def _raw(path: Path) -> Decoded:
     try:
         with rawpy.imread(str(path)) as raw:
             bitmap.check_size(raw.sizes.width, raw.sizes.height, path)
+            # Linear light as the camera recorded it: brightening is left to the fit's exposure.
             pixels = raw.postprocess(
                 gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16
             )

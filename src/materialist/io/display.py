@@ -44,6 +44,7 @@ def light(envmap: Array) -> Array:
     # A dark map with a bright sun has a median near 0: a tenth of the mean is the least.
     power = luminance(envmap)[..., None]
     key = max(float(np.median(power)), float(power.mean()) * 0.1, 1e-8)
+    # Reinhard: x (1 + x / 16) / (1 + x), which puts 4 times mid-grey at white.
     exposed = power * (0.22 / key)
     shown = exposed * (1 + exposed / 16) / (1 + exposed)
     return srgb_levels(envmap * (shown / np.maximum(power, 1e-8)))

@@ -37,6 +37,7 @@ _PICTURES = (
     *("render", "default"),
 )
 """Words in the name of the layer that is the picture, where there are several; the first are the surest."""
+# Names of render passes, as Blender, Arnold, V-Ray, RenderMan and Nuke write them.
 _DATA = frozenset(
     (
         *(
@@ -255,6 +256,7 @@ def write_exr(path: str | Path, array: Array) -> None:
         raise OutputError(
             f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
         )
+    # ZIP loses nothing.
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
         with OpenEXR.File(header, {names: pixels}) as file:
@@ -275,6 +277,7 @@ def layers_of(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
 
 def stacked_channels(parts: dict[str, Array], names: str) -> Array:
     """[H, W, C] float32, with alpha where there is one; each channel leaves `parts`, which bounds the memory."""
+    # Filled channel by channel, so that only one copy of the picture exists.
     order = names + "A" if "A" in parts else names
     out: Array = np.empty((*parts[order[0]].shape, len(order)), np.float32)
     for index, name in enumerate(order):

@@ -81,6 +81,7 @@ def _picture_bytes(picture: Image.Image) -> bytes:
     if picture.mode == "F":
         return _array_bytes(np.asarray(picture), encoded=False)
     buffer = io.BytesIO()
+    # What the file would say of colours and camera goes along.
     kept = {"icc_profile": picture.info.get("icc_profile"), "exif": picture.getexif().tobytes()}
     try:
         picture.save(

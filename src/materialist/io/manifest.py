@@ -87,6 +87,7 @@ def _check_size(file: Path, size: tuple[int, int]) -> None:
 def inside(folder: Path, name: str) -> Path:
     """A file of the package. Raises SceneError where it is missing, or a link leads out of the folder."""
     file = folder / name
+    # A link in a package from somebody else could lead anywhere.
     if not file.resolve().is_relative_to(folder.resolve()):
         raise SceneError(
             f"{file} leads out of the scene package, which is never followed; copy the file there."

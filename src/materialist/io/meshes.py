@@ -54,6 +54,7 @@ def write_ply(path: str | Path, mesh: Mesh) -> None:
     faces["vertex_indices"] = mesh.faces
     faces["pixel"] = mesh.face_pixel
     faces["plane"] = mesh.face_plane
+    # The whole header is fixed but for two numbers, so that reading can compare it.
     header = _HEADER.format(vertices=len(vertices), faces=len(faces)).encode()
     with writing(path):
         Path(path).write_bytes(header + vertices.tobytes() + faces.tobytes())
@@ -125,6 +126,7 @@ def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, 
         albedo, roughness, metallic = (
             package_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3]
         )
+        # Channels: the renderer would crash on others.
         if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
             raise SceneError(
                 f"The maps of body {k} have other channels than they need; the package is damaged."

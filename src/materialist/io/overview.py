@@ -150,6 +150,7 @@ def _header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
 
 def _drawn(tile: _Tile, width: int, height: int) -> Image.Image:
     """A tile in a frame of this size, its caption below; the texels of a coarse envmap stay to be seen."""
+    # Enlarged texels stay squares: a coarse map is not to look smooth.
     picture = Image.fromarray(tile.pixels)
     coarse = min(width / picture.width, height / picture.height) > 6
     resampling = Image.Resampling.NEAREST if coarse else Image.Resampling.LANCZOS

@@ -199,6 +199,7 @@ def _write_original(photo: Photo, folder: Path) -> str:
 
 def _suffix_of(source: bytes) -> str:
     """File suffix by content, for photos without a file name."""
+    # The first bytes of the formats that photos come in.
     known = {
         b"\x89PNG": ".png",
         b"\xff\xd8": ".jpg",
@@ -214,6 +215,7 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     file = folder / Path(meta["original"]).name
     stops = int(meta.get("stops", 0))
     if meta["has_source"]:
+        # Decoded again instead of stored: the file is smaller, and exact.
         original = decode_photo(file, meta.get("layer")).exposed(stops)
         source = file.read_bytes()
     else:

@@ -203,6 +203,7 @@ def make_missing(
 
 def _start_worker() -> None:
     """Use one thread for renderers, and end with the process that started this one."""
+    # Several workers with all threads each would slow each other down.
     os.environ["OMP_NUM_THREADS"] = "1"
     end_with_parent()
 
@@ -213,6 +214,7 @@ def end_with_parent() -> None:
     The pool cannot do it: a parent that gets SIGTERM or SIGKILL runs none of its code.
     """
     parent = multiprocessing.parent_process()
+    # A thread that waits for the parent costs nothing.
     if parent is not None:
         threading.Thread(target=_exit_after, args=(parent,), daemon=True).start()
 
@@ -240,6 +242,7 @@ def claim_folder(folder: Path, name: str, description: dict[str, Any], keys: Seq
                 raise InputError(
                     f"{folder} holds other things than such a set; name another folder."
                 )
+            # --- A set that was begun: only with the same options can it go on ---
             for key in keys:
                 if old.get(key) != description[key]:
                     raise InputError(

@@ -47,6 +47,7 @@ class Worker:
         # A file, not a pipe: a pipe that nobody reads stops the process once it is full.
         self._errors = tempfile.TemporaryFile() if keep_errors else None  # noqa: SIM115 - read at its end
         self.connection, theirs = Pipe()
+        # The worker gets its end of the pipe as a file descriptor.
         words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno())]
         words += [str(niceness), str(idle), str(memory)]
         try:

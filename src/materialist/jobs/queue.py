@@ -71,6 +71,7 @@ class JobQueue:
 
     def submit(self, job: Job) -> Job:
         with self._lock:
+            # Jobs that are over are forgotten here: whoever follows one holds it.
             self._jobs = [*(j for j in self._jobs if not j.over), job]
         self._threads.submit(self._run, job)
         return job
@@ -92,6 +93,7 @@ class JobQueue:
     def stop(self, job: Job) -> None:
         """End a job, in the queue or in the middle; nothing half-written stays."""
         with self._lock:
+            # The state first: the lost worker then counts as stopped, not as failed.
             job.end(STOPPED)
             worker = job.worker
         if worker is not None:

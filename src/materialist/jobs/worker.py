@@ -101,6 +101,7 @@ def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
         # Only the newest: a slider has moved on.
         while not tasks.empty():
             content = tasks.get()
+        # The task itself stays pickled until `run_task`, whose errors are reported.
         number, task = pickle.loads(content)
         report = Reporter(
             lambda *message, number=number: send((*message, number)), lambda: not tasks.empty()

@@ -92,6 +92,7 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
         _extract(archive, {name: members[name]}, folder, shown)
         steps = read_recipe(folder / name)
         options = _named(steps)
+        # A list without its files could not be replayed.
         lacking = sorted(options.keys() - members.keys())
         if lacking:
             raise InputError(
@@ -162,6 +163,7 @@ def _extract(
         most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
         raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
     folder.mkdir(parents=True, exist_ok=True)
+    # Room for the others must stay.
     if shutil.disk_usage(folder).free - total < SETTINGS.disk_left:
         raise InputError(f"The disk of the studio has no room for {shown}.")
     for name, entry in members.items():

@@ -34,6 +34,7 @@ def hex_colour(value: Any) -> str:
     value = str(value)
     if re.fullmatch(r"#[0-9a-fA-F]{6}", value):
         return value.lower()
+    # Gradio's picker gives rgba(r, g, b, a) after some moves.
     numbers = [float(v) for v in re.findall(r"[\d.]+", value)[:3]]
     if len(numbers) == 3 and all(0 <= v <= 255 for v in numbers):
         return "#" + "".join(f"{round(v):02x}" for v in numbers)
@@ -119,6 +120,7 @@ def file_field(name: str, label: str, suffixes: Iterable[str]) -> Any:
 def set_option(name: str, session: Session, value: Any) -> None:
     """Set the option of a control, or clear it by the default."""
     control = CONTROLS[name]
+    # The default is left out of the list: it says nothing.
     text = None if value == control.default else control.text(value)
     if control.operation is Relight:
         session.light(**{control.option: text})

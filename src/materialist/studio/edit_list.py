@@ -65,6 +65,7 @@ class EditList:
         if not 0 <= other < len(self.steps):
             return self
         steps = list(self.steps)
+        # Swapped with its neighbour.
         steps[index], steps[other] = steps[other], steps[index]
         current = (
             other if self.current == index else index if self.current == other else self.current
@@ -104,6 +105,7 @@ def with_options(step: Step, **options: Any) -> Step:
 
 def key_of(steps: tuple[Step, ...]) -> str:
     """The key of some steps in the store of `kept`."""
+    # Device and seed do not change what a step makes.
     entries = [[step.kind, step.options, str(step.folder)] for step in steps]
     return json.dumps(entries, default=str)
 

@@ -80,6 +80,7 @@ class GlassClient:
         """Request the picture of a glass step of this list; once for equal requests."""
         request = _request(steps, step)
         with self.changed:
+            # A slider sends the same value more than once.
             if request == self._asked:
                 return
             self._asked = request
@@ -187,6 +188,7 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
     """The pane of a glass step after other steps; None where a newer request came meanwhile. Raises InputError."""
     options = options_of(step)
     report("build", 0, 1)
+    # The body is the same for all values of these options.
     fixed = with_options(step, **dict.fromkeys(VALUES))
 
     def build() -> Any:

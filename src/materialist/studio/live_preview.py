@@ -117,6 +117,7 @@ class LivePreview:
         place = str(self._package)
         with self._allowance.opening():
             added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
+        # Only what the fall added crosses between the processes.
         edits = [*before.provenance.get("edits", []), *added["edits"]]
         after = replace(
             before,
@@ -203,6 +204,7 @@ class _Freeing:
     def _free(self) -> None:
         with self._lock:
             self._waiting = None
+        # Scenes are in cycles: only the collector frees them.
         gc.collect()
         if "drjit" in sys.modules:
             sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
@@ -237,11 +239,13 @@ def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:
     """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
+    # About as bright as the photo.
     exposure = 2 * float(luminance(scene.photo.linear).mean())
     # The farthest first: nearer ones are drawn over them.
     for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):
         colour, depth = _drawn(body, scene, exposure)
         behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
+        # Glass is sketched as see-through.
         share = 1 - 0.7 * body.surface.transmission
         picture = np.where(
             ((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture

@@ -39,6 +39,7 @@ def last(session: Session) -> int | None:
 def place(session: Session, x: float, y: float) -> None:
     """Stand the current object at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
     with session.lock:
+        # As texts: the list of edits holds nothing else.
         at = [str(v) for v in session.pixel(x, y)]
         edits = session.edits
         if session.current_kind not in KINDS:

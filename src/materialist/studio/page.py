@@ -75,6 +75,7 @@ def _left(parts: dict[str, Any]) -> None:
                 "Stop", size="sm", variant="stop", visible=False, min_width=70, elem_id="stop"
             )
     with gr.Row(elem_id="tools"):
+        # --- Tools of the pointer, and what a selection does to the one before ---
         tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
         tools.append(("Place an object", "place"))
         parts["tool"] = gr.Radio(
@@ -93,6 +94,7 @@ def _left(parts: dict[str, Any]) -> None:
             buttons=[],
             elem_id="brush",
         )
+    # Shown even where it cannot be used, with the way to get it.
     missing = sam.sam_problem()
     parts["sam"] = gr.Checkbox(
         False,

@@ -61,9 +61,11 @@ class Selection:
     ) -> Selection:
         """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
         height, width = scene.depth.shape
+        # The right and bottom edge belong to the last pixel.
         row = min(int(y), height - 1)
         column = min(int(x), width - 1)
         inside = any(part[row, column] for part in self.parts)
+        # A second click on a selected object takes it out.
         if (inside and mode != ADD) or mode == REMOVE:
             return (
                 Selection(tuple(part for part in self.parts if not part[row, column]))

@@ -27,6 +27,7 @@ def check_host(host: str, password: str | None, everyone: bool, proxy: str | Non
             f"--behind-proxy takes the HOST or HOST:PORT that people ask for, not {proxy!r}."
         )
     try:
+        # Behind a proxy everybody comes from this machine.
         local = proxy is None and (host == "localhost" or ipaddress.ip_address(host).is_loopback)
     except ValueError:
         local = False
@@ -83,6 +84,7 @@ def checked_target(target: str) -> Path:
 def first_shown(work: WorkFolder, path: Path) -> Project | Path:
     """A scene package as a project; a photo as it is."""
     scene = path.resolve()
+    # Opened before: its edits are there.
     known = next((p for p in work.projects() if p.scene == scene), None)
     return path if path.is_file() else known or work.new(path.stem, LOCAL_PERSON, scene=scene)
 
@@ -126,6 +128,7 @@ def serve(
     except KeyboardInterrupt:
         return
     finally:
+        # Jobs first: they would run on without anyone.
         studio.jobs.close()
         server.should_exit = True
         thread.join(3)

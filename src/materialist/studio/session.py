@@ -202,6 +202,7 @@ class Session:
         """
         with self.lock:
             _ = self.scene
+            # --- A new step over the selection, unless one of its kind is current ---
             mask = self.selection.mask
             edits = self.edits
             if self.current_kind != kind:
@@ -274,6 +275,7 @@ class Session:
                 raise InputError(
                     "There is nothing to do again." if again else "There is nothing to take back."
                 )
+            # Two pages may edit one photo: whoever comes second must not overwrite.
             self._check_unchanged()
             target.append(("", self.edits, self.selection))
             _, self.edits, self.selection = source.pop()

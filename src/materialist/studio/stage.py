@@ -41,11 +41,13 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     held; empty where `picture` is the photo itself, which the page keeps for live previews (None). At rest the page
     asks for the full picture after a `coarse` one.
     """
+    # Pictures may arrive out of order: the page keeps the newest.
     serial = time()
     with session.lock:
         live = session.live
         edits = session.edits
         final = session.final
+        # Taken together under the lock; the picture is made without it.
         masks = session.selection.pictures
         client = session.glass
     shown = {**_EMPTY, "serial": serial, "before": None, **masks}
@@ -101,6 +103,7 @@ def _lamps(edits: EditList) -> list[list[float]]:
 
 def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: bool) -> str:
     """The label of a picture that is not path traced: its kind, and its omissions."""
+    # What the picture lacks is said on it.
     panes = [step for step in steps if glass.is_traced(step)]
     sketched = (
         "; objects are sketched"

@@ -76,6 +76,7 @@ class Studio:
         now = time.monotonic()
         with self._lock:
             last = now - SETTINGS.page_seconds
+            # Pages that never held a request, and were not heard of for a while.
             gone = [
                 name
                 for name, session in self._sessions.items()
@@ -163,6 +164,7 @@ class Studio:
 
     def note_last(self, person: str, name: str) -> None:
         """Note the project that a person opened or began last; those who did so longest ago are forgotten."""
+        # Put back last: the oldest entries go first.
         self.last.pop(person, None)
         self.last = dict([*self.last.items(), (person, name)][-SETTINGS.people :])
 
@@ -231,6 +233,7 @@ class Studio:
         folder = self.work.cache / secrets.token_hex(16)
         with writing(file.name):
             folder.mkdir()
+            # A copy: the original may be replaced while somebody downloads it.
             copy = Path(shutil.copyfile(file, folder / (name or file.name)))
         return self.files.hand_out(person, copy, str(copy))
 

@@ -23,6 +23,7 @@ PHOTO_LIGHT = "The photo's own"
 def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Light", id="light"):
+        # --- Light from all around: computed maps, or one's own ---
         parts["lights"] = gr.Gallery(
             _gallery(),
             label="Light from all around",
@@ -41,6 +42,7 @@ def layout(context: PageContext) -> None:
         )
         parts["rotate"] = slider("rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
         parts["ambient"] = slider("ambient", "Dim or brighten", 0.02, maximum=2)
+        # --- Lights that are added ---
         with gr.Accordion("Sun", open=False):
             parts["sun_on"] = gr.Checkbox(False, label="A sun in the sky")
             parts["azimuth"] = gr.Slider(
@@ -75,6 +77,7 @@ def wire(context: PageContext) -> None:
     context.upload("own_map", _uploaded)
     context.bind("rotate", "ambient", coarse=True)
     sunny = ("sun_on", "azimuth", "elevation", "sun_power")
+    # Any of the four sets the whole sun: the list of edits has it as one option.
     for name in sunny:
         context.live(parts[name].input, _sun, *sunny, coarse=True)
     context.live(
@@ -83,6 +86,7 @@ def wire(context: PageContext) -> None:
 
 
 def _choose(session: Session, data: Any) -> None:
+    # The first picture of the gallery stands for the photo's own light.
     if data["index"] == 0:
         session.light(envmap=None, gain=None)
     else:
@@ -116,6 +120,7 @@ def place_lamp(
     depth = float(session.scene.depth[row, column])
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
+    # The lamp hangs between the camera and the clicked surface.
     new = [str(column), str(row), *(number_text(v) for v in (depth * before, kelvin, power))]
     place = session.edits.light
     known = session.edits.steps[place].options.get("lamps", []) if place is not None else []

@@ -74,14 +74,17 @@ def wire(context: PageContext) -> None:
     )
     for name in ("made_of", "thing_colour"):
         context.live(parts[name].input, _made_of, "made_of", "thing_colour")
+    # Filling a hole takes seconds: in the queue, with a sign of work.
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
     context.live(parts["remove"].click, _remove, "shadow", **slow)
     context.live(parts["glass"].click, partial(Session.set, kind="glass"), everything=True)
+    # The stage itself asks for this where its glass is still to come.
     context.long(parts["stage"].follow, partial(_follow, context), trigger_mode="always_last")
     context.long(parts["rest"].click, partial(_fall, context), "height")
 
 
 def _choose(session: Session, name: str | None) -> Updates:
+    # Only names of ours: anything else would be a path from a stranger.
     if name in objects.LIBRARY:
         objects.set_object_option(session, "mesh", objects.library_file(session, str(name)))
     return {"tool": "place", "own_mesh": None}

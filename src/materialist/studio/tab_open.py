@@ -80,6 +80,7 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     studio = context.studio
 
     def uploaded(session: Session, file: str | None) -> Iterator[Updates]:
+        # A zip is opened when the button is pressed; a photo is checked at once.
         name = Path(file or "").name
         if name.lower().endswith(".zip"):
             yield {"facts": message_box(f"{name} will be opened as a scene.")}
@@ -106,9 +107,11 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield from _follow_inversion(context, session, project, job)
 
     def arrive(session: Session) -> Iterator[Updates]:
+        # --- What this person can go on with ---
         known = _projects(context, session)
         last = studio.last.get(session.person)
         yield {"projects": gr.update(choices=known, value=known[0][1] if known else None)}
+        # --- What the page shows first: the last photo, or what the studio was started on ---
         if not any(value == last for _, value in known):
             last = studio.start.name if isinstance(studio.start, Project) else None
         if last is not None:
@@ -207,6 +210,7 @@ def _follow_inversion(
     if not job.over:  # the page was closed, or follows the inversion anew; it goes on
         return
     failed = job.state != "done"
+    # Nothing to go on with: the folder goes.
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
     before = (
@@ -226,6 +230,7 @@ def _resume(context: PageContext, session: Session, name: str | None) -> Iterato
     if not name:
         raise InputError("Choose one of your photos in the list first.")
     project = studio.project(name, session.person)
+    # A page that was reloaded follows the inversion that still runs.
     running = [
         j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder
     ]
@@ -253,6 +258,7 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
         "found": gr.update(visible=False, value=[]),
         "progress": message_box("Getting the live preview ready; select something meanwhile.", 0.6),
     }
+    # Another photo may have been opened meanwhile.
     live.wait()
     if session.live is live:
         yield context.everything(session) | {"progress": message_box(_READY)}

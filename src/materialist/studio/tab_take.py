@@ -31,6 +31,7 @@ KINDS = {
 def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Take away", id="take"):
+        # Results by their titles.
         choices = [(title, kind) for kind, (title, _) in KINDS.items()]
         parts["what"] = gr.Radio(choices, value="png", label="What to take", elem_id="what")
         parts["make"] = gr.Button("Prepare the file", variant="primary", elem_id="make")

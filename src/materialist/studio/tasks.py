@@ -54,6 +54,7 @@ def invert(
     def show(name, value):
         return _show(report, folder, name, value)
 
+    # The photo first: the page shows it while the rest is computed.
     show(PHOTO, picture.linear)
     done = mt.invert(
         picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show
@@ -63,6 +64,7 @@ def invert(
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
+    # Each stage brings other maps: all of the prediction, then materials, then light.
     if isinstance(value, Prediction):
         shown = display.maps(value)
     elif isinstance(value, Materials):
@@ -109,6 +111,7 @@ def fallen(report: Reporter, scene: str, steps: Steps) -> dict[str, Any]:
     from materialist.edits.recipe import apply
 
     loaded = mt.load_scene(scene)
+    # A fall meets surfaces alone: colours and light are left out.
     earlier = [step for step in steps[:-1] if step.kind in ("insert", "drop", "remove")]
     before = apply(loaded, earlier)
     after = apply(loaded, [steps[-1]], onto=before)
@@ -176,6 +179,7 @@ def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> 
     from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
+    # The same light function as of the command, so that both films are equal.
     scenes = list(moving_light(edited, SETTINGS.video_frames, rotate=360.0))
     film = pictures(loaded, scenes, progress=report)
     write_frames(output, film, fps=12, force=True)
@@ -189,6 +193,7 @@ def _zipped(output: Path) -> Iterator[Path]:
     folder.mkdir(parents=True)
     try:
         yield folder
+        # Zipped beside, then renamed: a half zip is never seen.
         os.replace(shutil.make_archive(str(folder), "zip", place, folder.name), output)
     finally:
         shutil.rmtree(place, ignore_errors=True)

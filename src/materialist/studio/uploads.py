@@ -96,6 +96,7 @@ def checked_upload(report: Any, file: Path, option: str) -> Path:
     Its header is read first, then all of it; of a photo the header alone: its inversion has a process of its own.
     Raises InputError for what cannot be read, and for what would be too large for the server.
     """
+    # Meshes are read in full: a header does not tell how large one becomes.
     if option == MESH:
         checked_mesh(file)
         _read_mesh(file)
@@ -163,6 +164,7 @@ def _shrunk(path: Path) -> Path:
     """A picture of colours that is small enough for the server: the file itself, or a PNG or EXR beside it."""
     decoded = decode(path)
     height, width = decoded.linear.shape[:2]
+    # Both sides by the root: the limit is one of pixels.
     scale = math.sqrt(SETTINGS.edit_pixels / (width * height))
     if scale >= 1:
         return path

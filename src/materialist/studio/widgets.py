@@ -90,6 +90,7 @@ class PageContext:
         def run(request: gr.Request, event_data: gr.EventData, *values: Any) -> Any:
             try:
                 session = self.session(request)
+                # Counted: one page must not keep all threads busy.
                 with session.allowance.request():
                     further = change(session, *([event_data._data] if data else []), *values) or {}
                     shown = (
@@ -99,6 +100,7 @@ class PageContext:
             except Exception as error:
                 raise self.message(error) from error
 
+        # Components that this event may update.
         names = [*PICTURE, *(CONTROLS if everything else ()), *more]
         input_parts = [self.parts[name] for name in inputs]
         outputs = [self.parts[name] for name in names]
@@ -182,12 +184,14 @@ class PageContext:
         Between two looks the thread is free for others. It ends early where the page is closed, or follows the job
         anew; `follows` tells.
         """
+        # Of several followers, as after a reload, the last one counts.
         follower = session.followers[id(job)] = object()
         last = None
         while not job.over and self.follows(session, job, follower):
             state = self.state(job)
             yield {"progress": state, "stop": gr.update(visible=True)} if state != last else {}
             last = state
+            # A job reports through its queue; looking at it costs nothing.
             time.sleep(SETTINGS.poll_seconds)
         if self.follows(session, job, follower):
             yield {"progress": self.state(job), "stop": gr.update(visible=False)}
@@ -228,6 +232,7 @@ class PageContext:
         Returns the picture, which the session keeps; None where the job failed or was stopped.
         """
         steps = session.edits.active
+        # A picture of just these edits is there already.
         known = session.final
         if known is not None and known.of(steps):
             return known
@@ -247,6 +252,7 @@ class PageContext:
 
 def failure_message(job: Job) -> str:
     """The reason of a failure; it names the photo by its title."""
+    # The path on this machine is nothing for a page.
     photo = job.arguments.get("photo")
     return job.message.replace(str(photo), job.arguments["title"]) if photo else job.message
 
@@ -276,6 +282,7 @@ def commands(session: Session) -> str:
     project = session.project
     if project is None:
         return ""
+    # Whoever has no command line here gets the names alone.
     place = str if session.local else session.without_folders
     lines = [f"cd {quote(place(str(project.folder)))}"]
     scene = quote(place(str(project.scene)))

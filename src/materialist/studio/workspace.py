@@ -122,6 +122,7 @@ class WorkFolder:
                     target = edits.with_name(f"edits-{person_of(cookie)}")
                     edits.rename(_free_name(target))
             if _COOKIE.fullmatch(project.owner):
+                # The card names its owner, too.
                 card = json.loads((project.folder / CARD).read_text("utf-8"))
                 card["owner"] = person_of(project.owner)
                 write_whole(project.folder / CARD, json.dumps(card, indent=1))
@@ -165,6 +166,7 @@ class WorkFolder:
                 ):
                     shutil.rmtree(place) if place.is_dir() else place.unlink()
         for project in self.projects():
+            # Only folders of the studio's own, without edits of anybody.
             idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
             if idle and ours and not project.ready:

@@ -83,6 +83,7 @@ def _of_file(photo: Photo | None) -> Image.Exif:
             exif = Image.Exif()
             exif.load(photo.exif or b"")
             return exif
+        # RAW files are TIFF inside, which Pillow's opener does not know.
         if is_tiff(source) or Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
             exif = Image.Exif()
             exif.load_from_fp(io.BytesIO(source))

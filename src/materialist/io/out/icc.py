@@ -101,5 +101,6 @@ def _curve(curve: Curve) -> bytes:
     exponent = getattr(curve, "keywords", {}).get("exponent")
     if exponent is not None:
         return b"para" + struct.pack(">IHH", 0, 0, 0) + _s15(exponent)
+    # Other curves, such as PQ, by samples of 16 bits.
     samples = np.round(np.clip(curve(np.linspace(0, 1, _SAMPLES)), 0, 1) * 65535).astype(">u2")
     return b"curv" + struct.pack(">II", 0, _SAMPLES) + samples.tobytes()

@@ -75,6 +75,7 @@ def _located(value: Any, person: str, files: HandedFiles) -> Any:
         return [_located(item, person, files) for item in value]
     if not isinstance(value, dict):
         return value
+    # Any such key makes Gradio treat the object as a file.
     if not _FILE_KEYS & value.keys():
         return {key: _located(item, person, files) for key, item in value.items()}
     # Only what is known of the file itself; nothing of what the request says of it.

@@ -130,6 +130,7 @@ class Gate:
     def _address(self, scope: Any) -> str:
         """The IP address that a request comes from: behind a proxy what the proxy says, its last word."""
         if self.proxy:
+            # The last entry is the proxy's own; those before it are what the client claims.
             forwarded = dict(scope["headers"]).get(b"x-forwarded-for", b"").decode("latin-1")
             return forwarded.rpartition(",")[2].strip() or "proxy"
         return scope["client"][0] if scope.get("client") else "unknown"
@@ -161,6 +162,7 @@ class Gate:
         if self.proxy and b"x-forwarded-host" not in values:
             values[b"x-forwarded-host"] = values.get(b"host", b"")
         dropped = (b"forwarded", PERSON_HEADER.encode())
+        # Only the proxy may say where a request comes from; the person's header is ours alone.
         kept = [(k, v) for k, v in headers if not k.startswith(b"x-forwarded") and k not in dropped]
         if self.proxy:
             scheme = b"http" if values.get(b"x-forwarded-proto") == b"http" else b"https"
@@ -187,6 +189,7 @@ class Gate:
         path = request.scope["path"]
         if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
             return PlainTextResponse("The studio has no such place.\n", 404)
+        # Files by id, each for its person.
         if path.startswith(_FILE):
             return self._file(request.scope, path.removeprefix(_FILE), person)
         try:
@@ -219,6 +222,7 @@ class Gate:
     def _file(self, scope: Any, name: str, person: str) -> Any:
         """The application that serves a file: one of the cache, or an upload of this person by its id."""
         with suppress(InputError):
+            # An upload by its id; else only what lies in the cache.
             path = self.studio.files.path(person, name)
             scope["path"] = f"{_FILE}{path}"
             scope["raw_path"] = scope["path"].encode()
@@ -277,9 +281,11 @@ class Gate:
     def _wrong_from(self, sender: str, now: float) -> deque[float]:
         """When wrong passwords came from a sender within the last minute; old senders are forgotten."""
         wrong = self._wrong.pop(sender, deque())
+        # Within the last minute.
         while wrong and now - wrong[0] > 60:
             wrong.popleft()
         self._wrong[sender] = wrong
+        # Bounded: addresses cost an attacker little.
         while len(self._wrong) > SETTINGS.addresses:
             self._wrong.pop(next(iter(self._wrong)))
         return wrong

@@ -68,6 +68,7 @@ class Quota:
         for who in list(self._claims):
             claims = self._claims[who]
             while claims and claims[0].time < hour_ago:
+                # Claims come in the order of their time.
                 claims.popleft()
             if not claims:
                 del self._claims[who]
@@ -75,6 +76,7 @@ class Quota:
 
     def check_disk(self, size: int = 0) -> None:
         """Raise InputError where so many bytes more would fill a disk."""
+        # Of several disks the fullest decides.
         free = min(shutil.disk_usage(place).free for place in self.places)
         if free - size < SETTINGS.disk_left:
             raise InputError("The disk of the studio is full; it takes no more files.")
@@ -88,6 +90,7 @@ class Quota:
                 opening = sum(
                     count for (activity, _), count in self._running.items() if activity == "opening"
                 )
+            # Checked after counting oneself: two at once cannot both pass.
             if opening > SETTINGS.openings:
                 raise InputError(
                     "The studio is opening the files of others; try again in a moment."
@@ -174,6 +177,7 @@ def sender_of(address: str) -> str:
         return address
     if ip.version == 4:
         return str(ip)
+    # A provider gives each customer a whole network of 64 bits.
     mapped = ip.ipv4_mapped
     return str(mapped) if mapped else str(ipaddress.ip_network((ip, 64), strict=False))
 
