@@ -1,5 +1,6 @@
 """Stand-ins for the inversion, as workers load them by name; and photos to give them."""
 
+import errno
 import os
 import signal
 import time
@@ -12,7 +13,7 @@ from made_scene import make_mesh
 from PIL import Image
 
 from materialist.batches.outcome import Outcome
-from materialist.errors import InputError, SetupError
+from materialist.errors import InputError, OutputError, SetupError
 from materialist.types import Geometry, Photo, Scene
 
 
@@ -50,6 +51,8 @@ def moody(photo: Photo, **options) -> Scene:
     if "lacking" in name:
         options["progress"]("predict", 0, 1)
         raise SetupError("No LLVM found; install one.")
+    if "full" in name:
+        raise OutputError(f"a.scene cannot be written: {os.strerror(errno.ENOSPC).lower()}.")
     if "slow" in name:
         options["progress"]("light", 0, 9)
         time.sleep(float(os.environ.get("MADE_SLOW", "0.4")))

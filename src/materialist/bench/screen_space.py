@@ -25,9 +25,8 @@ class ScreenSpaceSettings:
     beams: int = 192  # directions, by the light that comes from them
     steps: int = 32  # along each of them
     reach: float = 3.0  # length of a beam, in diagonals of the bodies; longer shadows are lost
-    thickness: float = (
-        0.2  # of what is seen of the bodies, in their diagonals; the best of four on eight photos
-    )
+    # of what is seen of the bodies, in their diagonals; the best of four on eight photos
+    thickness: float = 0.2
 
 
 SETTINGS = ScreenSpaceSettings()

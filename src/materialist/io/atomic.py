@@ -20,6 +20,7 @@ from pathlib import Path
 import psutil
 
 from materialist.errors import OutputError
+from materialist.io.native import name_problem
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
@@ -103,10 +104,14 @@ def require_parent(path: str | Path) -> None:
 def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | None = SCENE) -> None:
     """Check before the work that a folder of `kind`, or with None a file, can be written at PATH.
 
-    The folder that it lies in must be there. PATH must not exist, or with `force` be of the same kind: nothing else is
+    The folder that it lies in must be there, its name one that OpenEXR takes where EXRs are written.
+    PATH must not exist, or with `force` be of the same kind: nothing else is
     ever replaced. Raises OutputError with the way out.
     """
     target = _absolute(path)
+    needs_exr = kind is SCENE or target.suffix.lower() == ".exr"
+    if needs_exr and (problem := name_problem(target)):
+        raise OutputError(problem)
     with writing(path):
         if target.is_symlink() or target.exists():
             _require_replaceable(path, target, force, kind)

@@ -19,6 +19,7 @@ from materialist.io.colour_space import ColourSpace
 from materialist.io.colour_tags import png_chunks, stated_space
 from materialist.io.exif import image_tags
 from materialist.io.icc import matrix_profile
+from materialist.io.native import unprinted
 from materialist.types import Array
 
 FORMATS = "PNG, JPEG, JPEG 2000, HEIC, AVIF, TIFF, WEBP, EXR, HDR or camera RAW"
@@ -277,7 +278,8 @@ def stored_pixels(path: Path) -> tuple[Array, Array | None]:
 def levels_of(content: Array, path: Path) -> tuple[Array, Array | None]:
     """`stored_pixels` of the bytes of a file, which messages call `path`."""
     try:
-        decoded = cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
+        with unprinted():
+            decoded = cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
     except cv2.error:  # an empty file, or a header that promises more pixels than any picture has
         decoded = None
     if decoded is None or decoded.dtype not in (np.uint8, np.uint16, np.float32, np.float64):

@@ -15,6 +15,7 @@ from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
 from materialist.io.exr import exr_bytes, exr_headers, exr_size
 from materialist.io.exr_photo import read_exr_photo
+from materialist.io.native import unprinted
 from materialist.io.radiance import MAGIC, radiance_header, read_radiance
 from materialist.io.tiff import read_tiff
 from materialist.types import Array
@@ -114,7 +115,7 @@ def image_size(path: Path) -> tuple[int, int]:
     if head.startswith(MAGIC):
         return radiance_header(path).size
     if head.startswith(_TIFF):  # Pillow does not know some layouts, such as float RGB
-        with TiffFile(path) as tiff:
+        with unprinted(), TiffFile(path) as tiff:
             page: Any = tiff.pages[0]
             return int(page.imagewidth), int(page.imagelength)
     from pillow_heif import register_heif_opener

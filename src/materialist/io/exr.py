@@ -12,7 +12,7 @@ import OpenEXR
 
 from materialist.errors import InputError, OutputError
 from materialist.io.bitmap import MAX_PIXELS
-from materialist.plain import is_utf8
+from materialist.io.native import name_problem, unprinted
 from materialist.types import Array
 
 LARGEST_BYTES = 12 * MAX_PIXELS
@@ -166,12 +166,12 @@ def opened_exr(path: Path, **settings: bool) -> Iterator[Any]:
     """An open EXR. Raises InputError, also for what goes wrong within."""
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
-    if not is_utf8(str(path)):
-        raise InputError(
-            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it."
-        )
+    if problem := name_problem(path):
+        raise InputError(problem)
     try:
-        with OpenEXR.File(str(path), **settings) as file:
+        with unprinted():
+            file = OpenEXR.File(str(path), **settings)
+        with file:
             yield file
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
         raise InputError(

@@ -23,6 +23,7 @@ from materialist.io.colour_space import ColourSpace, lab_to_rec709
 from materialist.io.colour_tags import exif_space
 from materialist.io.exif import file_tags
 from materialist.io.icc import matrix_profile
+from materialist.io.native import unprinted
 from materialist.types import Array
 
 _UNSPECIFIED = 0
@@ -72,7 +73,7 @@ def read_tiff(path: Path) -> Decoded:
 
     Raises InputError for layouts that would be read wrong.
     """
-    with TiffFile(path) as file:
+    with unprinted(), TiffFile(path) as file:
         page: Any = file.pages[0]
         layout = _Layout.of(page, len(file.pages))
         if layout.bits > 8 and layout.meaning in (_CIELAB, _ICCLAB):

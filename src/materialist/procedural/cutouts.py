@@ -24,17 +24,14 @@ class PasteSettings:
     size: tuple[float, float] = (0.15, 0.8)  # longer side, from and to
     turned: float = 12.0  # standard deviation of the rotation, degrees
     visible: float = 0.6  # least share of a cut-out that lies inside the picture
-    matched: tuple[float, float] = (
-        0.3,
-        1.0,
-    )  # exponent by which its exposure follows its surroundings, from and to
+    # exponent by which its exposure follows its surroundings, from and to
+    matched: tuple[float, float] = (0.3, 1.0)
     shaded: float = 0.35  # largest amplitude of a ramp of light across it
     shadow: float = 0.6  # share of cut-outs that darken what lies around and below them
     fewest_pixels: int = 48  # shorter side of a file that is used
     longest: int = 400  # longer side at which one is kept
-    solid: float = (
-        0.97  # share of opaque pixels above which a file is a picture with a frame, not a cut-out
-    )
+    # share of opaque pixels above which a file is a picture with a frame, not a cut-out
+    solid: float = 0.97
 
 
 SETTINGS = PasteSettings()

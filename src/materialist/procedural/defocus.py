@@ -19,9 +19,8 @@ def defocused(image: Array, depth: Array, camera: Camera, aperture: float, focus
     depth: [H, W] planar, metres, 0 where there is no surface.
     """
     distance = np.where(depth > 0, depth, FAR)
-    blur = (
-        aperture * camera.focal * (1 / focus - 1 / distance)
-    )  # pixels across, signed: near negative
+    # pixels across, signed: near negative
+    blur = aperture * camera.focal * (1 / focus - 1 / distance)
     low = float(blur.min())
     high = float(blur.max())
     if max(-low, high) < LEAST:

@@ -49,20 +49,16 @@ class ClickDraw:
     """How clicks and crops are drawn; all tuned by eye."""
 
     fewest_pixels: int = 60  # of a view; smaller things are not clicked on
-    depth_inside: float = (
-        2.5  # pixels from the border of a thing to a click, where the thing is as large
-    )
+    # pixels from the border of a thing to a click, where the thing is as large
+    depth_inside: float = 2.5
     things: float = 0.85  # share of clicks on things; the others are on walls, floors and the like
     several: float = 0.25  # share of those with clicks that have two or three
     boxed: float = 0.35  # share of examples with a box
-    loose: tuple[float, float] = (
-        -0.03,
-        0.2,
-    )  # what each side of a box is too far out, shorter sides, from and to
+    # what each side of a box is too far out, shorter sides, from and to
+    loose: tuple[float, float] = (-0.03, 0.2)
     smallest_crop: float = 0.4  # smallest part of a view's side that an example shows
-    worsened: float = (
-        0.5  # share with worse maps: the bundled network knows these pictures better than photos
-    )
+    # share with worse maps: the bundled network knows these pictures better than photos
+    worsened: float = 0.5
     blur: tuple[float, float] = (0.008, 0.1)  # of worse maps, as a part of the side, from and to
     waves: float = 0.25  # largest amplitude of waves on worse normals and, times its spread, on worse log depth
 

@@ -37,9 +37,8 @@ class Recipe:
     weight_decay: float = 0.02  # of weights, not of biases and gains; tuned by eye
     betas: tuple[float, float] = (0.9, 0.98)  # of AdamW; tuned by eye
     warm_up: int = 100  # steps in which the rate rises to its peak; tuned by eye
-    last_rate: float = (
-        0.01  # rate at the end of the cosine, as a part of the peak; 1 keeps it constant
-    )
+    # rate at the end of the cosine, as a part of the peak; 1 keeps it constant
+    last_rate: float = 0.01
     ema: float = 0.998  # decay a step of the averaged weights; 0 averages nothing; tuned by eye
     clip: float = 1.0  # largest norm of the gradient; tuned by eye
     bfloat16: bool = False  # whether convolutions and products run in bfloat16

@@ -12,7 +12,7 @@ import OpenEXR
 from materialist import __version__
 from materialist.errors import OutputError
 from materialist.io.atomic import whole_file
-from materialist.plain import is_utf8
+from materialist.io.native import name_problem
 from materialist.types import Array
 
 LINEAR_REC709 = "lin_rec709_scene"
@@ -38,10 +38,8 @@ def write_layers(
     things: name -> [H, W] coverage in [0, 1], written as a cryptomatte (Friedman and Jones, specification 1.2.0).
     Raises OutputError.
     """
-    if not is_utf8(str(path)):
-        raise OutputError(
-            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
-        )
+    if problem := name_problem(path):
+        raise OutputError(problem)
     parts = [_part(name, values, plain=k == 0) for k, (name, values) in enumerate(layers.items())]
     parts += _cryptomatte(things) if things else []
     with whole_file(path, force) as temporary:

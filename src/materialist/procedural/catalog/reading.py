@@ -27,9 +27,8 @@ class ReadingSettings:
 
     faces: int = 40_000  # triangles of a model; larger ones are decimated
     picture: int = 512  # pixels along the longer side of a picture
-    crease: float = (
-        0.7  # radians: where a file has no normals, faces that meet at a sharper angle keep an edge
-    )
+    # radians: where a file has no normals, faces that meet at a sharper angle keep an edge
+    crease: float = 0.7
     glass: float = 0.35  # share of the surface that may be clear; it is left out
     holes: float = 0.12  # share of the surface that may have holes painted in its picture
 
