@@ -19,6 +19,7 @@ def install_command(*requirements: str) -> str:
     Environments of uv have no pip of their own.
     """
     words = shlex.join(requirements)
+    # This very Python's pip, whatever the shell would find first.
     if find_spec("pip") is not None:
         return f"{sys.executable} -m pip install {words}"
     return f"uv pip install --python {sys.executable} {words}"
@@ -43,6 +44,7 @@ def extra_requirements(extra: str) -> list[str]:
         every = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
         every = []
+    # Metadata has lines such as: rawpy>=0.21; extra == "raw".
     marked = re.compile(rf"(.+?)\s*;.*extra == ['\"]{re.escape(extra)}['\"]")
-    found = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
-    return found or [f"{DISTRIBUTION}[{extra}]"]
+    requirements = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
+    return requirements or [f"{DISTRIBUTION}[{extra}]"]

@@ -24,7 +24,7 @@ def answer(report, how="fine", out=None, wait=0.0):
         sys.stderr.flush()
         os.kill(os.getpid(), signal.SIGKILL)
     if how == "found":
-        report.found(name="albedo", file="a.jpg")
+        report.intermediate(name="albedo", file="a.jpg")
     time.sleep(60 if how == "wait" else wait)
     return {
         "how": how,
@@ -37,10 +37,10 @@ def answer(report, how="fine", out=None, wait=0.0):
 def until(done, seconds=15.0):
     """What `done` returns, once that is true."""
     end = time.monotonic() + seconds
-    while not (found := done()):
+    while not (intermediate := done()):
         assert time.monotonic() < end, "took too long"
         time.sleep(0.02)
-    return found
+    return intermediate
 
 
 def wait(report):

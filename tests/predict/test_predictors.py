@@ -114,7 +114,7 @@ def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeyp
     up[:8] = [0, 0, 1]
     materials = Materials(theirs["albedo"], theirs["roughness"], theirs["metallic"])
     seen = Prediction(materials, up, depth, warnings=("40% of the picture was taken for sky.",))
-    monkeypatch.setattr(predictor, "infer", lambda *_, **__: seen)
+    monkeypatch.setattr(predictor, "infer_bundled", lambda *_, **__: seen)
     mixed = get_predictor("bundled", depth=spec).predict(photo)
     assert np.allclose(mixed.normal[8:], [0, 1, 0]) and mixed.warnings == ()
     assert np.allclose(

@@ -31,6 +31,7 @@ PictureOutput = Annotated[
 class Computing(OperationOptions):
     """What every command that computes takes."""
 
+    # What makes a run repeatable, and where it runs.
     seed: int = option(
         0,
         "Random seed: the same seed on the same machine gives the same result.",
@@ -102,6 +103,7 @@ class Region(Place):
 class PictureFile(Run):
     """How a picture is written."""
 
+    # How the file is encoded.
     quality: int | None = option(
         None,
         "Of .jpg (default 95), .webp (90, 100 loses nothing) and .avif (85).",
@@ -132,6 +134,7 @@ class PictureFile(Run):
 class Rendering(PictureFile):
     """How an edited scene becomes a picture or a film."""
 
+    # How the picture is rendered.
     spp: int = option(
         PATHS,
         "Paths per pixel, of both renderings.",
@@ -146,6 +149,7 @@ class Rendering(PictureFile):
         kind="switch",
         flag="--denoise/--no-denoise",
     )
+    # The rendering in place of the composite.
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
     upscale: Any = option(
         None,
@@ -154,6 +158,7 @@ class Rendering(PictureFile):
         needs="full_render",
         metavar="FILE.py:FUNCTION",
     )
+    # What else is written.
     save: Path | None = option(
         None, "Write the edited scene as well.", kind="file", metavar="SCENE2"
     )

@@ -14,7 +14,7 @@ from materialist.errors import InputError
 from materialist.options import ExportOptions, InvertOptions
 
 
-def invert(
+def invert_command(
     photo: Annotated[
         str,
         typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...)."),
@@ -29,6 +29,7 @@ def invert(
     # Everything that can be wrong is found before the work starts.
     ensure_writable(output, run.force)
     picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
+    # Reading is quick, and wrong files show here; the clock is that of the inversion.
     start = time.monotonic()
     with stage_progress(quiet=run.as_json) as progress:
         scene = mt.invert(picture, options, progress=progress)
@@ -49,7 +50,7 @@ def invert(
     report_success("invert", run.as_json, lines, scene=str(output), **facts)
 
 
-def render(
+def render_command(
     scene: SceneArgument,
     output: PictureOutput,
     run: PictureFile,
@@ -79,6 +80,7 @@ def render(
     notes = (
         [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) and not photo else []
     )
+    # Layers may be of the photo itself: nothing is rendered then.
     if photo:
         image = loaded.photo.original
     else:
@@ -92,7 +94,7 @@ def render(
     report_success("render", run.as_json, shown, **facts)
 
 
-def export(
+def export_command(
     scene: SceneArgument,
     output: Annotated[
         Path,

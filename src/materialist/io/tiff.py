@@ -17,7 +17,7 @@ from materialist.io.bitmap import (
     light_and_alpha,
     read_bitmap,
     rgb_levels,
-    upright,
+    turned_upright,
 )
 from materialist.io.colour_space import ColourSpace, lab_to_rec709
 from materialist.io.colour_tags import exif_space
@@ -91,6 +91,7 @@ def read_tiff(path: Path) -> Decoded:
         warnings.append(
             "The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it."
         )
+    # --- Light for floats, display values for whole numbers ---
     space = _space(layout, tags, warnings, is_float=colour.dtype.kind == "f")
     premultiplied = _PREMULTIPLIED in layout.extra
     if colour.dtype.kind == "f":
@@ -105,6 +106,8 @@ def read_tiff(path: Path) -> Decoded:
 
 def _shallow(path: Path, layout: _Layout) -> Decoded:
     decoded = read_bitmap(path)
+    # --- Transparency: only where the file says that the last channel is one ---
+    # --- Transparency: only where the file says that the last channel is one ---
     if layout.extra[0] == _UNSPECIFIED:
         decoded.warnings.append(FOURTH)
     return decoded
@@ -162,6 +165,7 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
             f"{path} holds CIELab of {layout.bits} bits, compressed by {layout.compression}; save it uncompressed at "
             "16 bits, or as RGB."
         )
+    # tifffile decodes without colour conversion, which OpenCV would do wrong for deep CIELab.
     stored = page.asarray()
     if stored.ndim != 3 or stored.shape[-1] != 3:
         raise InputError(
@@ -172,7 +176,7 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
         rows = slice(start, start + ROWS)
         linear[rows] = lab_to_rec709(_lab_values(stored[rows], layout.meaning))
     tags = file_tags(path)
-    return Decoded(upright(linear, tags), False, tags, frames_note(layout.frames))
+    return Decoded(turned_upright(linear, tags), False, tags, frames_note(layout.frames))
 
 
 def _lab_values(stored: Array, meaning: int) -> Array:

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from materialist import metrics
-from materialist.edits.glass.preview import GlassPreview
+from materialist.edits.glass.glass_preview import GlassPreview
 from materialist.geometry.silhouette import window
 from materialist.option_kinds import option
 from materialist.predict.refraction.thickness import Thickness

@@ -1,21 +1,26 @@
 """`materialist train ...`: the sub-commands that make training data and train networks."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from materialist.cli.generate import add_command, group
 from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.progress import Progress, stage_progress
+from materialist.cli.progress import stage_progress
 from materialist.errors import Interrupted
 from materialist.option_kinds import OperationOptions, option
 from materialist_lab.cli.options import Learning, Training
 from materialist_lab.procedural.options import DataSetOptions
+
+if TYPE_CHECKING:
+    from materialist.types import Progress
 
 SETS = (
     "A set made by `materialist train data` (several: give it again), or an InteriorVerse folder."

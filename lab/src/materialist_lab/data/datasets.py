@@ -75,6 +75,7 @@ class InteriorVerse(Source):
         self.folder = Path(folder)
         self.split = split
         scenes = {}
+        # Scenes by part: both parts may have one of the same name.
         for part in parts(self.folder):
             listed = part / f"{split}.txt"
             for scene in listed.read_text("utf-8").split() if listed.is_file() else ():
@@ -87,7 +88,8 @@ class InteriorVerse(Source):
             raise InputError(
                 f"{self.folder} holds no pictures of the InteriorVerse split '{split}'; check the path."
             )
-        lost = [name for name, found in scenes.items() if not found]
+        # --- Notes on scenes and maps that are lost ---
+        lost = [name for name, paths in scenes.items() if not paths]
         bare = len(pictures) - len(self.paths)
         if lost:
             names = ", ".join(lost[:3])
@@ -123,18 +125,21 @@ class InteriorVerse(Source):
 
 def parts(folder: Path) -> list[Path]:
     """The folder itself and its parts, where they have lists of scenes."""
-    found = [folder, *(folder / part for part in PARTS)]
-    return [place for place in found if any((place / f"{split}.txt").is_file() for split in SPLITS)]
+    folders = [folder, *(folder / part for part in PARTS)]
+    return [
+        place for place in folders if any((place / f"{split}.txt").is_file() for split in SPLITS)
+    ]
 
 
 def field_of_view(path: Path) -> float:
     """Horizontal field of view, degrees: the number in the name of the part that the picture lies in, else 85."""
-    named = (re.fullmatch(r"(?:dataset|scenes)_(\d+)", parent.name) for parent in path.parents)
-    return next((float(found[1]) for found in named if found), 85.0)
+    matches = (re.fullmatch(r"(?:dataset|scenes)_(\d+)", parent.name) for parent in path.parents)
+    return next((float(match[1]) for match in matches if match), 85.0)
 
 
 def _sample(maps: dict[str, Array], camera: Camera) -> Sample:
     """The maps in our conventions; a pixel counts when its mask, depth and normal say so."""
+    # --- Surface: where depth, normal and mask all hold ---
     depth = maps["depth"][..., 0] * MILLIMETRES
     length = np.linalg.norm(maps["normal"][..., :3], axis=-1)
     surface = np.isfinite(depth) & (depth > 0) & np.isfinite(length) & (length > 0.5)
@@ -146,6 +151,7 @@ def _sample(maps: dict[str, Array], camera: Camera) -> Sample:
     rays = pixel_rays(camera)
     # Sheets that are modelled without a back show some normals from behind.
     normal *= np.where((normal * rays).sum(-1, keepdims=True) > 0, -1, 1)
+    # --- Exposure: the 97th percentile of the brightest channel goes to WHITE ---
     image = np.maximum(np.nan_to_num(maps["im"][..., :3], posinf=6e4), 0)
     bright = float(np.percentile(image.max(-1), 97))
 

@@ -110,13 +110,13 @@ class SampleFolder(Source):
         return int(self.paths[index].stem)
 
     def refresh(self) -> None:
-        found = [sorted((folder / "samples").glob("[0-9]*.npz")) for folder in self.folders]
-        for folder, paths in zip(self.folders, found, strict=True):
+        files = [sorted((folder / "samples").glob("[0-9]*.npz")) for folder in self.folders]
+        for folder, paths in zip(self.folders, files, strict=True):
             if not paths:
                 raise InputError(
                     f"{folder} holds no samples yet; make some with: materialist train data."
                 )
-        self.paths = list(chain.from_iterable(found))
+        self.paths = list(chain.from_iterable(files))
 
     def seed(self) -> list[int | None]:
         """The seeds that the sets were made with; None where dataset.json does not tell."""
@@ -134,6 +134,7 @@ def read_sample(path: Path) -> Sample:
         return np.nan_to_num(values.astype(np.float32), posinf=6e4)
 
     try:
+        # --- Stored as float16 and bytes: back to float32, and unit normals ---
         surface = (arrays["mask"] > 0) & (arrays["depth"] > 0)
         height, width = arrays["image"].shape[:2]
         normal = arrays["normal"].astype(np.float32)
@@ -170,10 +171,10 @@ def read_arrays(path: Path, *needed: str) -> dict[str, Array]:
     return arrays
 
 
-def complete(
+def make_missing(
     paths: Sequence[Path],
     make: Callable[[int], dict[str, Array]],
-    what: str,
+    stage: str,
     progress: Progress,
     workers: int = 1,
 ) -> int:
@@ -185,6 +186,7 @@ def complete(
     folder.mkdir(exist_ok=True)
     for stale in folder.glob(".*.partial-*"):
         stale.unlink(missing_ok=True)
+    # Files that are there stay: an interrupted run goes on where it stopped.
     missing = [k for k, path in enumerate(paths) if not path.exists()]
     # Fresh processes: a renderer that has started does not survive a fork.
     spawn = multiprocessing.get_context("spawn")
@@ -195,12 +197,13 @@ def complete(
             _write, [paths[k] for k in missing], repeat(make), missing
         )
         for done, _ in enumerate(written, len(paths) - len(missing) + 1):
-            progress(what, done, len(paths))
+            progress(stage, done, len(paths))
     return len(missing)
 
 
 def _start_worker() -> None:
     """Use one thread for renderers, and end with the process that started this one."""
+    # Several workers with all threads each would slow each other down.
     os.environ["OMP_NUM_THREADS"] = "1"
     end_with_parent()
 
@@ -211,6 +214,7 @@ def end_with_parent() -> None:
     The pool cannot do it: a parent that gets SIGTERM or SIGKILL runs none of its code.
     """
     parent = multiprocessing.parent_process()
+    # A thread that waits for the parent costs nothing.
     if parent is not None:
         threading.Thread(target=_exit_after, args=(parent,), daemon=True).start()
 
@@ -226,7 +230,7 @@ def _write(path: Path, make: Callable[[int], dict[str, Array]], number: int) -> 
         np.savez(file, **make(number))  # type: ignore[arg-type]
 
 
-def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:
+def claim_folder(folder: Path, name: str, description: dict[str, Any], keys: Sequence[str]) -> None:
     """Make FOLDER, and write the description of its set to FOLDER/name, or raise OutputError.
 
     Raises InputError when FOLDER holds a set whose description differs in one of `keys`, or other things.
@@ -238,6 +242,7 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
                 raise InputError(
                     f"{folder} holds other things than such a set; name another folder."
                 )
+            # --- A set that was begun: only with the same options can it go on ---
             for key in keys:
                 if old.get(key) != description[key]:
                     raise InputError(
@@ -250,7 +255,7 @@ def claim(folder: Path, name: str, description: dict[str, Any], keys: Sequence[s
 def described(file: Path) -> dict[str, Any] | None:
     """The description in a file; None where there is none, or a damaged one."""
     try:
-        found = json.loads(file.read_text("utf-8"))
+        content = json.loads(file.read_text("utf-8"))
     except (FileNotFoundError, NotADirectoryError, ValueError):
         return None
-    return found if isinstance(found, dict) else None
+    return content if isinstance(content, dict) else None

@@ -30,6 +30,7 @@ def backbone(name: str) -> Any:
     """The lpips package's network on `alex` or `vgg`, frozen; None unless package and backbone are here."""
     import torch
 
+    # Torchvision would download weights that are missing.
     files = {"alex": "alexnet*", "vgg": "vgg16*"}[name]
     if not list((Path(torch.hub.get_dir()) / "checkpoints").glob(files)):
         return None

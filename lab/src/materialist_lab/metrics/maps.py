@@ -9,11 +9,12 @@ from materialist.color import linear_to_srgb
 from materialist.metrics import mse, ssim, ssim_of_values
 from materialist.types import Array, Prediction
 
-LEAST_SURFACE = 0.01
-"""A picture with less surface than this part of it is not scored."""
+MIN_SURFACE = 0.01
+"""A picture with less surface than this share of its pixels is not scored."""
 PAIRS = 50_000
-ORDERED = 0.02
-"""Pixel pairs whose order in depth is compared, and the relative difference from which a pair has one."""
+"""Pixel pairs whose order in depth is compared."""
+MIN_DIFFERENCE = 0.02
+"""Relative difference in depth from which a pair has an order."""
 
 
 def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
@@ -25,21 +26,24 @@ def score(predicted: Prediction, true: Prediction) -> dict[str, float]:
     next to no surface. Square errors are given as *_mse as well, so that a set can be pooled.
     """
     surface = true.depth > 0
-    if surface.mean() < LEAST_SURFACE:
+    if surface.mean() < MIN_SURFACE:
         return {}
-    found = _albedo(predicted.materials.albedo, true.materials.albedo, surface)
+    # --- Materials ---
+    figures = _albedo(predicted.materials.albedo, true.materials.albedo, surface)
     for name in ("roughness", "metallic"):
         p = getattr(predicted.materials, name)
         t = getattr(true.materials, name)
-        found[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
-        found[f"{name}_psnr"] = decibel(found[f"{name}_mse"])
-        found[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
-    found |= depth_figures(predicted.depth, true.depth, surface)
-    found["normal_angle"] = mean_angle(predicted.normal, true.normal, surface)
-    found |= spread_calibration(predicted, true, surface)
+        figures[f"{name}_mse"] = float(np.square(p - t, dtype=np.float64)[surface].mean())
+        figures[f"{name}_psnr"] = decibel(figures[f"{name}_mse"])
+        figures[f"{name}_ssim"] = ssim_of_values(np.where(surface, p, t), t, mask=surface)
+    # --- Geometry ---
+    figures |= depth_figures(predicted.depth, true.depth, surface)
+    figures["normal_angle"] = mean_angle(predicted.normal, true.normal, surface)
+    figures |= spread_calibration(predicted, true, surface)
+    # --- Where each sees a surface at all ---
     p = predicted.depth > 0
     t = true.depth > 0
-    return {**found, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
+    return {**figures, "mask_iou": float((p & t).sum() / max((p | t).sum(), 1))}
 
 
 def spread_calibration(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, float]:
@@ -60,13 +64,16 @@ def spread_calibration(predicted: Prediction, true: Prediction, surface: Array) 
 
 def map_errors(predicted: Prediction, true: Prediction, surface: Array) -> dict[str, Array]:
     """[N] absolute errors over a surface [H, W] bool, as `Prediction.spread` counts them."""
-    encoded = [linear_to_srgb(one.materials.albedo[surface]) for one in (predicted, true)]
-    errors = {"albedo": np.abs(encoded[0] - encoded[1]).mean(-1)}
+    predicted_albedo = linear_to_srgb(predicted.materials.albedo[surface])
+    true_albedo = linear_to_srgb(true.materials.albedo[surface])
+    errors = {"albedo": np.abs(predicted_albedo - true_albedo).mean(-1)}
     for name in ("roughness", "metallic"):
-        ours, theirs = (getattr(one.materials, name)[surface] for one in (predicted, true))
+        ours = getattr(predicted.materials, name)[surface]
+        theirs = getattr(true.materials, name)[surface]
         errors[name] = np.abs(ours - theirs)
     cosine = (predicted.normal * true.normal).sum(-1)[surface]
     errors["normal"] = np.arccos(np.clip(cosine, -1, 1))
+    # Relative depth has no scale: the median difference of the logarithms is taken out.
     difference = np.log(predicted.depth[surface]) - np.log(true.depth[surface])
     errors["depth"] = np.abs(difference - np.median(difference))
     return errors
@@ -75,17 +82,18 @@ def map_errors(predicted: Prediction, true: Prediction, surface: Array) -> dict[
 def depth_figures(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
     """Figures of planar depth [H, W] against true depth over `surface`; see `score`."""
     both = surface & (predicted > 0)
-    found = {"depth_coverage": float(both.sum() / max(surface.sum(), 1))}
+    figures = {"depth_coverage": float(both.sum() / max(surface.sum(), 1))}
     if both.sum() < 2:
-        return found
+        return figures
     p = predicted[both].astype(np.float64)
     t = true[both].astype(np.float64)
+    # Least squares: a predicted depth has no unit of its own.
     scale = (p * t).sum() / (p * p).sum()
     for suffix, estimate in (("", p * scale), ("_raw", p)):
-        found[f"depth_mae{suffix}"] = float(np.abs(estimate - t).mean())
-        found[f"depth_rmse{suffix}"] = float(np.sqrt(np.square(estimate - t).mean()))
-    found["depth_si_log_rmse"] = float(np.std(np.log(p) - np.log(t)))
-    return found
+        figures[f"depth_mae{suffix}"] = float(np.abs(estimate - t).mean())
+        figures[f"depth_rmse{suffix}"] = float(np.sqrt(np.square(estimate - t).mean()))
+    figures["depth_si_log_rmse"] = float(np.std(np.log(p) - np.log(t)))
+    return figures
 
 
 def depth_abs_rel(predicted: Array, true: Array) -> float:
@@ -121,20 +129,21 @@ def aligned_psnr(picture: Array, true: Array, mask: Array) -> float:
 
 
 def ordinal_accuracy(predicted: Array, true: Array) -> float:
-    """Part of random pixel pairs whose order in depth [H, W] is right; those closer than ORDERED do not count.
+    """Part of random pixel pairs whose order in depth [H, W] is right; those closer than MIN_DIFFERENCE do not count.
 
     A tie in the prediction counts half, so that a constant gets 0.5. Pixels without true depth are left out; what is
     predicted to have none (0) is sky, behind everything.
     """
+    # A fixed seed: the same pairs for every prediction of a picture.
     rng = np.random.default_rng(0)
     known = np.flatnonzero(true > 0)
     first = rng.choice(known, PAIRS)
     second = rng.choice(known, PAIRS)
     t = np.log(true.ravel()[first]) - np.log(true.ravel()[second])
-    clear = np.abs(t) > np.log1p(ORDERED)
-    found = np.where(predicted > 0, predicted, np.inf).ravel()
-    a = found[first]
-    b = found[second]
+    clear = np.abs(t) > np.log1p(MIN_DIFFERENCE)
+    depth = np.where(predicted > 0, predicted, np.inf).ravel()
+    a = depth[first]
+    b = depth[second]
     right = np.where(a == b, 0.5, (a > b) == (t > 0))
     return float(right[clear].mean()) if clear.any() else float("nan")
 
@@ -144,14 +153,16 @@ def summary(rows: list[dict[str, float]]) -> dict[str, float]:
     if not rows:
         return {}
     keys = dict.fromkeys(key for row in rows for key in row)
-    found = {}
+    means = {}
     for key in keys:
         values = [row[key] for row in rows if key in row and np.isfinite(row[key])]
         if values:
-            found[key] = float(np.mean(values))
-    for key in [k for k in found if k.endswith("_mse")]:
-        found[key.replace("_mse", "_psnr_pooled")] = decibel(found[key])
-    return found
+            means[key] = float(np.mean(values))
+    # A pooled PSNR weighs every picture by its error, where the mean of PSNRs lets dark pictures
+    # rule.
+    for key in [k for k in means if k.endswith("_mse")]:
+        means[key.replace("_mse", "_psnr_pooled")] = decibel(means[key])
+    return means
 
 
 def decibel(square_error: float) -> float:
@@ -168,15 +179,14 @@ def best_scale(predicted: Array, true: Array, surface: Array) -> float:
 
 def _albedo(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
     scale = best_scale(predicted, true, surface)
-    found = {"albedo_scale": scale}
+    figures = {"albedo_scale": scale}
     for suffix, estimate in (("", predicted * np.float32(scale)), ("_raw", predicted)):
         difference = (
             linear_to_srgb(estimate)[surface].astype(np.float64) - linear_to_srgb(true)[surface]
         )
-        found[f"albedo{suffix}_mse"] = float(np.square(difference).mean())
-        found[f"albedo_psnr{suffix}"] = decibel(found[f"albedo{suffix}_mse"])
-        filled = np.where(
-            surface[..., None], estimate, true
-        )  # windows at the border see no difference beyond it
-        found[f"albedo_ssim{suffix}"] = ssim(filled, true, mask=surface)
-    return found
+        figures[f"albedo{suffix}_mse"] = float(np.square(difference).mean())
+        figures[f"albedo_psnr{suffix}"] = decibel(figures[f"albedo{suffix}_mse"])
+        # Windows at the border of the surface see no difference beyond it.
+        filled = np.where(surface[..., None], estimate, true)
+        figures[f"albedo_ssim{suffix}"] = ssim(filled, true, mask=surface)
+    return figures

@@ -12,7 +12,7 @@ from materialist.io.atomic import write_whole
 from materialist.io.display import strip, write_sheet
 from materialist.render.variant import setup
 from materialist.types import Progress
-from materialist_lab.data.samples import SampleFolder, claim, complete, described
+from materialist_lab.data.samples import SampleFolder, claim_folder, described, make_missing
 from materialist_lab.procedural.catalog.cache import CREDITS, Listing, listing
 from materialist_lab.procedural.objects import shapes
 from materialist_lab.procedural.options import DataSetOptions
@@ -52,11 +52,11 @@ def produce(
         raise InputError(
             f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
         )
-    claim(folder, DESCRIPTION, _description(options), _IDENTITY)
+    claim_folder(folder, DESCRIPTION, _description(options), _IDENTITY)
     if made_of:
         write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
     paths = [sample_path(folder, k) for k in range(count)]
-    return complete(paths, partial(make_sample, options=options), "samples", progress, workers)
+    return make_missing(paths, partial(make_sample, options=options), "samples", progress, workers)
 
 
 def _listed(options: DataSetOptions, progress: Progress) -> Listing | None:

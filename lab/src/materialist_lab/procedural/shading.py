@@ -368,7 +368,7 @@ def value(wi, wo, look: Look):
 
 def sample(wi, look: Look, draws):
     """A local direction drawn with the density that `value` gives."""
-    return lobes.sample(
+    return lobes.sample_direction(
         wi, alpha_of(look.roughness), draws.lobe < _specular_probability(wi, look), draws.bsdf
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from materialist.predict.bundled.inference import infer
+from materialist.predict.bundled.inference import infer_bundled
 from materialist.predict.bundled.network import BundledArchitecture, BundledNetwork, srgb
 from materialist.types import Array, Prediction
 from materialist_lab.data.samples import Sample, Source
@@ -132,7 +132,7 @@ class BundledTask(MapsTask):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         assert isinstance(network, BundledNetwork)
         with torch.inference_mode():
-            return infer(
+            return infer_bundled(
                 network, sample.image, sample.rays, device=next(network.parameters()).device
             )
 

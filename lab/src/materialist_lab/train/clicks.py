@@ -15,11 +15,17 @@ from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.predict.bundled.predictor import BundledPredictor
-from materialist.predict.clicks.features import Box, features
+from materialist.predict.clicks.features import Box, click_features
 from materialist.predict.clicks.network import ClickNet
 from materialist.predict.network import UNetArchitecture
 from materialist.types import Array, Camera, Photo, Progress
-from materialist_lab.data.samples import SampleFolder, claim, complete, read_arrays, read_sample
+from materialist_lab.data.samples import (
+    SampleFolder,
+    claim_folder,
+    make_missing,
+    read_arrays,
+    read_sample,
+)
 from materialist_lab.procedural.cutouts import cutout_files, load_cutout, paste
 from materialist_lab.procedural.dataset import identity
 from materialist_lab.procedural.photographic import photographic
@@ -86,7 +92,7 @@ def produce_views(
                 f"No picture in {cutouts} has transparency around a thing large enough to learn from."
             )
         said["cutouts"] = len(pasted)
-    claim(folder, DESCRIPTION, said, tuple(said))
+    claim_folder(folder, DESCRIPTION, said, tuple(said))
     predictor = BundledPredictor()
     kinds = 1 + PASTED if pasted else 1
 
@@ -116,7 +122,7 @@ def produce_views(
         for path in source.paths
         for kind in range(kinds)
     ]
-    complete([folder / name for name in names], view, "views", progress)
+    make_missing([folder / name for name in names], view, "views", progress)
 
 
 def load_views(folder: Path) -> list[View]:
@@ -174,7 +180,7 @@ def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, 
     if rng.random() < DRAW.worsened:
         normal, depth = worse(normal, depth, rng)
     rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
-    return features(rgb, normal, depth, clicks, box), mask
+    return click_features(rgb, normal, depth, clicks, box), mask
 
 
 def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from materialist.camera import unit
 from materialist.errors import WeightsError
 from materialist.predict.bundled.network import srgb
 from materialist.predict.matnet.network import PATCH, MatNet, Size
-from materialist.predict.matnet.predictor import infer
+from materialist.predict.matnet.predictor import infer_matnet
 from materialist.predict.weights import read_state
 from materialist.types import Array, Materials, Prediction
 from materialist_lab.data.samples import Sample, Source
@@ -135,7 +135,7 @@ class PaperTask(MapsTask):
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
         assert isinstance(network, MatNet)
-        maps = infer(
+        maps = infer_matnet(
             network, np.clip(sample.image, 0, 1), input_size=_patches(min(sample.depth.shape))
         )
         materials = Materials(

@@ -86,10 +86,12 @@ def _cryptomatte(things: Mapping[str, Array]) -> list[Any]:
     """The preview part and the parts of ids and coverage, each pixel's things by their coverage."""
     names = list(things)
     coverage = np.stack([np.asarray(share, np.float32) for share in things.values()])
+    # --- Of each pixel the things by their coverage, the largest first ---
     order = np.argsort(-coverage, 0, kind="stable")
     shares = np.take_along_axis(coverage, order, 0)
     ids = np.array([cryptomatte_id(name) for name in names], np.float32)[order]
     ids = np.where(shares > 0, ids, np.float32(0))
+    # --- What the specification asks of the header ---
     key = f"{murmur3(b'CryptoObject'):08x}"[:7]
     manifest = {
         name: f"{struct.unpack('<I', struct.pack('<f', cryptomatte_id(name)))[0]:08x}"
@@ -101,6 +103,7 @@ def _cryptomatte(things: Mapping[str, Array]) -> list[Any]:
         f"cryptomatte/{key}/conversion": "uint32_to_float32",
         f"cryptomatte/{key}/manifest": json.dumps(manifest),
     }
+    # --- Two ranks a part: id and coverage in R, G and B, A ---
     parts = []
     for level in range(-(-len(names) // _RANKS)):
         channels = {}
@@ -124,6 +127,7 @@ def cryptomatte_id(name: str) -> float:
     """The hash of a name as a float that is neither infinite, NaN nor denormal (specification, "uint32_to_float32")."""
     number = murmur3(name.encode("utf-8"))
     if (number >> 23) & 255 in (0, 255):
+        # Flip the lowest bit of the exponent, as the specification says.
         number ^= 1 << 23
     return float(struct.unpack("<f", struct.pack("<I", number))[0])
 

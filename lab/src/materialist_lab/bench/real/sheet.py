@@ -55,7 +55,7 @@ def sheet(real: RealPhoto, rows: Sequence[SheetRow]) -> Array:
         line = {
             row.title: _aligned(row.picture, target, real.inside),
             "albedo": _aligned(row.albedo, real.albedo, real.inside),
-            "normals": None if row.normal is None else display.normals(row.normal),
+            "normals": None if row.normal is None else display.normal_colours(row.normal),
             "depth": depth,
         }
         lines.append({f"{row.name}: {title}": pixels for title, pixels in line.items()})

@@ -14,9 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from materialist.camera import unit
 from materialist.errors import InputError
-from materialist.predict.refraction.crop import MARGIN, SIDE, View, Window, features, to_window
+from materialist.predict.refraction.crop import (
+    MARGIN,
+    SIDE,
+    View,
+    Window,
+    refraction_features,
+    to_window,
+)
 from materialist.types import Array, Progress
-from materialist_lab.data.samples import claim, complete, read_arrays
+from materialist_lab.data.samples import claim_folder, make_missing, read_arrays
 from materialist_lab.procedural.objects.glassware import SPLITS, Shape, make_shape
 from materialist_lab.procedural.thickness.ray_paths import Paths, ShapeTracer, towards
 
@@ -41,14 +48,14 @@ def produce(folder: Path, plan: ViewPlan, progress: Progress = lambda *_: None) 
 
     Raises InputError when FOLDER holds a set of another plan or other things, OutputError when it cannot be written.
     """
-    claim(
+    claim_folder(
         folder,
         DESCRIPTION,
         {"format": FORMAT, **asdict(plan)},
         ("format", "views", "split", "seed"),
     )
     paths = [folder / f"{index:05d}.npz" for index in range(plan.shapes)]
-    complete(paths, lambda index: make_views(index, plan), "shapes", progress)
+    make_missing(paths, lambda index: make_views(index, plan), "shapes", progress)
 
 
 def make_views(index: int, plan: ViewPlan) -> dict[str, Array]:
@@ -107,8 +114,9 @@ def draw_view(
     """A random view of the shape, cut from a picture of any size as `Window` does at prediction.
 
     `exact` leaves the shape as it is and shows it at the window's own resolution, its maps without noise. Returns maps
-    [CHANNELS, S, S] float16, see `crop.features`, and target [5, S, S] float16, 0 outside the true mask: solid and
-    hollow thickness in units of the object's size, and the normal of the last surface in the frame of `crop.to_window`.
+    [CHANNELS, S, S] float16, see `crop.refraction_features`, and target [5, S, S] float16, 0 outside the true mask:
+    solid and hollow thickness in units of the object's size, and the normal of the last surface in the frame of
+    `crop.to_window`.
     """
     while True:
         pose = draw_pose(rng, upright=shape.upright, plain=exact)
@@ -133,7 +141,7 @@ def draw_view(
     )
     back = np.moveaxis(np.where(there[..., None], back @ to_window(view.rays).T, 0), -1, 0)
     target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
-    return features(view).astype(np.float16), target
+    return refraction_features(view).astype(np.float16), target
 
 
 def _cut(rng: np.random.Generator, tracer: ShapeTracer, pose: CameraPose, vertices: Array) -> View:

@@ -24,7 +24,7 @@ from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
 from materialist.studio.access.quota import Allowance
-from materialist.studio.edit_list import kept, key_of, summary
+from materialist.studio.edit_list import kept, key_of, step_summary
 from materialist.types import Array, Body, Scene
 
 
@@ -65,9 +65,8 @@ class LivePreview:
     def _prepare(self, built: Future[Any]) -> None:
         """Get ready for another light part by part: pictures come between."""
         more = built is self._preview and built.exception() is None and built.result().prepare()
-        if (
-            more and built is self._preview
-        ):  # else it would hold the closed preview until after `free_memory`
+        # Only while it is open: the task would hold a closed preview until after `free_memory`.
+        if more and built is self._preview:
             _THREAD.submit(self._prepare, built)
 
     @property
@@ -90,7 +89,7 @@ class LivePreview:
 
     def _after(self, steps: tuple[Step, ...]) -> Scene:
         """The scene after the steps; the last scenes are kept, so moving the last step replays none before it."""
-
+        # The longest list that starts alike and is kept; from there step by step.
         counts = range(len(steps), 0, -1)
         known = next((n for n in counts if key_of(steps[:n]) in self._kept), 1)
         scene = self.scene
@@ -110,7 +109,7 @@ class LivePreview:
             return apply(self.scene, [step], onto=before)
         except InputError as error:
             reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
-            raise InputError(f"'{summary(step)}' cannot be applied. {reason}") from error
+            raise InputError(f"'{step_summary(step)}' cannot be applied. {reason}") from error
 
     def _fallen(self, before: Scene, steps: tuple[Step, ...]) -> Scene:
         """The scene `before` after the fall that the last step is; what falls, and for how long, is a stranger's."""
@@ -118,6 +117,7 @@ class LivePreview:
         place = str(self._package)
         with self._allowance.opening():
             added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
+        # Only what the fall added crosses between the processes.
         edits = [*before.provenance.get("edits", []), *added["edits"]]
         after = replace(
             before,
@@ -129,10 +129,10 @@ class LivePreview:
     def _glass(self, step: Step) -> tuple[Array, Colour]:
         """Region [H, W] bool and tint of a glass step; builds nothing. Raises InputError where it cannot be."""
 
-        def made():
+        def region_and_tint():
             return (region_of(self.scene, step), options_of(step).tint)
 
-        return kept(self._kept, (step,), made, SETTINGS.scenes_kept)
+        return kept(self._kept, (step,), region_and_tint, SETTINGS.scenes_kept)
 
     def picture(
         self,
@@ -152,15 +152,16 @@ class LivePreview:
         known = [
             (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
         ]
+        # --- Shading: the cache knows only the geometry of the fit ---
         shaded = edited
-        if (
-            edited.geometry is not self.scene.geometry
-        ):  # the cache knows nothing of what was taken away
+        if edited.geometry is not self.scene.geometry:
             shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
         picture = _THREAD.submit(preview.picture, shaded, coarse=coarse).result()
+        # --- What was taken away is filled as in the photo ---
         if edited.photo is not self.scene.photo:
             filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
             picture = np.where(filled, edited.photo.linear, picture)
+        # --- Glass: its ground first, then bodies, then the glass before them ---
         for step, pane in known:
             if pane is None:
                 picture = sketch_glass(picture, *self._glass(step))
@@ -176,9 +177,8 @@ class LivePreview:
     def close(self) -> None:
         self._preview.cancel()
         self._preview = Future()
-        self._preview.set_exception(
-            InputError("This photo was closed; open it again.")
-        )  # for who waits
+        # For whoever still waits for it.
+        self._preview.set_exception(InputError("This photo was closed; open it again."))
         self._kept.clear()
 
 
@@ -204,6 +204,7 @@ class _Freeing:
     def _free(self) -> None:
         with self._lock:
             self._waiting = None
+        # Scenes are in cycles: only the collector frees them.
         gc.collect()
         if "drjit" in sys.modules:
             sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
@@ -238,12 +239,13 @@ def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:
 
 def draw_bodies(picture: Array, scene: Scene) -> Array:
     """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
+    # About as bright as the photo.
     exposure = 2 * float(luminance(scene.photo.linear).mean())
-    for body in sorted(
-        scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())
-    ):  # the farthest first
+    # The farthest first: nearer ones are drawn over them.
+    for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):
         colour, depth = _drawn(body, scene, exposure)
         behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
+        # Glass is sketched as see-through.
         share = 1 - 0.7 * body.surface.transmission
         picture = np.where(
             ((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture
@@ -267,6 +269,7 @@ def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
     """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
     colour = np.zeros((*scene.depth.shape, 3), np.float32)
     depth = np.zeros(scene.depth.shape, np.float32)
+    # --- Triangles on the screen, at most as many as can be drawn at once ---
     stride = -(-len(body.faces) * len(scene.bodies) // SETTINGS.triangles)
     corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
     pixels, away = project(corners, scene.camera)
@@ -274,17 +277,20 @@ def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     seen = (away > 0).all(1) & (length > 0) & (np.einsum("fi,fi->f", normal, corners.mean(1)) < 0)
+    # --- Shading: a fixed light from above, and some from around ---
     shade = 0.35 + 0.65 * np.clip(normal @ _LIGHT / np.maximum(length, 1e-20), 0, 1)
     albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(
         body.surface.tint
     )
     points = np.round(np.clip(pixels, -1e5, 1e5) * 16).astype(np.int32)  # sixteenths of a pixel
+    # --- Painter's algorithm ---
     for face in np.argsort(-middle):
         if seen[face]:
             tone = [float(v) for v in np.minimum(albedo * shade[face] * exposure, 1)]
             cv2.fillConvexPoly(colour, points[face], tone, shift=4)
             cv2.fillConvexPoly(depth, points[face], float(middle[face]), shift=4)
     if stride > 1:
+        # Dilation closes the gaps of the triangles that were left out.
         kernel = np.ones((3, 3), np.uint8)
         return np.asarray(cv2.dilate(colour, kernel)), np.asarray(cv2.dilate(depth, kernel))
     return colour, depth

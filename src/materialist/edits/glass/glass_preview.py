@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from materialist.edits.composite.layers import without_fireflies
-from materialist.edits.composite.native_layer import spread
+from materialist.edits.composite.native_layer import spread_known
 from materialist.edits.core.renderer import EditRenderer, denoised, photo_sky
 from materialist.edits.glass.glass import glass, glass_surface
 from materialist.errors import InputError
@@ -12,9 +12,9 @@ from materialist.geometry.silhouette import area, window
 from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
 
-PATHS = 600_000
-"""Paths of one picture, as far as FEWEST a pixel allow."""
-FEWEST = 4
+MAX_PATHS = 600_000
+"""Paths of one picture, as far as MIN_PATHS a pixel allow."""
+MIN_PATHS = 4
 """Paths a traced pixel."""
 MARGIN = 2
 """Working pixels around the object that are traced as well."""
@@ -47,6 +47,7 @@ class GlassPreview:
         self._renderer = EditRenderer(self._edited, device=options.device)
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._size = scene.depth.shape
+        # Where the glass is seen, and the denoiser's guides: they stay the same for every picture
         traced = self._target(self._edited.bodies[-1].surface).mi_scene
         body = {self._name: self._edited.bodies[-1]}
         sight = first_hits(traced, scene.camera, body, self._size)
@@ -60,7 +61,7 @@ class GlassPreview:
     def picture(self, *, spp: int = 16, seed: int = 0, **values: Any) -> Array:
         """[H, W, 3] float32 linear at working size: the photo with the object as glass.
 
-        `spp` paths a working pixel of the object, fewer for objects so large that these are more than PATHS;
+        `spp` paths a working pixel of the object, fewer for objects so large that these are more than MAX_PATHS;
         `values`: `ior`, `transmission`, `tint` and `roughness` of this glass.
         """
         from materialist.render.pixels import radiance
@@ -69,11 +70,11 @@ class GlassPreview:
         surface = glass_surface(self.scene, Glass.given(self._options, **values))
         target = self._target(surface)
         box = self._box
-        paths = max(FEWEST, min(spp, PATHS // area(box)))
+        paths = max(MIN_PATHS, min(spp, MAX_PATHS // area(box)))
         seen = radiance(
             target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name]
         )
-        traced = denoised(without_fireflies(spread(seen)), *self._guides)
+        traced = denoised(without_fireflies(spread_known(seen)), *self._guides)
         out = self._edited.photo.linear.copy()
         share = self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]

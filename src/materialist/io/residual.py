@@ -19,7 +19,9 @@ def shading_residual(photo: Array, rerender: Array) -> Array:
     It holds shading that light and geometry lack, and highlights of lights that the map has not; it is never a part of
     the albedo. Pixels without a number in the rendering have 1.
     """
+    # In logarithms, so that a factor and its inverse weigh alike in the mean.
     ratio = np.log((np.maximum(photo, 0) + FLOOR) / (np.maximum(rerender, 0) + FLOOR))
+    # Paths of a rendering may be NaN: there the factor is 1.
     known = np.isfinite(ratio)
     smooth = gaussian_filter(np.where(known, ratio, 0), (SIGMA, SIGMA, 0))
     return np.exp(np.clip(np.where(known, smooth, 0), -np.log(LIMIT), np.log(LIMIT))).astype(
