@@ -4,6 +4,7 @@ import json
 import os
 import signal
 from dataclasses import replace
+from pathlib import Path
 
 import made_runs
 import psutil
@@ -16,6 +17,7 @@ from materialist_lab.procedural.thickness.dataset import ViewPlan, produce
 from materialist_lab.train import checkpoint
 from materialist_lab.train.bundled import RECIPE
 from materialist_lab.train.schedule import Budget, TrainingSchedule
+from materialist_lab.train.task import Recipe
 from materialist_lab.train.trainer import RunOptions
 
 
@@ -222,3 +224,12 @@ def test_the_rate_rises_falls_and_is_restarted():
 def test_settings_that_cannot_be(make, said):
     with pytest.raises(InputError, match=said):
         make()
+
+
+def test_bfloat16_is_taken_where_the_processor_has_it(monkeypatch):
+    cpu = torch.device("cpu")
+    recipe = Recipe(side=32, batch=1, rate=1e-3)
+    for flags, expected in (("avx2 fma", False), ("avx512_bf16", True), ("amx_bf16", True)):
+        monkeypatch.setattr(Path, "read_text", lambda *_, flags=flags, **__: f"flags : {flags}")
+        assert recipe.uses_bfloat16(cpu) is expected
+        assert recipe.changed(bfloat16=not expected).uses_bfloat16(cpu) is not expected

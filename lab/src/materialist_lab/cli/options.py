@@ -32,7 +32,7 @@ class Learning(OperationOptions):
     rate: float | None = option(None, "Peak learning rate; default: the recipe's.")
     bfloat16: bool | None = option(
         None,
-        "Half as long on processors that have it; default: the recipe's.",
+        "Compute in bfloat16; default: where the processor has instructions for it.",
         kind="switch",
         flag="--bfloat16/--no-bfloat16",
     )

@@ -23,7 +23,6 @@ RECIPE = Recipe(
     warm_up=300,
     last_rate=0.02,
     ema=0.999,
-    bfloat16=True,
     growth=((0.3, 128), (0.75, 192)),
 )
 ARCHITECTURE = BundledArchitecture(encoder="lite2", light=16, spread=True)

@@ -29,6 +29,7 @@ RECIPE = Recipe(
     warm_up=0,
     last_rate=1.0,
     ema=0.0,
+    bfloat16=False,
     clip=1e9,
 )
 """Paper, Implementation Details: AdamW, learning rate 1e-5, 512 x 512 crops. Where the paper says nothing (batch,

@@ -67,6 +67,7 @@ class Trainer:
         self.options = options or RunOptions()
         self.device = torch.device(device)
         state = checkpoint.load(folder, task.kind, resume=resume, device=self.device)
+        self._bfloat16 = self.recipe.uses_bfloat16(self.device)
         torch.manual_seed(self.options.seed)
         torch.backends.cudnn.benchmark = self.device.type == "cuda"
         self.network = task.network().to(self.device)
@@ -204,7 +205,7 @@ class Trainer:
         rate = self.recipe.rate * self.schedule.rate(self.recipe.warm_up, self.recipe.last_rate)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.recipe.bfloat16):
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self._bfloat16):
             terms = self.task.losses(self.network, batch)
         total: Tensor = sum(terms.values(), torch.zeros((), device=self.device))
         self.optimizer.zero_grad(set_to_none=True)
