@@ -163,7 +163,7 @@ def _picture(
     layers = render_layers(renderer, edited, spp=spp, **shared)
     dimmed = dimmed_emitters(scene, edited)
     lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
-    return into_photo(renderer.scene.photo, layers, lights)
+    return into_photo(renderer.scene.photo, layers, lights, progress)
 
 
 def _enlarged(picture: Array, upscale: Upscale) -> Array:

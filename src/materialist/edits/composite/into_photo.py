@@ -11,7 +11,7 @@ from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import grown, window
-from materialist.types import Array, Photo
+from materialist.types import Array, Photo, Progress
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,12 @@ class CompositeSettings:
 SETTINGS = CompositeSettings()
 
 
-def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None = None) -> Array:
+def into_photo(
+    photo: Photo,
+    layers: Layers,
+    lights: tuple[Array, dict] | None = None,
+    progress: Progress | None = None,
+) -> Array:
     """[H0, W0, 3] the photo with the difference of two renderings added.
 
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
@@ -43,34 +48,38 @@ def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None =
 
     lights: of in-photo emitters that are dimmed: where they are seen, and what is known of them; see `in_photo`.
     """
-    picture = _changed(photo, layers) if layers.reached.any() else photo.original.copy()
+    tick = progress or (lambda *_: None)
+    picture = _changed(photo, layers, tick) if layers.reached.any() else photo.original.copy()
     if lights is not None:
         picture = in_photo(picture, photo, *lights)
-    if layers.native is None:
+    if layers.native is None or not layers.native.share.any():
         return picture
-    share = layers.native.share[..., None]
-    bodies = layers.native.picture
+    # --- New bodies, where they are seen ---
+    box = window(layers.native.share > 0)
+    share = layers.native.share[box][..., None]
+    bodies = layers.native.picture[box]
     bodies = bodies if photo.hdr else np.where(share < 1, np.minimum(bodies, 1), bodies)
-    return np.where(share > 0, share * bodies + (1 - share) * picture, picture).astype(np.float32)
+    here = picture[box]
+    picture[box] = np.where(share > 0, share * bodies + (1 - share) * here, here)
+    return picture
 
 
-def _changed(photo: Photo, layers: Layers) -> Array:
+def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
     """[H0, W0, 3] the same without the new bodies."""
-    out = photo.original.copy()
     # --- All terms at working size, and how they are enlarged ---
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample = GuidedUpsample(photo.linear, photo.original)
-    native = out.shape[:2]
+    native = photo.original.shape[:2]
     alpha = matte(layers.changed, photo.original)
     stack, clear = _under_bodies(stack, layers)
     changed = layers.changed
     reached = (stack[..., :3] != 0).any(-1)
+    out = photo.original.copy()
     if not reached.any():
         return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
-    # Two sides of the border of a replaced surface: each is enlarged from its own pixels
-    # alone.
+    # Two sides of the border of a replaced surface: each is enlarged from its own pixels.
     sides = [
         (stack[nearest(side)] if upsample.same and side.any() else stack * side.any(), side)
         for side in (changed & clear, ~changed & clear)
@@ -96,8 +105,11 @@ def _changed(photo: Photo, layers: Layers) -> Array:
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
 
     # --- Strip by strip, which bounds the memory ---
+    parts = list(strips(box.stop, start=box.start))
     with ThreadPoolExecutor(min(SETTINGS.max_threads, os.cpu_count() or 1)) as threads:
-        list(threads.map(laid, strips(box.stop, start=box.start)))
+        for done, _ in enumerate(threads.map(laid, parts)):
+            tick("photo", done, len(parts))
+    tick("photo", len(parts), len(parts))
     return out
 
 
