@@ -5,8 +5,8 @@ import json
 import cv2
 import numpy as np
 import pytest
+from made_maps import good_maps, write
 from made_matnet import made_photo
-from test_maps import good_maps, write
 
 from materialist.errors import InputError, WeightsError
 from materialist.io.exr import write_exr
