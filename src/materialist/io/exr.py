@@ -252,10 +252,8 @@ def write_exr(path: str | Path, array: Array) -> None:
             f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}."
         )
     pixels = np.ascontiguousarray(array, np.float32)
-    if not is_utf8(str(path)):
-        raise OutputError(
-            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
-        )
+    if problem := name_problem(path):
+        raise OutputError(problem)
     # ZIP loses nothing.
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
