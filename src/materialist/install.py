@@ -5,9 +5,12 @@ import shlex
 import sys
 from importlib import metadata
 from importlib.util import find_spec
+from pathlib import Path
 
 DISTRIBUTION = "materialist-photo"
 """Name of this project among distributions: `materialist` is another one's."""
+LABORATORY = "materialist-photo-lab"
+"""The distribution of the benchmarks and the training; its source is the folder lab/ of the repository."""
 
 
 def install_command(*requirements: str) -> str:
@@ -20,6 +23,14 @@ def install_command(*requirements: str) -> str:
     if find_spec("pip") is not None:
         return f"{sys.executable} -m pip install {words}"
     return f"uv pip install --python {sys.executable} {words}"
+
+
+def laboratory_command() -> str:
+    """A line for a shell that installs the laboratory: from the checkout that this package runs from, if it does."""
+    folder = Path(__file__).resolve().parents[2] / "lab"
+    if (folder / "pyproject.toml").is_file():
+        return install_command("-e", str(folder))
+    return install_command(LABORATORY)
 
 
 def extra_command(extra: str) -> str:

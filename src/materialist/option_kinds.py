@@ -55,7 +55,7 @@ class Option:
         """The value in the type of the field. Raises InputError that names the value and what may be given."""
         called = self.called or name.replace("_", " ")
         if isinstance(value, str) and value in self.choices:
-            return str(value)  # of an enum of the command line, too
+            return value
         check = _CHECKS[self.kind]
         if self.many:
             return tuple(check(self, called, item) for item in several(value))

@@ -25,6 +25,7 @@ from materialist.keywords import InvertKeywords
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
+from materialist.threads import fixed_threads
 from materialist.types import Array, FitReport, Photo, Prediction, Prior, Scene
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ MIN_DEPTH = 0.05
 
 
 @documented(InvertOptions)
+@fixed_threads()
 def invert(
     photo: PhotoInput,
     options: InvertOptions | None = None,

@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import trimesh
 
-from materialist.bench.glass_scenes import SeenSide, seen
 from materialist.camera import pixel_rays
-from materialist.procedural.objects import shapes
 from materialist.solids.revolution import Axis
 from materialist.types import Camera
+from materialist_lab.bench.glass_scenes import SeenSide, seen
+from materialist_lab.procedural.objects import shapes
 
 CAMERA = Camera(120, 110, 40.0)
 RAYS = pixel_rays(CAMERA).astype(float)

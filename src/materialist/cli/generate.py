@@ -2,10 +2,9 @@
 
 import inspect
 from collections.abc import Callable
-from enum import StrEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
 import typer
 
@@ -14,8 +13,8 @@ from materialist.option_kinds import OperationOptions, Option, declarations
 TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": Path}
 
 
-def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
-    """A group of commands, of `app` where one is given."""
+def group(name: str, help: str, app: typer.Typer | None = None, **settings: Any) -> typer.Typer:
+    """A group of commands, of `app` where one is given; `settings` are other ones of typer."""
     app_group = typer.Typer(
         name=name,
         help=help,
@@ -23,6 +22,7 @@ def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        **settings,
     )
     if app is not None:
         app.add_typer(app_group)
@@ -115,8 +115,7 @@ def _option_flags(name: str, declared: Option, default: Any) -> list[inspect.Par
     # --- A value: of the option's type, or one of its words ---
     kind: Any = str if declared.choices else TYPES.get(declared.kind, str)
     if declared.kind == "word":
-        make: Any = StrEnum  # of a name that is not a literal
-        kind = make(name, {word: word for word in declared.choices})
+        kind = Literal[declared.choices]
     shown = _shown("auto" if default is None and "auto" in declared.choices else default)
     help = f"{declared.help}  [default: {shown}]" if shown else declared.help
     several = list[kind] | None if declared.many else kind | None

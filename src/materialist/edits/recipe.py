@@ -25,6 +25,7 @@ from materialist.option_kinds import (
     several,
 )
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
+from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
 
 OPTIONS: dict[str, type[OperationOptions]] = {
@@ -190,6 +191,7 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     write_whole(path, text)
 
 
+@fixed_threads()
 def apply(
     scene: Scene,
     steps: list[Step],

@@ -16,6 +16,7 @@ from materialist.plain import is_utf8
 
 _lock = threading.RLock()
 _STANDARD_STREAMS = (1, 2)
+_OPENCV_SILENT = 0
 
 
 def name_problem(path: str | Path) -> str | None:
@@ -93,12 +94,13 @@ def _silent_python() -> Iterator[None]:
 
 @contextmanager
 def _silent_opencv() -> Iterator[None]:
-    level = cv2.utils.logging.getLogLevel()
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    log = getattr(cv2.utils, "logging", cv2)  # where OpenCV 5 and 4 have it
+    level = log.getLogLevel()
+    log.setLogLevel(_OPENCV_SILENT)
     try:
         yield
     finally:
-        cv2.utils.logging.setLogLevel(level)
+        log.setLogLevel(level)
 
 
 @contextmanager
