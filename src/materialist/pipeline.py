@@ -19,8 +19,8 @@ from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.io.given import PhotoInput, photo_of
 from materialist.io.image import read_mask
+from materialist.io.out.residual import shading_residual
 from materialist.io.photo import HDR_CLIP, exposed
-from materialist.io.residual import shading_residual
 from materialist.keywords import InvertKeywords
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
