@@ -18,9 +18,8 @@ class RevolutionSettings:
     min_step_cells: float = 0.5  # of a step along a ray
     corners: int = 256  # of the swept circles
     min_side_lean: float = 0.5  # outward part of the normals of a side; above the side is the lid
-    lid_reach: float = (
-        3.5  # wall thicknesses below the rim to which the lid changes the inside; by eye
-    )
+    # wall thicknesses below the rim to which the lid changes the inside; by eye
+    lid_reach: float = 3.5
     lip_points: int = 12  # of the rounded rim of an open vessel
 
 

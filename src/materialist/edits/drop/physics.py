@@ -21,15 +21,10 @@ class PhysicsSettings:
 
     step: float = 1e-3  # seconds: at 10 m/s 1 cm, and blocks are deeper; derived
     gravity: float = 9.81  # m / s^2
-    contact_spring: tuple[float, float] = (
-        4e-3,
-        1.0,
-    )  # time constant, short as step allows; damping
-    friction: tuple[float, float, float] = (
-        0.6,
-        0.01,
-        0.0005,
-    )  # sliding, torsional (m), rolling (m)
+    # time constant, short as step allows; damping
+    contact_spring: tuple[float, float] = (4e-3, 1.0)
+    # sliding, torsional (m), rolling (m)
+    friction: tuple[float, float, float] = (0.6, 0.01, 0.0005)
     density: float = 600.0  # kg / m^3: wood; things of one density fall alike
 
     # Convex pieces.

@@ -133,9 +133,8 @@ class Front:
         self.camera = camera
         self._centres = np.argwhere(inside)[:, ::-1] + 0.5  # [N, 2] x, y
         inner_pixel = nearest(inside)
-        self._inverse = (
-            1 / depth[inner_pixel].astype(np.float64)[..., None]
-        )  # [H, W, 1], linear on planes
+        # [H, W, 1], linear on planes
+        self._inverse = 1 / depth[inner_pixel].astype(np.float64)[..., None]
         self._normals = normal[inner_pixel].astype(np.float64)  # [H, W, 3]
         self.through(np.zeros(2))
         self._backs = None if back is None else back[inner_pixel].astype(np.float64)
