@@ -14,7 +14,10 @@ from materialist.cli import app
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = (ROOT / "src" / "materialist", ROOT / "lab" / "src" / "materialist_lab")
 TESTS = (ROOT / "tests", ROOT / "lab" / "tests")
-PAGES = [ROOT / "README.md", ROOT / "lab" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "lab/README.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 PAPER_MAP = ROOT / "docs" / "paper_map.md"
 PROGRAM = get_command(app)
 FOREIGN = {
@@ -24,8 +27,9 @@ FOREIGN = {
     "--render",
     "--maps",
     "--no-install-recommends",
+    "--index-url",
 }
-"""Options of Blender, the script for it, MoGe and apt-get that the pages name."""
+"""Options of Blender, the script for it, MoGe, apt-get and pip that the pages name."""
 
 
 @pytest.fixture(params=PAGES, ids=lambda page: str(page.relative_to(ROOT)))
