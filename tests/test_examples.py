@@ -11,7 +11,7 @@ NOTEBOOKS = sorted((Path(__file__).resolve().parents[1] / "examples").glob("*.ip
 SIZE = "SIZE = 192"
 """The line of each notebook that sets the working size; the test takes fewer pixels."""
 PICTURES = {
-    "edit_a_photo": ("blue.png",),
+    "edit_a_photo": ("green.png",),
     "relight_and_insert": ("sunny.png", "ball.png", "both.png"),
 }
 
