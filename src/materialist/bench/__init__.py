@@ -8,6 +8,7 @@ from materialist.errors import InputError
 
 BENCHMARKS = (
     "real",
+    "geometry",
     "photo-alone",
     "invert",
     "batch",
