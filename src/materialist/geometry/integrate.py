@@ -19,6 +19,7 @@ from scipy.sparse import coo_matrix, csr_matrix, diags
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from materialist.camera import unit
+from materialist.geometry.regions import connected_regions, regions_without_strays
 from materialist.geometry.silhouette import spacing
 from materialist.types import Array
 
@@ -27,10 +28,14 @@ from materialist.types import Array
 class IntegrationSettings:
     """What decides between depth and normals."""
 
-    length: float = 0.25  # scale above which the depth decides, share of the picture's longer side
-    steep: float = 5.0  # tangent of the unexplained slope at which two pixels are half parted
+    length: float = 0.5  # scale above which the depth decides, share of the picture's longer side
+    steep: float = 1.0  # tangent of the unexplained slope at which two pixels are half parted
     grazing: float = 0.1  # least cosine of the view angle that a normal is taken to have
     rounds: int = 6  # reweighted solves
+    parted: float = 3.0  # tangent of the unexplained slope from which two pixels are parted
+    least: float = 0.002  # share of the surface below which a region is a stray
+    stray_pull: float = 1e-3  # part of the pull that is left to strays
+    last_rounds: int = 2  # reweighted solves without strays
     block: int = 4  # side of the blocks of the preconditioner's coarse grid, pixels
     tolerance: float = 1e-3  # residual at which a solve ends, share of its first one
     iterations: int = 200  # most steps of a solve
@@ -54,7 +59,22 @@ def integrated(depth: Array, normal: Array, rays: Array) -> Array:
     scale = SETTINGS.steep * spacing(rays)
     found = start
     for _ in range(SETTINGS.rounds):
-        weight = (1 + (grid.excess(found) / scale) ** 2) ** -2
+        weight = np.exp(-((grid.excess(found) / scale) ** 2))
+        found = grid.solved(weight, pull, start, found)
+
+    # Strays, as the blurred rim of a thing, follow their neighbour's depth in place of their own.
+    gap = np.abs(grid.step @ found - grid.demanded)
+    least = SETTINGS.least * len(start)
+    linked = gap < SETTINGS.parted * spacing(rays)
+    pairs = (grid.first, grid.second)
+    region, joined = regions_without_strays(pairs, linked, gap, least, len(start))
+    alone = connected_regions(pairs, linked, len(start))
+    stray = (np.bincount(alone)[alone] < least) & (np.bincount(region)[region] >= least)
+    pull = np.where(stray, SETTINGS.stray_pull * pull, pull)
+    for _ in range(SETTINGS.last_rounds):
+        weight = np.exp(-((grid.excess(found) / scale) ** 2))
+        weight = np.where(joined & ~linked, 1, weight)
+        weight = np.where(region[grid.first] == region[grid.second], weight, 0)
         found = grid.solved(weight, pull, start, found)
     result = np.zeros(depth.shape, np.float32)
     result[surface] = np.exp(found)
