@@ -33,7 +33,7 @@ class IntegrationSettings:
     grazing: float = 0.1  # least cosine of the view angle that a normal is taken to have
     rounds: int = 6  # reweighted solves
     parted: float = 3.0  # tangent of the unexplained slope from which two pixels are parted
-    least: float = 0.002  # share of the surface below which a region is a stray
+    least: float = 0.0005  # share of the surface below which a region is a stray
     stray_pull: float = 1e-3  # part of the pull that is left to strays
     last_rounds: int = 2  # reweighted solves without strays
     block: int = 4  # side of the blocks of the preconditioner's coarse grid, pixels

@@ -1,31 +1,17 @@
-"""Edges of maps put where the photo has them, and depth joined with the normals between them.
+"""Edges of maps put where the photo has them.
 
 A small network knows that an object stands before a wall, but blurs its outline over many pixels; a mesh of that is a
 tent. A median takes sides instead of mixing, and the photo's colours say with whom (Ma et al. 2013, "Constant Time
 Weighted Median Filtering for Stereo Matching and Beyond"; He et al. 2013, "Guided Image Filtering").
 
-Medians also print the photo's texture onto every slope, and a mesh with such steps shades itself in single pixels:
-`with_relief` makes depth smooth along a surface, broken where it steps to another one.
+Medians also print the photo's texture onto every slope; `geometry.integrate` takes it out of the depth again.
 """
-
-from typing import Any
 
 import cv2
 import numpy as np
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import cg
 
 from materialist.color import srgb_levels
 from materialist.types import Array
-
-STEP = 0.015
-"""Change of log depth from pixel to pixel, beyond what the normals demand, above which two surfaces meet; by eye."""
-OPEN = 1e-3
-"""Weight of such a pair; larger joins the two surfaces."""
-STEEPEST = 0.12
-"""Least n.v of a normal that depth follows."""
-LENGTH = 10.0
-"""Pixels above which the depth decides, below which the normals do; tuned by eye."""
 
 PARTS = 5
 """Parts of GrabCut's colour models, which need as many pixels; derived: OpenCV's."""
@@ -107,79 +93,3 @@ def weighted_median(values: Array, guide: GuidedFilter, known: Array, *, bins: i
     found = index + 0.5 - (upto - half) / np.maximum(own, 1e-9)
     median = low + np.clip(found, 0, bins - 1) / (bins - 1) * (high - low)
     return np.where(known & (half > 0), median, values).astype(np.float32)
-
-
-def with_relief(sharp: Array, normal: Array, rays: Array) -> Array:
-    """[H, W] float32 log depth that follows the normals in the small, and `sharp` in the large and at its steps.
-
-    Solves min over u of sum of w |u_q - u_p - g_pq|^2 over neighbours + sum |u_p - sharp_p|^2 / LENGTH^2, where g is
-    the slope that the normals demand (`slopes`).
-
-    sharp: [H, W] logarithm of depth with edges, NaN where there is no surface; so is the result. normal: [H, W, 3]
-    unit. rays: [H, W, 2] x and y of the rays at z = -1.
-    """
-    known = np.isfinite(sharp)
-    if known.sum() < 9:
-        return sharp
-    index = np.cumsum(known.ravel()).reshape(known.shape) - 1
-    pairs = []
-    neighbours: list[tuple[Any, Any]] = [
-        (np.s_[:, :-1], np.s_[:, 1:]),
-        (np.s_[:-1], np.s_[1:]),
-    ]  # in rows, in columns
-    for demanded, (near, far) in zip(slopes(normal, rays), neighbours, strict=True):
-        both = known[near] & known[far]
-        change = (sharp[far] - sharp[near])[both].astype(np.float64)
-        slope = ((demanded[near] + demanded[far]) / 2)[both].astype(np.float64)
-        weight = np.where(np.abs(change) > STEP + np.abs(slope), OPEN, 1.0)
-        pairs.append((index[near][both], index[far][both], slope - change, weight))
-    first, second, wanted, weight = (np.concatenate(column) for column in zip(*pairs, strict=True))
-    pull = np.full(int(known.sum()), LENGTH**-2)
-    found = np.array(sharp, np.float32)
-    found[known] += least_squares_change(
-        first, second, wanted, weight, pull, rtol=1e-3, maxiter=100
-    )
-    return found
-
-
-def slopes(normal: Array, rays: Array) -> tuple[Array, Array]:
-    """[H, W] change of log depth from one pixel to the next that the normals demand, to the right and downwards.
-
-    n . d(z r) = 0 along the surface gives d log z = -n . dr / (n . r). normal: [H, W, 3] unit, camera frame.
-    rays: [H, W, 2 or 3] through the pixels at z = -1, evenly spaced.
-    """
-    x = rays[..., 0]
-    y = rays[..., 1]
-    across = float(x[0, -1] - x[0, 0]) / max(x.shape[1] - 1, 1)
-    down = float(y[-1, 0] - y[0, 0]) / max(y.shape[0] - 1, 1)
-    facing = normal[..., 0] * x + normal[..., 1] * y - normal[..., 2]
-    facing = np.minimum(
-        facing, -STEEPEST * np.sqrt(x**2 + y**2 + 1)
-    )  # n . r < 0 where the surface is seen
-    return -normal[..., 0] * across / facing, -normal[..., 1] * down / facing
-
-
-def least_squares_change(
-    first: Array,
-    second: Array,
-    wanted: Array,
-    weight: Array,
-    pull: Array,
-    *,
-    rtol: float,
-    maxiter: int,
-) -> Array:
-    """[N] float64, min over u of sum of weight |u_second - u_first - wanted|^2 + sum of pull |u|^2.
-
-    Conjugate gradients, preconditioned by the diagonal, as far as `rtol` and `maxiter` say. first, second: [P] which
-    of the N unknowns a pair joins. wanted, weight: [P]. pull: [N] above 0.
-    """
-    rows = np.tile(np.arange(len(first)), 2)
-    root = np.sqrt(weight)
-    entries = (np.concatenate([-root, root]), (rows, np.concatenate([first, second])))
-    step = coo_matrix(entries, (len(first), len(pull))).tocsr()
-    system = (step.T @ step + diags(pull)).tocsr()
-    change, _ = cg(
-        system, step.T @ (root * wanted), rtol=rtol, maxiter=maxiter, M=diags(1 / system.diagonal())
-    )
-    return change
