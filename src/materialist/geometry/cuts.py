@@ -74,8 +74,8 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
 def without_strays(cuts: Cuts, depth: Array) -> Cuts:
     """The cuts without those that part a stray, a region below `CutSettings.least`, from what it fits best in depth.
 
-    depth: [H, W] planar, 0 = no surface. Strays are flecks on slopes and the blurred rims of things: each would be a rag
-    of its own in mirrors and shadows.
+    depth: [H, W] planar, 0 = no surface. Strays are flecks on slopes and the blurred rims of things: each would be a
+    rag of its own in mirrors and shadows.
     """
     height, width = depth.shape
     surface = depth > 0

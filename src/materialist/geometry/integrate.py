@@ -3,13 +3,13 @@
 Networks know normals better than depth: their depth bends floors and walls, and steps at painted edges. Of depth we
 keep the large scale and the steps between surfaces; its slopes come from the normals. Over log depth u,
 
-    sum over neighbours of rho((u_q - u_p - g_pq) c_pq^2) + sum over pixels of (u_p - d_p)^2 / length^2
+    sum over neighbours of rho((u_q - u_p - g_pq) c_pq) + sum over pixels of (u_p - d_p)^2 / length^2
 
 is made least, where d is the predicted log depth, g the change that the normals demand under perspective (exact on
-planes) and c the cosine of the view angle, by which the first sum is one of squared angles. rho (Geman and McClure) is
-bounded, so that a step costs the same whatever its height: one that goes round a thing stays, since depth holds both
-sides apart; one that ends on a surface, as along a painted edge, is closed by what lies around its end. Minimised by
-iteratively reweighted least squares, as in bilateral normal integration (Cao et al. 2022), which has no predicted depth.
+planes) and c the squared cosine of the view angle, by which the first sum is one of squared angles. rho (Welsch) is
+bounded: a step costs the same whatever its height. One that goes round a thing stays, since depth holds both sides
+apart; one that ends on a surface, as along a painted edge, is closed by what lies around its end. It is minimised by
+reweighted least squares, as in bilateral normal integration (Cao et al. 2022), which has no predicted depth.
 """
 
 from dataclasses import dataclass
@@ -26,15 +26,15 @@ from materialist.types import Array
 
 @dataclass(frozen=True)
 class IntegrationSettings:
-    """What decides between depth and normals."""
+    """What decides between depth and normals, and how it is solved."""
 
-    length: float = 0.5  # scale above which the depth decides, share of the picture's longer side
-    steep: float = 1.0  # tangent of the unexplained slope at which two pixels are half parted
-    grazing: float = 0.1  # least cosine of the view angle that a normal is taken to have
+    length: float = 0.5  # scale above which depth decides, share of the longer side; 3 made scenes
+    steep: float = 1.0  # tangent of the unexplained slope that weighs 1/e; tuned on 3 made scenes
+    grazing: float = 0.1  # least cosine of the view angle that a normal is taken to have; by eye
     rounds: int = 6  # reweighted solves
-    parted: float = 3.0  # tangent of the unexplained slope from which two pixels are parted
-    least: float = 0.0005  # share of the surface below which a region is a stray
-    stray_pull: float = 1e-3  # part of the pull that is left to strays
+    parted: float = 3.0  # tangent of the unexplained slope from which two pixels part; by eye
+    least: float = 0.0005  # share of the surface below which a region is a stray; by eye
+    stray_pull: float = 1e-3  # part of the pull that is left to strays; so that they follow
     last_rounds: int = 2  # reweighted solves without strays
     block: int = 4  # side of the blocks of the preconditioner's coarse grid, pixels
     tolerance: float = 1e-3  # residual at which a solve ends, share of its first one
@@ -54,31 +54,36 @@ def integrated(depth: Array, normal: Array, rays: Array) -> Array:
     if surface.sum() < 9:
         return depth.astype(np.float32)
     grid = _Grid.of(surface, normal, rays)
-    start = np.log(depth[surface].astype(np.float64))
-    pull = np.full(len(start), (SETTINGS.length * max(depth.shape)) ** -2)
+    data = np.log(depth[surface].astype(np.float64))
+    pull = np.full(len(data), (SETTINGS.length * max(depth.shape)) ** -2)
     scale = SETTINGS.steep * spacing(rays)
-    found = start
+    found = data
     for _ in range(SETTINGS.rounds):
-        weight = np.exp(-((grid.excess(found) / scale) ** 2))
-        found = grid.solved(weight, pull, start, found)
-
-    # Strays, as the blurred rim of a thing, follow their neighbour's depth in place of their own.
-    gap = np.abs(grid.step @ found - grid.demanded)
-    least = SETTINGS.least * len(start)
-    linked = gap < SETTINGS.parted * spacing(rays)
-    pairs = (grid.first, grid.second)
-    region, joined = regions_without_strays(pairs, linked, gap, least, len(start))
-    alone = connected_regions(pairs, linked, len(start))
-    stray = (np.bincount(alone)[alone] < least) & (np.bincount(region)[region] >= least)
-    pull = np.where(stray, SETTINGS.stray_pull * pull, pull)
-    for _ in range(SETTINGS.last_rounds):
-        weight = np.exp(-((grid.excess(found) / scale) ** 2))
-        weight = np.where(joined & ~linked, 1, weight)
-        weight = np.where(region[grid.first] == region[grid.second], weight, 0)
-        found = grid.solved(weight, pull, start, found)
+        found = grid.solved(grid.weights(found, scale), pull, data, found)
+    found = _without_strays(grid, found, pull, data, spacing(rays))
     result = np.zeros(depth.shape, np.float32)
     result[surface] = np.exp(found)
     return result
+
+
+def _without_strays(grid: "_Grid", found: Array, pull: Array, data: Array, angle: float) -> Array:
+    """[N] log depth whose strays, as the blurred rim of a thing, follow a neighbour in place of their own depth.
+
+    found, pull, data: [N] as in `_Grid.solved`. angle: of a pixel, radians.
+    """
+    gap = np.abs(grid.step @ found - grid.demanded)
+    least = SETTINGS.least * len(data)
+    linked = gap < SETTINGS.parted * angle
+    pairs = grid.first, grid.second
+    region, joined = regions_without_strays(pairs, linked, gap, least, len(data))
+    alone = connected_regions(pairs, linked, len(data))
+    stray = (np.bincount(alone)[alone] < least) & (np.bincount(region)[region] >= least)
+    pull = np.where(stray, SETTINGS.stray_pull * pull, pull)
+    within = region[grid.first] == region[grid.second]
+    for _ in range(SETTINGS.last_rounds):
+        weight = np.where(joined & ~linked, 1, grid.weights(found, SETTINGS.steep * angle))
+        found = grid.solved(np.where(within, weight, 0), pull, data, found)
+    return found
 
 
 @dataclass(frozen=True)
@@ -122,6 +127,10 @@ class _Grid:
     def excess(self, values: Array) -> Array:
         """[P] change of log depth [N] that the normals do not explain, less where they face away."""
         return (self.step @ values - self.demanded) * self.facing
+
+    def weights(self, values: Array, scale: float) -> Array:
+        """[P] how much each pair counts at log depth [N]: 1 where the normals explain it, 0 where a step is."""
+        return np.exp(-((self.excess(values) / scale) ** 2))
 
     def solved(self, weight: Array, pull: Array, data: Array, start: Array) -> Array:
         """[N] the minimum of sum of weight (excess)^2 + sum of pull (u - data)^2, from `start`.

@@ -2,7 +2,6 @@
 
 import cv2
 import numpy as np
-import pytest
 
 from materialist.predict.bundled.edges import GuidedFilter, weighted_median
 
