@@ -5,9 +5,9 @@ import pytest
 from edit_scenes import scene_of
 from PIL import Image
 
+from materialist.edits.select import select as selecting
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.sam import segment
-from materialist.edits.select import select as selecting
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 from materialist.types import Camera
