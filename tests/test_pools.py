@@ -19,9 +19,9 @@ POOLS = {
     "materialist_lab/data/samples.py": """
 import sys, pathlib
 from made_pools import slow_arrays
-from materialist_lab.data.samples import complete
+from materialist_lab.data.samples import make_missing
 folder = pathlib.Path(sys.argv[1]) / "samples"
-complete([folder / f"{k}.npz" for k in range(8)], slow_arrays, "samples", lambda *_: None, 2)
+make_missing([folder / f"{k}.npz" for k in range(8)], slow_arrays, "samples", lambda *_: None, 2)
 """,
     "materialist/jobs/process.py": """
 import time

@@ -53,8 +53,8 @@ def edits_key(path: str | Path, name: str, spp: int, quality: int | None = None)
 
 def missing_files(path: str | Path, name: str) -> list[str]:
     """Files that the edits of a photo need and that are not there."""
-    found = [file for step in edits_for(path, name) if not step.skipped for _, file in _files(step)]
-    return [str(file) for file in found if not file.is_file()]
+    files = [file for step in edits_for(path, name) if not step.skipped for _, file in _files(step)]
+    return [str(file) for file in files if not file.is_file()]
 
 
 def _files(step: "Step") -> list[tuple[str, Path]]:

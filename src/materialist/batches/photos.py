@@ -44,24 +44,24 @@ def list_photos(
     text = str(source)
     notes = [] if notes is None else notes
     if is_url(text):
-        found = [Listed(without_secrets(url), url) for url in list_url(text, SUFFIXES)]
+        photos = [Listed(without_secrets(url), url) for url in list_url(text, SUFFIXES)]
     elif text.startswith(PREFIX) or (
         Path(text).suffix.lower() in SUFFIXES and Path(text).is_file()
     ):
-        found = [_named(text, Path())]
+        photos = [_named(text, Path())]
     elif Path(text).is_dir():
-        found = _of_folder(Path(text), Path(runs), notes)
+        photos = _of_folder(Path(text), Path(runs), notes)
     elif Path(text).is_file():
-        found = _of_list(Path(text), notes)
+        photos = _of_list(Path(text), notes)
     else:
         raise InputError(f"There is no folder or list of photos at {text}.")
-    if not found:
+    if not photos:
         raise InputError(f"{without_secrets(text)} holds no photo; it may hold {FORMATS}.")
-    return sorted({photo.id: photo for photo in found}.values(), key=lambda photo: photo.id)
+    return sorted({photo.id: photo for photo in photos}.values(), key=lambda photo: photo.id)
 
 
 def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
-    found = list[Listed]()
+    photos = list[Listed]()
     others = list[str]()
     seen = {os.path.realpath(runs)}
     if os.path.realpath(folder) in seen:
@@ -88,7 +88,7 @@ def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
                     .decode("utf-8")
                 )
                 if path.suffix.lower() in SUFFIXES:
-                    found.append(Listed(id, os.path.abspath(path)))
+                    photos.append(Listed(id, os.path.abspath(path)))
                 else:
                     others.append(id)
     except OSError as error:
@@ -97,7 +97,7 @@ def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
         ) from error
     if others:
         notes.append(f"Passed over, as their names are no photo's: {_some(sorted(others))}.")
-    return found
+    return photos
 
 
 def _some(names: list[str]) -> str:
@@ -143,10 +143,10 @@ def unique_names(ids: Iterable[str], known: Mapping[str, str] | None = None) -> 
     """
     known = known or {}
     ids = list(dict.fromkeys(ids))
-    names = {one: known[one] for one in ids if one in known}
+    names = {photo_id: known[photo_id] for photo_id in ids if photo_id in known}
     used = {name.casefold() for name in known.values()}
-    for form in (_stem, lambda one: one.replace("://", "/"), _hashed):
-        proposed = {one: _clean(form(one)) for one in ids if one not in names}
+    for form in (_stem, lambda photo_id: photo_id.replace("://", "/"), _hashed):
+        proposed = {photo_id: _clean(form(photo_id)) for photo_id in ids if photo_id not in names}
         count = Counter(name.casefold() for name in proposed.values())
         chosen = {
             i: n
@@ -158,13 +158,13 @@ def unique_names(ids: Iterable[str], known: Mapping[str, str] | None = None) -> 
     return names
 
 
-def _stem(one: str) -> str:
-    last = re.split(r"[/\\]", one.rstrip("/\\"))[-1].removeprefix("example:")
+def _stem(photo_id: str) -> str:
+    last = re.split(r"[/\\]", photo_id.rstrip("/\\"))[-1].removeprefix("example:")
     return last.rsplit(".", 1)[0] or last
 
 
-def _hashed(one: str) -> str:
-    return f"{_stem(one)[:60]}-{zlib.crc32(one.encode('utf-8', 'surrogateescape')):08x}"
+def _hashed(photo_id: str) -> str:
+    return f"{_stem(photo_id)[:60]}-{zlib.crc32(photo_id.encode('utf-8', 'surrogateescape')):08x}"
 
 
 def _clean(text: str) -> str:

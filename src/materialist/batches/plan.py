@@ -70,11 +70,11 @@ def _inverted(entry: dict[str, Any], task: PhotoTask) -> bool:
 
 def _edited(entry: dict[str, Any], task: PhotoTask) -> bool:
     """Whether nothing is to be edited, or the edited photo is there and of the same edits."""
-    if entry.get("event") != "done" or task.how.recipe is None:
+    if entry.get("event") != "done" or task.batch_options.recipe is None:
         return entry.get("event") == "done"
     try:
         same = entry.get("edits") == edits_key(
-            task.how.recipe, task.name, task.how.spp, task.how.quality
+            task.batch_options.recipe, task.name, task.batch_options.spp, task.batch_options.quality
         )
         return same and entry.get("picture_hash") == file_hash(task.picture)
     except OSError:

@@ -33,11 +33,11 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
         if not pattern and _path(url).suffix.lower() in suffixes:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
-        found = [(str(one), _path(str(one))) for one in map(system.unstrip_protocol, paths)]
+        urls = [str(listed) for listed in map(system.unstrip_protocol, paths)]
     return [
-        one
-        for one, path in found
-        if path.suffix.lower() in suffixes and not path.name.startswith(".")
+        listed
+        for listed in urls
+        if _path(listed).suffix.lower() in suffixes and not _path(listed).name.startswith(".")
     ]
 
 
@@ -63,8 +63,9 @@ def local_copy(location: str) -> Iterator[Path]:
         with _opened(location) as (system, path):
             size = system.info(path).get("size")
             if size is not None and size > LARGEST:
-                told = f"{size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}."
-                raise InputError(f"{without_secrets(location)} has {told}")
+                raise InputError(
+                    f"{without_secrets(location)} has {size / 1e9:.1f} GB; the limit is {LARGEST / 1e9:.1f}."
+                )
             system.get_file(path, str(file))
         yield file
 

@@ -66,9 +66,11 @@ def batch(
     KeyboardInterrupt as pressed, after the workers are ended and the summary is written.
     """
     start = time.monotonic()
-    own = {one.name for one in fields(BatchOptions)}
+    batch_fields = {entry.name for entry in fields(BatchOptions)}
     values: dict[str, Any] = dict(options)
-    how = BatchOptions(**{name: value for name, value in values.items() if name in own})
+    batch_options = BatchOptions(
+        **{name: value for name, value in values.items() if name in batch_fields}
+    )
     asked: dict[str, Any] = {
         "predictor": "auto",
         "size": 512,
@@ -76,34 +78,42 @@ def batch(
         "seed": 0,
         "device": "auto",
     }
-    asked |= {name: value for name, value in values.items() if name not in own}
+    asked |= {name: value for name, value in values.items() if name not in batch_fields}
     check_options(asked)
-    if how.recipe is not None:
-        edits_for(how.recipe, "")  # a list that cannot be read is told before anything is written
+    if batch_options.recipe is not None:
+        edits_for(batch_options.recipe, "")  # a damaged list is an error before anything is written
     notes: list[str] = []
     photos = list_photos(source, runs=runs, notes=notes)
     folder = Path(runs)
-    told = {**asked, "tool_version": __version__}
-    with open_ledger(folder, told, resume=how.resume, force=how.force) as ledger:
-        template = PhotoTask("", "", "", folder.resolve(), asked, how)
+    facts = {**asked, "tool_version": __version__}
+    with open_ledger(
+        folder, facts, resume=batch_options.resume, force=batch_options.force
+    ) as ledger:
+        template = PhotoTask("", "", "", folder.resolve(), asked, batch_options)
         tasks = {task.id: task for task in plan(photos, ledger, template)}
         run = _Run(folder, photos, ledger, tasks, asked, progress or (lambda _: None), start, notes)
         try:
             for note in notes:
                 run.tell(note)
-            if how.recipe is not None and (notice := _lacking(how.recipe, [*tasks.values()])):
+            if batch_options.recipe is not None and (
+                notice := _lacking(batch_options.recipe, [*tasks.values()])
+            ):
                 run.tell(notice)
             if tasks:
-                run.work(_pool(how, len(tasks), asked["device"], asked["size"]))
+                run.work(_pool(batch_options, len(tasks), asked["device"], asked["size"]))
         finally:
             run.write()
     return run.outcome()
 
 
-def _pool(how: BatchOptions, tasks: int, device: str, size: int) -> LocalPool | RayPool:
-    if how.ray is not None:
-        return RayPool(how.ray, SINGLE_THREAD, workers=how.workers, gpu=device != "cpu")
-    return LocalPool(environments(min(how.workers or default_workers(device, size), tasks), device))
+def _pool(batch_options: BatchOptions, tasks: int, device: str, size: int) -> LocalPool | RayPool:
+    if batch_options.ray is not None:
+        return RayPool(
+            batch_options.ray, SINGLE_THREAD, workers=batch_options.workers, gpu=device != "cpu"
+        )
+    return LocalPool(
+        environments(min(batch_options.workers or default_workers(device, size), tasks), device)
+    )
 
 
 def environments(workers: int, device: str) -> list[dict[str, str]]:
@@ -140,17 +150,19 @@ def visible_gpus(device: str = "auto") -> list[str]:
 
 def _lacking(recipe: Path, tasks: list[PhotoTask]) -> str | None:
     """A sentence on photos whose edits name a file that is missing. Raises InputError where all photos are such."""
-    found = [(task, missing[0]) for task in tasks if (missing := missing_files(recipe, task.name))]
-    if not found:
+    lacking = [
+        (task, missing[0]) for task in tasks if (missing := missing_files(recipe, task.name))
+    ]
+    if not lacking:
         return None
-    task, file = found[0]
-    if len(found) == len(tasks):
+    task, file = lacking[0]
+    if len(lacking) == len(tasks):
         raise InputError(
             f"No photo has the files that {recipe} names (there is no {file} for {task.id}); put them "
             "there, and add `resume=True`."
         )
     return (
-        f"{len(found)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
+        f"{len(lacking)} of {len(tasks)} photos lack a file that {recipe} names (there is no {file} for {task.id}); "
         "they get a scene, but no edited photo unless it is there by then."
     )
 
@@ -207,7 +219,7 @@ class _Run:
 
     def _begin(self, pool: LocalPool | RayPool, task: PhotoTask) -> None:
         places = ([] if task.kept else [task.scene]) + (
-            [] if task.how.recipe is None else [task.picture]
+            [] if task.batch_options.recipe is None else [task.picture]
         )
         for place in places:
             if place.exists() and place.name not in self.ledger.owned:

@@ -48,7 +48,7 @@ class PhotoTask:
     runs: Path
     options: dict[str, Any] = field(default_factory=dict)
     """Keywords of the inversion; `{name}` in a text stands for the name."""
-    how: BatchOptions = field(default_factory=BatchOptions)
+    batch_options: BatchOptions = field(default_factory=BatchOptions)
     kept: dict[str, Any] = field(default_factory=dict)
     """OF_THE_SCENE, where the package is there, whole and of this photo and these options: only the edit is missing."""
 
@@ -58,7 +58,7 @@ class PhotoTask:
 
     @property
     def picture(self) -> Path:
-        return self.runs / f"{self.name}.{self.how.format}"
+        return self.runs / f"{self.name}.{self.batch_options.format}"
 
     def named_options(self) -> dict[str, Any]:
         return {
@@ -74,10 +74,10 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
     scene, facts = _scene(task, report)
     pictures = [scene.photo.linear, scene.rerender]
     warnings = scene.warnings
-    if task.how.recipe is not None:
+    if task.batch_options.recipe is not None:
         begun = time.perf_counter()
         try:
-            picture, notes = _edited(task, task.how.recipe, scene, report)
+            picture, notes = _edited(task, task.batch_options.recipe, scene, report)
         except Exception as error:
             # The scene is whole: with it in the ledger, the failure costs no second inversion.
             error.facts = {**facts, "scene_bytes": package_size(task.scene)}  # type: ignore[attr-defined]
@@ -89,7 +89,9 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
             "picture_hash": file_hash(task.picture),
         }
         facts["picture"] = task.picture.name
-        facts["edits"] = edits_key(task.how.recipe, task.name, task.how.spp, task.how.quality)
+        facts["edits"] = edits_key(
+            task.batch_options.recipe, task.name, task.batch_options.spp, task.batch_options.quality
+        )
     write_whole(task.runs / "thumbs" / f"{task.name}.jpg", _thumbnails(pictures))
     metrics = scene.report.metrics
     facts |= {
@@ -128,7 +130,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     report("start", 0, 1)
     begun = time.perf_counter()
-    module, _, attribute = task.how.function.partition(":")
+    module, _, attribute = task.batch_options.function.partition(":")
     scene = getattr(import_module(module), attribute)(
         photo, size=size, fov=fov, progress=report, **options
     )
@@ -163,9 +165,11 @@ def _edited(
     except InputError as error:
         raise InputError(f"The scene is there, but not its edit: {error}") from error
     picture = mt.composite(
-        scene, edited, spp=task.how.spp, seed=seed, device=device, progress=report
+        scene, edited, spp=task.batch_options.spp, seed=seed, device=device, progress=report
     )
-    written = mt.save_image(task.picture, picture, scene, quality=task.how.quality, force=True)
+    written = mt.save_image(
+        task.picture, picture, scene, quality=task.batch_options.quality, force=True
+    )
     change = mean_change(scene, picture)
     notes = [
         *warnings_since(scene, edited),

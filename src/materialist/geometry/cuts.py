@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import unit, unproject
+from materialist.geometry.regions import regions_without_strays
 from materialist.types import Array, Camera
 
 
@@ -17,6 +18,7 @@ class CutSettings:
     slanted: float = 25.0  # degrees from grazing: where normals face the camera more, a steep slope is a smeared edge
     steady: float = 2.0  # factor by which a step may exceed a steady slope, as on a plane
     bending: float = 3.0  # what a slope that grows towards the pair adds to that factor, times the share it grows by
+    least: float = 0.002  # share of the surface below which a region is a stray; by eye
     most: float = 5.0  # largest such factor: the last step of a sphere's rim is 4.2 times the least (derived, tau = 6)
 
 
@@ -66,6 +68,32 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     cut_x = pair_x & grazing_x & steep_x
     cut_y = pair_y & grazing_y & steep_y
     return Cuts(pair_x & ~cut_x, pair_y & ~cut_y, cut_x, cut_y)
+
+
+def without_strays(cuts: Cuts, depth: Array) -> Cuts:
+    """The cuts without those that part a stray, a region below `CutSettings.least`, from what it fits best in depth.
+
+    depth: [H, W] planar, 0 = no surface. Strays are flecks on slopes and the blurred rims of things: each would be a
+    rag of its own in mirrors and shadows.
+    """
+    height, width = depth.shape
+    surface = depth > 0
+    index = np.arange(depth.size).reshape(depth.shape)
+    across = cuts.link_x | cuts.cut_x
+    down = cuts.link_y | cuts.cut_y
+    first = np.concatenate([index[:, :-1][across], index[:-1][down]])
+    second = np.concatenate([index[:, 1:][across], index[1:][down]])
+    linked = np.concatenate([cuts.link_x[across], cuts.link_y[down]])
+    values = np.log(np.where(surface, depth, 1)).ravel()
+    step = np.abs(values[second] - values[first])
+    least = SETTINGS.least * float(surface.sum())
+    _, linked = regions_without_strays((first, second), linked, step, least, depth.size)
+    link_x = np.zeros((height, width - 1), bool)
+    link_y = np.zeros((height - 1, width), bool)
+    count = int(across.sum())
+    link_x[across] = linked[:count]
+    link_y[down] = linked[count:]
+    return Cuts(link_x, link_y, across & ~link_x, down & ~link_y)
 
 
 def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:

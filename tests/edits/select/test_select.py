@@ -5,6 +5,7 @@ import pytest
 from edit_scenes import scene_of
 from PIL import Image
 
+from materialist.edits.select import select as selecting
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.sam import segment
 from materialist.edits.select.select import select
@@ -99,6 +100,15 @@ def around(mask, more):
 def test_boxes_need_not_be_exact(table, which, more):
     scene, *things = table
     assert overlap(select(scene, box=around(things[which], more)), things[which]) > 0.85
+
+
+def test_a_box_far_too_large_names_the_box_of_what_is_in_it(table, monkeypatch):
+    scene, thing, _ = table
+    monkeypatch.setattr(selecting, "object_in", lambda *_, **__: thing)
+    with pytest.raises(InputError, match="give that box if it is meant") as error:
+        select(scene, box=(1, 1, 159, 119))
+    numbers = ",".join(str(edge) for edge in around(thing, 0))
+    assert numbers in str(error.value)
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from materialist.errors import InputError
 
 BENCHMARKS = (
     "real",
+    "geometry",
     "photo-alone",
     "invert",
     "batch",

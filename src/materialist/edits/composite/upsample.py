@@ -118,16 +118,16 @@ def matte(mask: Array, large: Array) -> Array:
         for part in strips(mask.shape[1], MATTE.tile):
             if not border[tile, part].any():
                 continue
-            own = np.zeros_like(border)
-            own[tile, part] = True
-            rows, columns = window(own, (height, width))
+            tile_mask = np.zeros_like(border)
+            tile_mask[tile, part] = True
+            rows, columns = window(tile_mask, (height, width))
             around = tuple(
                 slice(max(v.start - margin, 0), v.stop + margin) for v in (rows, columns)
             )
-            found = _shares(soft[around], large[around], scale)
+            shares = _shares(soft[around], large[around], scale)
             top = rows.start - around[0].start
             left = columns.start - around[1].start
-            alpha[rows, columns] = found[top:, left:][
+            alpha[rows, columns] = shares[top:, left:][
                 : rows.stop - rows.start, : columns.stop - columns.start
             ]
     return alpha

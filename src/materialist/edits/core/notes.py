@@ -16,12 +16,12 @@ PICTURED = "Glass of the two-interface model is a picture in the photo: "
 """The beginning of messages about glass that no rendering shows."""
 
 
-def noted(scene: Scene, kind: str, what: dict[str, Any]) -> Scene:
+def noted(scene: Scene, kind: str, facts: dict[str, Any]) -> Scene:
     """The scene with one more entry in `provenance["edits"]`, which reports and packages carry along.
 
     Values of None are left out.
     """
-    said = {name: value for name, value in what.items() if value is not None}
+    said = {name: value for name, value in facts.items() if value is not None}
     entries = [*scene.provenance.get("edits", []), {"kind": kind, **said}]
     return replace(scene, provenance={**scene.provenance, "edits": entries})
 

@@ -22,7 +22,7 @@ from materialist.types import Array, Scene
 class SelectSettings:
     """Where ClickNet and GrabCut look; lengths in longer sides; tuned by eye unless said otherwise."""
 
-    min_box_overlap: float = 0.25  # of the object's box with the given one; less: misplaced
+    min_box_overlap: float = 0.25  # IoU of the object's box with the given one; less: misplaced
     gap: float = 0.015  # half of the gap across which two parts are one
 
     # GrabCut: radii around a click; tuned on 54 clicks.
@@ -55,7 +55,7 @@ def object_at_points(
 
 
 def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
-    """[H, W] bool of the object in a box; empty where what is found does not fill it.
+    """[H, W] bool of the object in a box, which may be small in it (`box_overlap`) or empty.
 
     GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
     """
@@ -63,12 +63,9 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
         photo = linear_to_srgb(scene.photo.linear)
-        mask = outlined(
-            photo, segment.object_likelihood(photo, scene.normal, scene.depth, box=box) * inside, ()
-        )
-    else:
-        mask = tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
-    return mask if box_overlap(mask, box) >= SETTINGS.min_box_overlap else np.zeros_like(mask)
+        likely = segment.object_likelihood(photo, scene.normal, scene.depth, box=box)
+        return outlined(photo, likely * inside, ())
+    return tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
 
 
 def box_overlap(mask: Array, box: Box) -> float:

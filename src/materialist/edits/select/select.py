@@ -12,9 +12,10 @@ from materialist.edits.core.region import (
     checked_pixel,
     checked_region,
 )
-from materialist.edits.select.objects import object_at_points, object_in
+from materialist.edits.select.objects import SETTINGS, box_overlap, object_at_points, object_in
 from materialist.errors import InputError
 from materialist.forks import check_process
+from materialist.geometry.silhouette import window
 from materialist.io.image import read_mask
 from materialist.option_kinds import parse_numbers, several
 from materialist.predict.clicks.features import Box
@@ -71,6 +72,13 @@ def select(
             else "click another place on the object"
         )
         raise InputError(f"Nothing was found there; {other}, or give a mask.")
+    if frame is not None and box_overlap(region, frame) < SETTINGS.min_box_overlap:
+        rows, columns = window(region)
+        raise InputError(
+            f"What is found in the box {','.join(map(str, frame))} lies in a small part of it, "
+            f"{columns.start},{rows.start},{columns.stop},{rows.stop}; give that box if it is meant, "
+            "else one that fits the object, or click the object."
+        )
     return region
 
 

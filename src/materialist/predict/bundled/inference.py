@@ -11,9 +11,10 @@ from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.camera import rays_at, unit
 from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.geometry.integrate import integrated
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
-from materialist.predict.bundled.edges import GuidedFilter, grabcut, weighted_median, with_relief
+from materialist.predict.bundled.edges import GuidedFilter, grabcut, weighted_median
 from materialist.predict.bundled.network import SPREADS, BundledNetwork
 from materialist.predict.network import STRIDE
 from materialist.types import Array, Materials, Prediction
@@ -111,9 +112,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
         for c in np.moveaxis(normal, -1, 0)
     ]
     normal = unit(np.stack(planes, -1))
-    # --- Depth smooth along each surface again, by the normals ---
-    logarithm = with_relief(np.where(known, sharp, np.nan), normal, seen)
-    depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
+    depth = integrated(np.where(known, np.exp(sharp), 0), normal, seen)
     if middle != size:
         depth = resample.depth(depth, size)
         normal = resample.normals(normal, size)
