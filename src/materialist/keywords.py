@@ -101,6 +101,7 @@ class InvertKeywords(TypedDict, total=False):
     depth: str | None
     engine: str
     preset: str
+    steps: int | None
     fov: float | str
     size: int
     layer: str | None

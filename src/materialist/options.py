@@ -297,11 +297,14 @@ class InvertOptions(OperationOptions):
     )
     preset: str = option(
         "default",
-        "Our schedule, or the paper's to the letter.",
+        "Our schedule, or the paper's.",
         kind="word",
         choices=("default", "paper"),
     )
     """The path engine always follows the paper."""
+    steps: int | None = option(
+        None, "At most this many steps in each stage of the fit.", kind="whole", low=1, metavar="N"
+    )
     fov: float | str = option(
         "auto",
         "Horizontal field of view in degrees, or auto: EXIF, else 35.",

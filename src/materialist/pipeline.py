@@ -42,6 +42,7 @@ def invert(
     encoded: bool | None = None,
     progress: Callable[[str, int, int], Any] | None = None,
     on_stage: Callable[[str, Any], Any] | None = None,
+    stop: Callable[[], bool] | None = None,
     **values: Unpack[InvertKeywords],
 ) -> Scene:
     """Decompose a photograph into geometry, materials and light.
@@ -55,6 +56,7 @@ def invert(
         progress: called as progress(stage, done, total).
         on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
             soon as each is there.
+        stop: asked after each step of the fit; True ends it there, and the scene has what was found until then.
 
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
@@ -100,9 +102,12 @@ def invert(
     setup(wanted.device)
     from materialist.fit import invert as fitting
     from materialist.fit.invert import FitSetup
+    from materialist.fit.optimise import never
     from materialist.fit.settings import preset as named
 
     settings = wanted.settings or named(preset, hdr=picture.hdr)
+    if wanted.steps is not None:
+        settings = settings.at_most(wanted.steps)
     fit_setup = FitSetup(
         picture,
         prior,
@@ -118,7 +123,7 @@ def invert(
         spp=wanted.spp,
     )
     lap("setup")
-    best = fitting.invert(fit_setup, progress=progress, found=tell)
+    best = fitting.invert(fit_setup, progress=progress, found=tell, stop=stop or never)
     report = _report(picture, prior, best, (*stages, *best.stages), start)
     return Scene(
         camera=picture.camera,
@@ -137,6 +142,7 @@ def invert(
             "sources": prior.sources,
             "engine": wanted.engine,
             "preset": preset,
+            "steps": wanted.steps,
             "completion": fit_setup.completion,
             "completion_asked": wanted.completion,
             "tau": wanted.tau,
@@ -233,6 +239,11 @@ def _report(
         )
     if is_peaked(found.envmap):
         notes.append("The photo has hard light: its shadows may be baked into the albedo.")
+    if found.stopped:
+        last = [stage for stage in found.stages if "steps" in stage][-1]
+        notes.append(
+            f"The fit was stopped in its stage '{last['name']}', after {last['steps']} steps."
+        )
     poor = float((residual > 0.1).mean())
     return FitReport(
         stages=stages,

@@ -64,7 +64,7 @@ def test_progress_and_summary():
     result = run(
         lambda step: 2.0 / (step + 1), Schedule(max_steps=4), progress=lambda *a: told.append(a)
     )
-    assert told == [("test", k, 4) for k in (1, 2, 3, 4)]
+    assert told == [("test", k, 4) for k in (0, 1, 2, 3, 4)]
     summary = result.summary()
     assert (summary["name"], summary["steps"]) == ("test", 4)
     assert (summary["loss_first"], summary["loss_last"]) == (2.0, 0.5)

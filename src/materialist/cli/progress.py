@@ -4,6 +4,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 Progress = Callable[[str, int, int], None]
+SPEED_PERIOD = 600.0
+"""Seconds of which the time left is estimated; a path-traced step may take a minute."""
 
 
 @contextmanager
@@ -20,7 +22,12 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
     name = rich.TextColumn("{task.description:<24}")
     left = rich.TimeRemainingColumn(elapsed_when_finished=True)
     columns = name, rich.BarColumn(bar_width=32), rich.MofNCompleteColumn(), left
-    with rich.Progress(*columns, console=console, disable=quiet or not console.is_terminal) as bars:
+    with rich.Progress(
+        *columns,
+        console=console,
+        disable=quiet or not console.is_terminal,
+        speed_estimate_period=SPEED_PERIOD,
+    ) as bars:
 
         def told(stage: str, done: int, total: int) -> None:
             if stage not in tasks:

@@ -1,6 +1,7 @@
 """`materialist invert`, `render` and `export`: scene packages made, rendered, and written for other programs."""
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,8 +31,11 @@ def invert(
     ensure_writable(output, run.force)
     picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
     start = time.monotonic()
-    with stage_progress(quiet=run.as_json) as progress:
-        scene = mt.invert(picture, options, progress=progress)
+    slow = options.preset == "paper" or options.engine == "path"
+    with stage_progress(quiet=run.as_json) as progress, _Stop(slow) as stop:
+        scene = mt.invert(
+            picture, options, progress=progress, on_stage=stop.on_stage, stop=stop.requested
+        )
     mt.save_scene(scene, output, force=run.force)
     warnings = scene.warnings
     seconds = time.monotonic() - start
@@ -47,6 +51,34 @@ def invert(
     facts: dict[str, Any] = {"predictor": scene.prior.predictor, "sources": scene.prior.sources}
     facts |= {**scene.report.metrics, "seconds": seconds, "warnings": warnings}
     report_success("invert", run.as_json, lines, scene=str(output), **facts)
+
+
+class _Stop:
+    """Ctrl-C or SIGTERM during a fit of minutes or hours ends the fit; what it has found is then written.
+
+    Before the fit, and at the second signal, the command ends at once, as it does with our schedule.
+    """
+
+    def __init__(self, slow: bool):
+        self.slow = slow
+        self.signals: list[int] = []
+        self.stack = ExitStack()
+
+    def __enter__(self) -> "_Stop":
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.stack.close()
+
+    def on_stage(self, name: str, _: Any) -> None:
+        """The fit begins when the prior is there."""
+        from materialist.train.schedule import stop_requests
+
+        if self.slow and name == "prior":
+            self.signals = self.stack.enter_context(stop_requests())
+
+    def requested(self) -> bool:
+        return bool(self.signals)
 
 
 def render(
