@@ -123,6 +123,7 @@ class ExportKeywords(TypedDict, total=False):
     to: str | None
     max_triangles: int | None
     blender: str | None
+    residual: bool
     shadow_catcher: bool
     fitted_material: bool
 

@@ -405,6 +405,12 @@ class ExportOptions(OperationOptions):
         kind="name",
         metavar="PROGRAM",
     )
+    residual: bool = option(
+        True,
+        "Put what the fit leaves of the photo into base colour and metallic, so that renders look like it.",
+        kind="switch",
+    )
+    """Without it the maps are the fitted ones. The page of HTML has those anyway."""
     shadow_catcher: bool = option(
         False, "blend: show the photo, with the scene to catch shadows on it.", kind="switch"
     )

@@ -15,7 +15,7 @@ from materialist.envmap import texels_around
 from materialist.fit.fields import ALL, Rows, resize_envmap
 from materialist.render.scene import MAX_DEPTH
 from materialist.transport.cache import CacheSettings, Tables, TransportCache
-from materialist.transport.filter import Guide, filter_tables
+from materialist.transport.filter import filter_tables, surface_guide
 from materialist.transport.light import light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
@@ -72,7 +72,7 @@ class TransportEngine:
         self.radiance = radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
-        self.guide = _guide(self.cache, camera)
+        self.guide = surface_guide(self.cache)
 
     def light_problem(self, materials: Materials, sent: Array | None = None) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
@@ -204,11 +204,3 @@ def _subset(rng, size: int, share: float) -> Array:
 def _shaded(tables: Tables, maps: torch.Tensor) -> torch.Tensor:
     """[P, 3] radiance of maps [P, 5]."""
     return shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
-
-
-def _guide(cache: TransportCache, camera: Camera) -> Guide:
-    position = np.array(cache.position).T
-    scale = cache.image(-position[:, 2:] / camera.focal)[..., 0]
-    return Guide(
-        cache.image(position), cache.image(np.array(cache.normal).T), np.maximum(scale, 1e-9)
-    )
