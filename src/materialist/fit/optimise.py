@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
 import torch
 
 from materialist.fit.settings import Schedule
@@ -117,8 +118,10 @@ def optimise(
 
 def _stalled(losses: list[float], schedule: Schedule) -> bool:
     n = schedule.patience
-    if n == 0 or len(losses) <= n or len(losses) % 10:
+    if n == 0 or len(losses) < n + schedule.averaged or len(losses) % 10:
         return False
-    before = min(losses[:-n])
-    recent = min(losses[-n:])
+    window = np.full(schedule.averaged, 1 / schedule.averaged)
+    means = np.convolve(losses, window, mode="valid")
+    before = means[:-n].min()
+    recent = means[-n:].min()
     return recent > before * (1 - schedule.min_improvement)

@@ -30,6 +30,9 @@ class Schedule:
         100  # paper; stop when the loss improved too little over this many steps; 0: never
     )
     min_improvement: float = 0.01  # paper; fraction of the loss
+    averaged: int = (
+        1  # steps over whose mean the loss is judged; more where a step sees some pixels
+    )
     keep_best: bool = False  # end with the parameters of the smallest loss, not with the last
 
     def rate(self, step: int) -> float:
@@ -123,6 +126,7 @@ _MATERIAL = Schedule(
     max_steps=2000,
     patience=200,
     min_improvement=0.005,
+    averaged=100,
 )
 
 PAPER = FitSettings(
