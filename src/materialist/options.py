@@ -409,6 +409,7 @@ class ExportOptions(OperationOptions):
         True,
         "Put what the fit leaves of the photo into base colour and metallic, so that renders look like it.",
         kind="switch",
+        flag="--residual/--no-residual",
     )
     """Without it the maps are the fitted ones. The page of HTML has those anyway."""
     shadow_catcher: bool = option(
