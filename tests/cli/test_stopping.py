@@ -19,10 +19,10 @@ from materialist.cli import app, scenes
 from materialist.cli.outcome import run_to_exit_code
 
 @contextmanager
-def told(quiet):
+def to_stderr(quiet):
     yield lambda *words: print(*words, file=sys.stderr, flush=True)
 
-scenes.stage_progress = told
+scenes.stage_progress = to_stderr
 sys.exit(run_to_exit_code(app, sys.argv[1:]))
 """
 

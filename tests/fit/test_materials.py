@@ -65,7 +65,7 @@ def test_few_pixels_a_step_find_what_all_find():
         torch.from_numpy(rng.uniform(0.3, 0.9, (40, 3)).astype(np.float32)) for _ in range(2)
     )
     prior = torch.full((40, 5), 0.5)
-    found = fitted(light, photo, prior)
-    some = fitted(light, photo, prior, step_pixels=20)
-    assert float((found - prior).abs().max()) > 0.1
-    torch.testing.assert_close(some, found, atol=0.03, rtol=0)
+    by_all = fitted(light, photo, prior)
+    by_some = fitted(light, photo, prior, step_pixels=20)
+    assert float((by_all - prior).abs().max()) > 0.1
+    torch.testing.assert_close(by_some, by_all, atol=0.03, rtol=0)

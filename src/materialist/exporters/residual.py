@@ -62,6 +62,8 @@ def with_residual(scene: Scene) -> Materials:
     from materialist.transport.shading import specular_at
 
     maps = scene.materials
+    if not (scene.geometry.mesh.face_plane == -1).any():
+        return maps  # there is no surface to carry it
     cache = TransportCache(scene.geometry, scene.camera, roughness=maps.roughness)
     guide = surface_guide(cache)
     pixels = cache.pixels
@@ -81,8 +83,8 @@ def with_residual(scene: Scene) -> Materials:
     colour = maps.albedo.reshape(-1, 3)[pixels]
     metallic = maps.metallic.reshape(-1)[pixels][:, None]
     # By a factor on the rendering, not by the photo: what inserted bodies shade stays out of the maps.
-    wanted = lit(rerender).radiance(colour, metallic) * factor.reshape(-1, 3)[pixels]
-    colour, metallic = _carried(wanted, lit(rerender * factor), metallic)
+    goal = lit(rerender).radiance(colour, metallic) * factor.reshape(-1, 3)[pixels]
+    colour, metallic = _carried(goal, lit(rerender * factor), metallic)
     albedo = maps.albedo.reshape(-1, 3).copy()
     metal = maps.metallic.reshape(-1).copy()
     albedo[pixels] = colour
@@ -92,20 +94,20 @@ def with_residual(scene: Scene) -> Materials:
     )
 
 
-def _carried(wanted: Array, lit: _Lit, metallic: Array) -> tuple[Array, Array]:
+def _carried(goal: Array, lit: _Lit, metallic: Array) -> tuple[Array, Array]:
     """Base colour [P, 3] and metallic [P, 1] that come nearest to radiance [P, 3]; metallic never falls."""
-    colour = lit.colour(wanted, metallic)
-    excess = lit.radiance(colour, metallic) - wanted
+    colour = lit.colour(goal, metallic)
+    excess = lit.radiance(colour, metallic) - goal
     dark = np.flatnonzero((excess > _TOLERANCE).any(1))
     some = lit.rows(dark)
-    target = linear_to_srgb(wanted[dark])
+    goal_srgb = linear_to_srgb(goal[dark])
     first = metallic[dark]
     least = np.full((len(dark), 1), np.inf, np.float32)
     metallic = metallic.copy()
     for level in np.linspace(0, 1, _LEVELS, dtype=np.float32):
         tried = np.maximum(first, level)
-        fits = some.colour(wanted[dark], tried)
-        error = linear_to_srgb(np.maximum(some.radiance(fits, tried), 0)) - target
+        fits = some.colour(goal[dark], tried)
+        error = linear_to_srgb(np.maximum(some.radiance(fits, tried), 0)) - goal_srgb
         cost = (error**2).sum(1, keepdims=True) + _METALLIC_COST * (tried - first) ** 2
         better = cost < least
         least = np.where(better, cost, least)

@@ -24,7 +24,7 @@ SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
 """Format -> suffix of its single file."""
 FOLDERS = ("blend", "usd", "mitsuba")
 """Formats that may also be a folder: PATH without a suffix of its own."""
-HEARD = {
+ADVICE = {
     "glb": ("light", "scale", "colour"),
     "usd": ("scale", "colour"),
     "mitsuba": ("scale",),
@@ -87,10 +87,11 @@ def export(
             "html": _html,
         }
         made = writers[to](path, scene, parts, force)
-    told = [] if to == "html" else [word for key, word in advice(scene).items() if key in HEARD[to]]
+    words = advice(scene)
+    notes = [words[key] for key in ADVICE.get(to, ())]
     if carries:
-        told.append(CARRIED)
-    return replace(made, notes=(*made.notes, *told, *_losses(scene, bodies, to)))
+        notes.append(CARRIED)
+    return replace(made, notes=(*made.notes, *notes, *_losses(scene, bodies, to)))
 
 
 def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:
