@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from materialist.buffers import placed
 from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
 from materialist.fit.fields import (
@@ -108,4 +109,4 @@ def _pixel_draw(count: int, most: int, seed: int) -> Callable[[], Rows]:
     if not most or count <= most:
         return lambda: ALL
     rng = np.random.default_rng(seed)
-    return lambda: torch.from_numpy(rng.integers(count, size=most))
+    return lambda: placed(rng.integers(count, size=most))
