@@ -1,12 +1,18 @@
 """The import table of docs/architecture.md, modules without circles, and the modules that load heavy libraries."""
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
-SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = {
+    "materialist": ROOT / "src" / "materialist",
+    "materialist_lab": ROOT / "lab" / "src" / "materialist_lab",
+}
+"""The product and the laboratory, whose packages are called `lab.NAME` below."""
 
 NOUNS = {
     "types",
@@ -17,8 +23,10 @@ NOUNS = {
     "metrics",
     "buffers",
     "forks",
+    "threads",
     "install",
     "records",
+    "stopping",
 }
 NOUNS |= {"option_kinds", "options", "keywords", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
@@ -48,31 +56,34 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jobs": set(),
     "batches": SCENE | EDITING | {"jobs", "pipeline", "predict"},
     "studio": SCENE | EDITING | {"exporters", "jobs", "pipeline"},
-    "procedural": SCENE | {"predict"},
-    "train": {"io", "render", "predict", "procedural"},
-    "bench": SCENE
-    | EDITING
-    | {"batches", "exporters", "fit", "pipeline", "predict", "procedural", "solids"},
     "doctor": {"predict", "render"},
     "cli": SCENE
     | EDITING
     | {
         "batches",
-        "bench",
         "doctor",
         "exporters",
         "pipeline",
         "predict",
-        "procedural",
         "studio",
-        "train",
     },
     "__main__": {"cli"},
+    "lab": set(),
+    "lab.data": {"io"},
+    "lab.metrics": set(),
+    "lab.procedural": SCENE | {"predict", "lab.data"},
+    "lab.train": {"io", "render", "predict", "lab.data", "lab.metrics", "lab.procedural"},
+    "lab.bench": SCENE
+    | EDITING
+    | {"batches", "exporters", "fit", "pipeline", "predict", "solids"}
+    | {"lab.data", "lab.metrics", "lab.procedural"},
+    "lab.cli": {"cli", "io", "predict", "lab.bench", "lab.data", "lab.procedural", "lab.train"},
 }
-"""Package -> the packages it may import beside the nouns; docs/architecture.md draws this table."""
+"""Package -> the packages it may import beside the nouns; docs/architecture.md has the same table."""
 
 HEAVY = {"torch", "mitsuba", "drjit"}
-MAY_BE_HEAVY = ("bsdf", "render", "transport", "fit", "train", "procedural", "bench")
+MAY_BE_HEAVY = ("bsdf", "render", "transport", "fit")
+MAY_BE_HEAVY += ("lab.train", "lab.procedural", "lab.bench")
 NETWORKS = tuple(
     f"predict.{name}"
     for name in ("bundled.", "matnet.", "refraction.", "clicks.", "efficientnet", "network")
@@ -91,6 +102,8 @@ LIGHT_START = (
         "keywords",
         "plain",
         "cli",
+        "lab",
+        "lab.cli",
     ),
 )
 """Modules that load at every start and so may import nothing slow at the top."""
@@ -109,14 +122,22 @@ SLOW = HEAVY | {
 
 @cache
 def _trees() -> dict[str, ast.Module]:
-    """Dotted module name, without `materialist.` and `.__init__`, -> its syntax tree."""
-    found = {}
-    for path in sorted(SOURCE.rglob("*.py")):
-        parts = path.relative_to(SOURCE).with_suffix("").parts
-        found[".".join(part for part in parts if part != "__init__")] = ast.parse(
-            path.read_text("utf-8")
-        )
-    return found
+    """Short name of a module (see `_short`) -> its syntax tree."""
+    trees = {}
+    for distribution, folder in SOURCES.items():
+        for path in sorted(folder.rglob("*.py")):
+            parts = path.relative_to(folder).with_suffix("").parts
+            name = ".".join([distribution, *(part for part in parts if part != "__init__")])
+            trees[_short(name)] = ast.parse(path.read_text("utf-8"))
+    return trees
+
+
+def _short(name: str) -> str:
+    """`io.exr` for `materialist.io.exr`, and `lab.train.maps` for `materialist_lab.train.maps`."""
+    distribution, _, rest = name.partition(".")
+    if distribution == "materialist_lab":
+        return f"lab.{rest}".rstrip(".")
+    return rest
 
 
 def _imports(tree: ast.AST, top_only: bool = False) -> Iterator[str]:
@@ -154,11 +175,7 @@ def _arrows() -> dict[str, set[str]]:
         return name
 
     return {
-        module: {
-            home(n.removeprefix("materialist").lstrip("."))
-            for n in _imports(tree)
-            if n.split(".")[0] == "materialist"
-        }
+        module: {home(_short(name)) for name in _imports(tree) if name.split(".")[0] in SOURCES}
         for module, tree in modules.items()
     }
 
@@ -184,6 +201,30 @@ def test_every_package_imports_only_what_its_row_allows():
                 raise AssertionError(f"{module} imports {there}, which its row does not allow")
 
 
+def test_the_product_does_not_know_the_laboratory():
+    """Its commands come through entry points, so that the product is whole without it."""
+    for path in SOURCES["materialist"].rglob("*.py"):
+        assert "materialist_lab" not in path.read_text("utf-8"), path
+
+
+def test_the_page_has_the_same_table():
+    groups = {"scene packages": SCENE, "all edits": EDITING, "nouns only": set()}
+    page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    table = page.partition("| package | imports |\n|---|---|\n")[2].partition("\n\n")[0]
+    shown = {}
+    for row in table.splitlines():
+        left, right = (cell.split(", ") for cell in row.strip("| ").split(" | "))
+        targets = set().union(*(groups.get(name, {name}) for name in right))
+        shown |= {package: targets - {package} for package in left}
+    without_rows = {"__main__", "lab"}
+    expected = {
+        package: targets - {package}
+        for package, targets in MAY_IMPORT.items()
+        if package not in without_rows
+    }
+    assert shown == expected
+
+
 def test_the_table_itself_has_no_circle():
     _refuse_circles(MAY_IMPORT)
 
@@ -196,7 +237,7 @@ def test_no_modules_import_each_other_in_a_circle():
 def test_heavy_libraries_load_late():
     for module, tree in _trees().items():
         roots = {name.split(".")[0] for name in _imports(tree, top_only=True)}
-        package = module.split(".")[0]
+        package = _package(module)
         if package in LIGHT_START:
             assert not roots & SLOW, f"{module} imports {roots & SLOW} at every start"
         elif package not in MAY_BE_HEAVY and not module.startswith(NETWORKS):
@@ -211,13 +252,12 @@ def test_no_torchvision():
 
 
 def test_files_and_style_of_the_tree():
-    for path in SOURCE.rglob("*.py"):
+    files = [path for folder in SOURCES.values() for path in folder.rglob("*.py")]
+    for path in files:
         assert len(path.read_text("utf-8").splitlines()) <= 450, f"{path} is too long"
         assert path.name != "utils.py"
-    for folder in {path.parent for path in SOURCE.rglob("*.py")}:
-        assert len(list(folder.glob("*.py"))) <= 25, (
-            f"{folder} holds too many files to keep in mind"
-        )
+    for folder, count in Counter(path.parent for path in files).items():
+        assert count <= 25, f"{folder} holds too many files to keep in mind"
     for module, tree in _trees().items():
         calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
         assert not any(isinstance(c.func, ast.Name) and c.func.id == "print" for c in calls), (

@@ -3,20 +3,18 @@
 import ast
 import re
 import shlex
-from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
 import pytest
 from typer.main import get_command
 
-from materialist.bench import BENCHMARKS, benchmark_class
 from materialist.cli import app
-from materialist.cli.bench import parse_extra
 
 ROOT = Path(__file__).resolve().parents[1]
-SOURCE = ROOT / "src" / "materialist"
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+SOURCES = (ROOT / "src" / "materialist", ROOT / "lab" / "src" / "materialist_lab")
+TESTS = (ROOT / "tests", ROOT / "lab" / "tests")
+PAGES = [ROOT / "README.md", ROOT / "lab" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAPER_MAP = ROOT / "docs" / "paper_map.md"
 PROGRAM = get_command(app)
 FOREIGN = {
@@ -30,7 +28,7 @@ FOREIGN = {
 """Options of Blender, the script for it, MoGe and apt-get that the pages name."""
 
 
-@pytest.fixture(params=PAGES, ids=lambda page: page.name)
+@pytest.fixture(params=PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def page(request):
     return request.param
 
@@ -72,32 +70,21 @@ def _parsed(words, whole):
         return
     command = PROGRAM
     name = "materialist"
-    while hasattr(command, "commands") and words:
-        assert words[0] in command.commands, f"there is no command {name} {words[0]}"
-        command = command.commands[words[0]]
+    while hasattr(command, "list_commands") and words and words[0] != "--help":
+        assert words[0] in command.list_commands(None), f"there is no command {name} {words[0]}"
+        command = command.get_command(None, words[0])
         name = f"{name} {words[0]}"
         words = words[1:]
-    if hasattr(command, "commands"):
+    if hasattr(command, "list_commands"):
         return
     try:
-        context = command.make_context(name, list(words))
+        command.make_context(name, list(words))
     except Exception as error:
         if type(error).__name__ == "Exit" or (
             not whole and type(error).__name__ == "MissingParameter"
         ):  # --help
             return
         raise AssertionError(f"{name} {' '.join(words)}: {error}") from error
-    if name == "materialist bench":
-        unknown = set(parse_extra(context.args)) - {
-            *_bench_options(context.params["name"]),
-            "data",
-            "force",
-        }
-        assert not unknown, f"{name} {context.params['name']} does not take {unknown}"
-
-
-def _bench_options(name):
-    return [field.name for field in fields(benchmark_class(name))]
 
 
 def test_every_command_line_parses(text):
@@ -107,7 +94,7 @@ def test_every_command_line_parses(text):
 
 @cache
 def _options():
-    """Every option of every command, and of every benchmark."""
+    """Every option of every command, those of the benchmarks included."""
     found = {"--help"}
     waiting = [PROGRAM]
     while waiting:
@@ -117,9 +104,9 @@ def _options():
             for parameter in command.params
             for name in (*parameter.opts, *parameter.secondary_opts)
         )
-        waiting.extend(getattr(command, "commands", {}).values())
-    for name in BENCHMARKS:
-        found.update(f"--{option.replace('_', '-')}" for option in _bench_options(name))
+        if hasattr(command, "list_commands"):
+            names = command.list_commands(None)
+            waiting.extend(command.get_command(None, name) for name in names)
     return found
 
 
@@ -134,11 +121,13 @@ def test_every_option_in_the_text_exists(text):
 @cache
 def _names(module):
     """Names a module defines, and of its classes as Class.name; empty where there is no such module."""
-    path = SOURCE / Path(*module.split("."))
-    path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    if not path.is_file():
-        return frozenset()
-    return frozenset(_defined(ast.parse(path.read_text("utf-8"))))
+    names = set()
+    for source in SOURCES:
+        path = source / Path(*module.split("."))
+        path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        if path.is_file():
+            names.update(_defined(ast.parse(path.read_text("utf-8"))))
+    return frozenset(names)
 
 
 def _defined(node, inside=""):
@@ -158,14 +147,11 @@ def _place(name):
     """Module of a dotted name, or None where nothing is called so: `fit.loop`, `fit.loop.Schedule.keep_best`."""
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
-        path = SOURCE / Path(*parts[:count])
-        if path.is_dir() or path.with_suffix(".py").is_file():
+        module = ".".join(parts[:count])
+        paths = [source / Path(*parts[:count]) for source in SOURCES]
+        if any(path.is_dir() or path.with_suffix(".py").is_file() for path in paths):
             rest = ".".join(parts[count:])
-            return (
-                ".".join(parts[:count])
-                if not rest or rest in _names(".".join(parts[:count]))
-                else None
-            )
+            return module if not rest or rest in _names(module) else None
     return None
 
 
@@ -179,7 +165,8 @@ def _rows(text):
 def test_paper_map_names_functions_that_exist():
     everything = {
         name
-        for path in SOURCE.rglob("*.py")
+        for source in SOURCES
+        for path in source.rglob("*.py")
         for name in _defined(ast.parse(path.read_text("utf-8")))
     }
     missing = []
@@ -200,8 +187,8 @@ def test_paper_map_names_functions_that_exist():
 
 
 def test_pages_name_functions_that_exist(text):
-    ours = {path.stem for path in SOURCE.iterdir()}
-    dotted = re.findall(r"`(?:materialist\.)?([a-z_]+(?:\.\w+)+)(?:\([^`]*\))?`", text)
+    ours = {path.stem for source in SOURCES for path in source.iterdir()}
+    dotted = re.findall(r"`(?:materialist(?:_lab)?\.)?([a-z_]+(?:\.\w+)+)(?:\([^`]*\))?`", text)
     files = (".py", ".jsonl", ".txt", ".exr", ".yaml")
     assert not [
         n for n in dotted if n.split(".")[0] in ours and not n.endswith(files) and not _place(n)
@@ -214,10 +201,8 @@ def test_paper_map_names_tests_that_exist():
         folder = Path()
         for name in re.findall(r"`([\w/.:]*test_[\w/.:]*)`", tests):
             file, _, function = name.partition("::")
-            path = next(
-                (p for p in (ROOT / "tests" / file, ROOT / "tests" / folder / file) if p.is_file()),
-                None,
-            )
+            places = [tests / part for tests in TESTS for part in (file, folder / file)]
+            path = next((place for place in places if place.is_file()), None)
             if path is None or (
                 function and function not in _defined(ast.parse(path.read_text("utf-8")))
             ):

@@ -12,17 +12,18 @@ import psutil
 import pytest
 from made_tasks import until
 
-SOURCE = Path(__file__).resolve().parents[1] / "src" / "materialist"
+ROOT = Path(__file__).resolve().parents[1]
+SOURCES = (ROOT / "src", ROOT / "lab" / "src")
 
 POOLS = {
-    "io/samples.py": """
+    "materialist_lab/data/samples.py": """
 import sys, pathlib
 from made_pools import slow_arrays
-from materialist.io.samples import complete
+from materialist_lab.data.samples import complete
 folder = pathlib.Path(sys.argv[1]) / "samples"
 complete([folder / f"{k}.npz" for k in range(8)], slow_arrays, "samples", lambda *_: None, 2)
 """,
-    "jobs/process.py": """
+    "materialist/jobs/process.py": """
 import time
 from made_tasks import answer
 from materialist.jobs.pool import LocalPool
@@ -31,10 +32,10 @@ for key in "ab":
     pool.begin(key, answer, {"how": "wait"})
 time.sleep(60)
 """,
-    "train/stream.py": """
+    "materialist_lab/train/stream.py": """
 from made_pools import SlowNumbers
 from torch.utils.data import DataLoader
-from materialist.train.stream import _init_worker
+from materialist_lab.train.stream import _init_worker
 list(DataLoader(SlowNumbers(), num_workers=2, worker_init_fn=_init_worker))
 """,
 }
@@ -42,14 +43,15 @@ list(DataLoader(SlowNumbers(), num_workers=2, worker_init_fn=_init_worker))
 STARTS_PROCESSES = re.compile(
     r"ProcessPoolExecutor|multiprocessing\.Pool|Process\(|Popen\(|DataLoader\("
 )
-OTHERS = {"bench/studio.py", "render/variant.py"}
+OTHERS = {"materialist_lab/bench/studio.py", "materialist/render/variant.py"}
 """Modules that start one process and end it themselves."""
 
 
 def test_every_module_that_starts_processes_is_known():
     starting = {
-        str(file.relative_to(SOURCE))
-        for file in SOURCE.rglob("*.py")
+        str(file.relative_to(folder))
+        for folder in SOURCES
+        for file in folder.rglob("*.py")
         if STARTS_PROCESSES.search(file.read_text("utf-8"))
     }
     assert starting - OTHERS == {*POOLS}

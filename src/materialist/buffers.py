@@ -49,6 +49,7 @@ def _padded(array: Array, kind) -> Array:
     Dr.Jit borrows numpy's memory on the CPU. Its kernels read the last, partly filled vector in full: beyond the end,
     which ends the process where the next page is not mapped. And it compiles them anew for memory aligned otherwise.
     """
+    # One vector more than needed on either side: room to shift the start to a whole vector.
     flat = np.ravel(array)
     memory = np.empty(len(flat) + 2 * WIDEST, kind)
     start = -(memory.ctypes.data // memory.itemsize) % WIDEST

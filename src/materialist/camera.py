@@ -14,6 +14,7 @@ def pixel_rays(camera: Camera) -> Array:
 def rays_through(place: Array, camera: Camera) -> Array:
     """[..., 3] float64 rays through screen positions [..., 2] in pixels (x right, y down), scaled to z = -1."""
     middle = np.array([camera.width, camera.height]) / 2
+    # x_s = f x / z + W / 2, inverted at z = -1; rows run downwards, +Y upwards.
     across = (np.asarray(place, np.float64) - middle) / camera.focal
     return np.stack([across[..., 0], -across[..., 1], -np.ones(across.shape[:-1])], -1)
 
@@ -26,6 +27,8 @@ def rays_at(rays: Array, height: int, width: int) -> Array:
     rows, columns = rays.shape[:2]
     x = rays[0, :, 0].astype(np.float64)
     y = rays[:, 0, 1].astype(np.float64)
+    # Pixel centres of the new size, as shares of the way between the first and the last old
+    # centre.
     across = ((np.arange(width) + 0.5) * columns / width - 0.5) / max(columns - 1, 1)
     down = ((np.arange(height) + 0.5) * rows / height - 0.5) / max(rows - 1, 1)
     places = np.broadcast_arrays(
@@ -45,6 +48,7 @@ def project(points: Array, camera: Camera) -> tuple[Array, Array]:
     Depth is <= 0 behind the camera; the position is then meaningless.
     """
     depth = -points[..., 2]
+    # Points in the plane of the camera have no projection: any finite value will do.
     safe = np.where(np.abs(depth) < 1e-12, 1e-12, depth)
     xs = points[..., 0] / safe * camera.focal + camera.width / 2
     ys = -points[..., 1] / safe * camera.focal + camera.height / 2
@@ -54,6 +58,7 @@ def project(points: Array, camera: Camera) -> tuple[Array, Array]:
 def turn_upright(back: Array) -> Array:
     """[3, 3] rotation whose columns are right, up and the unit direction `back` [3], with right level."""
     right = np.cross([0, 1, 0], back)
+    # Looking straight up or down there is no level direction: any will do.
     right /= max(np.linalg.norm(right), 1e-9)
     return np.stack([right, np.cross(back, right), back], -1)
 

@@ -19,6 +19,7 @@ def srgb_to_linear(srgb: Array) -> Array:
     srgb = np.asarray(srgb)
     if srgb.dtype.kind == "u":  # by table: as exact, and faster
         top = np.iinfo(srgb.dtype).max
+        # A table of all levels.
         return srgb_to_linear(np.arange(top + 1, dtype=np.float32) / np.float32(top))[srgb]
     srgb = np.asarray(srgb, np.float32)
     return np.where(
@@ -40,6 +41,7 @@ def srgb_levels(linear: Array, dtype: type = np.uint8) -> Array:
     top = float(np.iinfo(dtype).max)
     out: Array = np.empty(linear.shape, dtype)
     for start in range(0, len(linear), ROWS):
+        # In float64: a level of 16 bits is near float32's precision at white.
         rows = slice(start, start + ROWS)
         out[rows] = np.round(np.nan_to_num(linear_to_srgb(linear[rows]).astype(np.float64)) * top)
     return out

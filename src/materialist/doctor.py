@@ -71,7 +71,7 @@ def examine(device: str = "auto") -> list[Finding]:
         llvm,
         _renderer(path),
         _cuda(needed=device == "cuda"),
-        *(_package(name, *what) for name, what in _EXTRAS.items()),
+        *(_package(name, *extra) for name, extra in _EXTRAS.items()),
         _weights(),
         _memory(),
         _disk(),
@@ -85,21 +85,23 @@ def _pip(name: str) -> str:
 
 def _llvm() -> tuple[Finding, str | None]:
     try:
-        found = find_llvm()
+        llvm = find_llvm()
     except MaterialistError as error:
         return Finding("LLVM", "broken", str(error), INSTALL_LLVM), None
-    return Finding("LLVM", "ok", f"{found.version} at {found.path}"), str(found.path)
+    return Finding("LLVM", "ok", f"{llvm.version} at {llvm.path}"), str(llvm.path)
 
 
 def _renderer(llvm: str | None) -> Finding:
     broken = partial(Finding, "renderer (CPU)", "broken")
     command = [sys.executable, "-c", _PROBE, *([llvm] if llvm else [])]
     try:
+        # In a child: an unusable LLVM aborts the process.
         child = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         return broken(f"the probe did not finish: {error}", "materialist doctor")
     if child.returncode == 0:
         return Finding("renderer (CPU)", "ok", f"variants {child.stdout.strip()}")
+    # The loader names the missing library; its Debian package follows from the name.
     absent = re.search(r"(lib\S+\.so\S*): cannot open shared object", child.stderr)
     if absent:
         return broken(f"{absent[1]} is missing", f"sudo apt-get install -y {package_of(absent[1])}")
@@ -109,6 +111,7 @@ def _renderer(llvm: str | None) -> Finding:
 
 def _cuda(needed: bool = False) -> Finding:
     """Whether a driver with OptiX answers; broken where a GPU is `needed` and none does."""
+    # The driver's own tool knows the card's name, which the library does not tell.
     tool = shutil.which("nvidia-smi")
     said = ""
     if tool is not None:
@@ -140,6 +143,7 @@ def _weights() -> Finding:
     """Networks fetched from a hub; none is needed for the main job."""
     from materialist.predict.models import KNOWN, is_complete, models_folder
 
+    # Only complete downloads: an interrupted one cannot be used.
     here = [model.name for model in KNOWN if is_complete(model)]
     if here:
         return Finding("hub models", "ok", f"{', '.join(here)} in {models_folder()}")
@@ -150,6 +154,7 @@ def _weights() -> Finding:
 def _memory() -> Finding:
     import psutil
 
+    # What is available, not what is free: caches give way.
     free = psutil.virtual_memory().available / 2**30
     detail = f"{free:.1f} GB free (an inversion at 512 needs up to 4)"
     if free >= 4:

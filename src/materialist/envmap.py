@@ -9,12 +9,15 @@ from materialist.types import Array, Camera
 
 def row_solid_angle(height: int) -> Array:
     """[h] solid angle of one texel of each row of an equirectangular [h, 2h] map, steradians."""
+    # The zone between two polar angles has the solid angle 2 pi (cos a - cos b), shared by 2h
+    # texels.
     edges = np.cos(np.pi * np.arange(height + 1) / height)
     return (edges[:-1] - edges[1:]) * np.pi / height
 
 
 def texel_directions(height: int, width: int, kind: type = np.float32) -> Array:
     """[h, w, 3] unit directions of texel centres, of that floating type, in the frame of the map."""
+    # d(u, v) of the paper in our axes: the middle column looks along -Z, the top row along +Y.
     theta = (np.arange(height) + 0.5)[:, None] / height * np.pi
     phi = ((np.arange(width) + 0.5)[None, :] / width * 2 - 1) * np.pi
     x = np.sin(theta) * np.sin(phi)
@@ -24,6 +27,8 @@ def texel_directions(height: int, width: int, kind: type = np.float32) -> Array:
 
 def sh_basis(direction: Array, degree: int) -> Array:
     """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
+    # Polar axis +Y: the cyclic permutation (z, x, y) of ours is a right-handed frame with +Y as
+    # its z.
     x = direction[..., 2]
     y = direction[..., 0]
     z = direction[..., 1]
@@ -32,6 +37,7 @@ def sh_basis(direction: Array, degree: int) -> Array:
     columns = []
     for order in range(degree + 1):
         for m in range(-order, order + 1):
+            # Real harmonics: sqrt(2) times the real part for m > 0, the imaginary part for m < 0.
             value = sph_harm_y(order, abs(m), theta, phi)
             part = value.real if m >= 0 else value.imag
             columns.append(part if m == 0 else np.sqrt(2) * part)
@@ -53,6 +59,7 @@ def texels_around(direction: Array, shape: tuple[int, ...]) -> tuple[Array, Arra
     y0 = np.floor(y).astype(np.int64)
     fx = x - x0
     fy = y - y0
+    # The azimuth wraps around, the poles do not.
     xs = np.stack([x0 % w, (x0 + 1) % w], -1)
     ys = np.stack([y0, np.minimum(y0 + 1, h - 1)], -1)
     index = ys[:, [0, 0, 1, 1]] * w + xs[:, [0, 1, 0, 1]]
@@ -86,8 +93,10 @@ def paste_visible_sky(
     if surface.all():
         return envmap
     h, w = envmap.shape[:2]
+    # --- Which texels look into the photo, past every surface ---
     place, ahead = project(texel_directions(h, w), camera)
     inside = (ahead > 1e-3) & ((place >= 0) & (place < [camera.width, camera.height])).all(-1)
+    # Columns and rows of the photo; 0 where a texel looks past it.
     c, r = np.moveaxis(np.where(inside[..., None], place, 0).astype(int), -1, 0)
     seen = (inside & ~surface[r, c])[..., None]
 
@@ -106,5 +115,6 @@ def paste_visible_sky(
     total = np.stack([np.bincount(texel, pixels[:, k], h * w) for k in range(3)], -1).reshape(
         h, w, 3
     )
+    # --- Texels with pixels in them take their mean, smaller ones the pixel at their centre ---
     value = np.where(count > 0, total / np.maximum(count, 1), raised(photo[r, c], envmap))
     return np.where(seen, value, envmap).astype(np.float32)

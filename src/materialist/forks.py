@@ -13,6 +13,7 @@ def check_process() -> None:
     global _started_in
     if _started_in is None:
         _started_in = os.getpid()
+    # A fork has copied this module's state, but not the threads.
     if _started_in != os.getpid():
         raise SetupError(
             "This process was forked from one in which Materialist had computed before, whose threads it lacks: it "

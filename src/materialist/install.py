@@ -5,9 +5,12 @@ import shlex
 import sys
 from importlib import metadata
 from importlib.util import find_spec
+from pathlib import Path
 
 DISTRIBUTION = "materialist-photo"
 """Name of this project among distributions: `materialist` is another one's."""
+LABORATORY = "materialist-photo-lab"
+"""The distribution of the benchmarks and the training; its source is the folder lab/ of the repository."""
 
 
 def install_command(*requirements: str) -> str:
@@ -16,9 +19,18 @@ def install_command(*requirements: str) -> str:
     Environments of uv have no pip of their own.
     """
     words = shlex.join(requirements)
+    # This very Python's pip, whatever the shell would find first.
     if find_spec("pip") is not None:
         return f"{sys.executable} -m pip install {words}"
     return f"uv pip install --python {sys.executable} {words}"
+
+
+def laboratory_command() -> str:
+    """A line for a shell that installs the laboratory: from the checkout that this package runs from, if it does."""
+    folder = Path(__file__).resolve().parents[2] / "lab"
+    if (folder / "pyproject.toml").is_file():
+        return install_command("-e", str(folder))
+    return install_command(LABORATORY)
 
 
 def extra_command(extra: str) -> str:
@@ -32,6 +44,7 @@ def extra_requirements(extra: str) -> list[str]:
         every = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
         every = []
+    # Metadata has lines such as: rawpy>=0.21; extra == "raw".
     marked = re.compile(rf"(.+?)\s*;.*extra == ['\"]{re.escape(extra)}['\"]")
-    found = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
-    return found or [f"{DISTRIBUTION}[{extra}]"]
+    requirements = [match[1].replace(" ", "") for match in map(marked.match, every) if match]
+    return requirements or [f"{DISTRIBUTION}[{extra}]"]

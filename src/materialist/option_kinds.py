@@ -37,7 +37,7 @@ class Option:
     choices: tuple[str, ...] = ()
     """Words that the option takes beside the values of its kind."""
     count: int = 1
-    """Of `numbers`: how many."""
+    """Of the kind `numbers`: how many."""
     many: bool = False
     called: str = ""
     """Name in messages, where the field's own is not a good one."""
@@ -55,10 +55,10 @@ class Option:
         """The value in the type of the field. Raises InputError that names the value and what may be given."""
         called = self.called or name.replace("_", " ")
         if isinstance(value, str) and value in self.choices:
-            return str(value)  # of an enum of the command line, too
+            return value
         check = _CHECKS[self.kind]
         if self.many:
-            return tuple(check(self, called, one) for one in several(value))
+            return tuple(check(self, called, item) for item in several(value))
         return check(self, called, value)
 
     def spells(self, name: str) -> list[str]:
@@ -67,6 +67,7 @@ class Option:
 
     def meaning(self, name: str, default: Any) -> str:
         """A line of a docstring: what the option means, what it takes, and its default."""
+        # --- What it takes: words, and a range where it has one ---
         words = [repr(word) for word in self.choices]
         if self.kind in ("number", "whole", "span", "shift") and math.isfinite(self.low):
             span = f"{self.ends[0]}{_text(self.low)}, {_text(self.high)}{self.ends[1]}"
@@ -75,9 +76,9 @@ class Option:
         return f"{name}: {self.help}{takes} Default: {default!r}."
 
 
-def option(default: Any, help: str, **told: Any) -> Any:
-    """A field of an options class; `told` are the other fields of `Option`."""
-    return field(default=default, metadata={"option": Option(help, **told)})
+def option(default: Any, help: str, **facts: Any) -> Any:
+    """A field of an options class; `facts` are the other fields of `Option`."""
+    return field(default=default, metadata={"option": Option(help, **facts)})
 
 
 def documented(kind: "type[OperationOptions]") -> Callable[[Function], Function]:
@@ -103,6 +104,7 @@ class OperationOptions:
     def __post_init__(self) -> None:
         for name, (declared, default) in declarations(type(self)).items():
             value = getattr(self, name)
+            # None is a value only where it is the default: such an option may be left out.
             if value is not None or default is not None:
                 object.__setattr__(self, name, declared.checked(name, value))
 
@@ -112,6 +114,7 @@ class OperationOptions:
         known = declarations(cls)
         for name in values:
             if name not in known:
+                # A misspelt name: say which one is meant.
                 near = difflib.get_close_matches(name, known, 1)
                 meant = f" Do you mean '{near[0]}'?" if near else ""
                 raise InputError(
@@ -138,12 +141,13 @@ class OperationOptions:
             if name not in values:
                 continue
             if declared.needs and declared.needs not in values and values[name] != default:
-                own, other = (
-                    known[n][0].spells(n)[0] if flags else n for n in (name, declared.needs)
-                )
+                needed = declared.needs
+                this = declared.spells(name)[0] if flags else name
+                other = known[needed][0].spells(needed)[0] if flags else needed
                 raise InputError(
-                    f"{own} says nothing without {other}; give that, too, or leave {own} out."
+                    f"{this} says nothing without {other}; give that, too, or leave {this} out."
                 )
+            # Files are named relative to the list of edits that names them.
             if declared.kind == "file" and values[name] not in declared.choices:
                 values[name] = beside(folder, name, values[name])
         return cls.given(cls(**defaults), **values)
@@ -151,20 +155,23 @@ class OperationOptions:
 
 def declarations(kind: type[OperationOptions]) -> dict[str, tuple[Option, Any]]:
     """Name of a field -> (what is known of it, its default); the fields of the class itself come first."""
-    inherited = {one.name for base in kind.__bases__ for one in fields(base)}
-    found = sorted(fields(kind), key=lambda one: one.name in inherited)
-    return {one.name: (one.metadata["option"], one.default) for one in found}
+    inherited = {entry.name for base in kind.__bases__ for entry in fields(base)}
+    ordered = sorted(fields(kind), key=lambda entry: entry.name in inherited)
+    return {entry.name: (entry.metadata["option"], entry.default) for entry in ordered}
 
 
 def _listing(kind: type[OperationOptions]) -> str:
     """The options of a class as lines of a docstring; `kind` need not be a dataclass yet."""
-    own = {name: value for name, value in vars(kind).items() if isinstance(value, Field)}
+    # A dataclass has its fields in `__dataclass_fields__`; before that they are its attributes.
+    declared = {name: value for name, value in vars(kind).items() if isinstance(value, Field)}
     inherited = getattr(kind, "__dataclass_fields__", {})
-    every = {
-        name: one for name, one in (own | {**inherited, **own}).items() if "option" in one.metadata
-    }
-    lines = [one.metadata["option"].meaning(name, one.default) for name, one in every.items()]
-    return "\n".join(["Options:", *(f"    {line}" for line in lines)])
+    # Fields of the class itself come first.
+    entries = declared | {**inherited, **declared}
+    lines = []
+    for name, entry in entries.items():
+        if "option" in entry.metadata:
+            lines.append(f"    {entry.metadata['option'].meaning(name, entry.default)}")
+    return "\n".join(["Options:", *lines])
 
 
 def beside(folder: Path, name: str, value: Any) -> Path:
@@ -178,23 +185,23 @@ def several(value: Any) -> list[Any]:
     """A single value, or a list of them: of lists, of texts such as 310,220, or of objects; also from an array."""
     value = getattr(value, "tolist", lambda: value)()
     plural = isinstance(value, list | tuple) and all(
-        not isinstance(one, str | Real) or "," in str(one) for one in value
+        not isinstance(item, str | Real) or "," in str(item) for item in value
     )
     return list(value) if plural else [value]
 
 
-def numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
+def parse_numbers(value: Any, count: int, called: str) -> tuple[float, ...]:
     """`count` numbers from a sequence, or from a text such as 310,220. Raises InputError."""
     parts = value.split(",") if isinstance(value, str) else value
     try:
-        found = tuple(float(part) for part in parts)
+        values = tuple(float(part) for part in parts)
     except (TypeError, ValueError, OverflowError):
-        found = ()
-    if len(found) != count or not all(map(math.isfinite, found)):
+        values = ()
+    if len(values) != count or not all(map(math.isfinite, values)):
         raise InputError(
             f"The {called} must be {count} numbers, with commas between them, not {value!r}."
         )
-    return found
+    return values
 
 
 def parse_colour(colour: Any, name: str = "albedo") -> Colour:
@@ -202,6 +209,7 @@ def parse_colour(colour: Any, name: str = "albedo") -> Colour:
 
     Raises InputError, which says what colour of what `name`.
     """
+    # --- "#rrggbb" is sRGB as in every editor; numbers are linear ---
     if isinstance(colour, str) and colour.startswith("#"):
         import numpy as np
 
@@ -228,13 +236,16 @@ def _number(declared: Option, called: str, value: Any) -> Any:
     high = declared.high
     ends = declared.ends
     try:
+        # True is no 1: a switch that was meant is an error.
         if isinstance(value, bool):
             raise TypeError
+        # A whole number stays one, so that messages and files show it as it was given.
         number = float(value)
         number = value if isinstance(value, int) else number
     except (TypeError, ValueError, OverflowError) as error:
         or_else = "".join(f", or {word}" for word in declared.choices)
         raise InputError(f"The {called} must be a number{or_else}, not {value!r}.") from error
+    # Ends that do not belong to the range, by its brackets.
     excluded = [end for end, mark in zip((low, high), ends) if mark in "()"]
     if not (math.isfinite(number) and low <= number <= high) or number in excluded:
         span = (
@@ -252,6 +263,7 @@ def _text(number: float) -> str:
 def _span(declared: Option, called: str, value: Any) -> Any:
     """A number, or the two that a film goes through: a pair, or a text such as 30..90."""
     ends = value.split("..") if isinstance(value, str) else value
+    # So that the message of a wrong value names this form.
     declared = replace(declared, choices=("A..B",))
     if isinstance(ends, list | tuple) and len(ends) == 2:
         return tuple(_number(declared, called, end) for end in ends)
@@ -267,6 +279,7 @@ def _whole(declared: Option, called: str, value: Any) -> int:
 
 def _shift(declared: Option, called: str, value: Any) -> float | str:
     """A number in the range, or a text with a sign that shifts by as much as the range is wide."""
+    # A sign makes it a shift; a number without one sets the value.
     if isinstance(value, str) and value.strip()[:1] in ("+", "-"):
         width = declared.high - declared.low
         _number(replace(declared, low=-width, high=width), f"{called} shift", value)
@@ -309,6 +322,7 @@ def _size(declared: Option, called: str, value: Any) -> tuple[int, int]:
         width, height = (_whole(declared, called, part) for part in parts)
     except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"The {called} must look like 512x256, not {value!r}.") from error
+    # Twice as wide as high: equirectangular.
     if width != 2 * height or not 8 <= height <= 4096:
         raise InputError(
             f"The {called} is {width}x{height}; it must be twice as wide as high, from 16x8 to 8192x4096."
@@ -318,7 +332,7 @@ def _size(declared: Option, called: str, value: Any) -> tuple[int, int]:
 
 def _lamp(declared: Option, called: str, value: Any) -> Any:
     """A lamp itself, or what `materialist.lamp` makes one of."""
-    return numbers(value, 5, called) if isinstance(value, str | list | tuple) else value
+    return parse_numbers(value, 5, called) if isinstance(value, str | list | tuple) else value
 
 
 def _function(declared: Option, called: str, value: Any) -> Any:
@@ -327,20 +341,21 @@ def _function(declared: Option, called: str, value: Any) -> Any:
         return value
     from runpy import run_path
 
+    # From the right: Windows paths have a colon, too.
     path, _, name = str(value).rpartition(":")
     if not Path(path).is_file():
         raise InputError(
             f"The {called} is {value}; give FILE.py:FUNCTION, with a file that is there."
         )
     try:
-        found = run_path(path).get(name)
+        function = run_path(path).get(name)
     except Exception as error:  # whatever a user's file raises
         raise InputError(
             f"The {called} {path} cannot be run: {type(error).__name__}: {error}."
         ) from error
-    if not callable(found):
+    if not callable(function):
         raise InputError(f"The {called} {path} has no function '{name}'; write FILE.py:FUNCTION.")
-    return found
+    return function
 
 
 _CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
@@ -349,7 +364,7 @@ _CHECKS: dict[str, Callable[[Option, str, Any], Any]] = {
     "function": _function,
     "whole": _whole,
     "shift": _shift,
-    "numbers": lambda declared, called, value: numbers(value, declared.count, called),
+    "numbers": lambda declared, called, value: parse_numbers(value, declared.count, called),
     "colour": lambda declared, called, value: parse_colour(value, called),
     "paint": _paint,
     "switch": _switch,

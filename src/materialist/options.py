@@ -43,6 +43,7 @@ class MaterialEdit(OperationOptions):
     """Another material inside a region."""
 
     operation = "edit"
+    # The colour: moved, or replaced by one colour or a texture.
     hue: float = option(
         0.0, "Turn the albedo's hue, degrees.", low=-3600, high=3600, unit="degrees"
     )
@@ -58,8 +59,10 @@ class MaterialEdit(OperationOptions):
     texture_scale: float = option(
         1.0, "Its size; 1 covers the region once.", low=0, high=100, ends="(]", needs="texture"
     )
+    # The other maps.
     roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **_SHIFT)
     metallic: float | str | None = option(None, "The same for metallic.", **_SHIFT)
+    # The region.
     grow: float = option(
         0.0,
         "Grow the region, or shrink it (below 0), by this share of the picture's longer side.",
@@ -76,6 +79,7 @@ class Removal(OperationOptions):
     """An object taken away, and what fills its place."""
 
     operation = "remove"
+    # What fills the place.
     background: Array | str | Path | None = option(
         None,
         "The same view without the object, in place of inpainting.",
@@ -87,6 +91,7 @@ class Removal(OperationOptions):
         None, "A diffusion model: a folder, or owner/name.", kind="name", metavar="sd:MODEL"
     )
     """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None copies patches."""
+    # How far around the object.
     shadow: float | None = option(
         None,
         "How far its shadow and reflection on the ground are filled, too, share of its size; auto: 0.15.",
@@ -118,6 +123,7 @@ class Glass(Removal):
     """An object turned to glass, before what it hid."""
 
     operation = "glass"
+    # The material.
     ior: float = option(
         1.5,
         "Index of refraction, 1 to 3: water 1.33, glass 1.5.",
@@ -134,8 +140,10 @@ class Glass(Removal):
     )
     """Of white light after a way in and a way out."""
     roughness: float = option(0.0, "0 is clear, 0.3 frosted.", **_SHARE)
+    # The body.
     hollow: bool | str = option(False, "A wall around air.", kind="switch", choices=("open",))
     """`open`: and without a lid, for what is a surface of revolution."""
+    # How it is rendered.
     model: str = option(
         "closed",
         "closed: path-traced; two-interface: as in the paper.",
@@ -182,6 +190,7 @@ class Relight(OperationOptions):
         None, "The lights that `dim` means.", kind="any", flag=None, written=False
     )
     """[H, W] bool at working size; None takes those that are found."""
+    # The light from around.
     envmap: Array | str | Path | None = option(
         None, "Another light: EXR or HDR, 2:1.", kind="file", metavar="FILE"
     )
@@ -205,6 +214,7 @@ class Relight(OperationOptions):
         unit="degrees",
         metavar="DEG|A..B",
     )
+    # Lights that are added.
     sun: tuple[float, float] | None = option(
         None,
         "A sun: degrees right of ahead, and above the horizon.",
@@ -289,6 +299,7 @@ class InvertOptions(OperationOptions):
     depth: str | None = option(
         None, "Where the depth comes from (also depth-anything, moge:DIR).", **_PREDICTOR
     )
+    # How it is fitted.
     engine: str = option(
         "transport",
         "Cached light transport, or the paper's path tracing.",
@@ -305,6 +316,7 @@ class InvertOptions(OperationOptions):
     steps: int | None = option(
         None, "At most this many steps in each stage of the fit.", kind="whole", low=1, metavar="N"
     )
+    # How the photo is read.
     fov: float | str = option(
         "auto",
         "Horizontal field of view in degrees, or auto: EXIF, else 35.",
@@ -334,6 +346,7 @@ class InvertOptions(OperationOptions):
         metavar="NAME",
     )
     """A Photo keeps the layer that it was read with."""
+    # The scene around.
     envmap_size: tuple[int, int] = option(
         (512, 256), "Size of the environment map.", kind="size", metavar="WxH"
     )
@@ -367,6 +380,7 @@ class InvertOptions(OperationOptions):
     )
     seed: int = option(0, "Equal seeds give equal scenes on one machine.", **_SEED)
     device: str = option("auto", "Where to compute.", **_DEVICE)
+    # In Python alone.
     settings: Any = option(None, "FitSettings in place of the preset.", kind="any", flag=None)
     prior: Prediction | Prior | None = option(
         None,

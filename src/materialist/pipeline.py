@@ -19,22 +19,24 @@ from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.io.given import PhotoInput, photo_of
 from materialist.io.image import read_mask
+from materialist.io.out.residual import shading_residual
 from materialist.io.photo import HDR_CLIP, exposed
 from materialist.keywords import InvertKeywords
-from materialist.metrics.residual import shading_residual
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
+from materialist.threads import fixed_threads
 from materialist.types import Array, FitReport, Photo, Prediction, Prior, Scene
 
 if TYPE_CHECKING:
     from materialist.fit.invert import FitResult
 
-SMALL = 0.05
+MIN_DEPTH = 0.05
 """Least median depth for which the path tracer's offsets are small."""
 
 
 @documented(InvertOptions)
+@fixed_threads()
 def invert(
     photo: PhotoInput,
     options: InvertOptions | None = None,
@@ -71,8 +73,9 @@ def invert(
         stages.append({"name": name, "seconds": round(now - last, 3)})
         last = now
 
-    wanted = InvertOptions.given(options, **values)
-    preset = "paper" if wanted.engine == "path" else wanted.preset
+    # --- Read the photo, at working size ---
+    choices = InvertOptions.given(options, **values)
+    preset = "paper" if choices.engine == "path" else choices.preset
     tick = progress or (lambda *_: None)
     tell = on_stage or (lambda *_: None)
     tick("read", 0, 1)
@@ -80,50 +83,56 @@ def invert(
         picture = exposed(photo)
     else:
         picture = photo_of(
-            photo, encoded=encoded, size=wanted.size, fov=wanted.fov, layer=wanted.layer
+            photo, encoded=encoded, size=choices.size, fov=choices.fov, layer=choices.layer
         )
-    if isinstance(photo, Photo) and wanted.fov != "auto":
+    # A photo that was read elsewhere keeps its pixels; only its field of view is replaced.
+    if isinstance(photo, Photo) and choices.fov != "auto":
         picture = replace(
             picture,
-            camera=replace(picture.camera, fov=cast(float, wanted.fov)),
+            camera=replace(picture.camera, fov=cast(float, choices.fov)),
             fov_source="option",
         )
-    mask = _mask(wanted.mask, picture)
+    mask = _mask(choices.mask, picture)
     lap("read")
+
+    # --- Predict the prior ---
     tick("predict", 0, 1)
-    picture, prior = _prior(picture, wanted)
+    picture, prior = _prior(picture, choices)
     lap("predict")
     if mask is not None and not (mask & (prior.depth > 0)).any():
         raise InputError("The mask lies wholly where there is no surface (sky); mark an object.")
     tell("prior", prior)
 
+    # --- Fit light and materials; the renderer is loaded only now ---
     from materialist.render.variant import setup
 
-    setup(wanted.device)
+    setup(choices.device)
     from materialist.fit import invert as fitting
     from materialist.fit.invert import FitSetup
     from materialist.fit.optimise import never
     from materialist.fit.settings import preset as named
 
-    settings = wanted.settings or named(preset, hdr=picture.hdr)
-    if wanted.steps is not None:
-        settings = settings.at_most(wanted.steps)
+    settings = choices.settings or named(preset, hdr=picture.hdr)
+    if choices.steps is not None:
+        settings = settings.at_most(choices.steps)
     fit_setup = FitSetup(
         picture,
         prior,
         settings,
-        wanted.completion,
-        wanted.engine,
-        envmap_height=wanted.envmap_size[1],
-        tau=wanted.tau,
+        choices.completion,
+        choices.engine,
+        envmap_height=choices.envmap_size[1],
+        tau=choices.tau,
         mask=mask,
-        strategy=wanted.strategy,
-        seed=wanted.seed,
-        device=wanted.device,
-        spp=wanted.spp,
+        strategy=choices.strategy,
+        seed=choices.seed,
+        device=choices.device,
+        spp=choices.spp,
     )
     lap("setup")
     best = fitting.invert(fit_setup, progress=progress, found=tell, stop=stop or never)
+
+    # --- The scene, with where everything came from ---
     report = _report(picture, prior, best, (*stages, *best.stages), start)
     return Scene(
         camera=picture.camera,
@@ -140,62 +149,65 @@ def invert(
             "tool_version": __version__,
             "predictor": prior.predictor,
             "sources": prior.sources,
-            "engine": wanted.engine,
+            "engine": choices.engine,
             "preset": preset,
-            "steps": wanted.steps,
+            "steps": choices.steps,
             "completion": fit_setup.completion,
-            "completion_asked": wanted.completion,
-            "tau": wanted.tau,
-            "strategy": wanted.strategy,
+            "completion_asked": choices.completion,
+            "tau": choices.tau,
+            "strategy": choices.strategy,
             "mask": _named(mask),
-            "settings": asdict(settings) if wanted.settings else None,
-            "seed": wanted.seed,
+            "settings": asdict(settings) if choices.settings else None,
+            "seed": choices.seed,
             "spp": best.spp,
-            "size": wanted.size,
-            "envmap_size": list(wanted.envmap_size),
+            "size": choices.size,
+            "envmap_size": list(choices.envmap_size),
             "fov": picture.camera.fov,
             "fov_source": picture.fov_source,
         },
     )
 
 
-def _prior(picture: Photo, wanted: InvertOptions) -> tuple[Photo, Prediction]:
+def _prior(picture: Photo, choices: InvertOptions) -> tuple[Photo, Prediction]:
     """The photo as the predictor sees it, and the prior."""
-    known = wanted.prior
+    known = choices.prior
     if known is not None and not isinstance(known, Prediction | Prior):
         raise InputError(
             f"The prior is a {type(known).__name__}; give a materialist.Prior of arrays, or a Prediction."
         )
+    # --- A whole prediction is the prior as it is ---
     if isinstance(known, Prediction):
-        given, (height, width) = known, picture.linear.shape[:2]
-        for values in (*vars(given.materials).values(), given.normal, given.depth):
+        height, width = picture.linear.shape[:2]
+        for values in (*vars(known.materials).values(), known.normal, known.depth):
             if values.shape[:2] != (height, width):
                 raise InputError(
                     f"The prior has {values.shape[1]} x {values.shape[0]} pixels, the photo {width} x {height} at "
                     "working size; give maps of that size, or another working size."
                 )
-        return picture, given
+        return picture, known
     from materialist.predict import get_predictor
 
+    # --- Else a predictor, with maps that are known in place of its own ---
     parts = {
-        name: getattr(wanted, name)
+        name: getattr(choices, name)
         for name in ("albedo", "roughness", "metallic", "normal", "depth")
     }
-    source = get_predictor(wanted.predictor, device=wanted.device, prior=known, **parts)
+    source = get_predictor(choices.predictor, device=choices.device, prior=known, **parts)
     picture = _seen_by(source, picture)
-    prediction = source.predict(picture, seed=wanted.seed)
-    if not (prediction.depth > 0).any():
+    result = source.predict(picture, seed=choices.seed)
+    if not (result.depth > 0).any():
         raise InputError(
             'The predictor found no surface in the photo; give a depth map, as in `depth="maps:DIR"`.'
         )
-    middle = float(np.median(prediction.depth[prediction.depth > 0]))
-    if middle < SMALL:
+    middle = float(np.median(result.depth[result.depth > 0]))
+    # Offsets of rays are absolute: in a tiny scene they are as large as its details.
+    if middle < MIN_DEPTH:
         note = (
             f"Depth is {middle:.3g} in the median. Rays start about 0.0001 off a surface, which thins out its shadows; "
-            f"give depth in a smaller unit, so that the median is {SMALL:g} or more."
+            f"give depth in a smaller unit, so that the median is {MIN_DEPTH:g} or more."
         )
-        prediction = replace(prediction, warnings=(*prediction.warnings, note))
-    return picture, prediction
+        result = replace(result, warnings=(*result.warnings, note))
+    return picture, result
 
 
 def render_scene(
@@ -213,10 +225,12 @@ def render_scene(
 
 
 def _report(
-    picture: Photo, prior: Prediction, found: FitResult, stages: tuple[dict, ...], start: float
+    picture: Photo, prior: Prediction, result: FitResult, stages: tuple[dict, ...], start: float
 ) -> FitReport:
-    materials = found.materials
-    halves = [np.nan_to_num(half, posinf=0) for half in found.halves]
+    """Figures and warnings of a fit."""
+    # Two halves with independent noise: their difference tells how much of the error is noise.
+    materials = result.materials
+    halves = [np.nan_to_num(half, posinf=0) for half in result.halves]
     rerender = (halves[0] + halves[1]) / 2
     surface = prior.depth > 0
     distance = {
@@ -225,11 +239,12 @@ def _report(
         )
         for name in ("albedo", "roughness", "metallic")
     }
+    # --- Where the photo cannot be trusted, or the fit does not explain it ---
     residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
     white = HDR_CLIP if picture.hdr else CLIPPED
     clipped = float((picture.linear >= white).any(-1).mean())
     notes = [*picture.warnings, *prior.warnings]
-    if lost := int((~np.isfinite(found.rerender).all(-1)).sum()):
+    if lost := int((~np.isfinite(result.rerender).all(-1)).sum()):
         notes.append(
             f"{lost} pixels of the re-rendering are no numbers; look for wild values in the depth and normals."
         )
@@ -237,10 +252,10 @@ def _report(
         notes.append(
             f"{clipped:.0%} of the photo's pixels are clipped: light and albedo there are lower bounds."
         )
-    if is_peaked(found.envmap):
+    if is_peaked(result.envmap):
         notes.append("The photo has hard light: its shadows may be baked into the albedo.")
-    if found.stopped:
-        last = [stage for stage in found.stages if "steps" in stage][-1]
+    if result.stopped:
+        last = [stage for stage in result.stages if "steps" in stage][-1]
         notes.append(
             f"The fit was stopped in its stage '{last['name']}', after {last['steps']} steps."
         )
@@ -265,6 +280,7 @@ def _report(
 
 def peak_rss_mb() -> float:
     """The most memory that this process has held, MB; macOS counts in bytes, Linux in kB."""
+    # `ru_maxrss` has another unit on each system.
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (
         2**20 if sys.platform == "darwin" else 2**10
     )
@@ -295,19 +311,19 @@ def _seen_by(source, picture: Photo) -> Photo:
     )
 
 
-def _mask(given: Array | str | Path | None, picture: Photo) -> Array | None:
+def _mask(mask: Array | str | Path | None, picture: Photo) -> Array | None:
     """[H, W] bool of an array or a file. Raises InputError for one of another size or type, or empty."""
-    if given is None:
+    if mask is None:
         return None
     shape = picture.linear.shape[:2]
-    if isinstance(given, str | Path):
-        given = read_mask(given, shape, picture.original.shape[:2])
-    if given.shape != shape:
+    if isinstance(mask, str | Path):
+        mask = read_mask(mask, shape, picture.original.shape[:2])
+    if mask.shape != shape:
         raise InputError(
-            f"Mask is {given.shape}, the photo at working size is {shape} (rows, columns)."
+            f"Mask is {mask.shape}, the photo at working size is {shape} (rows, columns)."
         )
-    if given.dtype != bool:
-        raise InputError(f"Mask holds {given.dtype}; give truth values, for example mask > 0.5.")
-    if not given.any():
+    if mask.dtype != bool:
+        raise InputError(f"Mask holds {mask.dtype}; give truth values, for example mask > 0.5.")
+    if not mask.any():
         raise InputError("The mask is empty; mark at least one pixel.")
-    return given
+    return mask

@@ -16,37 +16,40 @@ class Record:
 
     def __repr__(self) -> str:
         shown = []
-        for one in fields(self):  # type: ignore[arg-type]
-            if one.repr:
-                shown.append(f"{one.name}={_short(getattr(self, one.name))}")
+        for field in fields(self):  # type: ignore[arg-type]
+            if field.repr:
+                shown.append(f"{field.name}={_short(getattr(self, field.name))}")
         return f"{type(self).__name__}({', '.join(shown)})"
 
 
-def same(one: Any, other: Any) -> bool:
+def same(first: Any, second: Any) -> bool:
     """Whether two values are equal, arrays by their numbers; NaN equals NaN, and a list the tuple of its items."""
-    if one is other:
+    if first is second:
         return True
-    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
-        return _same_arrays(np.asarray(one), np.asarray(other))
-    if isinstance(one, Record):
-        names = [field.name for field in fields(one)]  # type: ignore[arg-type]
-        return type(one) is type(other) and all(
-            same(getattr(one, n), getattr(other, n)) for n in names
+    # Arrays by their numbers: `==` would give an array of truth values.
+    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
+        return _same_arrays(np.asarray(first), np.asarray(second))
+    if isinstance(first, Record):
+        names = [field.name for field in fields(first)]  # type: ignore[arg-type]
+        return type(first) is type(second) and all(
+            same(getattr(first, n), getattr(second, n)) for n in names
         )
-    if isinstance(one, dict) and isinstance(other, dict):
-        return one.keys() == other.keys() and all(
-            same(value, other[key]) for key, value in one.items()
+    if isinstance(first, dict) and isinstance(second, dict):
+        return first.keys() == second.keys() and all(
+            same(value, second[key]) for key, value in first.items()
         )
-    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
-        return len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, float) and isinstance(other, float) and one != one:
-        return other != other
-    return bool(one == other)
+    if isinstance(first, list | tuple) and isinstance(second, list | tuple):
+        return len(first) == len(second) and all(map(same, first, second))
+    # NaN differs from itself: two of them count as equal.
+    if isinstance(first, float) and isinstance(second, float) and first != first:
+        return second != second
+    return bool(first == second)
 
 
-def _same_arrays(one: Array, other: Array) -> bool:
-    floats = one.dtype.kind == other.dtype.kind == "f"
-    return np.array_equal(one, other, equal_nan=floats)
+def _same_arrays(first: Array, second: Array) -> bool:
+    # numpy compares NaN with NaN in floats alone.
+    floats = first.dtype.kind == second.dtype.kind == "f"
+    return np.array_equal(first, second, equal_nan=floats)
 
 
 def _short(value: Any) -> str:

@@ -25,10 +25,10 @@ _SHOWN = 960
 def _numbers(value: Any, count: int) -> tuple[float, ...]:
     """`count` finite numbers as Python's; none where the value is anything else."""
     try:
-        found = tuple(np.asarray(value, np.float64).ravel().tolist())
+        numbers = tuple(np.asarray(value, np.float64).ravel().tolist())
     except (TypeError, ValueError):
         return ()
-    return found if len(found) == count and all(np.isfinite(found)) else ()
+    return numbers if len(numbers) == count and all(np.isfinite(numbers)) else ()
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,10 @@ class Camera:
 
     def __post_init__(self) -> None:
         """NumPy's numbers become Python's, as files and other programs need them. Raises InputError for others."""
-        width, height, fov = (
-            _numbers(getattr(self, name), 1) for name in ("width", "height", "fov")
-        )
+        # Each is a tuple of one number, or empty where it is none.
+        width = _numbers(self.width, 1)
+        height = _numbers(self.height, 1)
+        fov = _numbers(self.fov, 1)
         if not (
             width
             and height
@@ -64,6 +65,7 @@ class Camera:
     @property
     def focal(self) -> float:
         """Focal length in pixels."""
+        # W / 2 pixels span half the field of view.
         return 0.5 * self.width / float(np.tan(np.radians(self.fov) / 2))
 
 
@@ -222,6 +224,7 @@ class Lamp:
     @property
     def radiance(self) -> tuple[float, float, float]:
         """Of its surface, in R, G, B: power / (4 pi^2 radius^2)."""
+        # A surface of radiance L sends out the flux pi L times its area, 4 pi r^2.
         r, g, b = (float(c) / (4 * np.pi**2 * self.radius**2) for c in self.power)
         return r, g, b
 
@@ -312,6 +315,7 @@ class Scene(Record):
     def __repr__(self) -> str:
         camera = self.camera
         edits = self.provenance.get("edits", ())
+        # What edits have added, each as singular, plural, items.
         counts = (
             ("edit", "edits", edits),
             ("lamp", "lamps", self.lamps),
@@ -325,14 +329,15 @@ class Scene(Record):
         quality = self.report.metrics.get("rerender_psnr_path")
         facts += [] if quality is None else [f"re-rendering {quality:.1f} dB"]
         facts += [
-            f"{len(items)} {many if len(items) > 1 else one}"
-            for one, many, items in counts
+            f"{len(items)} {plural if len(items) > 1 else singular}"
+            for singular, plural, items in counts
             if items
         ]
         return f"<Scene {self.photo.name}: {', '.join(facts)}>"
 
     def _repr_png_(self) -> bytes:
         """For notebooks: the photo beside its re-rendering, as a PNG."""
+        # Imported here: a scene is used without ever being shown.
         import cv2
 
         from materialist.color import srgb_levels

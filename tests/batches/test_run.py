@@ -10,7 +10,7 @@ from PIL import Image
 
 from materialist.batches.ledger import LEDGER, read_events
 from materialist.batches.results import package_hash
-from materialist.errors import InputError, SetupError
+from materialist.errors import InputError, OutputError, SetupError
 
 RECIPE = "- edit:\n    mask: masks/{name}.png\n    hue: 90\n"
 
@@ -96,6 +96,15 @@ def test_what_every_photo_lacks_stops_the_batch_at_once(tmp_path):
         run(source, tmp_path / "runs")
     summary = json.loads((tmp_path / "runs/summary.json").read_text())
     assert summary["open"] == 30 and summary["failed"] == 0
+
+
+def test_a_full_disk_stops_the_batch_at_once(tmp_path):
+    source = photos(tmp_path / "in", *(f"full{k}" for k in range(30)))
+    with pytest.raises(OutputError, match="make room"):
+        run(source, tmp_path / "runs")
+    summary = json.loads((tmp_path / "runs/summary.json").read_text())
+    assert summary["open"] + summary["failed"] == 30
+    assert summary["failed"] <= 1
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,7 @@ def test_visible_normals_have_the_moments_of_their_density(alpha, cos_o):
     sin_o = float(np.sqrt(1 - cos_o**2))
     wo = mi.Vector3f(sin_o, 0, cos_o)
     sampled = np.array(
-        lobes.visible_normal(
+        lobes.visible_normal_vector(
             wo, mi.Float(alpha), mi.Point2f(*np.random.default_rng(0).random((2, 1 << 16)))
         )
     ).astype(np.float64)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import typer
 from made_pipeline import install
+from made_program import heavy_after, options_of
 from PIL import Image
 
 from materialist import __version__
@@ -131,8 +132,6 @@ def test_exit_codes(run, photo, tmp_path, monkeypatch, failure, code):
         (["invert", "PHOTO", "-o", "/proc/x.scene"], "/proc/x.scene"),
         (["render", "nothing.scene", "-o", "OUT.png"], "nothing.scene"),
         (["render", "nothing.scene", "-o", "OUT.gif"], ".png"),
-        (["bench", "light", "-o", "OUT", "--data", "nowhere"], "nowhere"),
-        (["bench", "light", "-o", "OUT", "ten"], "ten"),
     ],
 )
 def test_bad_input_is_exit_2_before_any_work(
@@ -144,28 +143,6 @@ def test_bad_input_is_exit_2_before_any_work(
     ]
     assert words in refused(*filled)
     assert not calls and os.listdir(tmp_path) == ["photo.png"]
-
-
-def test_bench_dispatches_with_extra_options(done, tmp_path, monkeypatch):
-    from materialist import bench
-
-    seen = {}
-    monkeypatch.setattr(
-        bench, "run", lambda name, **options: seen.update(options, name=name), raising=False
-    )
-    done("bench", "light", "--scenes", 10, "--quick", "size=64", "--rate=0.5", "-o", tmp_path / "r")
-    assert seen.pop("output") == tmp_path / "r"
-    assert seen == {
-        "name": "light",
-        "data": None,
-        "seed": 0,
-        "device": "auto",
-        "force": False,
-        "scenes": "10",
-        "quick": True,
-        "size": "64",
-        "rate": "0.5",
-    }
 
 
 @pytest.mark.parametrize(
@@ -192,15 +169,7 @@ def test_help_names_a_flag_for_every_option(run, command, kind):
 
 
 def test_starting_loads_nothing_heavy():
-    script = (
-        "import sys, materialist, materialist.cli\n"
-        "heavy = 'torch mitsuba drjit cv2 matplotlib OpenEXR scipy skimage PIL rawpy pillow_heif numpy'.split()\n"
-        "sys.exit(','.join(name for name in heavy if name in sys.modules) or 0)"
-    )
-    child = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, check=False
-    )
-    assert child.returncode == 0, f"importing the command line loads {child.stderr.strip()}"
+    assert not heavy_after("import materialist, materialist.cli")
 
 
 def told_to_end(script, word, number):
@@ -248,15 +217,10 @@ def test_a_terminated_command_takes_its_unfinished_files_away(tmp_path):
 
 def test_every_command_takes_seed_device_and_json():
     """What scripts pass to all of them, but for those that compute nothing."""
-
-    def commands(group, name=""):
-        for word, command in getattr(group, "commands", {}).items():
-            yield from commands(command, f"{name} {word}".strip())
-        if not hasattr(group, "commands"):
-            yield name, {option for parameter in group.params for option in parameter.opts}
-
-    found = dict(commands(typer.main.get_command(app)))
-    assert {"invert", "studio", "doctor", "train refraction", "bench"} <= set(found)
-    lacking = {name: {"--seed", "--device", "--json"} - options for name, options in found.items()}
+    lacking = {
+        name: {"--seed", "--device", "--json"} - options
+        for name, options in options_of(typer.main.get_command(app)).items()
+    }
+    assert {"invert", "studio", "doctor", "batch"} <= set(lacking)
     idle = {"models list", "models download", "models verify"}
     assert {name for name, options in lacking.items() if options} == idle

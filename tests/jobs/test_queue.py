@@ -21,7 +21,7 @@ def ask(jobs: JobQueue, how: str, folder, owner: str = "me") -> Job:
 def test_results_failures_and_the_queue_goes_on(jobs, tmp_path):
     good, sad, bug, dead = (ask(jobs, how, tmp_path) for how in ("found", "fail", "bug", "die"))
     until(lambda: dead.over)
-    assert good.state == DONE and good.found == [{"name": "albedo", "file": "a.jpg"}]
+    assert good.state == DONE and good.intermediate == [{"name": "albedo", "file": "a.jpg"}]
     assert sad.state == FAILED and sad.message == "It is too dark."
     assert bug.message.startswith("Something went wrong inside (RuntimeError: three is not four)")
     assert dead.state == FAILED and "SIGKILL" in dead.message

@@ -6,7 +6,7 @@ from made_tasks import answer, until
 from materialist.errors import SetupError
 from materialist.jobs.pool import LocalPool
 from materialist.jobs.process import LOST, Worker
-from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
+from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, PROGRESS
 
 
 def told(worker, how, **more):
@@ -24,7 +24,7 @@ def test_one_process_does_task_after_task_until_it_dies():
     worker = Worker(environment={"OMP_NUM_THREADS": "7"}, keep_errors=True)
     done, kinds = told(worker, "found")
     assert (
-        kinds == [PROGRESS, FOUND]
+        kinds == [PROGRESS, INTERMEDIATE]
         and done.facts["threads"] == "7"
         and done.facts["pid"] == worker.pid
     )

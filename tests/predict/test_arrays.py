@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from made_maps import good_maps
 from made_matnet import made_photo
-from test_maps import good_maps
 
 import materialist as mt
 from materialist.errors import InputError

@@ -9,11 +9,11 @@ import pytest
 
 from materialist.errors import WeightsError
 from materialist.predict.models import (
-    chosen,
     download,
     folder_of,
     hub_model,
     is_complete,
+    needed_files,
     require,
     weights_file,
 )
@@ -143,7 +143,7 @@ def test_the_best_format_of_each_folder_is_chosen():
         "old/c.fp16.bin",
         "w.pth",
     ]
-    assert set(chosen(names)) == {
+    assert set(needed_files(names)) == {
         "model_index.json",
         "tokenizer/vocab.json",
         "tokenizer/merges.txt",

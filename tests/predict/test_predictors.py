@@ -5,8 +5,8 @@ import json
 import cv2
 import numpy as np
 import pytest
+from made_maps import good_maps, write
 from made_matnet import made_photo
-from test_maps import good_maps, write
 
 from materialist.errors import InputError, WeightsError
 from materialist.io.exr import write_exr
@@ -114,7 +114,7 @@ def test_sky_of_one_source_is_no_surface_normal_of_another(photo, other, monkeyp
     up[:8] = [0, 0, 1]
     materials = Materials(theirs["albedo"], theirs["roughness"], theirs["metallic"])
     seen = Prediction(materials, up, depth, warnings=("40% of the picture was taken for sky.",))
-    monkeypatch.setattr(predictor, "infer", lambda *_, **__: seen)
+    monkeypatch.setattr(predictor, "infer_bundled", lambda *_, **__: seen)
     mixed = get_predictor("bundled", depth=spec).predict(photo)
     assert np.allclose(mixed.normal[8:], [0, 1, 0]) and mixed.warnings == ()
     assert np.allclose(

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from render_scenes import empty, wall
 
-from materialist.procedural.objects import shapes
 from materialist.render.bodies import is_transparent
 from materialist.render.pixels import first_hits, radiance
 from materialist.render.scene import GLASS_DEPTH, RenderScene
 from materialist.types import Body, Camera, Surface
+from materialist_lab.procedural.objects import shapes
 
 CAMERA = Camera(48, 32, 40.0)
 DISTANCE = 5.0

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, arc, box, lines, turned, view
 
-from materialist.bench.glass_scenes import is_closed
 from materialist.solids.outline import surface_of_revolution
 from materialist.types import Camera
+from materialist_lab.bench.glass_scenes import is_closed
 
 
 def seen_badly(solid, blur=0.4):

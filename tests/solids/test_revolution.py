@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, arc, lines, turned, view, volume
 
-from materialist.bench.glass_scenes import is_closed
 from materialist.solids.outline import surface_of_revolution
+from materialist_lab.bench.glass_scenes import is_closed
 
 
 def revolved(profile):

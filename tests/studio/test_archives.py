@@ -12,7 +12,7 @@ from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.studio import StudioSettings, objects, tasks, uploads
 from materialist.studio.access.quota import Allowance
-from materialist.studio.archives import pack, unpack
+from materialist.studio.archives import pack_edits, unpack
 from materialist.studio.edit_list import EditList
 from materialist.studio.objects import library_file
 from materialist.studio.session import Session
@@ -32,13 +32,13 @@ def packed(session, tmp_path):
 
     upload("wood.png", "texture", lambda name: session.set("edit", texture=name, roughness="0.3"))
     upload("sky.exr", "envmap", lambda name: session.light(envmap=name, gain="auto"))
-    objects.set_option(session, "mesh", library_file(session, "Cube"))
+    objects.set_object_option(session, "mesh", library_file(session, "Cube"))
     objects.place(session, 50, 40)
     session.edits = session.edits.add(
         Step("drop", {"mesh": ["thing-cube.ply"], "at": ["9", "9"], "skip": "true"})
     )
     session.save()
-    pack(session.edits.steps, session.workspace / "edits.yaml", tmp_path / "edits.zip")
+    pack_edits(session.edits.steps, session.workspace / "edits.yaml", tmp_path / "edits.zip")
     return session, tmp_path / "edits.zip"
 
 

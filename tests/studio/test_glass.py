@@ -8,7 +8,7 @@ import studio_glass_task
 from made_tasks import until
 from studio_scenes import block, package, room
 
-from materialist.edits.glass.preview import GlassPreview
+from materialist.edits.glass.glass_preview import GlassPreview
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.jobs.worker import Reporter

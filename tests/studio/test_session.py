@@ -17,10 +17,10 @@ from materialist.io.image import write_png
 from materialist.studio import SETTINGS, objects
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
-from materialist.studio.preview import LivePreview, free_memory
+from materialist.studio.live_preview import LivePreview, free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
-from materialist.studio.stage import maps, report, stage
+from materialist.studio.stage import named_maps, report, stage
 from materialist.studio.tab_light import place_lamp
 from materialist.studio.widgets import PageContext, commands
 
@@ -288,8 +288,8 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     monkeypatch.setattr(session, "live", floor)
     with pytest.raises(InputError, match="Place an object first"):
         objects.let_fall(session, 1.0)
-    objects.set_option(session, "mesh", objects.library_file(session, "Cube"))
-    objects.set_option(session, "scale", "0.5")
+    objects.set_object_option(session, "mesh", objects.library_file(session, "Cube"))
+    objects.set_object_option(session, "scale", "0.5")
     objects.place(session, 32, 34)
     stands = session.live.edited(session.edits.active).bodies[0]
     assert objects.let_fall(session, 0.5) == []
@@ -324,13 +324,14 @@ def test_the_report_is_plain_and_harmless():
         "31.5 dB from the photo" in text and "40.0°" in text and "&lt;img src=x> &#91;a](b)" in text
     )
     assert (
-        all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in maps(room())) and len(maps(room())) == 8
+        all(p.dtype == np.uint8 and p.ndim == 3 for p, _ in named_maps(room()))
+        and len(named_maps(room())) == 8
     )
 
 
 def test_places_are_pixels_and_those_outside_are_refused(session):
     click(session, 64, 47.9)  # the page clips to the edge
-    objects.set_option(session, "mesh", objects.library_file(session, "Cube"))
+    objects.set_object_option(session, "mesh", objects.library_file(session, "Cube"))
     objects.place(session, 64, 47.6)
     assert session.edits.steps[-1].options["at"] == ["63", "47"]
     place_lamp(session, 40.7, 40.7)

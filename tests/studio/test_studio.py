@@ -22,7 +22,7 @@ from materialist.errors import InputError
 from materialist.io.photo import example_path
 from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
-from materialist.studio import SETTINGS, StudioSettings, preview, stage, widgets
+from materialist.studio import SETTINGS, StudioSettings, live_preview, stage, widgets
 from materialist.studio.access import quota
 from materialist.studio.edit_list import EditList
 from materialist.studio.server import check_host
@@ -247,14 +247,14 @@ def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_close
 
 def test_one_freeing_serves_all_who_wait_for_it(monkeypatch):
     pytest.importorskip("torch")
-    preview._THREAD.submit(lambda: None).result()
+    live_preview._THREAD.submit(lambda: None).result()
     held = threading.Event()
-    preview._THREAD.submit(held.wait, 10)
-    futures = {preview.free_memory() for _ in range(100)}
+    live_preview._THREAD.submit(held.wait, 10)
+    futures = {live_preview.free_memory() for _ in range(100)}
     held.set()
     assert len(futures) == 1
     futures.pop().result(30)
-    assert preview.free_memory() not in futures
+    assert live_preview.free_memory() not in futures
 
 
 def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shared, monkeypatch):

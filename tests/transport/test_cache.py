@@ -155,9 +155,8 @@ def test_wall_hides_the_light_behind_it(walled_floor):
     for row, p, wo in floor_rows(walled_floor):
         seen = (d[:, 2] < 0) & ~_meets_wall(p, d)
         gap = WALL_DISTANCE + p[2]
-        closed_form = (
-            0.5 * gap / np.hypot(gap, WALL_HEIGHT)
-        )  # strip of infinite length beside a horizontal element
+        # strip of infinite length beside a horizontal element
+        closed_form = 0.5 * gap / np.hypot(gap, WALL_HEIGHT)
         assert (seen * weight).sum() / np.pi == pytest.approx(closed_form, abs=2e-3)
         expected = (diffuse_coefficients(UP, d, wo) * (seen * weight)[:, None]).sum(0) / np.pi
         np.testing.assert_allclose(tables.diffuse[row].reshape(3, 3)[:, 0], expected, atol=6e-3)

@@ -1,5 +1,6 @@
 """`materialist.batch`: the loop that hands photos to workers and records the results."""
 
+import errno
 import os
 import time
 from collections import Counter, deque
@@ -18,7 +19,7 @@ from materialist.batches.outcome import COLUMNS, Outcome, Row, Status, write_pag
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
 from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.jobs.pool import LocalPool, RayPool
 from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import DONE, FAILED, PROGRESS
@@ -33,12 +34,15 @@ class BatchSettings:
     """How often a batch does things; tuned by eye."""
 
     tries: int = 3  # how often a photo is begun whose worker dies
-    refresh: float = (
-        30.0  # seconds between two writings of the summary and the page while the batch runs
-    )
+    # seconds between two writings of the summary and the page while the batch runs
+    refresh: float = 30.0
 
 
 SETTINGS = BatchSettings()
+DISK_PROBLEMS = tuple(
+    os.strerror(code).lower() for code in (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+)
+"""What the system says of a disk to which nothing more can be written."""
 
 
 @documented(BatchOptions)
@@ -118,9 +122,8 @@ def default_workers(device: str = "auto", size: int = 512) -> int:
     processors = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
-    worker = (
-        720 + 2.9e-3 * size**2
-    )  # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
+    # MB to count on for each: measured were 1.5 GB at 512 and 3.7 GB at 1024
+    worker = 720 + 2.9e-3 * size**2
     return max(1, min(processors, int(psutil.virtual_memory().available / 1e6 / worker)))
 
 
@@ -280,3 +283,7 @@ def _stop_if_for_all(facts: dict[str, Any]) -> None:
     machine = facts["error"] in ("SetupError", "WeightsError") and facts["stage"] != "read"
     if machine or (facts["error"] == "InputError" and facts["stage"] == "start"):
         raise getattr(errors, facts["error"])(facts["reason"])
+    if facts["error"] == "OutputError" and any(text in facts["reason"] for text in DISK_PROBLEMS):
+        raise OutputError(
+            f"{facts['reason']} What is finished is kept; make room, and add `resume=True`."
+        )

@@ -16,6 +16,7 @@ def refract(direction: Array, normal: Array, ratio: float) -> tuple[Array, Array
     the side the ray comes from, over that of the other. Returns the unit directions beyond the surface, and [...] bool
     where there is none because all light is reflected; the direction is then that of the reflection.
     """
+    # sin(theta_t) = ratio sin(theta_i), written in cosines; below 0 there is no refracted ray.
     cosine = np.clip(-np.sum(direction * normal, -1, keepdims=True), 0, 1)
     squared = 1 - ratio**2 * (1 - cosine**2)  # cosine squared on the other side
     bent = ratio * direction + (ratio * cosine - np.sqrt(np.maximum(squared, 0))) * normal
@@ -38,6 +39,8 @@ def fresnel_dielectric(cosine: Array, ior: float) -> Array:
     squared = 1 - (1 - cosine**2) / ior**2
     other = np.sqrt(np.maximum(squared, 0))
     with np.errstate(invalid="ignore", divide="ignore"):
+        # r_p and r_s, the amplitudes of both polarisations; unpolarised light has the mean of
+        # their squares.
         parallel = (ior * cosine - other) / (ior * cosine + other)
         across = (cosine - ior * other) / (cosine + ior * other)
     both = 0.5 * (parallel**2 + across**2)
@@ -51,6 +54,7 @@ def visible_facet(direction: Array, normal: Array, alpha: float, u: float, v: fl
     """
     if alpha <= 0:
         return normal
+    # In the frame of the normal, from the side that the ray comes from.
     right, up = _tangents(normal)
     back = -direction
     x, y, z = ggx.visible_normal([np.sum(back * t, -1) for t in (right, up, normal)], alpha, u, v)
@@ -67,6 +71,7 @@ def _tangents(normal: Array) -> tuple[Array, Array]:
     x = normal[..., 0]
     y = normal[..., 1]
     z = normal[..., 2]
+    # Without a branch at the pole: the sign keeps the denominator from 0.
     sign = np.where(z < 0, -1.0, 1.0)
     a = -1 / (sign + z)
     b = x * y * a

@@ -4,7 +4,7 @@ f_r = f_s + (1 - M) f_d. Choices that the paper leaves open (docs/rendering.md):
 Mitsuba; alpha = R^2 is at least `ggx.MIN_ALPHA`; both sides of a surface shade alike.
 """
 
-from materialist.bsdf.ggx import distribution, library, smith_g1
+from materialist.bsdf.ggx import array_module, distribution, smith_g1
 
 ETA = 1.5
 """Relative index of refraction of the dielectric part."""
@@ -20,7 +20,8 @@ def base_reflectance(albedo, metallic):
 
 def schlick(cosine):
     """(1 - cos)^5 of Schlick's approximation."""
-    m = library(cosine).clip(1 - cosine, 0, 1)
+    # Powers by products: exact in every library, and cheaper to differentiate.
+    m = array_module(cosine).clip(1 - cosine, 0, 1)
     m2 = m * m
     return m2 * m2 * m
 
@@ -30,6 +31,8 @@ def diffuse_coefficients(cos_i, cos_o, cos_d):
 
     F_d(w) = 1 + (F_D90 - 1)(1 - n.w)^5 is linear in F_D90 = 0.5 + 2 R (h.w)^2, hence in R.
     """
+    # F_d(w) = 1 - 0.5 f + 2 R (h.w)^2 f with f = (1 - n.w)^5: a constant and a slope in R for
+    # each direction.
     fi = schlick(cos_i)
     fo = schlick(cos_o)
     slope = 2 * cos_d * cos_d
@@ -49,6 +52,15 @@ def combine(albedo, metallic, diffuse, s0, s1):
     return albedo * (1 - metallic) * diffuse + base_reflectance(albedo, metallic) * s0 + s1
 
 
+def combine_by_albedo(metallic, diffuse, s0, s1):
+    """`combine` as a linear function of the albedo A: (what A multiplies, the rest).
+
+    C_0 = R_0 (1 - M) + M A, so that its second term belongs to the first part.
+    """
+    base = base_reflectance(0, metallic)  # C_0 at A = 0
+    return metallic * s0 + (1 - metallic) * diffuse, base * s0 + s1
+
+
 def fresnel(base, cosine):
     """F_s: Schlick's reflectance of base reflectance C_0."""
     return base + (1 - base) * schlick(cosine)
@@ -57,15 +69,17 @@ def fresnel(base, cosine):
 def half_vector_density(cos_wo, sin2_h, alpha):
     """Density, per solid angle of the mirrored direction, of mirroring `wo` at its visible normals."""
     return (
+        # D(h) G1(wo) max(h.wo, 0) / (n.wo) over the Jacobian 4 (h.wo) of the reflection.
         distribution(sin2_h, alpha)
         * smith_g1(cos_wo, alpha)
-        / (4 * library(cos_wo).clip(cos_wo, 1e-6, 1))
+        / (4 * array_module(cos_wo).clip(cos_wo, 1e-6, 1))
     )
 
 
 def specular_probability(cosine, luminance, metallic):
     """With which probability to sample the specular lobe: its share of the reflectance, 0.1 at least."""
+    # A grey of the same luminance stands for the colour; neither lobe may starve.
     specular = fresnel(base_reflectance(luminance, metallic), cosine)
     diffuse = (1 - metallic) * luminance
-    xp = library(cosine)
+    xp = array_module(cosine)
     return xp.clip(specular / xp.clip(specular + diffuse, 1e-6, 4), 0.1, 1)

@@ -6,13 +6,13 @@ import drjit as dr
 import mitsuba as mi
 
 from materialist.bsdf import lobes
-from materialist.bsdf.disney import base_reflectance, specular_probability
+from materialist.bsdf.disney import specular_probability
 from materialist.bsdf.ggx import alpha_of
 
 PLUGIN = "materialist_disney"
 
 
-def register() -> None:
+def register_disney() -> None:
     """Make the plugin known to the active variant."""
 
     class SimplifiedDisney(mi.BSDF):
@@ -50,26 +50,22 @@ def register() -> None:
         def _specular_probability(self, cos_i, albedo, metallic):
             return dr.detach(specular_probability(cos_i, mi.luminance(albedo), metallic))
 
-        def _value(self, wi, wo, albedo, roughness, metallic):
-            """f_r cos(theta_o) for directions above the surface."""
-            diffuse = albedo * (1 - metallic) * lobes.diffuse(wi, wo, roughness)
-            return diffuse + lobes.specular(
-                wi, wo, alpha_of(roughness), base_reflectance(albedo, metallic)
-            )
-
         def sample(self, ctx, si, sample1, sample2, active=True):
+            # --- Choose a lobe; the probability carries no gradient, as sampling must not ---
             albedo, roughness, metallic = self._materials(si, active)
             wi = mi.Vector3f(si.wi.x, si.wi.y, dr.abs(si.wi.z))
             probability = self._specular_probability(wi.z, albedo, metallic)
             take_specular = sample1 < probability
-            wo = lobes.sample(wi, dr.detach(alpha_of(roughness)), take_specular, sample2)
+            wo = lobes.sample_direction(wi, dr.detach(alpha_of(roughness)), take_specular, sample2)
             active = active & (wi.z > 0) & (wo.z > 0)
+            # --- Back to the side of the surface that the ray meets, and above the face ---
             bs = mi.BSDFSample3f()
             side = self._side(si)
             bs.wo = lobes.lifted(mi.Vector3f(wo.x, wo.y, wo.z * side), self._face(si, side))
             value, pdf = self._both(si, bs.wo, probability, albedo, roughness, metallic)
             bs.pdf = dr.select(active, pdf, 0)
             active = active & (bs.pdf > 0)
+            # --- What Mitsuba's integrators ask of a sample: its lobe, and value over density ---
             bs.eta = 1.0
             bs.sampled_type = dr.select(
                 take_specular,
@@ -101,18 +97,20 @@ def register() -> None:
             face = self._face(si, side)
             height = dr.dot(face, wo)
             below = wo - 2 * height * face
-            found = [
-                self._one(si.wi, w, probability, *materials, seen & (side * w.z > 0))
-                for w, seen in ((wo, height >= 0), (below, height > 0))
-            ]
-            return found[0][0] + found[1][0], found[0][1] + found[1][1]
+            # Two directions give `wo`: itself, and the one below the face that is mirrored to it.
+            value, density = self._unlifted(
+                si.wi, wo, probability, *materials, (height >= 0) & (side * wo.z > 0)
+            )
+            value_below, density_below = self._unlifted(
+                si.wi, below, probability, *materials, (height > 0) & (side * below.z > 0)
+            )
+            return value + value_below, density + density_below
 
-        def _one(self, wi, wo, probability, albedo, roughness, metallic, active):
+        def _unlifted(self, wi, wo, probability, albedo, roughness, metallic, active):
             """Value and density of a direction by the shading normal alone, 0 where not `active`."""
             wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
-            value = dr.select(
-                active, self._value(wi, wo, albedo, roughness, metallic), mi.Color3f(0)
-            )
+            value = lobes.reflectance(wi, wo, albedo, roughness, metallic)
+            value = dr.select(active, value, mi.Color3f(0))
             density = lobes.density(wi, wo, dr.detach(alpha_of(roughness)), probability)
             return value, dr.select(active, density, 0)
 

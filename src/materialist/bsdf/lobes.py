@@ -7,7 +7,13 @@ import drjit as dr
 import mitsuba as mi
 
 from materialist.bsdf import ggx
-from materialist.bsdf.disney import diffuse_coefficients, fresnel, half_vector_density, quadratic
+from materialist.bsdf.disney import (
+    base_reflectance,
+    diffuse_coefficients,
+    fresnel,
+    half_vector_density,
+    quadratic,
+)
 
 AGREEING = 0.7
 """Least cosine between a shading normal and its face for the face to hold back light: where a predicted depth slopes
@@ -29,24 +35,34 @@ def diffuse(wi, wo, roughness):
 def specular(wi, wo, alpha, base):
     """f_s cos(theta_o) of base reflectance C_0."""
     _, sin2, cos_d = half_vector(wi, wo)
+    # f_s = F D G / (4 cos_i cos_o) with G = G1(wi) G1(wo); cos(theta_o) cancels against one of
+    # the cosines.
     return fresnel(base, cos_d) * (
         half_vector_density(wi.z, sin2, alpha) * ggx.smith_g1(wo.z, alpha)
     )
 
 
+def reflectance(wi, wo, albedo, roughness, metallic):
+    """f_r cos(theta_o) with f_r = f_s + (1 - M) f_d (paper, Preliminary), for directions above the surface."""
+    diffuse_part = albedo * (1 - metallic) * diffuse(wi, wo, roughness)
+    base = base_reflectance(albedo, metallic)
+    return diffuse_part + specular(wi, wo, ggx.alpha_of(roughness), base)
+
+
 def density(wi, wo, alpha, probability):
-    """Density with which `sample` draws `wo` when it takes the specular lobe with this probability."""
+    """Density with which `sample_direction` draws `wo`; `probability` is that of the specular lobe."""
+    # One-sample mixture of both lobes: visible normals, and cosine-weighted directions.
     mirrored = half_vector_density(wi.z, half_vector(wi, wo)[1], alpha)
     return probability * mirrored + (1 - probability) * wo.z * dr.inv_pi
 
 
-def sample(wi, alpha, specular, point):
-    """A direction of the specular lobe where `specular`, else of the cosine lobe, for a point of the unit square."""
-    mirrored = mi.reflect(wi, visible_normal(wi, alpha, point))
-    return dr.select(specular, mirrored, mi.warp.square_to_cosine_hemisphere(point))
+def sample_direction(wi, alpha, take_specular, point):
+    """A direction of the specular lobe where `take_specular`, else of the cosine lobe; point: in the unit square."""
+    mirrored = mi.reflect(wi, visible_normal_vector(wi, alpha, point))
+    return dr.select(take_specular, mirrored, mi.warp.square_to_cosine_hemisphere(point))
 
 
-def visible_normal(wi, alpha, point):
+def visible_normal_vector(wi, alpha, point):
     """`ggx.visible_normal` as a vector."""
     return mi.Vector3f(*ggx.visible_normal(wi, alpha, point.x, point.y))
 

@@ -32,14 +32,16 @@ def directional_albedo(ior: float, alpha: float) -> Array:
     Sum over visible GGX normals m of F(m) G1(reflected) + (1 - F(m)) G1(refracted), Smith's G1; cosines are
     (k + 1/2) / COSINES. alpha: GGX width, roughness^2; ior: within over outside.
     """
+    # --- Visible normals at the centres of a grid over the unit square ---
     u = (np.arange(FACETS) + 0.5) / FACETS
     u, v = np.meshgrid(u, u)
     cosine = ((np.arange(COSINES) + 0.5) / COSINES)[:, None, None]
     wi = np.stack(np.broadcast_arrays(np.sqrt(1 - cosine**2), 0 * cosine, cosine), -1)
     m = np.stack(visible_normal(np.moveaxis(wi, -1, 0), alpha, u, v), -1)  # [N, FACETS, FACETS, 3]
     along = (wi * m).sum(-1)
-    found = []
+    albedos = []
     for relative in (ior, 1 / ior):
+        # --- What leaves after one facet: reflected on the same side, refracted on the other ---
         reflected = fresnel_dielectric(along, relative)
         upward = (2 * along[..., None] * m - wi)[..., 2]
         downward = refract(-wi, m, 1 / relative)[0][..., 2]
@@ -47,11 +49,12 @@ def directional_albedo(ior: float, alpha: float) -> Array:
             np.where(sign * z > 0, smith_g1(z, alpha), 0)
             for sign, z in ((1, upward), (-1, downward))
         ]
-        found.append((reflected * shares[0] + (1 - reflected) * shares[1]).mean((1, 2)))
-    return np.stack(found)
+        albedos.append((reflected * shares[0] + (1 - reflected) * shares[1]).mean((1, 2)))
+    return np.stack(albedos)
 
 
-def register() -> None:
+def register_frosted() -> None:
+    """Make the plugin known to the active variant."""
     import drjit as dr
     import mitsuba as mi
 
@@ -68,9 +71,8 @@ def register() -> None:
 
         def _tabulate(self):
             params = mi.traverse(self.interface)
-            ior, alpha = (
-                float(np.array(params[name]).ravel()[0]) for name in ("eta", "alpha.value")
-            )
+            ior = float(np.array(params["eta"]).ravel()[0])
+            alpha = float(np.array(params["alpha.value"]).ravel()[0])
             self.table = mi.Float(np.maximum(directional_albedo(ior, alpha), MIN_ALBEDO).ravel())
 
         def traverse(self, cb):
@@ -81,6 +83,8 @@ def register() -> None:
 
         def _gain(self, si, active):
             """One over the albedo of the direction to the eye, between the entries of the table."""
+            # Linear between the table's entries: the first half from outside, the second from
+            # within.
             at = dr.clip(dr.abs(si.wi.z) * COSINES - 0.5, 0, COSINES - 1)
             first = dr.minimum(mi.UInt32(at), COSINES - 2)
             start = first + dr.select(si.wi.z > 0, mi.UInt32(0), mi.UInt32(COSINES))
@@ -88,8 +92,8 @@ def register() -> None:
             return dr.rcp(dr.maximum(dr.lerp(low, high, at - mi.Float(first)), MIN_ALBEDO))
 
         def sample(self, ctx, si, sample1, sample2, active=True):
-            found, weight = self.interface.sample(ctx, si, sample1, sample2, active)
-            return found, weight * self._gain(si, active)
+            sampled, weight = self.interface.sample(ctx, si, sample1, sample2, active)
+            return sampled, weight * self._gain(si, active)
 
         def eval(self, ctx, si, wo, active=True):
             return self.interface.eval(ctx, si, wo, active) * self._gain(si, active)

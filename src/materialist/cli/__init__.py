@@ -6,50 +6,42 @@ from typing import Any
 
 import typer
 
-from materialist.cli import batch, bench, edits, scenes, setup, studio, train
+from materialist.cli import batch, edits, plugins, scenes, setup, studio
 from materialist.cli.generate import add_command, group
 from materialist.cli.outcome import run_to_exit_code
 
 ABOUT = "Physically based editing of a single photograph, by inverse rendering."
 MODELS = "List, download and verify networks from a model hub; no other command ever downloads."
-FREE = {"allow_extra_args": True, "ignore_unknown_options": True}
-COMMANDS: tuple[Callable[..., Any], ...] = (
-    scenes.invert,
-    scenes.render,
-    scenes.export,
-    setup.doctor,
-    edits.select,
-    edits.edit,
-    edits.glass,
-    edits.remove,
-    edits.insert,
-    edits.apply,
-    edits.relight,
-    edits.drop,
-    batch.batch,
-    studio.studio,
-)
-TRAINING: tuple[Callable[..., Any], ...] = (
-    train.data,
-    train.matnet,
-    train.refraction,
-    train.clicks,
-)
-app = group("materialist", ABOUT)
-for command in COMMANDS:
-    add_command(app, command)
-add_command(app, bench.bench, context_settings=FREE)
+COMMANDS: dict[str, Callable[..., Any]] = {
+    "invert": scenes.invert_command,
+    "render": scenes.render_command,
+    "export": scenes.export_command,
+    "doctor": setup.doctor,
+    "select": edits.select_command,
+    "edit": edits.edit_command,
+    "glass": edits.glass_command,
+    "remove": edits.remove_command,
+    "insert": edits.insert_command,
+    "apply": edits.apply_command,
+    "relight": edits.relight_command,
+    "drop": edits.drop_command,
+    "batch": batch.batch_command,
+    "studio": studio.studio_command,
+}
+"""Name -> function of each command, in the order of the help."""
+# --- The commands ---
+app = group("materialist", ABOUT, cls=plugins.Program)
+for name, command in COMMANDS.items():
+    add_command(app, command, name)
+# --- Groups of commands ---
 models = group("models", MODELS, app)
 add_command(models, setup.list_models, "list")
 add_command(models, setup.download_model, "download")
 add_command(models, setup.verify_model, "verify")
-trainers = group("train", "Make training data, and train the networks that predict materials.", app)
-for command in TRAINING:
-    add_command(trainers, command)
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(is_given: bool) -> None:
+    if is_given:
         from materialist import __version__
 
         typer.echo(__version__)

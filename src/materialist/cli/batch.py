@@ -11,14 +11,15 @@ import materialist as mt
 from materialist.batches.options import BatchOptions
 from materialist.cli.options import Computing, output_option
 from materialist.cli.outcome import report_success
-from materialist.cli.progress import Progress, stage_progress
+from materialist.cli.progress import stage_progress
 from materialist.errors import Interrupted
 
 if TYPE_CHECKING:
     from materialist.batches.outcome import Outcome, Status
+    from materialist.types import Progress
 
 
-def batch(
+def batch_command(
     source: Annotated[
         str,
         typer.Argument(
@@ -27,7 +28,7 @@ def batch(
         ),
     ],
     output: Annotated[Path, output_option("RUNS", "Folder of the results.")],
-    how: BatchOptions,
+    options: BatchOptions,
     computing: Computing,
     predictor: Annotated[
         str, typer.Option(help="As for invert; {name} in maps:DIR is the photo's.")
@@ -44,17 +45,18 @@ def batch(
     chosen: Any = {} if layer is None else {"layer": layer}
     try:
         with stage_progress(quiet=computing.as_json) as bars:
+            # Options of the file's own class go by name; shared ones come from the command line.
             outcome = mt.batch(
                 source,
                 output,
-                **vars(how),
+                **vars(options),
                 **chosen,
                 predictor=predictor,
                 size=size,
                 fov=fov,
                 seed=computing.seed,
                 device=computing.device,
-                progress=lambda status: _told(bars, status, computing.as_json),
+                progress=lambda status: _show(bars, status, computing.as_json),
             )
     except KeyboardInterrupt:
         raise Interrupted(
@@ -68,6 +70,7 @@ def batch(
 
 
 def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
+    # At most twenty failures by name: summary.csv has all.
     failed = [row for row in outcome.rows if row["status"] == "failed"]
     kept = f" ({outcome.kept} of them before)" if outcome.kept else ""
     lines = [
@@ -95,7 +98,7 @@ def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
     )
 
 
-def _told(bars: Progress, status: Status, quiet: bool) -> None:
+def _show(bars: Progress, status: Status, quiet: bool) -> None:
     """The state of the batch as a bar, and what has just happened as a line."""
     over = status.done + status.failed
     bars("photos", over, status.total)

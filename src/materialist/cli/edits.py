@@ -17,9 +17,15 @@ from materialist.cli.options import (
     output_option,
 )
 from materialist.cli.outcome import report_success
-from materialist.cli.picture import check_before, chosen_region, opened, write_film, write_result
+from materialist.cli.picture import (
+    check_before,
+    chosen_region,
+    opened_region,
+    write_film,
+    write_result,
+)
 from materialist.errors import InputError
-from materialist.option_kinds import numbers, option
+from materialist.option_kinds import option, parse_numbers
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
 
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
@@ -45,7 +51,7 @@ class MovingLight(Relight):
     )
 
 
-def select(
+def select_command(
     scene: SceneArgument,
     output: Annotated[Path, output_option("MASK", "A .png; white is inside.")],
     region: Region,
@@ -63,116 +69,126 @@ def select(
 
     if output.suffix.lower() != ".png":
         raise InputError(f"The mask {output} must end in .png.")
+    # The output is checked before the work.
     ensure_image_writable(output, force=run.force)
     loaded = mt.load_scene(scene)
-    found = chosen_region(loaded, region, run.device)
-    shown = matte(found, loaded.photo.original) if native else found.astype(np.float32)
+    region_mask = chosen_region(loaded, region, run.device)
+    shown = matte(region_mask, loaded.photo.original) if native else region_mask.astype(np.float32)
     # Written as display values: half a pixel inside must be half of white, whatever the curve.
     write_image(output, np.repeat(srgb_to_linear(shown)[..., None], 3, -1), force=run.force)
-    share = float(found.mean())
+    share = float(region_mask.mean())
     report_success(
         "select",
         run.as_json,
-        [f"{int(found.sum())} pixels, {share:.1%} of the photo.", f"Look at {output}"],
+        [f"{int(region_mask.sum())} pixels, {share:.1%} of the photo.", f"Look at {output}"],
         mask=str(output),
-        pixels=int(found.sum()),
+        pixels=int(region_mask.sum()),
         share=share,
     )
 
 
-def edit(
+def edit_command(
     scene: SceneArgument,
     output: PictureOutput,
     region: Region,
     options: MaterialEdit,
-    how: Rendering,
+    rendering: Rendering,
 ) -> None:
     """Change the material of a region, and get the photo back with only that changed."""
     if options == MaterialEdit():
         raise InputError(
             "Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like."
         )
-    loaded, found = opened(scene, output, region, how)
-    lines = [f"{int(found.sum())} pixels edited, {float(found.mean()):.0%} of the photo."]
-    write_result("edit", loaded, mt.edit(loaded, found, options), output, how, lines=lines)
+    loaded, mask = opened_region(scene, output, region, rendering)
+    lines = [f"{int(mask.sum())} pixels edited, {float(mask.mean()):.0%} of the photo."]
+    write_result("edit", loaded, mt.edit(loaded, mask, options), output, rendering, lines=lines)
 
 
-def glass(
-    scene: SceneArgument, output: PictureOutput, region: Region, options: Glass, how: Rendering
+def glass_command(
+    scene: SceneArgument,
+    output: PictureOutput,
+    region: Region,
+    options: Glass,
+    rendering: Rendering,
 ) -> None:
     """Turn an object to glass: what is behind it is continued, and seen through it."""
     from materialist.edits.core.notes import PICTURED
 
-    if options.model == "two-interface" and how.full_render:
+    if options.model == "two-interface" and rendering.full_render:
         raise InputError(
             f"{PICTURED}--full-render would not show it; take --model closed, or leave that out."
         )
-    loaded, found = opened(scene, output, region, how)
-    edited = mt.glass(loaded, found, options)
+    loaded, mask = opened_region(scene, output, region, rendering)
+    edited = mt.glass(loaded, mask, options)
     source = edited.provenance["edits"][-1]["thickness"]
-    lines = [f"{int(found.sum())} pixels are glass; thickness: {source}."]
-    write_result("glass", loaded, edited, output, how, lines=lines)
+    lines = [f"{int(mask.sum())} pixels are glass; thickness: {source}."]
+    write_result("glass", loaded, edited, output, rendering, lines=lines)
 
 
-def remove(
-    scene: SceneArgument, output: PictureOutput, region: Region, options: Removal, how: Rendering
+def remove_command(
+    scene: SceneArgument,
+    output: PictureOutput,
+    region: Region,
+    options: Removal,
+    rendering: Rendering,
 ) -> None:
     """Take an object out of the photo, with its shadow and its reflections."""
-    loaded, found = opened(scene, output, region, how)
-    lines = [f"{int(found.sum())} pixels taken away."]
-    write_result("remove", loaded, mt.remove(loaded, found, options), output, how, lines=lines)
+    loaded, mask = opened_region(scene, output, region, rendering)
+    lines = [f"{int(mask.sum())} pixels taken away."]
+    write_result("remove", loaded, mt.remove(loaded, mask, options), output, rendering, lines=lines)
 
 
-def insert(
+def insert_command(
     scene: SceneArgument,
     mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
     output: PictureOutput,
     at: At,
     options: Insertion,
-    how: Rendering,
+    rendering: Rendering,
 ) -> None:
     """Put a mesh into the photo: it stands on what is there, casts its shadow and is reflected."""
     from materialist.edits.insert.meshes import read_model
 
-    check_before(output, how)
-    places = [numbers(text, 2, "--at") for text in at]
+    check_before(output, rendering)
+    places = [parse_numbers(text, 2, "--at") for text in at]
     model = read_model(mesh, up=options.up)
     loaded = edited = mt.load_scene(scene)
+    # One after the other: the last stands on what the first ones are.
     for x, y in places:
         edited = mt.insert(edited, model, (x, y), options)
     longest = edited.provenance["edits"][-1]["size"]
     lines = [f"{model.name}: longest side {longest:.3g} scene units."]
-    write_result("insert", loaded, edited, output, how, lines=lines)
+    write_result("insert", loaded, edited, output, rendering, lines=lines)
 
 
-def apply(
+def apply_command(
     scene: SceneArgument,
     edits: Annotated[Path, typer.Argument(metavar="EDITS", help="A YAML list of edits.")],
     output: PictureOutput,
-    how: Rendering,
+    rendering: Rendering,
 ) -> None:
     """Replay a list of edits on a scene: materials and light, in one picture."""
     from materialist.edits.recipe import apply as replay
     from materialist.edits.recipe import read_recipe
 
-    check_before(output, how)
+    check_before(output, rendering)
     steps = read_recipe(edits)
     loaded = mt.load_scene(scene)
-    edited = replay(loaded, steps, seed=how.seed, device=how.device)
+    edited = replay(loaded, steps, seed=rendering.seed, device=rendering.device)
     skipped = sum(step.skipped for step in steps)
     done = len(steps) - skipped
-    told = f"{done} edit{'s' * (done != 1)} applied" + f", {skipped} skipped" * bool(skipped)
-    write_result("apply", loaded, edited, output, how, lines=[f"{told}."])
+    summary = f"{done} edit{'s' * (done != 1)} applied" + f", {skipped} skipped" * bool(skipped)
+    write_result("apply", loaded, edited, output, rendering, lines=[f"{summary}."])
 
 
-def relight(
+def relight_command(
     scene: SceneArgument,
     output: Annotated[
         Path, output_option("OUT", "A picture as for edit; with --frames .mp4 or a folder.")
     ],
     options: MovingLight,
     lights: Place,
-    how: Rendering,
+    rendering: Rendering,
     frames: Annotated[
         int | None,
         typer.Option(
@@ -182,11 +198,13 @@ def relight(
     fps: FramesPerSecond = FPS,
 ) -> None:
     """Show the photo under other light."""
+    # In a film several suns are stations; one picture has one.
     suns = options.sun
     if options == MovingLight() and frames is None:
         raise InputError(
             "No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim."
         )
+    # --- Options that say nothing, or contradict each other ---
     alone = [("--fps", "--frames")] if fps != FPS and frames is None else []
     alone += [(flag, "--dim") for flag in lights.named if options.dim is None]
     if alone:
@@ -202,23 +220,24 @@ def relight(
         raise InputError(
             "Several --sun are stations of a moving one; give --frames as well, or one --sun."
         )
-    if frames is not None and how.save is not None:
+    if frames is not None and rendering.save is not None:
         raise InputError("--save writes one scene; leave out --frames.")
-    check_before(output, how, video=frames is not None)
+    # --- One picture, or a film of a moving light ---
+    check_before(output, rendering, video=frames is not None)
     loaded = mt.load_scene(scene)
-    marked = chosen_region(loaded, lights, how.device) if lights.named else None
-    wanted = Relight(**{**vars(options), "sun": None, "lights": marked})
+    marked = chosen_region(loaded, lights, rendering.device) if lights.named else None
+    changes = Relight(**{**vars(options), "sun": None, "lights": marked})
     if frames is not None:
         from materialist.edits.light.relight import moving_light
 
-        film = moving_light(loaded, frames, wanted, suns=suns)
-        write_film("relight", loaded, film, output, how, frames=frames, fps=fps)
+        film = moving_light(loaded, frames, changes, suns=suns)
+        write_film("relight", loaded, film, output, rendering, frames=frames, fps=fps)
         return
-    edited = mt.relight(loaded, wanted, sun=suns[0] if suns else None)
-    write_result("relight", loaded, edited, output, how)
+    edited = mt.relight(loaded, changes, sun=suns[0] if suns else None)
+    write_result("relight", loaded, edited, output, rendering)
 
 
-def drop(
+def drop_command(
     scene: SceneArgument,
     meshes: Annotated[list[Path], typer.Argument(metavar="MESH...", help=MESH_FILES)],
     output: Annotated[Path, output_option("OUT", "A .mp4, or a folder of frames.")],
@@ -232,17 +251,18 @@ def drop(
             metavar="DEG|A..B", help="Meanwhile the light turns to the right, from A to B."
         ),
     ] = None,
-    how: Rendering = Rendering(),  # noqa: B008
+    rendering: Rendering = Rendering(),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
     from materialist.edits.insert.meshes import read_model
     from materialist.edits.light.relight import moving_light
 
+    # Read as a list of edits would be, so that the same texts are accepted.
     light = Relight.read({} if rotate is None else {"rotate": rotate})
-    check_before(output, how, video=True)
-    places: Any = [numbers(text, 2, "--at") for text in at]
+    check_before(output, rendering, video=True)
+    places: Any = [parse_numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]
     loaded = mt.load_scene(scene)
     film: Any = mt.drop(loaded, models, places, options, frames=frames, fps=fps)
     film = film if rotate is None else moving_light(film, frames, light)
-    write_film("drop", loaded, film, output, how, frames=frames, fps=fps)
+    write_film("drop", loaded, film, output, rendering, frames=frames, fps=fps)

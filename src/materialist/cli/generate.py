@@ -2,10 +2,9 @@
 
 import inspect
 from collections.abc import Callable
-from enum import StrEnum
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, Literal, get_type_hints
 
 import typer
 
@@ -14,19 +13,20 @@ from materialist.option_kinds import OperationOptions, Option, declarations
 TYPES: dict[str, Any] = {"number": float, "whole": int, "switch": bool, "file": Path}
 
 
-def group(name: str, help: str, app: typer.Typer | None = None) -> typer.Typer:
-    """A group of commands, of `app` where one is given."""
-    made = typer.Typer(
+def group(name: str, help: str, app: typer.Typer | None = None, **settings: Any) -> typer.Typer:
+    """A group of commands, of `app` where one is given; `settings` are other ones of typer."""
+    app_group = typer.Typer(
         name=name,
         help=help,
         no_args_is_help=True,
         add_completion=False,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
+        **settings,
     )
     if app is not None:
-        app.add_typer(made)
-    return made
+        app.add_typer(app_group)
+    return app_group
 
 
 def add_command(
@@ -36,6 +36,7 @@ def add_command(
 
     Options are read from what was given; fields without a flag take the value of the other parameters of that name.
     """
+    # --- Which parameters are options classes, and the flags of all parameters ---
     hints = get_type_hints(function, include_extras=True)
     named = inspect.signature(function).parameters
     taken = {key for key in named if not _is_options(hints[key])}
@@ -44,10 +45,14 @@ def add_command(
     @wraps(function)
     def command(**values: Any) -> Any:
         return function(
-            **{key: _value(hints[key], named[key], own, values) for key, own in flags.items()}
+            **{
+                key: _value(hints[key], named[key], parameter_flags, values)
+                for key, parameter_flags in flags.items()
+            }
         )
 
-    every = [flag for own in flags.values() for flag in own]
+    every = [flag for parameter_flags in flags.values() for flag in parameter_flags]
+    # Typer reads the signature: there each flag is a parameter of its own.
     command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     command.__annotations__ = {flag.name: flag.annotation for flag in every}
     app.command(name or function.__name__, **settings)(command)
@@ -57,7 +62,7 @@ def _is_options(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, OperationOptions)
 
 
-def _usual(parameter: inspect.Parameter) -> dict[str, Any]:
+def _defaults(parameter: inspect.Parameter) -> dict[str, Any]:
     """Other defaults of the fields, where the parameter has a default."""
     return dict(vars(parameter.default)) if isinstance(parameter.default, OperationOptions) else {}
 
@@ -66,52 +71,59 @@ def _flags(kind: Any, parameter: inspect.Parameter, taken: set[str]) -> list[ins
     """The flags of a parameter; an option whose name is `taken` by another one gets its value from the function."""
     if not _is_options(kind):
         return [_parameter(parameter.name, kind, parameter.default)]
-    declared = {name: told for name, told in declarations(kind).items() if name not in taken}
-    usual = {name: default for name, (_, default) in declared.items()} | _usual(parameter)
-    return [
-        flag
-        for name, (told, _) in declared.items()
-        for flag in _option_flags(name, told, usual[name])
-    ]
+    declared = {name: entry for name, entry in declarations(kind).items() if name not in taken}
+    defaults = {name: default for name, (_, default) in declared.items()} | _defaults(parameter)
+    flags = []
+    for name, (declaration, _) in declared.items():
+        flags += _option_flags(name, declaration, defaults[name])
+    return flags
 
 
 def _value(
     kind: Any, parameter: inspect.Parameter, flags: list[inspect.Parameter], values: dict[str, Any]
 ) -> Any:
     """The argument that the flags of a parameter spell."""
-    own = {flag.name: values[flag.name] for flag in flags}
+    flag_values = {flag.name: values[flag.name] for flag in flags}
     if not _is_options(kind):
-        return own[flags[0].name]
-    given = {}
-    for key, value in own.items():
+        return flag_values[flags[0].name]
+    spelled = {}
+    for key, value in flag_values.items():
+        # Flags that were not given say nothing.
         if value is not None and value != []:
             field, _, word = key.partition("__")  # the flag of a word that a switch also takes
-            given[field] = word or value
-    unspelled = (key for key, (told, _) in declarations(kind).items() if told.flag is None)
+            spelled[field] = word or value
+    unspelled = (
+        key for key, (declaration, _) in declarations(kind).items() if declaration.flag is None
+    )
     shared = {key: values[key] for key in unspelled if values.get(key) is not None}
-    return kind.read(given, flags=True, **(_usual(parameter) | shared))
+    return kind.read(spelled, flags=True, **(_defaults(parameter) | shared))
 
 
-def _option_flags(name: str, told: Option, default: Any) -> list[inspect.Parameter]:
+def _option_flags(name: str, declared: Option, default: Any) -> list[inspect.Parameter]:
     """The flag of an option, and one for each word that a switch takes beside; none for an option without flags."""
-    if told.flag is None:
+    if declared.flag is None:
         return []
-    if told.kind == "switch":
-        help = f"{told.help}  [default: on]" if default is True else told.help
-        texts = {name: (told.spells(name), help)}
+    # --- A switch: a flag of its own, and one for each further word ---
+    if declared.kind == "switch":
+        help = f"{declared.help}  [default: on]" if default is True else declared.help
+        texts = {name: (declared.spells(name), help)}
         texts |= {
-            f"{name}__{word}": ([f"--{word}"], f"{told.help[:-1]}, {word}.")
-            for word in told.choices
+            f"{name}__{word}": ([f"--{word}"], f"{declared.help[:-1]}, {word}.")
+            for word in declared.choices
         }
         return [_parameter(key, _flag(bool | None, *text), None) for key, text in texts.items()]
-    kind: Any = str if told.choices else TYPES.get(told.kind, str)
-    if told.kind == "word":
-        make: Any = StrEnum  # of a name that is not a literal
-        kind = make(name, {word: word for word in told.choices})
-    shown = _shown("auto" if default is None and "auto" in told.choices else default)
-    help = f"{told.help}  [default: {shown}]" if shown else told.help
-    several = list[kind] | None if told.many else kind | None
-    return [_parameter(name, _flag(several, told.spells(name), help, metavar=told.metavar), None)]
+    # --- A value: of the option's type, or one of its words ---
+    kind: Any = str if declared.choices else TYPES.get(declared.kind, str)
+    if declared.kind == "word":
+        kind = Literal[declared.choices]
+    shown = _shown("auto" if default is None and "auto" in declared.choices else default)
+    help = f"{declared.help}  [default: {shown}]" if shown else declared.help
+    several = list[kind] | None if declared.many else kind | None
+    return [
+        _parameter(
+            name, _flag(several, declared.spells(name), help, metavar=declared.metavar), None
+        )
+    ]
 
 
 def _flag(kind: Any, names: list[str], help: str, **settings: Any) -> Any:
@@ -126,6 +138,6 @@ def _parameter(name: str, annotation: Any, default: Any) -> inspect.Parameter:
 
 def _shown(default: Any) -> str | bool:
     if isinstance(default, tuple):
-        whole = bool(default) and all(isinstance(one, int) for one in default)
-        return ("x" if whole else ",").join(f"{one:g}" for one in default) or False
+        whole = bool(default) and all(isinstance(number, int) for number in default)
+        return ("x" if whole else ",").join(f"{number:g}" for number in default) or False
     return False if default is None else str(default)

@@ -31,6 +31,7 @@ PictureOutput = Annotated[
 class Computing(OperationOptions):
     """What every command that computes takes."""
 
+    # What makes a run repeatable, and where it runs.
     seed: int = option(
         0,
         "Random seed: the same seed on the same machine gives the same result.",
@@ -102,6 +103,7 @@ class Region(Place):
 class PictureFile(Run):
     """How a picture is written."""
 
+    # How the file is encoded.
     quality: int | None = option(
         None,
         "Of .jpg (default 95), .webp (90, 100 loses nothing) and .avif (85).",
@@ -132,6 +134,7 @@ class PictureFile(Run):
 class Rendering(PictureFile):
     """How an edited scene becomes a picture or a film."""
 
+    # How the picture is rendered.
     spp: int = option(
         PATHS,
         "Paths per pixel, of both renderings.",
@@ -146,6 +149,7 @@ class Rendering(PictureFile):
         kind="switch",
         flag="--denoise/--no-denoise",
     )
+    # The rendering in place of the composite.
     full_render: bool = option(False, "The plain rendering, without the photo.", kind="switch")
     upscale: Any = option(
         None,
@@ -154,47 +158,7 @@ class Rendering(PictureFile):
         needs="full_render",
         metavar="FILE.py:FUNCTION",
     )
+    # What else is written.
     save: Path | None = option(
         None, "Write the edited scene as well.", kind="file", metavar="SCENE2"
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Training(Computing):
-    """How long a network is trained, and where the run goes on."""
-
-    steps: int | None = option(None, "Train this many steps more.", kind="whole")
-    minutes: float | None = option(None, "Train this many minutes more.")
-    resume: bool = option(False, "Go on with the run in RUN, if there is one.", kind="switch")
-    every: float = option(180, "Seconds between checkpoints.")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Learning(OperationOptions):
-    """How a network learns, where that differs from its recipe."""
-
-    batch: int | None = option(None, "Samples a step; default: the recipe's.", kind="whole")
-    side: int | None = option(
-        None,
-        "Side of all crops, pixels; default: the recipe's, small ones first.",
-        kind="whole",
-        flag="--size",
-    )
-    rate: float | None = option(None, "Peak learning rate; default: the recipe's.")
-    bfloat16: bool | None = option(
-        None,
-        "Half as long on processors that have it; default: the recipe's.",
-        kind="switch",
-        flag="--bfloat16/--no-bfloat16",
-    )
-    init: Path | None = option(
-        None,
-        "Weights to begin from: those of a run; matnet --config paper: Depth Anything or DINOv2.",
-        kind="file",
-    )
-
-    def recipe(self, usual: Any) -> Any:
-        """The recipe `usual` with what was given."""
-        return usual.changed(
-            batch=self.batch, side=self.side, rate=self.rate, bfloat16=self.bfloat16
-        )

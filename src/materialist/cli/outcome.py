@@ -64,6 +64,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
         said = f"The system refused {error.filename or 'it'}: {(error.strerror or str(error)).lower()}."
         return _fail("OSError", said, BAD_INPUT, wants_json)
     except Exception as error:
+        # --- Not a bug: a package that is not installed, or a flag that does not exist ---
         if isinstance(error, ModuleNotFoundError) and not (error.name or "").startswith(
             "materialist"
         ):
@@ -75,6 +76,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
             )
         if _is_usage_error(error):
             return _usage(error, wants_json)
+        # --- A bug of ours ---
         traceback.print_exc()
         message = f"This is a bug in Materialist, not your mistake: please report it with the lines above ({error})."
         return _fail(type(error).__name__, message, BUG, wants_json)
@@ -89,6 +91,7 @@ def _tidy_when_terminated() -> Iterator[None]:
     """Within it SIGTERM ends the command as an exception does, so that nothing half-written stays; soon in any case."""
 
     def stop(number: int, frame: Any) -> None:
+        # A second SIGTERM ends the process at once, and so does a timer.
         signal.signal(number, signal.SIG_DFL)
         last = threading.Timer(
             GRACE, os.kill, (os.getpid(), number)
@@ -97,6 +100,7 @@ def _tidy_when_terminated() -> Iterator[None]:
         last.start()
         raise _Terminated
 
+    # Handlers belong to the main thread, and one that somebody else has set stays.
     here = threading.current_thread() is threading.main_thread()
     if not here or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
         yield
@@ -115,6 +119,7 @@ def with_flags(message: str) -> str:
 
 
 def _flag(keyword: re.Match[str]) -> str:
+    # True and False become a flag and its opposite, other values follow their flag.
     name, value = keyword.groups()
     flag = FLAGS.get(name, name).replace("_", "-")
     if value in ("True", "False"):

@@ -21,25 +21,28 @@ def chosen_region(scene: Any, region: Place, device: str) -> Any:
     )
 
 
-def opened(scene: Path, output: Path, region: Place, how: Rendering) -> tuple[Any, Any]:
+def opened_region(
+    scene: Path, output: Path, region: Place, rendering: Rendering
+) -> tuple[Any, Any]:
     """(the scene, [H, W] bool region that is edited), once the output is known to be writable."""
-    check_before(output, how)
+    check_before(output, rendering)
     loaded = mt.load_scene(scene)
-    return loaded, chosen_region(loaded, region, how.device)
+    return loaded, chosen_region(loaded, region, rendering.device)
 
 
-def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
+def check_before(output: Path, rendering: Rendering, *, video: bool = False) -> None:
     """Everything about the output that can be wrong, before the work starts.
 
     All renderings of the command are then done on its device, also those that ask for `auto`.
     """
+    # --- The scene that --save writes ---
     from materialist.io.atomic import ensure_writable
     from materialist.io.video import ensure_video_writable
     from materialist.render.denoise import require_denoiser
 
-    save = how.save
+    save = rendering.save
     if save is not None:
-        if how.full_render:
+        if rendering.full_render:
             raise InputError(
                 "--save keeps the photograph with the edit in it, and --full-render writes the rendering alone; leave "
                 "one of them out."
@@ -48,29 +51,31 @@ def check_before(output: Path, how: Rendering, *, video: bool = False) -> None:
             raise InputError(
                 f"{output} would lie in the scene {save}, which is written whole; put it beside."
             )
-        ensure_writable(save, how.force)
+        ensure_writable(save, rendering.force)
+    # --- The picture or film itself ---
     if video:
-        if how.quality is not None or how.bits is not None or how.exr_layers:
+        if rendering.quality is not None or rendering.bits is not None or rendering.exr_layers:
             raise InputError(
                 "--quality, --bits and --exr-layers are of pictures; leave them out for a film."
             )
-        ensure_video_writable(output, force=how.force)
+        ensure_video_writable(output, force=rendering.force)
     else:
-        check_picture(output, how)
-    if how.denoise:
+        check_picture(output, rendering)
+    # --- What the work needs ---
+    if rendering.denoise:
         require_denoiser()
-    if how.device != "auto":
+    if rendering.device != "auto":
         from materialist.render.variant import setup
 
-        setup(how.device)
+        setup(rendering.device)
 
 
-def check_picture(output: Path, how: PictureFile) -> None:
+def check_picture(output: Path, options: PictureFile) -> None:
     """Raise what the output of a picture is refused for."""
     from materialist.io.out.encode import check_image_output
 
-    check_image_output(output, **how.encoding)
-    if how.exr_layers and output.suffix.lower() != ".exr":
+    check_image_output(output, **options.encoding)
+    if options.exr_layers and output.suffix.lower() != ".exr":
         raise InputError(
             f"--exr-layers writes an .exr, not {output}; give another name, or leave it out."
         )
@@ -81,37 +86,46 @@ def write_result(
     scene: Any,
     edited: Any,
     output: Path,
-    how: Rendering,
+    rendering: Rendering,
     *,
     lines: Sequence[str] = (),
 ) -> None:
     start = time.monotonic()
-    with stage_progress(quiet=how.as_json) as progress:
+    with stage_progress(quiet=rendering.as_json) as progress:
         picture = mt.composite(
             scene,
             edited,
-            spp=how.spp,
-            seed=how.seed,
-            full_render=how.full_render,
-            upscale=how.upscale,
-            denoise=how.denoise is not False,
-            device=how.device,
+            spp=rendering.spp,
+            seed=rendering.seed,
+            full_render=rendering.full_render,
+            upscale=rendering.upscale,
+            denoise=rendering.denoise is not False,
+            device=rendering.device,
             progress=progress,
         )
-    notes = write_picture(output, picture, scene, edited, how)
-    told = {"image": str(output), "spp": how.spp, "seconds": time.monotonic() - start}
-    finish(command, scene, edited, picture, how, [*lines, f"Look at {output}"], told, notes=notes)
+    notes = write_picture(output, picture, scene, edited, rendering)
+    facts = {"image": str(output), "spp": rendering.spp, "seconds": time.monotonic() - start}
+    finish_command(
+        command,
+        scene,
+        edited,
+        picture,
+        rendering,
+        [*lines, f"Look at {output}"],
+        facts,
+        notes=notes,
+    )
 
 
 def write_picture(
-    output: Path, picture: Any, scene: Any, shown: Any, how: PictureFile
+    output: Path, picture: Any, scene: Any, shown: Any, options: PictureFile
 ) -> tuple[str, ...]:
     """Write a picture of the scene `shown`, made of the photo of `scene`; returns notes."""
-    if not how.exr_layers:
-        return mt.save_image(output, picture, scene, **how.encoding)
+    if not options.exr_layers:
+        return mt.save_image(output, picture, scene, **options.encoding)
     from materialist.edits.layers import save_layers
 
-    return save_layers(output, shown, picture, device=how.device, force=how.force)
+    return save_layers(output, shown, picture, device=options.device, force=options.force)
 
 
 def write_film(
@@ -119,7 +133,7 @@ def write_film(
     scene: Any,
     film: Iterable[Any],
     output: Path,
-    how: Rendering,
+    rendering: Rendering,
     *,
     frames: int,
     fps: int,
@@ -137,36 +151,50 @@ def write_film(
         nonlocal change
         for item in items:
             last[name] = item
-            if name == "picture" and not how.full_render:
+            if name == "picture" and not rendering.full_render:
                 change = max(change, mean_change(scene, item))
             yield item
 
-    with stage_progress(quiet=how.as_json) as progress:
-        made = pictures(
+    with stage_progress(quiet=rendering.as_json) as progress:
+        composites = pictures(
             scene,
             kept("scene", film),
-            spp=how.spp,
-            seed=how.seed,
-            denoise=how.denoise is not False,
-            device=how.device,
-            full_render=how.full_render,
-            upscale=how.upscale,
+            spp=rendering.spp,
+            seed=rendering.seed,
+            denoise=rendering.denoise is not False,
+            device=rendering.device,
+            full_render=rendering.full_render,
+            upscale=rendering.upscale,
             progress=progress,
             count=frames,
         )
-        write_frames(output, kept("picture", made), fps=fps, force=how.force)
-    told = {"video": str(output), "frames": frames, "fps": fps, "seconds": time.monotonic() - start}
-    finish(command, scene, last["scene"], last["picture"], how, [f"Look at {output}"], told, change)
+        write_frames(output, kept("picture", composites), fps=fps, force=rendering.force)
+    facts = {
+        "video": str(output),
+        "frames": frames,
+        "fps": fps,
+        "seconds": time.monotonic() - start,
+    }
+    finish_command(
+        command,
+        scene,
+        last["scene"],
+        last["picture"],
+        rendering,
+        [f"Look at {output}"],
+        facts,
+        change,
+    )
 
 
-def finish(
+def finish_command(
     command: str,
     scene: Any,
     edited: Any,
     picture: Any,
-    how: Rendering,
+    rendering: Rendering,
     lines: list[str],
-    told: dict[str, Any],
+    facts: dict[str, Any],
     change: float | None = None,
     notes: Sequence[str] = (),
 ) -> None:
@@ -174,24 +202,29 @@ def finish(
     from materialist.edits.composite.composite import developed
     from materialist.edits.core.notes import effect_notes, mean_change, noise_notes, warnings_since
 
-    save = how.save
-    grainy = noise_notes(how.denoise is not False)
+    # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
+    # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
+    save = rendering.save
+    grainy = noise_notes(rendering.denoise is not False)
     warnings = [*warnings_since(scene, edited), *grainy, *notes]
-    if not how.full_render:
+    if not rendering.full_render:
         warnings += effect_notes(
             scene, edited, mean_change(scene, picture) if change is None else change
         )
+    # --- The edited scene, whose photo is the picture ---
+    # --- The edited scene, whose photo is the picture ---
     if save is not None:
-        saved = developed(scene, edited, picture, seed=how.seed, device=how.device)
-        mt.save_scene(saved, save, force=how.force)
+        saved = developed(scene, edited, picture, seed=rendering.seed, device=rendering.device)
+        mt.save_scene(saved, save, force=rendering.force)
         warnings += warnings_since(edited, saved)
         lines.append(f"The edited scene is {save}")
+    # Notes stand before the lines that say where the results are.
     last = -2 if save is not None else -1
     lines[last:last] = [f"Note: {note}" for note in warnings]
-    told["denoised"] = how.denoise is not False and not grainy
-    told |= {
+    facts["denoised"] = rendering.denoise is not False and not grainy
+    facts |= {
         "scene": str(save) if save else None,
         "edits": edited.provenance.get("edits", []),
         "warnings": warnings,
     }
-    report_success(command, how.as_json, lines, **told)
+    report_success(command, rendering.as_json, lines, **facts)

@@ -1,9 +1,14 @@
 """A progress bar on stderr for each stage, driven by `progress(stage, done, total)` callbacks."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from __future__ import annotations
 
-Progress = Callable[[str, int, int], None]
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:  # numpy, which it needs, would slow every --help
+    from materialist.types import Progress
+
 SPEED_PERIOD = 600.0
 """Seconds of which the time left is estimated; a path-traced step may take a minute."""
 
@@ -17,6 +22,7 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
     from rich import progress as rich
     from rich.console import Console
 
+    # On stderr: stdout is for results.
     console = Console(stderr=True)
     tasks = dict[str, rich.TaskID]()
     name = rich.TextColumn("{task.description:<24}")
@@ -29,7 +35,7 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
         speed_estimate_period=SPEED_PERIOD,
     ) as bars:
 
-        def told(stage: str, done: int, total: int) -> None:
+        def update(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
                 for task in bars.tasks:  # one that stopped early shows what it did as its total
                     if not task.finished:
@@ -39,4 +45,4 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
                 tasks[stage] = bars.add_task(stage, total=max(total, 1))
             bars.update(tasks[stage], completed=done, total=max(total, 1))
 
-        yield told
+        yield update

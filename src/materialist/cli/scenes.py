@@ -1,7 +1,6 @@
 """`materialist invert`, `render` and `export`: scene packages made, rendered, and written for other programs."""
 
 import time
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,11 +10,12 @@ import materialist as mt
 from materialist.cli.options import PictureFile, PictureOutput, Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
+from materialist.cli.stopping import FitStop
 from materialist.errors import InputError
 from materialist.options import ExportOptions, InvertOptions
 
 
-def invert(
+def invert_command(
     photo: Annotated[
         str,
         typer.Argument(metavar="PHOTO", help="A photo file, or example:NAME (coffee, cat, ...)."),
@@ -30,9 +30,10 @@ def invert(
     # Everything that can be wrong is found before the work starts.
     ensure_writable(output, run.force)
     picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
+    # Reading is quick, and wrong files show here; the clock is that of the inversion.
     start = time.monotonic()
     slow = options.preset == "paper" or options.engine == "path"
-    with stage_progress(quiet=run.as_json) as progress, _Stop(slow) as stop:
+    with stage_progress(quiet=run.as_json) as progress, FitStop(slow) as stop:
         scene = mt.invert(
             picture, options, progress=progress, on_stage=stop.on_stage, stop=stop.requested
         )
@@ -53,35 +54,7 @@ def invert(
     report_success("invert", run.as_json, lines, scene=str(output), **facts)
 
 
-class _Stop:
-    """Ctrl-C or SIGTERM during a fit of minutes or hours ends the fit; what it has found is then written.
-
-    Before the fit, and at the second signal, the command ends at once, as it does with our schedule.
-    """
-
-    def __init__(self, slow: bool):
-        self.slow = slow
-        self.signals: list[int] = []
-        self.stack = ExitStack()
-
-    def __enter__(self) -> "_Stop":
-        return self
-
-    def __exit__(self, *_: Any) -> None:
-        self.stack.close()
-
-    def on_stage(self, name: str, _: Any) -> None:
-        """The fit begins when the prior is there."""
-        from materialist.train.schedule import stop_requests
-
-        if self.slow and name == "prior":
-            self.signals = self.stack.enter_context(stop_requests())
-
-    def requested(self) -> bool:
-        return bool(self.signals)
-
-
-def render(
+def render_command(
     scene: SceneArgument,
     output: PictureOutput,
     run: PictureFile,
@@ -111,6 +84,7 @@ def render(
     notes = (
         [f"{PICTURED}a rendering does not show it."] if is_pictured(loaded) and not photo else []
     )
+    # Layers may be of the photo itself: nothing is rendered then.
     if photo:
         image = loaded.photo.original
     else:
@@ -124,7 +98,7 @@ def render(
     report_success("render", run.as_json, shown, **facts)
 
 
-def export(
+def export_command(
     scene: SceneArgument,
     output: Annotated[
         Path,

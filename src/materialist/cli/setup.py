@@ -23,20 +23,21 @@ def doctor(computing: Computing) -> None:
 
     findings = examine(computing.device)
     as_json = computing.as_json
+    # Missing extras are no failure: the main job runs without them.
     broken = [finding for finding in findings if finding.state == "broken"]
     verdict = (
         "The main job cannot run yet; run the commands above."
         if broken
         else "Ready: materialist invert PHOTO -o SCENE"
     )
-    found = [vars(finding) for finding in findings]
+    rows = [vars(finding) for finding in findings]
     lines = [*map(_line, findings), verdict]
     report_success(
         "doctor",
         as_json,
         lines,
         ok=not broken,
-        findings=found,
+        findings=rows,
         exit_code=BAD_INPUT if broken else 0,
     )
     if broken:
@@ -56,13 +57,13 @@ def list_models(as_json: Json = False) -> None:
     """Say which models there are, what they are for, and which are on this machine."""
     from materialist.predict.models import KNOWN, folder_of, is_complete, models_folder
 
-    found = [{**vars(m), "here": is_complete(m), "folder": str(folder_of(m))} for m in KNOWN]
+    rows = [{**vars(m), "here": is_complete(m), "folder": str(folder_of(m))} for m in KNOWN]
     lines = [
         f"{'here' if m['here'] else '-':<5}{m['name']:<21}{m['megabytes']:>5} MB  {m['purpose']} "
         f"({m['repo']}; licence: {m['licence']})"
-        for m in found
+        for m in rows
     ]
-    report_success("models list", as_json, [*lines, f"Folder: {models_folder()}"], models=found)
+    report_success("models list", as_json, [*lines, f"Folder: {models_folder()}"], models=rows)
 
 
 def download_model(
@@ -100,6 +101,7 @@ def verify_model(
     from materialist.predict.models import downloaded, hub_model, models_folder, require
     from materialist.predict.weights import verify_folder
 
+    # Without names all that are here; none is a question that was misunderstood.
     folders = {name: require(hub_model(name)) for name in names} if names else downloaded()
     if not folders:
         raise InputError(
@@ -111,6 +113,7 @@ def verify_model(
         try:
             digests[name] = verify_folder(folder)
         except WeightsError as error:
+            # The others are checked all the same.
             damaged.append(str(error))
     if damaged:
         raise WeightsError(" ".join(damaged))

@@ -16,6 +16,7 @@ from materialist.option_kinds import option
 class Serving(Computing):
     """Who can reach the studio, and what it works with."""
 
+    # Where it is served.
     host: str = option(
         "127.0.0.1",
         "Address to serve on; other than this machine needs a password or --open.",
@@ -25,6 +26,7 @@ class Serving(Computing):
     work: Path = option(
         Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR"
     )
+    # Who may come in.
     password: str | None = option(
         None,
         "Ask everyone for it; `ps` shows an argument, so MATERIALIST_PASSWORD may hold it.",
@@ -51,8 +53,8 @@ class Serving(Computing):
     )
 
 
-def studio(
-    how: Serving,
+def studio_command(
+    serving: Serving,
     target: Annotated[
         str | None,
         typer.Argument(
@@ -63,32 +65,40 @@ def studio(
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.studio import server
 
+    # --- Who may reach it, checked before anything is made ---
     password = server.password_of(
-        how.password or os.environ.get("MATERIALIST_PASSWORD"), how.password_file
+        serving.password or os.environ.get("MATERIALIST_PASSWORD"), serving.password_file
     )
-    single_user = server.check_host(how.host, password, how.everyone, how.behind_proxy)
-    server.check_port(how.host, how.port)
-    if how.device != "auto":
+    single_user = server.check_host(serving.host, password, serving.everyone, serving.behind_proxy)
+    server.check_port(serving.host, serving.port)
+    if serving.device != "auto":
         from materialist.render.variant import setup
 
-        setup(how.device)
+        setup(serving.device)
+    # --- The studio, and what it opens first ---
     first = None if target is None else server.checked_target(target)
-    made = server.new_studio(
-        how.work, single_user=single_user, workers=how.workers, seed=how.seed, device=how.device
+    studio = server.new_studio(
+        serving.work,
+        single_user=single_user,
+        workers=serving.workers,
+        seed=serving.seed,
+        device=serving.device,
     )
-    made.start = None if first is None else server.first_shown(made.work, first)
-    if not how.as_json:
-        typer.echo(f"Scenes and edits are kept in {made.work.root}")
+    studio.start = None if first is None else server.first_shown(studio.work, first)
+    if not serving.as_json:
+        typer.echo(f"Scenes and edits are kept in {studio.work.root}")
 
     def on_ready(address: str) -> None:
         lines = [f"The studio is open at {address} (Ctrl-C ends it)"]
-        report_success("studio", how.as_json, lines, address=address, work=str(made.work.root))
+        report_success(
+            "studio", serving.as_json, lines, address=address, work=str(studio.work.root)
+        )
 
     server.serve(
-        made,
-        host=how.host,
-        port=how.port,
+        studio,
+        host=serving.host,
+        port=serving.port,
         password=password,
-        proxy=how.behind_proxy,
+        proxy=serving.behind_proxy,
         on_ready=on_ready,
     )

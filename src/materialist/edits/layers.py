@@ -45,6 +45,7 @@ def save_layers(
     if beauty.ndim != 3 or beauty.shape[2] != 3:
         raise InputError(f"The picture is {list(beauty.shape)}; give linear RGB [H, W, 3].")
     size = beauty.shape[:2]
+    # --- What is known of each pixel, at the picture's size and in the unit of the photo's file ---
     diffuse, specular = (_large(light, size) for light in _lobes(scene, beauty, device))
     surface = _surface(scene, size, device)
     unit = np.float32(2.0**-scene.photo.stops)
@@ -82,6 +83,7 @@ def _lobes(scene: Scene, picture: Array, device: str) -> tuple[Array, Array]:
     shape = scene.depth.shape
     materials = scene.materials
     passed_on = cv2.resize(np.maximum(picture, 0), shape[::-1], interpolation=cv2.INTER_AREA)
+    # The picture itself is the light that surfaces pass on: it holds the edit's own bounces.
     engine = TransportEngine(
         scene.geometry, scene.camera, passed_on, seed=0, cache=CacheSettings(*RAYS)
     )
@@ -93,18 +95,20 @@ def _lobes(scene: Scene, picture: Array, device: str) -> tuple[Array, Array]:
         materials.metallic.ravel(),
     )
     albedo, roughness, metallic = (placed(np.ascontiguousarray(values[pixels])) for values in maps)
+    # --- The two terms of the shading, apart: A (1 - M) (D0 + D1 R + D2 R^2), and C_0 S0 + S1 ---
     with torch.no_grad():
         metal = metallic[:, None]
         rough = roughness[:, None]
         diffuse = albedo * (1 - metal) * quadratic(tables.diffuse.split(3, -1), rough)
         s0, s1 = specular_at(tables, roughness).split(3, -1)
         specular = base_reflectance(albedo, metal) * s0 + s1
-    return _spread(diffuse.cpu().numpy(), pixels, shape), _spread(
-        specular.cpu().numpy(), pixels, shape
+    return (
+        _scattered(diffuse.cpu().numpy(), pixels, shape),
+        _scattered(specular.cpu().numpy(), pixels, shape),
     )
 
 
-def _spread(values: Array, pixels: Array, shape: tuple[int, ...]) -> Array:
+def _scattered(values: Array, pixels: Array, shape: tuple[int, ...]) -> Array:
     """Values [P, 3] of some pixels as a picture [H, W, 3], 0 elsewhere."""
     flat = np.zeros((shape[0] * shape[1], 3), np.float32)
     flat[pixels] = values
@@ -129,6 +133,7 @@ def _surface(scene: Scene, size: tuple[int, int], device: str) -> dict[str, Arra
 
         bodies = {f"body{k}": body for k, body in enumerate(scene.bodies)}
         sight = first_hits(_built(scene, device), scene.camera, bodies, size)
+        # Albedo mixes at silhouettes; a normal or a depth between two surfaces belongs to neither.
         share = sight.share[..., None]
         albedo = share * sight.albedo + (1 - share) * albedo
         seen = sight.share > 0.5
@@ -142,12 +147,13 @@ def _things(scene: Scene, size: tuple[int, int], device: str) -> dict[str, Array
     """Coverage [H, W] of each body, by a name that no other has."""
     from materialist.render.pixels import first_hits
 
-    found: dict[str, Array] = {}
+    coverage: dict[str, Array] = {}
     built = _built(scene, device) if scene.bodies else None
     for k, body in enumerate(scene.bodies):
-        name = body.name if body.name not in found else f"{body.name} {k + 1}"
-        found[name] = first_hits(built, scene.camera, {f"body{k}": body}, size).share
-    return found
+        # Layers of one name would overwrite each other.
+        name = body.name if body.name not in coverage else f"{body.name} {k + 1}"
+        coverage[name] = first_hits(built, scene.camera, {f"body{k}": body}, size).share
+    return coverage
 
 
 def _built(scene: Scene, device: str):

@@ -30,7 +30,7 @@ RAYS = (48, 12)
 """Diffuse and specular rays a pixel, three quarters of the fit's: a new light is gathered sooner."""
 VERSION = 1
 """Of the tables on disk; another one where the same scene gives other tables."""
-LEAST_AMBIENT = 1e-3
+MIN_AMBIENT = 1e-3
 """Factor on the fitted map below which the map cannot be scaled back."""
 
 
@@ -69,6 +69,7 @@ class Preview:
         self._tables = Tables(
             *(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular"))
         )
+        # The fitted scene, shaded once: every edit is compared with it.
         self._base = self._image(
             self._shaded(self.scene.materials, self._tables), self._sky(self.scene.envmap)
         )
@@ -119,6 +120,8 @@ class Preview:
 
     def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""
+        # The same layers as of the composite, without noise: what differs is what the edit
+        # reaches.
         picture = self.render(edited, coarse=coarse)
         base = self._base
         differs = (picture != base).any(-1)
@@ -131,22 +134,23 @@ class Preview:
 
     def _seen(self, edited: Scene) -> Scene:
         """The scene as it is shaded: in-photo emitters are not shown, and their light comes from the map, as fitted."""
-        found = dimmed_emitters(self.scene, edited)
-        if found is None:
+        emitters = dimmed_emitters(self.scene, edited)
+        if emitters is None:
             return edited
-        ambient = float(found["ambient"])
-        lights = float(found["share"])
-        brought = (ambient + lights * found["dim"]) / max(
-            ambient + lights, 1e-6
-        )  # relative to the photo's light
+        ambient = float(emitters["ambient"])
+        lights = float(emitters["share"])
+        # All light after the dimming, relative to the photo's.
+        factor = (ambient + lights * emitters["dim"]) / max(ambient + lights, 1e-6)
         # Without its lights the map may have nothing left to be scaled.
-        light = edited.envmap / ambient if ambient > LEAST_AMBIENT else self.scene.envmap
-        return replace(edited, envmap=(light * brought).astype(np.float32))
+        light = edited.envmap / ambient if ambient > MIN_AMBIENT else self.scene.envmap
+        return replace(edited, envmap=(light * factor).astype(np.float32))
 
     def _tables_under(self, edited: Scene, coarse: bool) -> Tables:
         """The tables of another light, which surfaces pass on once; kept until there is a third light."""
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
             return self._other[1]
+        # First what surfaces pass on under this light, by few rays; then the picture, by all of
+        # them.
         tables = self._filtered(self._quick, edited.envmap, self._passed_on if coarse else None)
         self._passed_on = self._image(
             self._shaded(edited.materials, tables), self._sky(edited.envmap)
@@ -184,7 +188,8 @@ class Preview:
 
     def _image(self, shaded, sky: Array) -> Array:
         flat = np.empty((self.scene.depth.size, 3), np.float32)
-        flat[self._pixels], flat[self._skies] = shaded.cpu().numpy(), sky
+        flat[self._pixels] = shaded.cpu().numpy()
+        flat[self._skies] = sky
         return flat.reshape(*self.scene.depth.shape, 3)
 
 
@@ -199,6 +204,7 @@ def _key(scene: Scene) -> str:
 
 def _stored(cache: TransportCache, tables: Tables) -> dict[str, Any]:
     """Tables and the pixels of their rows as a file holds them, so that a scene opened again looks the same."""
+    # float16 halves the file; its largest number is 65504.
     halves = {
         name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16)
         for name, v in vars(tables).items()

@@ -21,10 +21,11 @@ from materialist.option_kinds import (
     OperationOptions,
     beside,
     declarations,
-    numbers,
+    parse_numbers,
     several,
 )
 from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
+from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
 
 OPTIONS: dict[str, type[OperationOptions]] = {
@@ -38,7 +39,7 @@ WHERE = {"insert": PLACE, "drop": PLACE}
 KINDS = {
     name: (
         *WHERE.get(name, REGION),
-        *(key for key, (told, _) in declarations(kind).items() if told.written),
+        *(key for key, (declared, _) in declarations(kind).items() if declared.written),
     )
     for name, kind in OPTIONS.items()
 }
@@ -78,6 +79,7 @@ def read_recipe(path: str | Path) -> list[Step]:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
+    # --- Either the list itself, or a mapping with the one key `edits` ---
     unknown = [str(key) for key in content if key != "edits"] if isinstance(content, dict) else []
     if unknown and "edits" in content:
         raise InputError(f"{path} says '{unknown[0]}' beside its edits; it knows edits alone.")
@@ -109,6 +111,7 @@ def _loader() -> Any:
 
         def construct_mapping(self, node, deep=False):
             names = Counter(key.value for key, _ in node.value if isinstance(key, yaml.ScalarNode))
+            # YAML keeps the last of two equal keys without a word.
             twice = [name for name, count in names.items() if count > 1]
             if twice:
                 raise yaml.constructor.ConstructorError(
@@ -130,6 +133,7 @@ def _step(entry: Any, number: int, path: Path) -> Step:
         raise InputError(
             f"Step {number} of {path} is {said}; it must be one of {known} with its options below it."
         )
+    # --- The step's options: only those that its kind has ---
     kind, options = next(iter(entry.items()))
     if not isinstance(options, dict):
         raise InputError(
@@ -150,14 +154,15 @@ def _step(entry: Any, number: int, path: Path) -> Step:
 def with_files(step: Step, use: Callable[[str, Any], Any]) -> Step:
     """The step with `use(option, value)` in place of each file that it names; words such as `auto` stay."""
     known = declarations(OPTIONS[step.kind])
-    words = {name: told.choices for name, (told, _) in known.items() if told.kind == "file"} | {
-        "mask": (),
-        "mesh": (),
-    }
+    files = {name: declared for name, (declared, _) in known.items() if declared.kind == "file"}
+    words = {name: declared.choices for name, declared in files.items()}
+    words |= {"mask": (), "mesh": ()}
     options = dict(step.options)
     for name in words.keys() & options:
-        put = [one if one in words[name] else use(name, one) for one in _listed(options[name])]
-        options[name] = put if isinstance(options[name], list) else put[0]
+        values = [
+            value if value in words[name] else use(name, value) for value in _listed(options[name])
+        ]
+        options[name] = values if isinstance(options[name], list) else values[0]
     return replace(step, options=options)
 
 
@@ -186,6 +191,7 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     write_whole(path, text)
 
 
+@fixed_threads()
 def apply(
     scene: Scene,
     steps: list[Step],
@@ -196,7 +202,7 @@ def apply(
 ) -> Scene:
     """The scene after all steps, in order. Regions are chosen on the original photo, whatever came before.
 
-    `seed` is that of the steps that name none, where chance has a part in them; `onto` the scene after earlier steps.
+    seed: of random numbers, for steps that name none. onto: the scene after earlier steps.
     """
     edited = scene if onto is None else onto
     for number, step in enumerate(steps, 1):
@@ -213,15 +219,15 @@ def apply(
 
 def region_of(scene: Scene, step: Step) -> Array:
     """[H, W] bool of the step's mask, click or box. Raises InputError."""
-    given = step.options
-    where: dict[str, Any] = {
-        "click": [numbers(c, 2, "click") for c in several(given["click"])]
-        if "click" in given
-        else None,
-        "box": numbers(given["box"], 4, "box") if "box" in given else None,
-        "mask": beside(step.folder, "mask", given["mask"]) if "mask" in given else None,
-    }
-    return select(scene, method=given.get("with", "network"), device=step.device, **where)
+    options = step.options
+    where: dict[str, Any] = {}
+    if "click" in options:
+        where["click"] = [parse_numbers(click, 2, "click") for click in several(options["click"])]
+    if "box" in options:
+        where["box"] = parse_numbers(options["box"], 4, "box")
+    if "mask" in options:
+        where["mask"] = beside(step.folder, "mask", options["mask"])
+    return select(scene, method=options.get("with", "network"), device=step.device, **where)
 
 
 def _left(scene: Scene, edited: Scene, region: Array) -> Array:
@@ -239,6 +245,7 @@ def options_of(step: Step) -> Any:
     kind = OPTIONS[step.kind]
     known = declarations(kind)
     shared = {name: getattr(step, name) for name in ("seed", "device") if name in known}
+    # Region and place are read elsewhere.
     said = {name: value for name, value in step.options.items() if name in known}
     return kind.read(said, folder=step.folder, **shared)
 
@@ -253,29 +260,30 @@ def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
         raise InputError(
             f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out."
         )
-    wanted = options_of(step)
-    return relight(edited, wanted, lights=region_of(scene, step) if region else None, fitted=scene)
+    options = options_of(step)
+    return relight(edited, options, lights=region_of(scene, step) if region else None, fitted=scene)
 
 
 def _put(scene: Scene, edited: Scene, step: Step) -> Scene:
+    """Meshes at places: inserted one by one, or dropped together."""
     for name in PLACE:
         if name not in step.options:
             raise InputError(
                 f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}."
             )
-    wanted = options_of(step)
+    options = options_of(step)
     mesh = step.options["mesh"]
-    places: list[Any] = [numbers(one, 2, "at") for one in several(step.options["at"])]
+    places: list[Any] = [parse_numbers(pair, 2, "at") for pair in several(step.options["at"])]
     if step.kind == "drop":
-        return settle(
-            edited, [beside(step.folder, "mesh", one) for one in _listed(mesh)], places, wanted
-        )
+        files = [beside(step.folder, "mesh", name) for name in _listed(mesh)]
+        return settle(edited, files, places, options)
     for place in places:
-        edited = insert(edited, beside(step.folder, "mesh", mesh), place, wanted)
+        edited = insert(edited, beside(step.folder, "mesh", mesh), place, options)
     return edited
 
 
 def _in_region(scene: Scene, edited: Scene, step: Step) -> Scene:
+    """Edits of a region: material, glass, removal."""
     region = _left(scene, edited, region_of(scene, step))
     options = options_of(step)
     if step.kind == "edit":

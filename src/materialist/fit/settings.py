@@ -26,13 +26,11 @@ class Schedule:
     decay_every: int = 100  # paper; steps
     decay: float = 0.8  # paper; factor on the learning rate
     least_rate: float = 0.0  # learning rate below which it does not fall
-    patience: int = (
-        100  # paper; stop when the loss improved too little over this many steps; 0: never
-    )
+    # paper; stop when the loss improved too little over this many steps; 0: never
+    patience: int = 100
     min_improvement: float = 0.01  # paper; fraction of the loss
-    averaged: int = (
-        1  # steps over whose mean the loss is judged; more where a step sees some pixels
-    )
+    # steps over whose mean the loss is judged; more where a step sees some pixels alone
+    averaged: int = 1
     keep_best: bool = False  # end with the parameters of the smallest loss, not with the last
 
     def rate(self, step: int) -> float:
@@ -52,18 +50,15 @@ class LightSettings:
     field: str = "mlp"  # `mlp` (directions), `mlp-uv`, `texels` or `sh`
     height: int = 256  # paper; rows of the field's map
     encoding: Encoding = "linear"
-    white: float = (
-        math.inf
-    )  # linear value from which a photo's channel is clipped: a brighter rendering is no error
+    # linear value from which a photo's channel is clipped: a brighter rendering is no error
+    white: float = math.inf
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     again: Schedule | None = None  # of another fit of the light after each stage of the materials
-    smooth: float = (
-        0.0  # weight of the total variation of log radiance, as it differs from the predicted one
-    )
-    chroma: float = (
-        0.0  # weight of the colourfulness of the same; larger: whiter; tuned on 12 scenes
-    )
+    # weight of the total variation of log radiance, as it differs from the predicted one
+    smooth: float = 0.0
+    # weight of the colourfulness of the same; larger: whiter; tuned on 12 scenes
+    chroma: float = 0.0
     prior: float = 0.0  # weight of the distance from a predicted light, over its scale of error; tuned on 14 scenes
     start: float = 0.6  # grey radiance at which texels start at most; tuned by eye
     start_albedo: float = 0.35  # a darker photo starts texels at its mean over this; tuned by eye
@@ -85,9 +80,8 @@ class MaterialSettings:
     field: str = "mlp"  # `mlp`, `maps` or `unet`
     remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
-    loss: Loss = (
-        "l1+l2"  # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
-    )
+    # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
+    loss: Loss = "l1+l2"
     white: float = math.inf
     step_pixels: int = 0  # pixels that a step with cached transport compares, drawn anew; 0: all
     delta: float = 0.5  # paper; scale of L_cons
@@ -106,9 +100,8 @@ class FitSettings:
     """What surfaces send each other with cached transport: as the photo shows, or, once there is a light, `traced`."""
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
-    rerender_pixels: int = (
-        2**62
-    )  # pixels of a picture from which they are fewer, in proportion; 8 at the least
+    # pixels of a picture from which they are fewer, in proportion; 8 at the least
+    rerender_pixels: int = 2**62
 
     def at_most(self, steps: int) -> "FitSettings":
         """The same with no more steps in any stage."""

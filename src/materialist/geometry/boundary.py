@@ -22,13 +22,11 @@ from materialist.types import Array, Camera, Mesh
 class BoundarySettings:
     """How far depth is carried on to the corners of pixels, and under the foreground; tuned by eye."""
 
-    extrapolation: float = (
-        2.0  # inverse depth at a pixel's corner stays within this factor of the pixel's own
-    )
+    # inverse depth at a pixel's corner stays within this factor of the pixel's own
+    extrapolation: float = 2.0
     behind: float = 1e-3  # part of the depth by which a continued background lies behind the foreground, at least
-    overlap: float = (
-        0.02  # pixels by which a tuck that had to leave the background's vertex reaches under it
-    )
+    # pixels by which a tuck that had to leave the background's vertex reaches under it
+    overlap: float = 0.02
     least_facing: float = 0.02  # least n . v of shading normals (89 degrees), so that every visible point can be shaded
 
 

@@ -24,27 +24,21 @@ class CompletionSettings:
     behind: float = 0.01  # part of the depth by which a continuation lies behind the observed surface; tuned by eye
     extent: float = 2.0  # from the plane's visible middle: under the camera and somewhat behind it; tuned by eye
     ground_extent: float = 20.0  # the same for ground under open sky; tuned by eye
-    sky_share: float = (
-        0.05  # share of the picture without a surface from which a scene counts as outdoors
-    )
+    # share of the picture without a surface from which a scene counts as outdoors
+    sky_share: float = 0.05
     upward: float = 0.5  # least Y of the normal of a floor, as of `drop`: a table seen from above has 0.6; by eye
-    wall_reach: float = (
-        0.8  # extent of a wall in its own seen size, beyond the picture; tuned on 8 scenes
-    )
-    wall_behind: float = (
-        1.2  # the same for what lies behind things that the picture shows; tuned on 8 scenes
-    )
+    # extent of a wall in its own seen size, beyond the picture; tuned on 8 scenes
+    wall_reach: float = 0.8
+    # the same for what lies behind things that the picture shows; tuned on 8 scenes
+    wall_behind: float = 1.2
     bounding: float = 0.9  # share of the other points in front of a plane from which it bounds the scene (floor, wall)
     touch: float = 0.2  # share of a frame side that a plane must cover to go on across it
-    one_side: float = (
-        0.9  # share of a plane's pixels on one side of another for the planes to stop at each other
-    )
-    cells: int = (
-        256  # cells of a continuation along the picture's longer side; at least a pixel each
-    )
-    rim: float = (
-        0.01  # pixels by which the part beyond the frame keeps clear of it, against round-off
-    )
+    # share of a plane's pixels on one side of another for the planes to stop at each other
+    one_side: float = 0.9
+    # cells of a continuation along the picture's longer side; at least a pixel each
+    cells: int = 256
+    # pixels by which the part beyond the frame keeps clear of it, against round-off
+    rim: float = 0.01
     cell: float = 0.2  # size of a continuation's cells beyond the frame, part of the distance from its middle; by eye
 
 

@@ -12,9 +12,8 @@ from materialist.types import Array, Camera
 class CutSettings:
     """Which steps in depth are the surface's own; tuned by eye unless derived."""
 
-    support: int = (
-        3  # pixels beside a pair over which a slope must hold to count as the surface's own
-    )
+    # pixels beside a pair over which a slope must hold to count as the surface's own
+    support: int = 3
     slanted: float = 25.0  # degrees from grazing: where normals face the camera more, a steep slope is a smeared edge
     steady: float = 2.0  # factor by which a step may exceed a steady slope, as on a plane
     bending: float = 3.0  # what a slope that grows towards the pair adds to that factor, times the share it grows by

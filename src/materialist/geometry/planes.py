@@ -20,12 +20,10 @@ class PlaneSettings:
     samples: int = 12_000  # points that take part in the search; labels are made for every pixel
     hypotheses: int = 400  # planes that are tried
     tolerance: float = 0.025  # error of a pixel on a plane; networks bend planes by about this much
-    bent: float = (
-        0.08  # error up to which a plane grows, where connected: a bent table top stays one plane
-    )
-    step: float = (
-        0.01  # change of the error between neighbours that ends the growth: the rim of a book
-    )
+    # error up to which a plane grows, where connected: a bent table top stays one plane
+    bent: float = 0.08
+    # change of the error between neighbours that ends the growth: the rim of a book
+    step: float = 0.01
     small_picture: int = 150  # pixels along the longer side below which `step` grows in proportion
     same_normal: float = np.cos(
         np.radians(25.0)
@@ -223,9 +221,8 @@ def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
         label = np.where(error < nearest, k, label)
         nearest = np.minimum(nearest, error)
     planes = []
-    speck = (
-        int(np.ceil(SETTINGS.speck * surface.size)) - 1
-    )  # pixels of the largest patch that is chance
+    # pixels of the largest patch that is chance
+    speck = int(np.ceil(SETTINGS.speck * surface.size)) - 1
     for k, fit in enumerate(found):
         mask = remove_small_objects(label == k, max_size=speck)
         if mask.sum() < SETTINGS.least * surface.sum():

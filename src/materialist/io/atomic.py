@@ -20,6 +20,7 @@ from pathlib import Path
 import psutil
 
 from materialist.errors import OutputError
+from materialist.io.native import name_problem
 
 MARKER = "scene.json"
 """The file that makes a folder a scene package."""
@@ -92,6 +93,7 @@ def writing(path: str | Path, temporary: Path | None = None) -> Iterator[None]:
 
 def require_parent(path: str | Path) -> None:
     """Raise OutputError where the folder that PATH lies in is not there: its name may be misspelt."""
+    # `lexists`: a broken link is there, too, and its error names it.
     parent = _absolute(path).parent
     if not os.path.lexists(parent):
         raise OutputError(
@@ -102,15 +104,20 @@ def require_parent(path: str | Path) -> None:
 def ensure_writable(path: str | Path, force: bool = False, kind: FolderKind | None = SCENE) -> None:
     """Check before the work that a folder of `kind`, or with None a file, can be written at PATH.
 
-    The folder that it lies in must be there. PATH must not exist, or with `force` be of the same kind: nothing else is
+    The folder that it lies in must be there, its name one that OpenEXR takes where EXRs are written.
+    PATH must not exist, or with `force` be of the same kind: nothing else is
     ever replaced. Raises OutputError with the way out.
     """
     target = _absolute(path)
+    needs_exr = kind is SCENE or target.suffix.lower() == ".exr"
+    if needs_exr and (problem := name_problem(target)):
+        raise OutputError(problem)
     with writing(path):
         if target.is_symlink() or target.exists():
             _require_replaceable(path, target, force, kind)
         require_parent(path)
         make_folder(target.parent)  # says which file stands in the way
+        # The only sure test of permissions: write a file.
         probe = partial(target, ".probe")
         probe.touch()
         probe.unlink()
@@ -129,6 +136,7 @@ def _require_replaceable(
         )
     if kind is None:
         return
+    # --- Is it a folder of this kind, or an empty one? ---
     marked = target.is_dir() and (
         kind.marker is None or (target / kind.marker).is_file() or not any(target.iterdir())
     )
@@ -136,6 +144,7 @@ def _require_replaceable(
         raise OutputError(
             f"{path} is not {kind.called}, so `force=True` will not replace it; give another name."
         )
+    # --- Nothing in it may be somebody else's ---
     for name in files_below(target):
         if not kind.is_member(target, name):
             raise OutputError(
@@ -174,6 +183,7 @@ def whole_folder(path: str | Path, force: bool = False, kind: FolderKind = SCENE
     """Yield an empty temporary folder that becomes PATH when the block ends well, and vanishes when it does not."""
     ensure_writable(path, force, kind)
     target = _absolute(path)
+    # What killed runs left is removed first: it may fill the disk.
     _sweep(target)
     temporary = partial(target, "")
     try:
@@ -189,6 +199,7 @@ def whole_folder(path: str | Path, force: bool = False, kind: FolderKind = SCENE
 
 def files_below(folder: Path) -> list[str]:
     """Names of the files in and below a folder, without those that file managers leave."""
+    # A link counts as a file: what it leads to is not the program's.
     files = (file for file in folder.rglob("*") if file.is_symlink() or not file.is_dir())
     return sorted(
         file.relative_to(folder).as_posix() for file in files if file.name not in FILE_MANAGER_FILES
@@ -215,6 +226,7 @@ def _put_in_place(temporary: Path, target: Path) -> None:
     if not target.exists():
         os.rename(temporary, target)
         return
+    # Two renames, each atomic: at every moment the old or the new folder is whole.
     aside = target.with_name(f"{_stem(target)}replaced-{os.getpid()}-{_MARK}")
     os.rename(target, aside)
     try:
@@ -231,6 +243,7 @@ def _sweep(target: Path) -> None:
         name = re.fullmatch(
             re.escape(_stem(target)) + r"(partial|replaced)-(\d+)\b.*", leftover.name
         )
+        # Another running process may be writing the same target.
         if name is None or (psutil.pid_exists(int(name[2])) and int(name[2]) != os.getpid()):
             continue
         if name[1] == "replaced" and not target.exists():

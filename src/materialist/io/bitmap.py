@@ -19,6 +19,7 @@ from materialist.io.colour_space import ColourSpace
 from materialist.io.colour_tags import png_chunks, stated_space
 from materialist.io.exif import image_tags
 from materialist.io.icc import matrix_profile
+from materialist.io.native import unprinted
 from materialist.types import Array
 
 FORMATS = "PNG, JPEG, JPEG 2000, HEIC, AVIF, TIFF, WEBP, EXR, HDR or camera RAW"
@@ -123,6 +124,7 @@ def read_bitmap(path: Path) -> Decoded:
         tags = image_tags(image)
         chunks = png_chunks(path) if image.format == "PNG" else {}
         profile = None if b"cICP" in chunks else _profile(image, path)
+        # --- What the levels mean: cICP before ICC before other tags ---
         space = None if profile else stated_space(path, image.format, tags, warnings)
         # Pillow cuts PNG and HEIC of more bits a channel to 8.
         bits = int(image.info.get("bit_depth", 8)) if image.format == "HEIF" else 8
@@ -140,9 +142,13 @@ def read_bitmap(path: Path) -> Decoded:
             )
         else:
             levels = _shallow(image, profile, space, warnings)
+    # --- Linear, upright, over white ---
     colour, alpha, space = levels
     decoded = flattened(
-        upright(colour, tags), None if alpha is None else upright(alpha, tags), space, warnings
+        turned_upright(colour, tags),
+        None if alpha is None else turned_upright(alpha, tags),
+        space,
+        warnings,
     )
     decoded.tags = tags
     return decoded
@@ -167,6 +173,7 @@ def flattened(
         return Decoded(linear, is_light, warnings=warnings)
     warnings.append(OVER_WHITE)
     for start in range(0, len(linear), ROWS):  # bounds the memory
+        # In linear light, as a transparent film over white paper.
         share = alpha[start : start + ROWS] / np.float32(top)
         linear[start : start + ROWS] *= share
         if not is_light:
@@ -205,6 +212,7 @@ def _shallow(
         image_rgba = image.convert("RGBA")
         alpha = np.asarray(image_rgba)[..., 3:]
         image = image if image.mode in ("L", "LA", "La") else image_rgba
+    # Matrix profiles are applied in floats; table profiles need LittleCMS, at 8 bits.
     matrix = matrix_profile(profile) if profile and image.mode != "CMYK" else None
     if matrix is None:
         image = _through_lcms(image, profile, warnings)
@@ -239,6 +247,7 @@ def _deep_levels(path: Path, transparent: bytes | None) -> tuple[Array, Array | 
     colour, alpha = rgb_levels(path)
     if transparent is None or colour.dtype != np.uint16 or len(transparent) not in (2, 6):
         return colour, alpha
+    # Exactly this colour is transparent, and nothing else.
     clear = (colour == np.frombuffer(transparent, ">u2")).all(-1, keepdims=True)
     return colour, np.where(clear, np.uint16(0), np.uint16(65535))
 
@@ -269,7 +278,8 @@ def stored_pixels(path: Path) -> tuple[Array, Array | None]:
 def levels_of(content: Array, path: Path) -> tuple[Array, Array | None]:
     """`stored_pixels` of the bytes of a file, which messages call `path`."""
     try:
-        decoded = cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
+        with unprinted():
+            decoded = cv2.imdecode(content, cv2.IMREAD_UNCHANGED)
     except cv2.error:  # an empty file, or a header that promises more pixels than any picture has
         decoded = None
     if decoded is None or decoded.dtype not in (np.uint8, np.uint16, np.float32, np.float64):
@@ -288,7 +298,7 @@ def rgb_levels(path: Path) -> tuple[Array, Array | None]:
     return np.broadcast_to(colour, (*colour.shape[:2], 3)), alpha
 
 
-def upright(pixels: Array, tags: dict[str, Any]) -> Array:
+def turned_upright(pixels: Array, tags: dict[str, Any]) -> Array:
     """Undo the orientation (1 .. 8) that EXIF states."""
     orientation = int(tags.get("Orientation", 1) or 1)
     pixels = pixels.swapaxes(0, 1) if orientation in (5, 6, 7, 8) else pixels
@@ -300,6 +310,7 @@ def upright(pixels: Array, tags: dict[str, Any]) -> Array:
 def pixel_limit_lifted() -> Iterator[None]:
     """Let Pillow open files up to our own limit, which `check_size` applies before any pixel is decoded."""
     with _LIMIT:  # all threads share Pillow's
+        # A global of Pillow's: it must come back whatever happens.
         before = Image.MAX_IMAGE_PIXELS
         Image.MAX_IMAGE_PIXELS = None
         try:

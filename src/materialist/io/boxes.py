@@ -10,9 +10,9 @@ _HEAD_BYTES = 4 << 20
 
 def nclx(path: Path) -> tuple[int, int] | None:
     """Codes of primaries and transfer (ITU-T H.273) of a HEIC's or AVIF's main picture; None where it has none."""
-    meta = dict(boxes(_head(path))).get(b"meta", b"")[4:]
-    top = dict(boxes(meta))
-    properties = list(boxes(dict(boxes(top.get(b"iprp", b""))).get(b"ipco", b"")))
+    meta = dict(iso_boxes(_head(path))).get(b"meta", b"")[4:]
+    top = dict(iso_boxes(meta))
+    properties = list(iso_boxes(dict(iso_boxes(top.get(b"iprp", b""))).get(b"ipco", b"")))
     for index in _properties_of_primary(top):
         kind, data = properties[index - 1] if 0 < index <= len(properties) else (b"", b"")
         if kind == b"colr" and data[:4] == b"nclx" and len(data) >= 8:
@@ -22,23 +22,24 @@ def nclx(path: Path) -> tuple[int, int] | None:
 
 def jp2_profile(path: Path) -> bytes | None:
     """The ICC profile of a JPEG 2000 file, or None."""
-    header = dict(boxes(_head(path))).get(b"jp2h", b"")
+    header = dict(iso_boxes(_head(path))).get(b"jp2h", b"")
     return next(
         (
             data[3:]
-            for kind, data in boxes(header)
+            for kind, data in iso_boxes(header)
             if kind == b"colr" and data[:1] in (b"\2", b"\3")
         ),
         None,
     )
 
 
-def boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+def iso_boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
     """Kind and content of each box, one after the other; what is cut off or damaged ends them."""
     at = 0
     while at + 8 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, at)
         start = at + 8
+        # Size 1: the true size follows in 64 bits. Size 0: to the end of the file.
         if size == 1 and at + 16 <= len(data):
             (size,) = struct.unpack_from(">Q", data, start)
             start += 8
@@ -56,14 +57,16 @@ def _head(path: Path) -> bytes:
 
 def _properties_of_primary(meta: dict[bytes, bytes]) -> list[int]:
     """Numbers, from 1, of the properties of the main picture (ISO 23008-12, `pitm` and `ipma`)."""
+    # --- Which item is the main picture, and how wide the entries of the table are ---
     primary_box = meta.get(b"pitm", b"")
-    association = dict(boxes(meta.get(b"iprp", b""))).get(b"ipma", b"")
+    association = dict(iso_boxes(meta.get(b"iprp", b""))).get(b"ipma", b"")
     try:
         (primary,) = struct.unpack_from(">I" if primary_box[0] else ">H", primary_box, 4)
         wide_ids = association[0] > 0
         wide_indices = association[3] & 1
         (entries,) = struct.unpack_from(">I", association, 4)
         at = 8
+        # --- Walk the table of items; every entry has its own length ---
         for _ in range(entries):
             (item,) = struct.unpack_from(">I" if wide_ids else ">H", association, at)
             at += 4 if wide_ids else 2

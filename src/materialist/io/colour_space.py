@@ -58,6 +58,7 @@ class ColourSpace:
 
         Whole levels are clipped to [0, 1] unless the space holds light; floats never are.
         """
+        # Whole levels go through a table: as exact as the curve, and much faster.
         levels = encoded.dtype.kind == "u"
         out: Array = np.empty(encoded.shape, np.float32)
         tables = self._tables(encoded.dtype) if levels else None
@@ -82,6 +83,7 @@ class ColourSpace:
 def transformed(pixels: Array, matrix: Array) -> Array:
     """[H, W, 3] float32 times a colour matrix, in place; bit for bit as before where that is the identity."""
     if np.abs(matrix - np.eye(3)).max() > 1e-5:
+        # Rows of pixels times the transposed matrix.
         turned = matrix.T.astype(np.float32)
         for start in range(0, len(pixels), ROWS):
             block = pixels[start : start + ROWS]
@@ -98,6 +100,7 @@ def space(
 
 def rgb_to_xyz(primaries: Sequence[float]) -> Array:
     """[3, 3] float64: linear RGB to XYZ with white at Y = 1. Raises ValueError for primaries that span no colours."""
+    # --- Colours of the primaries at Y = 1, weighed so that they sum to white ---
     xy = np.array(primaries, np.float64).reshape(4, 2)
     xyz = np.column_stack([xy, 1 - xy.sum(1)])
     colours = xyz[:3].T
@@ -110,6 +113,7 @@ def rgb_to_xyz(primaries: Sequence[float]) -> Array:
 
 def adapted(white: Array, new_white: Array) -> Array:
     """[3, 3] float64: XYZ under one white to XYZ under another (Bradford)."""
+    # Cone responses scale by the ratio of the whites.
     cones = (_BRADFORD @ new_white) / (_BRADFORD @ white)
     return np.linalg.inv(_BRADFORD) @ (cones[:, None] * _BRADFORD)
 
@@ -144,7 +148,7 @@ def srgb_curve(encoded: Array) -> Array:
     return np.where(encoded <= 0.04045, encoded / 12.92, power)
 
 
-def identity(encoded: Array) -> Array:
+def linear_curve(encoded: Array) -> Array:
     return encoded
 
 

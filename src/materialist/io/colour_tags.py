@@ -31,7 +31,7 @@ _PRIMARIES: dict[int, Primaries] = {
 _TRANSFERS: dict[int, tuple[str, Curve]] = {
     4: ("gamma 2.2", spaces.power_curve(2.2)),
     5: ("gamma 2.8", spaces.power_curve(2.8)),
-    8: ("linear", spaces.identity),
+    8: ("linear", spaces.linear_curve),
     13: ("sRGB", spaces.srgb_curve),
     16: ("PQ", spaces.pq_curve),
     18: ("HLG", spaces.hlg_curve),
@@ -58,6 +58,7 @@ def stated_space(
     if kind == "PNG":
         stated, colours = _png_space(path, notes)
     else:
+        # HEIC and AVIF state it in a box, PNG in chunks, others in EXIF alone.
         codes = nclx(path) if kind in ("AVIF", "HEIF") else None
         stated = codes is not None
         colours = cicp_space(*codes, notes) if codes else None
@@ -69,6 +70,7 @@ def png_chunks(path: Path) -> dict[bytes, bytes]:
     chunks: dict[bytes, bytes] = {}
     with path.open("rb") as file:
         file.seek(8)
+        # Chunks: length, kind, content, checksum.
         while len(head := file.read(8)) == 8:
             size, kind = struct.unpack(">I4s", head)
             if kind in (b"IDAT", b"IEND"):
@@ -94,6 +96,7 @@ def cicp_space(
         )
         primaries = 1 if primaries in _VIDEO_PRIMARIES else primaries
         transfer = 13
+    # --- Codes that are not known count as sRGB and Rec.709, with a note ---
     name, curve = _TRANSFERS.get(transfer, _TRANSFERS[13])
     if primaries not in (0, _UNSPECIFIED, *_PRIMARIES) or transfer not in (
         0,
@@ -116,10 +119,12 @@ def cicp_space(
 
 def exif_space(tags: Mapping[str, Any], notes: list[str]) -> ColourSpace | None:
     """The space that EXIF (or TIFF) tags name: Adobe RGB, or primaries of their own; None for sRGB or nothing."""
+    # --- Adobe RGB has no code in EXIF: interoperability index R03 means it ---
     stated = tags.get("ColorSpace")
     index = str(tags.get("InteropIndex", "")).strip("\0 ")
     if stated == _ADOBE_RGB or (index == "R03" and stated != 1):
         return space("Adobe RGB", spaces.ADOBE_RGB, spaces.power_curve(563 / 256))
+    # --- Primaries of its own ---
     primaries = tags.get("PrimaryChromaticities")
     white = tags.get("WhitePoint")
     if stated != 1 and primaries is not None and white is not None:
@@ -145,6 +150,7 @@ def _png_space(path: Path, notes: list[str]) -> tuple[bool, ColourSpace | None]:
         if b"cICP" in chunks:
             primaries, transfer, _, full_range = struct.unpack(">4B", chunks[b"cICP"])
             return True, cicp_space(primaries, transfer, notes, full_range=bool(full_range))
+        # The sRGB chunk goes before gAMA and cHRM, which then only repeat it.
         if b"sRGB" in chunks or not chunks.keys() & {b"gAMA", b"cHRM"}:
             return b"sRGB" in chunks, None
         return True, _of_gamma(chunks)
@@ -159,6 +165,7 @@ def _of_gamma(chunks: Mapping[bytes, bytes]) -> ColourSpace | None:
     """The space of gAMA and cHRM chunks; None for sRGB. Raises struct.error, ValueError or ZeroDivisionError."""
     primaries: Sequence[float] = spaces.REC709
     if b"cHRM" in chunks:
+        # cHRM has white first, in units of 1e-5.
         white_x, white_y, *colours = (
             value / 1e5 for value in struct.unpack(">8I", chunks[b"cHRM"])
         )

@@ -15,6 +15,7 @@ from materialist.io.bitmap import Decoded
 from materialist.io.exif import file_tags
 from materialist.io.exr import exr_bytes, exr_headers, exr_size
 from materialist.io.exr_photo import read_exr_photo
+from materialist.io.native import unprinted
 from materialist.io.radiance import MAGIC, radiance_header, read_radiance
 from materialist.io.tiff import read_tiff
 from materialist.types import Array
@@ -108,12 +109,13 @@ def image_size(path: Path) -> tuple[int, int]:
     """
     with path.open("rb") as file:
         head = file.read(32)
+    # Headers alone: no pixel is decoded here.
     if head.startswith(_EXR):
         return max((exr_size(header) for header in exr_headers(path)), key=math.prod)
     if head.startswith(MAGIC):
         return radiance_header(path).size
     if head.startswith(_TIFF):  # Pillow does not know some layouts, such as float RGB
-        with TiffFile(path) as tiff:
+        with unprinted(), TiffFile(path) as tiff:
             page: Any = tiff.pages[0]
             return int(page.imagewidth), int(page.imagelength)
     from pillow_heif import register_heif_opener
@@ -166,6 +168,7 @@ def decode(path: Path, layer: str | None = None) -> Decoded:
     if layer is not None and not head.startswith(_EXR):
         raise InputError(f"{path} is no EXR, so it has no layer '{layer}'; leave the layer out.")
     try:
+        # RAW by the name, everything else by its first bytes: suffixes may lie.
         if path.suffix.lower() in RAW_SUFFIXES:
             return _raw(path)
         bitmap.check_size(*image_size(path), path)
@@ -199,6 +202,7 @@ def _raw(path: Path) -> Decoded:
     try:
         with rawpy.imread(str(path)) as raw:
             bitmap.check_size(raw.sizes.width, raw.sizes.height, path)
+            # Linear light as the camera recorded it: brightening is left to the fit's exposure.
             pixels = raw.postprocess(
                 gamma=(1, 1), no_auto_bright=True, use_camera_wb=True, output_bps=16
             )
@@ -218,6 +222,7 @@ def _cropped(pixels: Array, sizes: Any) -> Array:
 
     `sizes` are LibRaw's, of the picture before it was turned by `flip` (3: half, 5: left, 6: right).
     """
+    # --- Borders of the crop, in the frame of the sensor ---
     left = sizes.crop_left_margin - sizes.left_margin
     top = sizes.crop_top_margin - sizes.top_margin
     right = sizes.width - left - sizes.crop_width
@@ -227,6 +232,7 @@ def _cropped(pixels: Array, sizes: Any) -> Array:
         sizes.crop_width and sizes.crop_height and is_whole and min(left, top, right, bottom) >= 0
     ):
         return pixels
+    # --- The same borders after LibRaw has turned the picture ---
     sides = [left, top, right, bottom]
     turns = {3: 2, 5: 3, 6: 1}.get(sizes.flip, 0)  # quarters to the right
     left, top, right, bottom = (sides[(k - turns) % 4] for k in range(4))

@@ -32,7 +32,7 @@ def ramp(values: Array) -> Array:
     return cv2.applyColorMap(to_bytes(values), cv2.COLORMAP_INFERNO)[..., ::-1]
 
 
-def normals(normal: Array) -> Array:
+def normal_colours(normal: Array) -> Array:
     """Usual colours of camera-frame normals [H, W, 3]; black where there is none."""
     return np.where(np.any(normal != 0, -1, keepdims=True), to_bytes(normal * 0.5 + 0.5), 0).astype(
         np.uint8
@@ -41,8 +41,10 @@ def normals(normal: Array) -> Array:
 
 def light(envmap: Array) -> Array:
     """An environment map [h, 2h, 3]: exposed so that its median is mid-grey, highlights rolled off (Reinhard)."""
+    # A dark map with a bright sun has a median near 0: a tenth of the mean is the least.
     power = luminance(envmap)[..., None]
     key = max(float(np.median(power)), float(power.mean()) * 0.1, 1e-8)
+    # Reinhard: x (1 + x / 16) / (1 + x), which puts 4 times mid-grey at white.
     exposed = power * (0.22 / key)
     shown = exposed * (1 + exposed / 16) / (1 + exposed)
     return srgb_levels(envmap * (shown / np.maximum(power, 1e-8)))
@@ -54,6 +56,7 @@ def depths(depth: Array) -> Array:
     if not known.any():
         return ramp(np.zeros_like(depth))
     inverse = np.where(known, 1 / np.where(known, depth, 1), 0)
+    # Inverse depth, so that near things get most of the ramp; 0.1 to 1, as black means no surface.
     low, high = np.percentile(inverse[known], [1, 99])
     return ramp(
         np.where(known, 0.1 + 0.9 * np.clip((inverse - low) / max(high - low, 1e-9), 0, 1), 0)
@@ -73,7 +76,7 @@ def factor(values: Array) -> Array:
 def maps(of: Prediction | Scene) -> dict[str, Array]:
     """Each map of a prediction or a scene by its name."""
     m = of.materials
-    geometry = {"normal": normals(of.normal), "depth": depths(of.depth)}
+    geometry = {"normal": normal_colours(of.normal), "depth": depths(of.depth)}
     return {
         "albedo": srgb_levels(m.albedo),
         "roughness": grey(m.roughness),

@@ -49,6 +49,7 @@ def horizontal_fov(tags: Mapping[str, Any], width: int, height: int) -> float | 
     )
     if not focal:
         return None
+    # tan(fov / 2) = (width / 2) / focal, in pixels.
     fov = math.degrees(2 * math.atan(0.5 * width / focal))
     return fov if 1 < fov < 170 else None
 

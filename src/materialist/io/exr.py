@@ -12,7 +12,7 @@ import OpenEXR
 
 from materialist.errors import InputError, OutputError
 from materialist.io.bitmap import MAX_PIXELS
-from materialist.plain import is_utf8
+from materialist.io.native import name_problem, unprinted
 from materialist.types import Array
 
 LARGEST_BYTES = 12 * MAX_PIXELS
@@ -37,6 +37,7 @@ _PICTURES = (
     *("render", "default"),
 )
 """Words in the name of the layer that is the picture, where there are several; the first are the surest."""
+# Names of render passes, as Blender, Arnold, V-Ray, RenderMan and Nuke write them.
 _DATA = frozenset(
     (
         *(
@@ -165,12 +166,12 @@ def opened_exr(path: Path, **settings: bool) -> Iterator[Any]:
     """An open EXR. Raises InputError, also for what goes wrong within."""
     if not path.is_file():
         raise InputError(f"There is no EXR file at {path}.")
-    if not is_utf8(str(path)):
-        raise InputError(
-            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; rename it."
-        )
+    if problem := name_problem(path):
+        raise InputError(problem)
     try:
-        with OpenEXR.File(str(path), **settings) as file:
+        with unprinted():
+            file = OpenEXR.File(str(path), **settings)
+        with file:
             yield file
     except Exception as error:  # the bindings raise RuntimeError, ValueError or their own C++ types
         raise InputError(
@@ -184,7 +185,7 @@ def exr_headers(path: Path) -> list[dict[str, Any]]:
         return [dict(part.header) for part in file.parts]
 
 
-def window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
+def exr_window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
     """Left, top, width and height of a part's dataWindow or displayWindow, pixels."""
     low, high = (np.asarray(corner, np.int64) for corner in header[name])
     return int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
@@ -193,7 +194,7 @@ def window(header: dict[str, Any], name: str) -> tuple[int, int, int, int]:
 def exr_size(header: dict[str, Any]) -> tuple[int, int]:
     """(width, height) of a part's picture: of its display window, or of its data where they are more."""
     return max(
-        (window(header, name)[2:] for name in ("displayWindow", "dataWindow")), key=math.prod
+        (exr_window(header, name)[2:] for name in ("displayWindow", "dataWindow")), key=math.prod
     )
 
 
@@ -219,8 +220,9 @@ def displayed(pixels: Array, header: dict[str, Any], path: Path) -> Array:
 
     Raises InputError where the two windows have nothing in common.
     """
-    left, top, wide, high = window(header, "displayWindow")
-    data_left, data_top, data_wide, data_high = window(header, "dataWindow")
+    left, top, wide, high = exr_window(header, "displayWindow")
+    data_left, data_top, data_wide, data_high = exr_window(header, "dataWindow")
+    # --- The overlap of both windows ---
     x0 = max(left, data_left)
     x1 = min(left + wide, data_left + data_wide)
     y0 = max(top, data_top)
@@ -230,6 +232,7 @@ def displayed(pixels: Array, header: dict[str, Any], path: Path) -> Array:
     inside = pixels[y0 - data_top : y1 - data_top, x0 - data_left : x1 - data_left]
     if inside.shape[:2] == (high, wide):
         return np.ascontiguousarray(inside)
+    # --- The display window, black where the file has no data ---
     out = np.zeros((high, wide, *pixels.shape[2:]), pixels.dtype)
     out[y0 - top : y1 - top, x0 - left : x1 - left] = inside
     return out
@@ -249,10 +252,9 @@ def write_exr(path: str | Path, array: Array) -> None:
             f"An EXR holds [H, W], [H, W, 3] or [H, W, 4]; this array is {list(array.shape)}."
         )
     pixels = np.ascontiguousarray(array, np.float32)
-    if not is_utf8(str(path)):
-        raise OutputError(
-            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
-        )
+    if problem := name_problem(path):
+        raise OutputError(problem)
+    # ZIP loses nothing.
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     try:
         with OpenEXR.File(header, {names: pixels}) as file:
@@ -271,8 +273,9 @@ def layers_of(channels: dict[str, Array]) -> dict[str, dict[str, Array]]:
     return layers
 
 
-def stacked(parts: dict[str, Array], names: str) -> Array:
+def stacked_channels(parts: dict[str, Array], names: str) -> Array:
     """[H, W, C] float32, with alpha where there is one; each channel leaves `parts`, which bounds the memory."""
+    # Filled channel by channel, so that only one copy of the picture exists.
     order = names + "A" if "A" in parts else names
     out: Array = np.empty((*parts[order[0]].shape, len(order)), np.float32)
     for index, name in enumerate(order):
@@ -299,6 +302,7 @@ def picture_rank(name: str) -> tuple[bool, int]:
 
     Names that say data (normals, albedo, one kind of light) come last, unknown ones before them.
     """
+    # Words of names such as `ViewLayer.DiffCol` or `beauty_pass`.
     words = [word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)]
     places = [_PICTURES.index(word) for word in words if word in _PICTURES]
     is_data = any(word in _DATA or word.startswith("crypto") for word in words)
@@ -312,7 +316,7 @@ def _pick(channels: dict[str, Array], path: Path) -> Array:
     coloured = [layer for layer, parts in layers.items() if {"R", "G", "B"} <= set(parts)]
     grey = [name for name in GREY if name in plain]
     if coloured and ("" in coloured or not grey):
-        return stacked(
+        return stacked_channels(
             layers[min(coloured, key=lambda layer: (layer != "", picture_rank(layer)))], "RGB"
         )
     if grey:

@@ -17,12 +17,12 @@ from materialist.io.exr import (
     GREY,
     check_exr,
     displayed,
+    exr_window,
     layers_of,
     no_picture,
     opened_exr,
     picture_rank,
-    stacked,
-    window,
+    stacked_channels,
 )
 from materialist.types import Array
 
@@ -76,12 +76,15 @@ def read_exr_photo(path: Path, wished: str | None = None) -> Decoded:
             {name: pixels for channels in parts for name, pixels in channels.items()}, path
         )
     chosen = (
-        min(layers, key=lambda one: one.rank) if wished is None else _named(layers, wished, path)
+        min(layers, key=lambda layer: layer.rank)
+        if wished is None
+        else _named(layers, wished, path)
     )
     several = len(layers) > 1
     notes = [_choice(layers, chosen)] if several else []
+    # --- Its pixels: linear Rec.709, at the display window, square ---
     header = headers[chosen.part]
-    check_size(*window(header, "displayWindow")[2:], path)
+    check_size(*exr_window(header, "displayWindow")[2:], path)
     del parts, layers  # the pixels of the others
     decoded = square_pixels(
         _light(chosen, header, path, notes), float(header.get("pixelAspectRatio", 1)), path
@@ -92,6 +95,7 @@ def read_exr_photo(path: Path, wished: str | None = None) -> Decoded:
 
 def _layers(part_name: str, part: int, channels: dict[str, Array], parts: int) -> list[_Layer]:
     """The layers of a part that have colours, or light alone."""
+    # --- All layers that could be the photo, and the one that is ---
     layers = []
     for layer, values in layers_of(channels).items():
         colours = {"R", "G", "B"} <= set(values) or {"Y", "RY", "BY"} <= set(values)
@@ -139,9 +143,9 @@ def _light(layer: _Layer, header: dict[str, Any], path: Path, notes: list[str]) 
         if "A" in layer.channels:
             pixels = np.concatenate([pixels, layer.channels["A"][..., None].astype(np.float32)], -1)
     elif "R" in layer.channels:
-        pixels = stacked(layer.channels, "RGB")
+        pixels = stacked_channels(layer.channels, "RGB")
     else:
-        pixels = _from_luminance(layer.channels, primaries, window(header, "dataWindow")[2:])
+        pixels = _from_luminance(layer.channels, primaries, exr_window(header, "dataWindow")[2:])
     pixels = displayed(pixels, header, path)
     alpha = pixels[..., 3:] if pixels.shape[-1] == 4 else None
     if alpha is None:
@@ -152,6 +156,7 @@ def _light(layer: _Layer, header: dict[str, Any], path: Path, notes: list[str]) 
 
 def _primaries(header: dict[str, Any], notes: list[str]) -> Primaries:
     """What a part's header says of its colours: chromaticities, or the name of a colour space; else Rec.709."""
+    # --- Chromaticities before the name of a space; a name that is not known gets a note ---
     identity = str(header.get("colorInteropID", "") or "")
     stated = header.get("chromaticities")
     if stated is None and identity:
@@ -181,6 +186,7 @@ def _from_luminance(
     y, ry, by = (_full(channels[name], size) for name in ("Y", "RY", "BY"))
     red = (ry + 1) * y
     blue = (by + 1) * y
+    # Y = w_r R + w_g G + w_b B, solved for G.
     weights = rgb_to_xyz(primaries)[1].astype(np.float32)
     green = (y - red * weights[0] - blue * weights[2]) / weights[1]
     alpha = [_full(channels["A"], size)] if "A" in channels else []
@@ -193,6 +199,7 @@ def _full(channel: Array, size: tuple[int, int]) -> Array:
     if values.shape == size[::-1]:
         return values
     steps = (math.ceil(size[0] / values.shape[1]), math.ceil(size[1] / values.shape[0]))
+    # Samples of subsampled channels lie on the first of each group of pixels.
     between = np.array([[1 / steps[0], 0, 0], [0, 1 / steps[1], 0]], np.float32)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.asarray(
@@ -202,8 +209,8 @@ def _full(channel: Array, size: tuple[int, int]) -> Array:
 
 def _note_border(header: dict[str, Any], notes: list[str]) -> None:
     """Say where the display window has no data."""
-    left, top, wide, high = window(header, "displayWindow")
-    data_left, data_top, data_wide, data_high = window(header, "dataWindow")
+    left, top, wide, high = exr_window(header, "displayWindow")
+    data_left, data_top, data_wide, data_high = exr_window(header, "dataWindow")
     covers = data_left <= left and data_top <= top
     if not (covers and data_left + data_wide >= left + wide and data_top + data_high >= top + high):
         notes.append(

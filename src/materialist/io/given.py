@@ -57,6 +57,7 @@ def _name(source: Any, attribute: str) -> str | None:
 def _read(content: bytes, called: str, name: str | None, settings: dict[str, Any]) -> Photo:
     """Read the bytes of a file. Messages call it by `name`, or as it is `called`."""
     with tempfile.TemporaryDirectory() as folder:
+        # The readers know files: their checks, limits and messages then hold here as well.
         file = Path(folder) / f"photo{Path(name or '').suffix}"
         file.write_bytes(content)
         try:
@@ -80,6 +81,7 @@ def _picture_bytes(picture: Image.Image) -> bytes:
     if picture.mode == "F":
         return _array_bytes(np.asarray(picture), encoded=False)
     buffer = io.BytesIO()
+    # What the file would say of colours and camera goes along.
     kept = {"icc_profile": picture.info.get("icc_profile"), "exif": picture.getexif().tobytes()}
     try:
         picture.save(
@@ -129,9 +131,11 @@ def _array_bytes(array: Array, encoded: bool) -> bytes:
                 f"Encoded floats must lie in [0, 1]; these go from {array.min():.4g} to {array.max():.4g}. Divide "
                 "levels by 255, or leave encoded out for linear values."
             )
+        # 16 bits keep what an 8-bit step would lose.
         array = np.round(array.astype(np.float64) * 65535).astype(np.uint16)
     if array.dtype not in (np.uint8, np.uint16):
         raise InputError(f"The array holds {array.dtype}; give uint8, uint16, or floats in [0, 1].")
+    # OpenCV writes B, G, R.
     order = {(3,): [2, 1, 0], (4,): [2, 1, 0, 3]}.get(array.shape[2:])
     levels = np.ascontiguousarray(array if order is None else array[..., order])
     return cv2.imencode(".png", levels)[1].tobytes()

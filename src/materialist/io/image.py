@@ -78,6 +78,7 @@ def _with_alpha(path: str | Path) -> tuple[Array, Array | None]:
         raise InputError(f"There is no map at {path}.")
     _check_pixels(path)
     colour, alpha = stored_pixels(path)
+    # Whole numbers by their largest level; floats as they are.
     scale = np.float32({"uint8": 255, "uint16": 65535}.get(colour.dtype.name, 1))
     array = (
         np.ascontiguousarray(colour if colour.shape[2] == 3 else colour[..., 0], np.float32) / scale
@@ -121,6 +122,7 @@ def read_mask(
             raise InputError(
                 f"The mask {path} is {mask.shape[1]} x {mask.shape[0]} pixels, the photo {sizes}."
             )
+        # An area mean: a pixel is inside where more than half of it is.
         mask = cv2.resize(mask, shape[::-1], interpolation=cv2.INTER_AREA)
     inside = mask > 0.5
     if not inside.any():
@@ -133,6 +135,7 @@ def read_mask(
 def _marked(values: Array, alpha: Array | None, path: str | Path) -> Array:
     """How far each pixel is inside, [H, W] in [0, 1]: by brightness, or by the alpha of a cut-out object."""
     brightness = values.max(-1) if values.ndim == 3 else values
+    # Masks are black and white; a photo has colours in between.
     between = (brightness > BLACK) & (brightness < WHITE)
     shown = None if alpha is None else alpha > 0.5
     if alpha is None or shown is None or shown.all() or not shown.any():

@@ -10,11 +10,11 @@ from materialist.io.decode import RAW_SUFFIXES, decoded_bytes, image_size
 from materialist.io.exr import exr_bytes, exr_headers, exr_size, read_exr
 from materialist.types import Array
 
-LONGEST = 8192
+MAX_SIDE = 8192
 """Pixels along the longer side of any map: the largest working size, environment map or texture there is."""
-MOST = 16e9
+MAX_BYTES = 16e9
 """Bytes of a whole package once decoded; the largest that this program writes has half as many."""
-RAW_GROWS = 12
+RAW_BYTES_RATIO = 12
 """Bytes of a decoded camera RAW for one of its file."""
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
 LIGHT = "prior/light.exr"
@@ -31,11 +31,13 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
 
     Raises whatever the readers of their headers raise.
     """
+    # --- The files that this package must have, and those that it may ---
     pictures = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS]
     pictures += [file for file in map(spread_file, MAPS) if (folder / file).exists()]
     pictures += ["photo.exr", "rerender.exr", "envmap.exr", *[LIGHT] * (folder / LIGHT).exists()]
     pictures += [f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3]]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
+    # --- Their size in memory, by headers alone ---
     total = sum(_exr_bytes(inside(folder, name)) for name in pictures)
     total += sum(inside(folder, name).stat().st_size for name in meshes)
     _check_size(label := inside(folder, "plane_label.png"), image_size(label))
@@ -68,22 +70,24 @@ def _exr_bytes(file: Path) -> int:
 def _photo_bytes(file: Path) -> int:
     """Bytes of a photo once decoded."""
     return (
-        RAW_GROWS * file.stat().st_size
+        RAW_BYTES_RATIO * file.stat().st_size
         if file.suffix.lower() in RAW_SUFFIXES
         else decoded_bytes(file)
     )
 
 
-def _check_size(file: Path, found: tuple[int, int]) -> None:
-    if not 1 <= min(found) <= max(found) <= LONGEST and file.stem != "original":
+def _check_size(file: Path, size: tuple[int, int]) -> None:
+    # The photo as it was given may be larger; its own limit applies when it is read.
+    if not 1 <= min(size) <= max(size) <= MAX_SIDE and file.stem != "original":
         raise SceneError(
-            f"{file} is {found[0]} x {found[1]} pixels; {LONGEST} on a side is the limit."
+            f"{file} is {size[0]} x {size[1]} pixels; {MAX_SIDE} on a side is the limit."
         )
 
 
 def inside(folder: Path, name: str) -> Path:
     """A file of the package. Raises SceneError where it is missing, or a link leads out of the folder."""
     file = folder / name
+    # A link in a package from somebody else could lead anywhere.
     if not file.resolve().is_relative_to(folder.resolve()):
         raise SceneError(
             f"{file} leads out of the scene package, which is never followed; copy the file there."

@@ -21,7 +21,7 @@ _FACE = np.dtype(
     [("count", "u1"), ("vertex_indices", "<i4", 3), ("pixel", "<i4"), ("plane", "<i2")]
 )
 
-_OF_GLASS = ("transmission", "ior", "tint", "emission", "glass_roughness")
+_SURFACE_KEYS = ("transmission", "ior", "tint", "emission", "glass_roughness")
 """What scene.json says of the surface of a body."""
 _HEADER = """\
 ply
@@ -50,8 +50,11 @@ def write_ply(path: str | Path, mesh: Mesh) -> None:
     """Write the mesh; texture coordinate t is Mesh.uv's v unchanged (DOWN), so that it stays exact."""
     vertices = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], -1).astype("<f4")  # [V, 8]
     faces = np.empty(len(mesh.faces), _FACE)
-    faces["count"], faces["vertex_indices"] = 3, mesh.faces
-    faces["pixel"], faces["plane"] = mesh.face_pixel, mesh.face_plane
+    faces["count"] = 3
+    faces["vertex_indices"] = mesh.faces
+    faces["pixel"] = mesh.face_pixel
+    faces["plane"] = mesh.face_plane
+    # The whole header is fixed but for two numbers, so that reading can compare it.
     header = _HEADER.format(vertices=len(vertices), faces=len(faces)).encode()
     with writing(path):
         Path(path).write_bytes(header + vertices.tobytes() + faces.tobytes())
@@ -62,8 +65,8 @@ def read_ply(path: str | Path, pixels: int | None = None) -> Mesh:
     path = Path(path)
     with path.open("rb") as file:
         head, mark, _ = file.read(2048).partition(b"end_header\n")
-        found = re.findall(rb"^element \w+ (\d{1,10})$", head, re.MULTILINE)
-        counts = [int(count) for count in found]
+        header_counts = re.findall(rb"^element \w+ (\d{1,10})$", head, re.MULTILINE)
+        counts = [int(count) for count in header_counts]
         if (
             len(counts) != 2
             or head + mark != _HEADER.format(vertices=counts[0], faces=counts[1]).encode()
@@ -71,12 +74,14 @@ def read_ply(path: str | Path, pixels: int | None = None) -> Mesh:
             raise SceneError(
                 f"The mesh {path} was not written by this program; the scene package is damaged."
             )
+        # --- Sizes: exactly as many bytes as the header promises ---
         split = counts[0] * 32  # bytes of eight floats
         if path.stat().st_size != len(head + mark) + split + counts[1] * _FACE.itemsize:
             raise SceneError(f"The mesh {path} is truncated; save the scene again.")
         file.seek(len(head + mark))
         vertices = np.frombuffer(file.read(split), "<f4").reshape(-1, 8)
         faces = np.frombuffer(file.read(), _FACE)
+    # --- Values: a damaged file must not crash the renderer later ---
     corners = faces["vertex_indices"]
     if (faces["count"] != 3).any() or not np.isfinite(vertices).all():
         raise SceneError(
@@ -87,11 +92,11 @@ def read_ply(path: str | Path, pixels: int | None = None) -> Mesh:
     pixel = faces["pixel"]
     if pixels is not None and pixel.size and not 0 <= pixel.min() <= pixel.max() < pixels:
         raise SceneError(f"The mesh {path} has faces of pixels that do not exist; it is damaged.")
-    place, normals, uv = (
+    positions, normals, uv = (
         np.array(part, np.float32, order="C") for part in np.split(vertices, [3, 6], axis=1)
     )
     return Mesh(
-        place,
+        positions,
         corners.astype(np.int32),
         normals,
         uv,
@@ -109,7 +114,7 @@ def write_bodies(folder: Path, bodies: Sequence[Body]) -> list[dict[str, Any]]:
         write_ply(folder / "bodies" / f"{k}.ply", body.mesh)
         for name in MAPS[:3]:
             write_exr(folder / "bodies" / f"{k}.{name}.exr", getattr(surface, name))
-        entries.append({"name": body.name, **{key: getattr(surface, key) for key in _OF_GLASS}})
+        entries.append({"name": body.name, **{key: getattr(surface, key) for key in _SURFACE_KEYS}})
     return entries
 
 
@@ -121,23 +126,26 @@ def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, 
         albedo, roughness, metallic = (
             package_map(folder / f"bodies/{k}.{name}.exr") for name in MAPS[:3]
         )
+        # Channels: the renderer would crash on others.
         if (albedo.shape[2:], roughness.ndim, metallic.ndim) != ((3,), 2, 2):
             raise SceneError(
                 f"The maps of body {k} have other channels than they need; the package is damaged."
             )
-        told: dict[str, Any] = {
-            key: _told(entry[key]) for key in _OF_GLASS if entry.get(key) is not None
+        values: dict[str, Any] = {
+            key: _number_or_colour(entry[key])
+            for key in _SURFACE_KEYS
+            if entry.get(key) is not None
         }
-        surface = Surface(albedo, roughness, metallic, **told)
+        surface = Surface(albedo, roughness, metallic, **values)
         bodies.append(
             Body(mesh.vertices, mesh.faces, mesh.normals, mesh.uv, surface, str(entry["name"]))
         )
     return tuple(bodies)
 
 
-def _told(value: Any) -> float | tuple[float, float, float]:
-    """A number, or a colour."""
+def _number_or_colour(value: Any) -> float | tuple[float, float, float]:
+    """A number, or a colour from a list of three."""
     if not isinstance(value, list):
         return float(value)
-    r, g, b = (float(one) for one in value)
+    r, g, b = (float(channel) for channel in value)
     return r, g, b

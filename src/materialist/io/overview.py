@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from materialist.color import srgb_levels
 from materialist.io import display
-from materialist.metrics.residual import shading_residual
+from materialist.io.out.residual import shading_residual
 from materialist.types import Array, Scene
 
 _WIDTH = 1600
@@ -24,9 +24,10 @@ _DIM = (150, 152, 158)
 _PAPER = (24, 25, 28)
 _FRAME = (36, 38, 42)
 _AMBER = (232, 178, 92)
-_MOST_WARNINGS = 6
-_NAME = 44
-"""How many are shown, and letters of the file's name."""
+_MAX_WARNINGS = 6
+"""How many are shown."""
+_MAX_NAME = 44
+"""Letters of the file's name."""
 
 
 class _Tile(NamedTuple):
@@ -40,6 +41,7 @@ class _Tile(NamedTuple):
 
 def overview(scene: Scene) -> Array:
     """[h, 1600, 3] uint8 sRGB: photo, re-rendering, error; the maps; light and geometry; and how it was made."""
+    # --- Layout: every row fills the width, so that its height follows from its pictures ---
     rows = _rows(scene)
     footer = _footer(scene)
     inner = _WIDTH - 2 * _MARGIN
@@ -49,6 +51,7 @@ def overview(scene: Scene) -> Array:
     height = (
         2 * _MARGIN + _HEADER + sum(h + _CAPTION + _GAP for h in heights) + _LINE * len(footer) + 20
     )
+    # --- Header, rows of pictures, footer ---
     sheet = Image.new("RGB", (_WIDTH, height), _PAPER)
     draw = ImageDraw.Draw(sheet)
     _header(draw, scene)
@@ -83,6 +86,7 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
     exposure = f"exposed by {photo.stops:+d} stops" if photo.stops else "as given"
     off = f"mean |difference| of sRGB x {display.ERROR_GAIN}"
     residual = shading_residual(photo.linear, scene.rerender)
+    # --- The first row: how well the re-rendering agrees with the photo ---
     pictures = [
         ("Photo", exposure, srgb_levels(photo.linear)),
         ("Re-rendering", score, srgb_levels(scene.rerender)),
@@ -91,10 +95,12 @@ def _rows(scene: Scene) -> list[list[_Tile]]:
     ]
     notes = {name: f"mean {values.mean():.2f}" for name, values in vars(m).items()}
     notes |= {"normal": "camera frame", "depth": span}
+    # --- The second row: what the photo was decomposed into ---
     maps = [
         (name.capitalize(), notes[name], pixels) for name, pixels in display.maps(scene).items()
     ]
     planes = f"{continued or 'none'} continued, {len(geometry.mesh.faces):,} triangles"
+    # --- The last row: light and geometry ---
     last = [
         _Tile(
             "Environment map",
@@ -124,17 +130,17 @@ def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
     }
     parts += [text.format(metrics[key]) for key, text in figures.items() if key in metrics]
     lines = [("   ·   ".join(parts), _INK)]
-    for warning in scene.warnings[:_MOST_WARNINGS]:
+    for warning in scene.warnings[:_MAX_WARNINGS]:
         lines += [(line, _AMBER) for line in textwrap.wrap(f"Note: {warning}", 190, max_lines=2)]
-    if len(scene.warnings) > _MOST_WARNINGS:
-        lines.append((f"and {len(scene.warnings) - _MOST_WARNINGS} more in report.json", _AMBER))
+    if len(scene.warnings) > _MAX_WARNINGS:
+        lines.append((f"and {len(scene.warnings) - _MAX_WARNINGS} more in report.json", _AMBER))
     return lines
 
 
 def _header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
     camera = scene.camera
     photo = scene.photo
-    draw.text((_MARGIN, _MARGIN - 10), photo.name[:_NAME], font=_font(34), fill=_INK)
+    draw.text((_MARGIN, _MARGIN - 10), photo.name[:_MAX_NAME], font=_font(34), fill=_INK)
     note = (
         f"{photo.original.shape[1]} x {photo.original.shape[0]} photo  ·  worked at {camera.width} x {camera.height}"
         f"  ·  {camera.fov:.1f}° wide ({photo.fov_source})"
@@ -144,11 +150,12 @@ def _header(draw: ImageDraw.ImageDraw, scene: Scene) -> None:
 
 def _drawn(tile: _Tile, width: int, height: int) -> Image.Image:
     """A tile in a frame of this size, its caption below; the texels of a coarse envmap stay to be seen."""
+    # Enlarged texels stay squares: a coarse map is not to look smooth.
     picture = Image.fromarray(tile.pixels)
     coarse = min(width / picture.width, height / picture.height) > 6
-    how = Image.Resampling.NEAREST if coarse else Image.Resampling.LANCZOS
+    resampling = Image.Resampling.NEAREST if coarse else Image.Resampling.LANCZOS
     image = Image.new("RGB", (width, height + _CAPTION), _PAPER)
-    image.paste(ImageOps.pad(picture, (width, height), how, _FRAME))
+    image.paste(ImageOps.pad(picture, (width, height), resampling, _FRAME))
     draw = ImageDraw.Draw(image)
     draw.text((0, height + 8), tile.title, font=_font(17), fill=_INK)
     left = draw.textlength(tile.title + "   ", font=_font(17))
@@ -162,6 +169,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont:
 
 def _labels(label: Array, linear: Array) -> Array:
     """Each plane [H, W] in a colour of its own over a dim grey photo [H, W, 3]."""
+    # Steps of 67 in OpenCV's 180 degrees of hue put neighbouring numbers far apart.
     hue = (label.astype(np.int32) * 67 + 100) % 180
     colour = cv2.cvtColor(
         np.stack([hue, hue * 0 + 130, hue * 0 + 255], -1).astype(np.uint8), cv2.COLOR_HSV2RGB

@@ -14,11 +14,19 @@ from materialist.errors import SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
-from materialist.io.manifest import LIGHT, MAPS, MOST, check_files, inside, package_map, spread_file
+from materialist.io.manifest import (
+    LIGHT,
+    MAPS,
+    MAX_BYTES,
+    check_files,
+    inside,
+    package_map,
+    spread_file,
+)
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
+from materialist.io.out.residual import shading_residual
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
-from materialist.metrics.residual import shading_residual
 from materialist.plain import plain
 from materialist.types import (
     Array,
@@ -47,7 +55,7 @@ def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
         _write(scene, folder)
 
 
-def load_scene(path: str | Path, *, most: float = MOST) -> Scene:
+def load_scene(path: str | Path, *, most: float = MAX_BYTES) -> Scene:
     """Read a scene package of at most `most` bytes once decoded, by the headers of its files.
 
     Raises SceneError when it is missing, incomplete, damaged, too large or of an unknown version.
@@ -67,11 +75,11 @@ def _read(folder: Path, most: float) -> Scene:
     camera = Camera(**meta["camera"])
     photo = meta["photo"]
     prior = meta["prior"]
+    # Sizes first: nothing is decoded that would not fit into memory.
     check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
     shape = (camera.height, camera.width)
-    before, (materials, normal, depth) = (
-        _read_maps(folder / name, shape) for name in ("prior", "maps")
-    )
+    predicted = _read_maps(folder / "prior", shape)
+    materials, normal, depth = _read_maps(folder / "maps", shape)
     light = package_map(folder / LIGHT) if (folder / LIGHT).exists() else None
     if light is not None and light.shape[2:] != (4,):
         raise SceneError(
@@ -82,6 +90,7 @@ def _read(folder: Path, most: float) -> Scene:
         for key in MAPS
         if (folder / spread_file(key)).exists()
     }
+    # Stored from 0 on, see `_write`.
     label = package_map(folder / "plane_label.png", shape).astype(np.int16) - 1
     return Scene(
         camera=camera,
@@ -90,7 +99,7 @@ def _read(folder: Path, most: float) -> Scene:
         normal=normal,
         depth=depth,
         prior=Prediction(
-            *before,
+            *predicted,
             prior["predictor"],
             tuple(prior["warnings"]),
             prior.get("sources", {}),
@@ -109,9 +118,11 @@ def _read(folder: Path, most: float) -> Scene:
 
 def _write(scene: Scene, folder: Path) -> None:
     photo = scene.photo
+    # --- The photo, as it was given and at working size ---
     write_exr(folder / "photo.exr", photo.linear)
     write_png(folder / "photo.png", photo.linear)
     original = _write_original(photo, folder)
+    # --- What the predictor said, and what the fit made of it ---
     for name, maps in (("prior", scene.prior), ("maps", scene)):
         (folder / name).mkdir()
         for key, array in {
@@ -125,6 +136,7 @@ def _write(scene: Scene, folder: Path) -> None:
     if scene.prior.light is not None:
         write_exr(folder / LIGHT, scene.prior.light)
     write_exr(folder / "maps/shading_residual.exr", shading_residual(photo.linear, scene.rerender))
+    # --- Light and geometry ---
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)
     # Labels -1 .. 126 become 0 .. 127, so that an image viewer shows them as grey levels.
@@ -132,9 +144,11 @@ def _write(scene: Scene, folder: Path) -> None:
         folder / "plane_label.png",
         (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8),
     )
+    # --- What a person looks at ---
     write_exr(folder / "rerender.exr", scene.rerender)
     write_png(folder / "rerender.png", scene.rerender)
     write_png(folder / "overview.png", overview(scene))
+    # --- The report, and scene.json last: a folder without it is no package ---
     report = scene.report  # its metrics lie flat beside `stages` and `warnings`
     warnings = list(dict.fromkeys(report.warnings))
     _write_json(
@@ -185,6 +199,7 @@ def _write_original(photo: Photo, folder: Path) -> str:
 
 def _suffix_of(source: bytes) -> str:
     """File suffix by content, for photos without a file name."""
+    # The first bytes of the formats that photos come in.
     known = {
         b"\x89PNG": ".png",
         b"\xff\xd8": ".jpg",
@@ -200,6 +215,7 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
     file = folder / Path(meta["original"]).name
     stops = int(meta.get("stops", 0))
     if meta["has_source"]:
+        # Decoded again instead of stored: the file is smaller, and exact.
         original = decode_photo(file, meta.get("layer")).exposed(stops)
         source = file.read_bytes()
     else:
@@ -275,9 +291,8 @@ def _finite(text: str) -> float:
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
     text = json.dumps(plain(content), indent=1, ensure_ascii=False) + "\n"
-    path.write_text(
-        text, "utf-8", "backslashreplace"
-    )  # bytes of a name that are no UTF-8 become JSON's own escapes
+    # Bytes of a file name that are no UTF-8 become JSON's own escapes.
+    path.write_text(text, "utf-8", "backslashreplace")
 
 
 def _read_report(folder: Path) -> FitReport:

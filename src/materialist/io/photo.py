@@ -52,11 +52,12 @@ def read_photo(
     Raises InputError, in one sentence, for anything that is not a photograph that can be inverted: a missing, empty,
     damaged, too small, too large, too long, constant, or non-finite one; SetupError for RAW without rawpy.
     """
-    wanted = InvertOptions(size=size, fov="auto" if fov is None else fov)
-    angle = None if wanted.fov == "auto" else float(wanted.fov)  # type: ignore[arg-type]
+    checked = InvertOptions(size=size, fov="auto" if fov is None else fov)
+    angle = None if checked.fov == "auto" else float(checked.fov)  # type: ignore[arg-type]
     name = str(path)
     file = example_path(name) if name.startswith(PREFIX) else Path(path)
     decoded = decode_photo(file, layer)
+    # --- Exposure: an HDR file has any unit; whole stops lose no digit ---
     hdr = decoded.scene_linear and not _is_clipped(decoded.linear)
     stops = _stops(_working(decoded.linear, size)) if hdr else 0
     original = decoded.exposed(stops)
@@ -72,11 +73,13 @@ def read_photo(
             f"The HDR photo is exposed by {stops:+d} stops; EXR pictures made of it have its own unit."
         )
     _require_content(linear, name)
+    # --- The limits of a working picture ---
     if hdr and float(linear.max()) > HDR_CLIP:
         warnings.append(
             f"HDR values above {HDR_CLIP * 2.0**-stops:.3g} are clipped at working size."
         )
         linear = np.minimum(linear, np.float32(HDR_CLIP))
+    # --- The camera: the option, else EXIF, else the paper's 35 degrees ---
     from_exif = horizontal_fov(decoded.tags, width, height)
     source = "option" if angle else "exif" if from_exif else "default"
     camera = Camera(linear.shape[1], linear.shape[0], angle or from_exif or DEFAULT_FOV)
@@ -116,9 +119,8 @@ def _stops(linear: Array) -> int:
     The 97th percentile of what is not black comes near BRIGHT, or the median near MIDDLE where that asks for more.
     """
     value = linear.max(-1)
-    value = np.minimum(
-        value, HDR_CLIP * float(np.percentile(value, 99)) or value.max()
-    )  # suns set no scale
+    # A sun is no scale: values are cut at ten times the 99th percentile.
+    value = np.minimum(value, HDR_CLIP * float(np.percentile(value, 99)) or value.max())
     bright, middle = np.percentile(value[value >= BLACK * value.max()], (97, 50))
     if bright <= 0:
         return 0

@@ -66,24 +66,26 @@ def read_radiance(path: Path) -> Decoded:
     content = np.concatenate(
         [np.frombuffer(plain, np.uint8), np.fromfile(path, np.uint8, offset=header.bytes)]
     )
+    # OpenCV writes a scratch file before it decodes.
     scratch = os.environ.get("OPENCV_TEMP_PATH", "/tmp")
-    if os.path.isdir(scratch) and not os.access(
-        scratch, os.W_OK
-    ):  # where OpenCV puts the file before it decodes it
+    if os.path.isdir(scratch) and not os.access(scratch, os.W_OK):
         raise InputError(
             f"{path} cannot be decoded: {scratch} is read-only; set OPENCV_TEMP_PATH to another folder."
         )
     light = levels_of(content, path)[0]
     if light.dtype != np.float32:
         raise InputError(f"{path} is no Radiance picture that can be read; export it as EXR.")
+    # --- Upright: scan lines from the top, pixels from the left ---
     light = light.swapaxes(0, 1) if "X" in header.axes[0] else light
     light = light[::-1] if "+Y" in header.axes else light
     light = np.array(light[:, ::-1] if "-X" in header.axes else light, order="C")
     notes: list[str] = []
+    # --- Without exposure and colour correction, which the pixels already include ---
     factor = _product(header, "EXPOSURE", 1, notes) * _product(header, "COLORCORR", 3, notes)
     if (factor != 1).any():
         light /= factor.astype(np.float32)
     transformed(light, to_rec709(_primaries(header, notes)))
+    # --- Square pixels ---
     tall = _product(header, "PIXASPECT", 1, notes)[0]
     return square_pixels(Decoded(light, True, warnings=notes), 1 / tall, path)
 

@@ -17,12 +17,13 @@ from materialist.io.bitmap import (
     light_and_alpha,
     read_bitmap,
     rgb_levels,
-    upright,
+    turned_upright,
 )
 from materialist.io.colour_space import ColourSpace, lab_to_rec709
 from materialist.io.colour_tags import exif_space
 from materialist.io.exif import file_tags
 from materialist.io.icc import matrix_profile
+from materialist.io.native import unprinted
 from materialist.types import Array
 
 _UNSPECIFIED = 0
@@ -72,7 +73,7 @@ def read_tiff(path: Path) -> Decoded:
 
     Raises InputError for layouts that would be read wrong.
     """
-    with TiffFile(path) as file:
+    with unprinted(), TiffFile(path) as file:
         page: Any = file.pages[0]
         layout = _Layout.of(page, len(file.pages))
         if layout.bits > 8 and layout.meaning in (_CIELAB, _ICCLAB):
@@ -90,6 +91,7 @@ def read_tiff(path: Path) -> Decoded:
         warnings.append(
             "The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it."
         )
+    # --- Light for floats, display values for whole numbers ---
     space = _space(layout, tags, warnings, is_float=colour.dtype.kind == "f")
     premultiplied = _PREMULTIPLIED in layout.extra
     if colour.dtype.kind == "f":
@@ -104,6 +106,8 @@ def read_tiff(path: Path) -> Decoded:
 
 def _shallow(path: Path, layout: _Layout) -> Decoded:
     decoded = read_bitmap(path)
+    # --- Transparency: only where the file says that the last channel is one ---
+    # --- Transparency: only where the file says that the last channel is one ---
     if layout.extra[0] == _UNSPECIFIED:
         decoded.warnings.append(FOURTH)
     return decoded
@@ -161,6 +165,7 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
             f"{path} holds CIELab of {layout.bits} bits, compressed by {layout.compression}; save it uncompressed at "
             "16 bits, or as RGB."
         )
+    # tifffile decodes without colour conversion, which OpenCV would do wrong for deep CIELab.
     stored = page.asarray()
     if stored.ndim != 3 or stored.shape[-1] != 3:
         raise InputError(
@@ -171,7 +176,7 @@ def _lab(page: Any, layout: _Layout, path: Path) -> Decoded:
         rows = slice(start, start + ROWS)
         linear[rows] = lab_to_rec709(_lab_values(stored[rows], layout.meaning))
     tags = file_tags(path)
-    return Decoded(upright(linear, tags), False, tags, frames_note(layout.frames))
+    return Decoded(turned_upright(linear, tags), False, tags, frames_note(layout.frames))
 
 
 def _lab_values(stored: Array, meaning: int) -> Array:

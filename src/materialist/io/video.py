@@ -35,6 +35,7 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
         raise InputError(
             f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames."
         )
+    # Found before the work: writing fails only at the end.
     if path.suffix and find_spec("imageio_ffmpeg") is None:
         raise SetupError(
             f"Video needs one more package: {extra_command('video')}; or give -o a name without "
@@ -75,6 +76,7 @@ def _to_video(path: Path, pictures: Iterable[Array], fps: int) -> int:
     )
     with writer:
         for picture in pictures:
+            # H.264 stores colour at half resolution.
             height, width = (n - n % 2 for n in picture.shape[:2])
             writer.append_data(srgb_levels(picture[:height, :width]))
             count += 1

@@ -46,6 +46,7 @@ def run_limited(task: Callable[..., Any], limits: Limits, **arguments: Any) -> A
 def _last_message(worker: Worker, deadline: float) -> Message | None:
     """The message that ends a task; None where it does not come in time."""
     while True:
+        # `wait` returns as soon as a message is there, and at the deadline in any case.
         left = deadline - time.monotonic()
         if left <= 0 or not wait([worker.connection], left):
             return None

@@ -10,7 +10,7 @@ from typing import Any
 from materialist.errors import SetupError
 from materialist.install import extra_command
 from materialist.jobs.process import LOST, Message, Worker
-from materialist.jobs.worker import DONE, FAILED, Reporter, run
+from materialist.jobs.worker import DONE, FAILED, Reporter, run_task
 
 
 @dataclass
@@ -46,22 +46,23 @@ class LocalPool:
         begun = {
             place.worker.connection: place for place in self._places if place.worker is not None
         }
-        found = []
+        messages = []
         for connection in wait(list(begun), seconds):
             place = begun[connection]  # type: ignore[index]
             assert place.worker is not None
             for message in place.worker.receive():
                 if place.key is not None:
-                    found.append((place.key, message))
+                    messages.append((place.key, message))
                 if message.kind in (DONE, FAILED, LOST):
                     place.key = None
                 if message.kind == LOST:
                     place.worker = None
-        return found
+        return messages
 
     def close(self) -> None:
         """End all workers, also those at work."""
         workers = [place.worker for place in self._places if place.worker is not None]
+        # First all are told to end, then each is waited for: they end side by side.
         for worker in workers:
             worker.kill()
         for worker in workers:
@@ -93,12 +94,14 @@ class RayPool:
             ) from error
         self._ray = ray
         local = address == "local"  # a cluster of this machine alone, which ends with the pool
+        # --- Connect ---
         _check_reachable(address)
         try:
             # 'local', not the address of a cluster that happens to run on this machine: it was not asked for.
             place: dict[str, Any] = (
                 {"address": "local", "num_cpus": workers} if local else {"address": address}
             )
+            # Results are fetched by the pool, not printed by workers.
             ray.init(
                 **place,
                 log_to_driver=False,
@@ -114,6 +117,7 @@ class RayPool:
             ) from error
         resources = ray.cluster_resources()
         gpu = gpu and resources.get("GPU", 0) >= 1
+        # --- How many tasks may run at once ---
         capacity = int(resources.get("GPU" if gpu else "CPU", 1))
         self._limit = max(1, min(workers or capacity, capacity))
         self._task = ray.remote(num_cpus=1, num_gpus=1 if gpu else 0, max_retries=0)(_run)
@@ -132,7 +136,7 @@ class RayPool:
         if not self._running:
             return []
         ended, _ = self._ray.wait(list(self._running), num_returns=1, timeout=seconds)
-        found = []
+        messages = []
         for reference in ended:
             key = self._running.pop(reference)
             try:
@@ -141,8 +145,8 @@ class RayPool:
                 reason = f"Its worker on the cluster was lost ({type(error).__name__})."
                 facts = {"error": "WorkerLost", "reason": reason, "bug": False, "trace": None}
                 message = Message(LOST, {**facts, "out_of_memory": False})
-            found.append((key, message))
-        return found
+            messages.append((key, message))
+        return messages
 
     def close(self) -> None:
         """End the tasks that run, and leave the cluster."""
@@ -154,7 +158,7 @@ class RayPool:
 
 def _run(task: bytes) -> tuple[str, Any]:
     """The Ray task. It raises nothing, because the exception's class might not be known elsewhere."""
-    return run(task, Reporter(lambda kind, facts: None))
+    return run_task(task, Reporter(lambda kind, facts: None))
 
 
 def _check_reachable(address: str) -> None:

@@ -44,8 +44,10 @@ class Worker:
         without a task after which it ends by itself; 0: never. memory: bytes of data that it may hold; 0: no limit.
         keep_errors: keep its stderr for the report of its end.
         """
+        # A file, not a pipe: a pipe that nobody reads stops the process once it is full.
         self._errors = tempfile.TemporaryFile() if keep_errors else None  # noqa: SIM115 - read at its end
         self.connection, theirs = Pipe()
+        # The worker gets its end of the pipe as a file descriptor.
         words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno())]
         words += [str(niceness), str(idle), str(memory)]
         try:
@@ -82,13 +84,13 @@ class Worker:
 
     def receive(self) -> list[Message]:
         """The messages that are there now. After LOST there is nothing more, and the process is gone."""
-        found = []
+        messages = []
         try:
             while self.connection.poll():
-                found.append(Message(*self.connection.recv()))
+                messages.append(Message(*self.connection.recv()))
         except (EOFError, OSError):
-            found.append(Message(LOST, exit_report(self.close(), self._errors), self._number))
-        return found
+            messages.append(Message(LOST, exit_report(self.close(), self._errors), self._number))
+        return messages
 
     def messages(self) -> Iterator[Message]:
         """Messages as they come, the last one LOST."""
@@ -103,6 +105,7 @@ class Worker:
         """End it and what it started at once; the next message is LOST."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
             if self.running:
+                # The whole session: what the task started ends with it.
                 os.killpg(self.pid, signal.SIGKILL)
 
     def close(self) -> int:
@@ -117,7 +120,7 @@ class Worker:
 
 
 def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
-    """Why a process ended, from its exit code and its last line of stderr; keys as of `worker.failure`."""
+    """Why a process ended, from its exit code and its last line of stderr; keys as of `worker.failure_facts`."""
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         hint = " (as the system does when memory runs out)" if -code == signal.SIGKILL else ""
@@ -125,6 +128,7 @@ def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
     else:
         reason = f"The worker process ended with exit code {code}."
     if errors is not None:
+        # The last two thousand bytes hold the last line.
         size = errors.seek(0, os.SEEK_END)
         errors.seek(max(0, size - 2000))
         lines = errors.read().decode("utf-8", "replace").strip().splitlines()

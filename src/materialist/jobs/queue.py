@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from materialist.jobs.process import LOST, Worker, sentence
-from materialist.jobs.worker import DONE, FAILED, FOUND, PROGRESS
+from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, PROGRESS
 
 QUEUED = "queued"
 RUNNING = "running"
@@ -37,7 +37,7 @@ class Job:
     total: int = 0
     message: str = ""
     """One sentence where it failed."""
-    found: list[dict[str, Any]] = field(default_factory=list)
+    intermediate: list[dict[str, Any]] = field(default_factory=list)
     began: float = field(default_factory=time.monotonic)
     ended: float | None = None
     worker: Worker | None = field(default=None, repr=False)
@@ -71,6 +71,7 @@ class JobQueue:
 
     def submit(self, job: Job) -> Job:
         with self._lock:
+            # Jobs that are over are forgotten here: whoever follows one holds it.
             self._jobs = [*(j for j in self._jobs if not j.over), job]
         self._threads.submit(self._run, job)
         return job
@@ -92,6 +93,7 @@ class JobQueue:
     def stop(self, job: Job) -> None:
         """End a job, in the queue or in the middle; nothing half-written stays."""
         with self._lock:
+            # The state first: the lost worker then counts as stopped, not as failed.
             job.end(STOPPED)
             worker = job.worker
         if worker is not None:
@@ -114,27 +116,30 @@ class JobQueue:
             except OSError as error:
                 job.end(FAILED, f"The work cannot be started: {error}.")
                 return
+        # --- The task, with a timer that ends it where it takes too long ---
         worker.begin(job.task, job.arguments)
         too_long = threading.Timer(self._seconds, worker.kill)
         too_long.daemon = True
         if self._seconds:
             too_long.start()
         try:
+            # --- Its messages, until it is done, fails or is lost ---
             for message in worker.messages():
                 if message.kind in (DONE, FAILED, LOST):
                     worker.kill()
                     break
                 if message.kind == PROGRESS:
-                    job.stage, job.done, job.total = (
-                        message.facts[name] for name in ("stage", "done", "total")
-                    )
-                elif message.kind == FOUND:
-                    job.found = [*job.found, message.facts]
+                    job.stage = message.facts["stage"]
+                    job.done = message.facts["done"]
+                    job.total = message.facts["total"]
+                elif message.kind == INTERMEDIATE:
+                    job.intermediate = [*job.intermediate, message.facts]
         finally:
             too_long.cancel()
             worker.close()
             _sweep(job.folder, worker.pid)
         with self._lock:
+            # A stop may have come first: then the job keeps that state.
             if message.kind == DONE:
                 job.end(DONE)
             else:

@@ -22,11 +22,11 @@ from typing import Any
 from materialist.errors import MaterialistError
 
 PROGRESS = "progress"
-FOUND = "found"
+INTERMEDIATE = "intermediate"
 DONE = "done"
 FAILED = "failed"
-"""Kinds of messages. Facts of PROGRESS: stage, done, total; of FOUND: whatever the task passes to `Reporter.found`; of
-DONE: what the task returned; of FAILED: see `failure`."""
+"""Kinds of messages. Facts of PROGRESS: stage, done, total; of INTERMEDIATE: whatever the task passes to
+DONE: what the task returned; of FAILED: see `failure_facts`."""
 _NO_MEMORY = (
     "Insufficient memory",
     "Failed to allocate",
@@ -39,7 +39,7 @@ INTERVAL = 0.1
 
 
 class Reporter:
-    """Callback of a task: `report(stage, done, total)` tells progress, `report.found(...)` an intermediate result."""
+    """Callback of a task: `report(stage, done, total)` for progress, `report.intermediate(...)` for a first result."""
 
     def __init__(
         self, send: Callable[[str, Any], None], waiting: Callable[[], bool] = lambda: False
@@ -51,14 +51,15 @@ class Reporter:
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         now = time.monotonic()
+        # Not every step: messages would take longer than the work.
         if stage != self.stage or now - self._last > INTERVAL or done >= total:
             self.stage = stage
             self._last = now
             self._send(PROGRESS, {"stage": stage, "done": int(done), "total": int(total)})
 
-    def found(self, **facts: Any) -> None:
+    def intermediate(self, **facts: Any) -> None:
         """Send an intermediate result."""
-        self._send(FOUND, facts)
+        self._send(INTERMEDIATE, facts)
 
     @property
     def outdated(self) -> bool:
@@ -97,25 +98,27 @@ def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
             content = tasks.get(timeout=idle or None)
         except queue.Empty:
             os._exit(0)
+        # Only the newest: a slider has moved on.
         while not tasks.empty():
             content = tasks.get()
+        # The task itself stays pickled until `run_task`, whose errors are reported.
         number, task = pickle.loads(content)
         report = Reporter(
             lambda *message, number=number: send((*message, number)), lambda: not tasks.empty()
         )
-        send((*run(task, report), number))
+        send((*run_task(task, report), number))
 
 
-def run(task: bytes, report: Reporter) -> tuple[str, Any]:
+def run_task(task: bytes, report: Reporter) -> tuple[str, Any]:
     """(DONE, what a task returned) or (FAILED, why), of a pickled function and its keywords."""
     try:
         function, arguments = pickle.loads(task)
         return DONE, function(report, **arguments)
     except Exception as error:
-        return FAILED, failure(error, report.stage)
+        return FAILED, failure_facts(error, report.stage)
 
 
-def failure(error: BaseException, stage: str) -> dict[str, Any]:
+def failure_facts(error: BaseException, stage: str) -> dict[str, Any]:
     """An exception as texts: `error` (its type), `reason`, `stage`, `bug` (whether unexpected), `trace` of bugs.
 
     `out_of_memory` says whether memory ran out.
@@ -127,6 +130,7 @@ def failure(error: BaseException, stage: str) -> dict[str, Any]:
     out_of_memory = isinstance(error, MemoryError) or any(word in reason for word in _NO_MEMORY)
     if isinstance(error, MemoryError):
         reason = "There is not enough memory for this; take a smaller size, or fewer workers."
+    # A trace helps with bugs alone; an expected error says all in its sentence.
     trace = "".join(traceback.format_exception(error))[-4000:] if bug else None
     facts = {
         "error": type(error).__name__,

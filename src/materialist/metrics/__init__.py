@@ -61,26 +61,29 @@ def ssim_without_noise(first: Array, second: Array, b: Array) -> float:
 
     Their variance in a window is their covariance, to which the noise of neither adds.
     """
-    one, other, b = (
-        linear_to_srgb(v).astype(np.float64) for v in (_checked(first, b), _checked(second, b), b)
-    )
+    first = linear_to_srgb(_checked(first, b)).astype(np.float64)
+    second = linear_to_srgb(_checked(second, b)).astype(np.float64)
+    b = linear_to_srgb(b).astype(np.float64)
 
     def smooth(v):
         return gaussian_filter(v, (1.5, 1.5, 0), truncate=3.5)
 
-    mean_one = smooth(one)
-    mean_other = smooth(other)
+    # Local means, variances and the covariance; noise is independent in `first` and `second`.
+    mean_first = smooth(first)
+    mean_second = smooth(second)
     mean_b = smooth(b)
-    mean = (mean_one + mean_other) / 2
+    mean = (mean_first + mean_second) / 2
     variance = (
-        np.maximum(smooth(one * other) - mean_one * mean_other, 0) + smooth(b * b) - mean_b**2
+        np.maximum(smooth(first * second) - mean_first * mean_second, 0) + smooth(b * b) - mean_b**2
     )
-    covariance = smooth((one + other) / 2 * b) - mean * mean_b
-    level, contrast = 0.01**2, 0.03**2  # the constants of Wang et al. for values in [0, 1]
-    similar = (2 * mean * mean_b + level) * (2 * covariance + contrast)
-    return float(
-        (similar / ((mean_one * mean_other + mean_b**2 + level) * (variance + contrast))).mean()
-    )
+    covariance = smooth((first + second) / 2 * b) - mean * mean_b
+
+    # --- SSIM of Wang et al., with their constants C1, C2 for values in [0, 1] ---
+    c1 = 0.01**2
+    c2 = 0.03**2
+    similar = (2 * mean * mean_b + c1) * (2 * covariance + c2)
+    norm = (mean_first * mean_second + mean_b**2 + c1) * (variance + c2)
+    return float((similar / norm).mean())
 
 
 def ssim_of_values(a: Array, b: Array, *, mask: Array | None = None) -> float:
@@ -90,16 +93,20 @@ def ssim_of_values(a: Array, b: Array, *, mask: Array | None = None) -> float:
         raise InputError(
             f"SSIM needs at least 3 x 3 pixels, but the images are {a.shape[1]} x {a.shape[0]}."
         )
+    # The 11 x 11 Gaussian of the paper; smaller pictures get the largest odd window that fits.
     window = (
         {"gaussian_weights": True, "sigma": 1.5}
         if smallest >= 11
         else {"win_size": smallest - 1 + smallest % 2}
     )
-    a, b, channel = a.astype(np.float64), b.astype(np.float64), -1 if a.ndim == 3 else None
-    how = {"data_range": 1, "channel_axis": channel, "use_sample_covariance": False, **window}
+    a = a.astype(np.float64)
+    b = b.astype(np.float64)
+    channel = -1 if a.ndim == 3 else None
+    options = {"data_range": 1, "channel_axis": channel, "use_sample_covariance": False, **window}
     if mask is None:
-        return float(structural_similarity(a, b, **how))
-    return float(structural_similarity(a, b, full=True, **how)[1][mask].mean())
+        return float(structural_similarity(a, b, **options))
+    _, similarity = structural_similarity(a, b, full=True, **options)
+    return float(similarity[mask].mean())
 
 
 def sh_coefficients(envmap: Array) -> Array:
@@ -113,6 +120,7 @@ def sh_coefficients(envmap: Array) -> Array:
         raise InputError(
             f"An environment map has shape (h, 2h, 3), but this one has {envmap.shape}."
         )
+    # The integral over the sphere of envmap times basis, as a sum over texels.
     return np.tensordot(_weighted_basis(len(envmap)), envmap, ([0, 1], [0, 1]))
 
 
@@ -158,6 +166,7 @@ def _rms_norm(coefficients: Array) -> float:
 
 def _mean_square(a: Array, b: Array, mask: Array | None = None) -> float:
     """Mean of (a - b)**2 over pixels (of mask [H, W], if given) and channels, in double precision."""
+    # Double precision: a float32 mean over a large picture loses digits.
     square = (a.astype(np.float64) - b) ** 2
     if mask is not None:
         if mask.shape != a.shape[:2]:

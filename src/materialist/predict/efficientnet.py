@@ -46,6 +46,7 @@ class EfficientNetLite(nn.Module):
         """Number of the block after which each of OUTPUTS is complete."""
         for number, (repeats, kernel, stride, expansion, inputs, outputs) in enumerate(STAGES):
             for k in range(repeats):
+                # Only the first block of a stage changes resolution and channels.
                 first = k == 0
                 blocks.append(
                     _MBConv(
@@ -64,13 +65,15 @@ class EfficientNetLite(nn.Module):
 
     def forward(self, picture: Tensor) -> list[Tensor]:
         """Features [B, channels[k], H / 2^(k+2), W / 2^(k+2)] of sRGB pictures [B, 3, H, W] in [0, 1]."""
+        # The classifier's own normalisation: weights that never learn need the input that they
+        # learned on.
         x = F.relu6(_same_padding(self.stem, (picture - MEAN) / SCALE))
-        found = []
+        features = []
         for k, block in enumerate(self.blocks):
             x = block(x)
             if k in self.last_blocks:
-                found.append(x)
-        return found
+                features.append(x)
+        return features
 
 
 class _MBConv(nn.Module):
@@ -96,6 +99,7 @@ def _same_padding(conv: nn.Conv2d, x: Tensor) -> Tensor:
     stride = conv.stride[0]
     sides = []
     for length in (x.shape[-1], x.shape[-2]):
+        # Total padding after which the output has ceil(length / stride) pixels.
         missing = max((math.ceil(length / stride) - 1) * stride + kernel - length, 0)
         sides += [missing // 2, missing - missing // 2]
     return conv(F.pad(x, sides))

@@ -44,7 +44,7 @@ def advice(instead: str) -> Iterator[None]:
         raise type(error)(str(error).replace(INSTEAD, instead)) from error
 
 
-def library(name: str) -> Any:
+def import_library(name: str) -> Any:
     """The optional library, imported. Raises SetupError that says how to install it."""
     try:
         module = importlib.import_module(name)
@@ -73,11 +73,11 @@ class HubPredictor(Predictor):
         """Where the model lies. Raises WeightsError where it does not."""
         return locate(self.where, self.default)
 
-    def prepare(self, wanted: Collection[str]) -> None:
+    def prepare(self, names: Collection[str]) -> None:
         """Raise SetupError or WeightsError where a library or the model is missing."""
         _ = self.folder
         for name in self.libraries:
-            library(name)
+            import_library(name)
 
 
 def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
@@ -103,23 +103,24 @@ class Marigold(HubPredictor):
         self.name = f"marigold ({where})"
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
         import torch
 
         folder = self.folder
-        source = f"marigold ({folder.name.replace('--', '/')}){checked(folder)}"
+        source = f"marigold ({folder.name.replace('--', '/')}){checksum_note(folder)}"
         kind = _pipeline_class(folder)
         gpu = on_gpu(self.device)
-        made = pipeline(kind, folder, gpu)
+        loaded = pipeline(kind, folder, gpu)
         generator = torch.Generator("cuda" if gpu else "cpu").manual_seed(seed)
-        output = made(
+        output = loaded(
             linear_to_srgb(photo.linear)[None], generator=generator, output_type="np"
         ).prediction
         notes: tuple[str, ...] = ()
         if kind == "MarigoldIntrinsicsPipeline":
-            maps = appearance(output, made.target_properties or {})
+            # --- Its answer as our maps: each kind of pipeline has its own convention ---
+            maps = appearance(output, loaded.target_properties or {})
         elif kind == "MarigoldNormalsPipeline":
             normal = unit(output[0])  # in our frame already; interpolation shortens
             maps = {
@@ -128,18 +129,18 @@ class Marigold(HubPredictor):
                 )
             }
         else:
-            inverse = made.config.prediction_type == "disparity"
+            inverse = loaded.config.prediction_type == "disparity"
             depth, note, notes = planar(
                 output[0, ..., 0], photo.camera, normal, inverse=inverse, name=self.name
             )
             maps = {"depth": depth}
             source = source + note
-        lacking = [name for name in wanted if name not in maps]
+        lacking = [name for name in names if name not in maps]
         if lacking:
             raise WeightsError(
                 f"{folder} gives {', '.join(maps)}, not {lacking[0]}; use an 'appearance' model for it."
             )
-        return MapSet({name: maps[name] for name in wanted}, dict.fromkeys(wanted, source), notes)
+        return MapSet({name: maps[name] for name in names}, dict.fromkeys(names, source), notes)
 
 
 def appearance(output: Array, properties: dict) -> dict[str, Array]:
@@ -190,14 +191,15 @@ class DepthAnything(HubPredictor):
         self.name = f"depth-anything ({where or 'V2 Small'})"
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """Planar depth. The network sees sRGB values; a metric model's depth is in metres and taken as it is, a
         relative one gives inverse depth without scale and shift, see `relative.from_relative`.
         """
+        # --- The model, verified, and one run of its pipeline ---
         folder = self.folder
-        digest = checked(folder)
-        model = load(library("transformers").DepthAnythingForDepthEstimation, folder)
+        digest = checksum_note(folder)
+        model = load_model(import_library("transformers").DepthAnythingForDepthEstimation, folder)
         values = _run(model, photo.linear, on_gpu(self.device))
         if model.config.depth_estimation_type == "metric":
             return MapSet(
@@ -220,12 +222,12 @@ def _run(model, linear: Array, gpu: bool) -> Array:
     return at_network_size(run, pixels, model.device)["depth"]
 
 
-def checked(folder: Path) -> str:
+def checksum_note(folder: Path) -> str:
     """' sha256:...' of a download after every file was verified; '' for a folder without a list of checksums."""
     return f" sha256:{verify_folder(folder)[:16]}" if (folder / CHECKSUMS).is_file() else ""
 
 
-def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
+def load_model(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
     """`cls.from_pretrained` of a local folder, where every tensor that the model needs must be there and fit.
 
     The libraries themselves fill what is missing with random numbers and only log it. Tensors too many do no harm:
@@ -251,15 +253,15 @@ def load(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> Any:
     return model
 
 
-def pipeline(name: str, folder: Path, gpu: bool, what: str = "", **options: Any) -> Any:
+def pipeline(name: str, folder: Path, gpu: bool, label: str = "", **options: Any) -> Any:
     """The pipeline `name` of diffusers in a folder, every component whole; half precision on the GPU only.
 
-    `what` is what errors call it, by default its name. Raises SetupError, WeightsError.
+    `label`: name of the model in errors, by default that of the pipeline. Raises SetupError, WeightsError.
     """
     import torch
 
-    diffusers = library("diffusers")
-    transformers = library("transformers")
+    diffusers = import_library("diffusers")
+    transformers = import_library("transformers")
     kinds = {
         "unet": diffusers.UNet2DConditionModel,
         "vae": diffusers.AutoencoderKL,
@@ -267,17 +269,18 @@ def pipeline(name: str, folder: Path, gpu: bool, what: str = "", **options: Any)
     }
     components = {}
     for part, cls in kinds.items():
+        # Half-precision files hold the same network in half the space.
         variant = {"variant": "fp16"} if any((folder / part).glob("*.fp16.*")) else {}
-        components[part] = load(cls, folder, part, **variant).to(
+        components[part] = load_model(cls, folder, part, **variant).to(
             torch.float16 if gpu else torch.float32
         )
     try:
-        made = getattr(diffusers, name).from_pretrained(
+        loaded = getattr(diffusers, name).from_pretrained(
             folder, local_files_only=True, **components, **options
         )
     except Exception as error:  # whatever its readers raise on a damaged configuration
         raise WeightsError(
-            f"{folder} holds no whole {what or name} ({reason(error)}); fetch it again."
+            f"{folder} holds no whole {label or name} ({reason(error)}); fetch it again."
         ) from error
-    made.set_progress_bar_config(disable=True)
-    return made.to("cuda" if gpu else "cpu")
+    loaded.set_progress_bar_config(disable=True)
+    return loaded.to("cuda" if gpu else "cpu")

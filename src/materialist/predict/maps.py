@@ -21,10 +21,10 @@ MOGE = "write it with: moge infer -i PHOTO -o DIR --maps"
 class MapSettings:
     """Limits within which the values of a foreign map are mended; beyond them the map is refused. Tuned by eye."""
 
-    excess: float = 0.1  # farthest outside of its range that a value is clipped with a warning
-    wild: float = 0.01  # share of values farther outside from which the map is in another unit
-    beyond: float = 1e5  # multiple of the nearest surfaces' depth that is sky: renderers write it for missed rays
-    known_normal: float = 0.2  # length of a normal from which it is known
+    max_excess: float = 0.1  # distance outside of its range up to which a value is clipped
+    max_wild_share: float = 0.01  # share of values farther outside; more means another unit
+    max_depth_ratio: float = 1e5  # to the nearest surfaces; renderers write more for missed rays
+    min_normal_length: float = 0.2  # length of a normal from which it is known
 
 
 SETTINGS = MapSettings()
@@ -44,7 +44,7 @@ class MapsPredictor(Predictor):
         self.name = f"maps:{self.folder}"
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted maps. A missing roughness or metallic is the paper's neutral start, a missing normal is unknown.
 
@@ -54,10 +54,12 @@ class MapsPredictor(Predictor):
         size = photo.linear.shape[:2]
         maps = dict[str, Array]()
         warnings: list[str] = []
-        for name in wanted:
+        for name in names:
             path = next(
                 (p for s in ("exr", "png") if (p := self.folder / f"{name}.{s}").is_file()), None
             )
+            # Missing materials are neutral, missing normals follow from depth; albedo and depth
+            # are needed.
             if path is not None:
                 maps[name] = _fitted(self.read(name, path, warnings), name, size, path, warnings)
             elif name == "normal":
@@ -72,11 +74,11 @@ class MapsPredictor(Predictor):
                 raise InputError(
                     f"{self.folder} holds no {name}.exr or {name}.png; albedo and depth are needed."
                 )
-        return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
+        return MapSet(maps, dict.fromkeys(names, self.name), tuple(warnings))
 
     def read(self, name: str, path: Path, warnings: list[str]) -> Array:
         """The values of a map at their own size, checked and mended. Raises InputError."""
-        return _CHECKS[name](read_map(path, name), path, warnings)
+        return _CHECKS[name](read_map_file(path, name), path, warnings)
 
 
 class ArraysPredictor(Predictor):
@@ -89,13 +91,13 @@ class ArraysPredictor(Predictor):
         self.gives = tuple(self.known)
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted maps. Raises InputError for another shape than the map has, and as `MapsPredictor.parts`."""
         size = photo.linear.shape[:2]
         warnings = list[str]()
-        maps = {name: self._fitted(name, size, warnings) for name in wanted}
-        return MapSet(maps, dict.fromkeys(wanted, self.name), tuple(warnings))
+        maps = {name: self._fitted(name, size, warnings) for name in names}
+        return MapSet(maps, dict.fromkeys(names, self.name), tuple(warnings))
 
     def _fitted(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array:
         values = np.asarray(self.known[name])
@@ -129,17 +131,20 @@ class MogeFolder(MapsPredictor):
         if not str(folder):
             raise InputError(f'moge: needs a folder, as in `depth="moge:DIR"`; {MOGE}')
         super().__init__(folder)
-        found = [
+        # MoGe writes a folder for each picture: the results lie here, or in the only folder below.
+        folders = [
             path.parent
             for path in sorted((*self.folder.glob("depth.exr"), *self.folder.glob("*/depth.exr")))
         ]
-        if self.folder not in found and len(found) != 1:
-            names = ", ".join(path.name for path in found[:3])
+        if self.folder not in folders and len(folders) != 1:
+            listed = ", ".join(path.name for path in folders[:3])
             several = (
-                f"several results ({names}); name one of them" if found else f"no depth.exr; {MOGE}"
+                f"several results ({listed}); name one of them"
+                if folders
+                else f"no depth.exr; {MOGE}"
             )
             raise InputError(f"{self.folder} holds {several}.")
-        self.folder = self.folder if self.folder in found else found[0]
+        self.folder = self.folder if self.folder in folders else folders[0]
         self.field_of_view = _field_of_view(self.folder / "fov.json")
         self.name = f"moge:{self.folder}"
 
@@ -162,7 +167,8 @@ def _fitted(
     values: Array, name: str, size: tuple[int, int], path: Path, warnings: list[str]
 ) -> Array:
     """A map [h, w, ...] brought to the photo's size (H, W). Raises InputError for another aspect ratio."""
-    (h, w), (height, width) = values.shape[:2], size
+    h, w = values.shape[:2]
+    height, width = size
     if (h, w) == size:
         return values
     slack = 1.5 * max(1.0, height / h, width / w)  # pixels, for sizes that were rounded
@@ -176,21 +182,20 @@ def _fitted(
     )
 
 
-def read_map(path: Path, name: str) -> Array:
+def read_map_file(path: Path, name: str) -> Array:
     """The linear values in a map file, float32: [H, W, 3] for albedo and normal, [H, W] for the others.
 
     EXR values are as stored. PNG (8 or 16 bit) is brought to [0, 1]; albedo is then sRGB-decoded and normal is
     2 v - 1. Raises InputError for a damaged file or the wrong number of channels.
     """
     values = read_data(path)
-    if path.suffix != ".exr":
-        values = (
-            srgb_to_linear(values)
-            if name == "albedo"
-            else 2 * values - 1
-            if name == "normal"
-            else values
-        )
+    # --- PNGs are encoded: colours by the sRGB curve, normals by (n + 1) / 2 ---
+    if path.suffix != ".exr" and name == "albedo":
+        values = srgb_to_linear(values)
+    elif path.suffix != ".exr" and name == "normal":
+        values = 2 * values - 1
+
+    # --- Three channels for colours and directions, one for the rest ---
     if name in ("albedo", "normal"):
         if values.ndim == 2 and name == "albedo":
             values = np.repeat(values[..., None], 3, -1)
@@ -198,6 +203,7 @@ def read_map(path: Path, name: str) -> Array:
             raise InputError(f"{path} has one channel, but a {name} map needs three.")
         return np.ascontiguousarray(values)
     if values.ndim == 3:
+        # Grey maps are often saved as RGB: equal channels are one channel.
         if np.nanmax(np.ptp(values, axis=-1)) > 0.01 * max(1.0, float(np.nanmax(np.abs(values)))):
             raise InputError(
                 f"{path} is a colour picture, but a {name} map has one value a pixel; save it as grey."
@@ -218,12 +224,13 @@ def _check_finite(values: Array, path: Path) -> None:
 def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
     """Albedo, roughness, metallic: in [0, 1], slight excess clipped, anything else refused."""
     _check_finite(values, path)
-    wild = (values < -SETTINGS.excess) | (values > 1 + SETTINGS.excess)
-    if wild.mean() > SETTINGS.wild:
+    wild = (values < -SETTINGS.max_excess) | (values > 1 + SETTINGS.max_excess)
+    if wild.mean() > SETTINGS.max_wild_share:
         raise InputError(
             f"{path} has values from {values.min():.4g} to {values.max():.4g}; this map must be in [0, 1] "
             "(divide by 255 or 65535 if it was written as integers)."
         )
+    # Rounding and resampling overshoot a little, which is no reason for a warning.
     if values.min() < -1e-3 or values.max() > 1 + 1e-3:
         warnings.append(
             f"{path.name} reaches from {values.min():.3f} to {values.max():.3f}: clipped to [0, 1]."
@@ -233,12 +240,13 @@ def _unit_range(values: Array, path: Path, warnings: list[str]) -> Array:
 
 def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
     """Depth: positive, 0 for no surface; infinite is taken as no surface."""
+    # --- No surface: infinite, negative, or far beyond everything else ---
     if np.isposinf(values).any():
         warnings.append(f"{path.name} has infinite depths: taken as sky (no surface).")
         values = np.where(np.isposinf(values), 0, values)
     _check_finite(values, path)
     negative = values < 0
-    if negative.mean() > SETTINGS.wild:
+    if negative.mean() > SETTINGS.max_wild_share:
         raise InputError(
             f"{path} has negative depths (to {values.min():.4g}); depth is a positive distance along -Z."
         )
@@ -248,7 +256,7 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
         )
     values = np.maximum(values, 0)
     if (values > 0).any():
-        far = values > SETTINGS.beyond * np.percentile(values[values > 0], 5)
+        far = values > SETTINGS.max_depth_ratio * np.percentile(values[values > 0], 5)
         if far.any():
             warnings.append(
                 f"{path.name} has depths of up to {values.max():.3g}: taken as sky (no surface)."
@@ -258,6 +266,7 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
         raise InputError(
             f"{path} is 0 everywhere, so there is no surface to reconstruct; depth must be positive."
         )
+    # --- Coarse steps make terraces of slopes ---
     if path.suffix == ".png" and np.unique(values).size <= 256:
         warnings.append(
             f"{path.name} has only {np.unique(values).size} depth steps; 16-bit PNG or EXR is smoother."
@@ -269,13 +278,13 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
     """Normals: unit vectors facing the viewer; a zero vector means unknown."""
     _check_finite(values, path)
     length = np.linalg.norm(values, axis=-1)
-    known = length > SETTINGS.known_normal
-    wrong = (np.abs(length[known] - 1) > SETTINGS.excess).mean() > 0.05 if known.any() else True
+    known = length > SETTINGS.min_normal_length
+    wrong = (np.abs(length[known] - 1) > SETTINGS.max_excess).mean() > 0.05 if known.any() else True
     if (
         wrong
         and path.suffix == ".exr"
         and values.min() >= 0
-        and values.max() <= 1 + SETTINGS.excess
+        and values.max() <= 1 + SETTINGS.max_excess
     ):
         raise InputError(
             f"{path} has no negative value: it holds encoded normals; store 2 v - 1 in an EXR."

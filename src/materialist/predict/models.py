@@ -91,8 +91,8 @@ KNOWN = (
 
 def models_folder() -> Path:
     """Where downloads lie: $MATERIALIST_MODELS, else materialist/models in the user's cache folder."""
-    if own := os.environ.get("MATERIALIST_MODELS"):
-        return Path(own)
+    if folder := os.environ.get("MATERIALIST_MODELS"):
+        return Path(folder)
     return (
         Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "materialist" / "models"
     )
@@ -132,11 +132,11 @@ def is_complete(model: HubModel) -> bool:
 
 def downloaded() -> dict[str, Path]:
     """The folders of all finished downloads here, by the model's name or hub id."""
-    found = {
+    folders = {
         file.parent.name: file.parent for file in sorted(models_folder().glob(f"*/{CHECKSUMS}"))
     }
     known = {folder_of(model).name: model.name for model in KNOWN}
-    return {known.get(name, name.replace("--", "/", 1)): folder for name, folder in found.items()}
+    return {known.get(name, name.replace("--", "/", 1)): folder for name, folder in folders.items()}
 
 
 def require(model: HubModel) -> Path:
@@ -170,16 +170,16 @@ def locate(where: str, default: str) -> Path:
 
 def weights_file(path: Path) -> Path:
     """The file itself, or the weights in a folder, safetensors before pickles. Raises WeightsError for none."""
-    found = (
+    files = (
         [path]
         if path.is_file()
         else [file for end in WEIGHTS for file in sorted(path.glob(f"*{end}"))]
     )
-    if not found:
+    if not files:
         raise WeightsError(
             f"{path} holds no .safetensors or .pth file; fetch the model again, or {INSTEAD}."
         )
-    return found[0]
+    return files[0]
 
 
 def download(model: HubModel, *, force: bool = False) -> Path:
@@ -194,11 +194,13 @@ def download(model: HubModel, *, force: bool = False) -> Path:
     api = HfApi(os.environ.get("HF_ENDPOINT"), library_name="materialist")
     folder = folder_of(model)
     try:
+        # --- What the hub promises, and what of it is needed ---
         listing = api.model_info(model.repo, files_metadata=True, timeout=TIMEOUT).siblings or []
         promised = {file.rfilename: file.lfs.sha256 if file.lfs else None for file in listing}
-        wanted = chosen(promised)
-        for name in wanted:
+        names = needed_files(promised)
+        for name in names:
             api.hf_hub_download(model.repo, name, local_dir=folder, force_download=force)
+            # A damaged file is deleted, or the next try would take it for complete.
             if promised[name] not in (None, sha256(folder / name)):
                 (folder / name).unlink()
                 raise ValueError(f"{name} came damaged: its sha256 is not {promised[name]}")
@@ -214,9 +216,9 @@ def download(model: HubModel, *, force: bool = False) -> Path:
             f"fetch {model.main_file or 'its files'} elsewhere into a folder and take them from there: materialist "
             f"models download {model.name} --from FOLDER; or {INSTEAD}."
         ) from error
-    if not any(name.endswith(WEIGHTS) for name in wanted):
+    if not any(name.endswith(WEIGHTS) for name in names):
         raise WeightsError(f"{api.endpoint}/{model.repo} holds no file of weights; check the id.")
-    _write_checksums(folder, wanted)
+    _write_checksums(folder, names)
     return folder
 
 
@@ -225,25 +227,25 @@ def adopt(model: HubModel, source: Path) -> Path:
 
     Raises InputError where the folder lacks the model's files, OutputError when the disk is full or read-only.
     """
-    wanted = chosen(
+    names = needed_files(
         path.relative_to(source).as_posix() for path in sorted(source.rglob("*")) if path.is_file()
     )
-    if not any(name.endswith(WEIGHTS) for name in wanted) or model.main_file not in ("", *wanted):
+    if not any(name.endswith(WEIGHTS) for name in names) or model.main_file not in ("", *names):
         raise InputError(
             f"{source} lacks {model.main_file or 'a file of weights'} of {model.repo}; fetch it again."
         )
     folder = folder_of(model)
     try:
-        for name in wanted if source.resolve() != folder.resolve() else ():
+        for name in names if source.resolve() != folder.resolve() else ():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(source / name, folder / name)
     except OSError as error:
         raise _unwritable(folder, error) from error
-    _write_checksums(folder, wanted)
+    _write_checksums(folder, names)
     return folder
 
 
-def chosen(names: Iterable[str]) -> list[str]:
+def needed_files(names: Iterable[str]) -> list[str]:
     """The needed files of a repository: all settings, and of the weights of each folder the best of several formats.
 
     Half precision before full (it is the same network at half the size), safetensors before pickles.
@@ -253,6 +255,8 @@ def chosen(names: Iterable[str]) -> list[str]:
     weights = [name for name in names if name.endswith(WEIGHTS)]
     for folder in dict.fromkeys(PurePosixPath(name).parent for name in weights):
         files = [name for name in weights if PurePosixPath(name).parent == folder]
+        # The first ending that any file has; its whole group, as weights may be split into
+        # several files.
         ends = (".fp16.safetensors", ".safetensors", ".fp16.bin", *WEIGHTS)
         picked += next(
             group for end in ends if (group := [name for name in files if name.endswith(end)])

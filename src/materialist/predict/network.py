@@ -44,11 +44,11 @@ class StoredNetwork(nn.Module):
 
     def save(self, path: Path, facts: dict[str, Any]) -> None:
         """Write the network with `facts` (steps, data, scores), whole or not at all; without the shared encoder."""
-        own = {k: v for k, v in self.state_dict().items() if not k.startswith(SHARED)}
+        tensors = {k: v for k, v in self.state_dict().items() if not k.startswith(SHARED)}
         architecture = json.dumps(self.architecture.as_dict())
         write_weights(
             path,
-            own,
+            tensors,
             {"format": self.FORMAT, "architecture": architecture, "facts": json.dumps(facts)},
         )
 
@@ -151,21 +151,22 @@ class UNet(StoredNetwork):
         )
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(len(w) - 1))
         self.decoders = nn.ModuleList(ResidualBlock(w[k]) for k in range(len(w) - 1))
+        # Zero at first, so that training starts from the prior that the network corrects.
         self.head = nn.Conv2d(w[0], 4 * outputs, 3, padding=1)
         nn.init.zeros_(self.head.weight)
         assert self.head.bias is not None
         nn.init.zeros_(self.head.bias)
 
-    def raw(self, maps: Tensor, told: Sequence[Tensor | float] = (0.0,) * 4) -> Tensor:
+    def raw(self, maps: Tensor, added: Sequence[Tensor | float] = (0.0,) * 4) -> Tensor:
         """[B, outputs, S, S] float32 of maps [B, inputs, S, S]; S a multiple of STRIDE.
 
-        `told` is added to the levels from 1/4 on: [B, widths[k], S/4, S/4] and so forth.
+        `added` is added to the levels from 1/4 on: [B, widths[k], S/4, S/4] and so forth.
         """
         x = self.levels[0](self.stem(F.pixel_unshuffle(maps, 2)))
         skips = []
-        for down, level, more in zip(self.downs, self.levels[1:], told, strict=True):
+        for down, level, term in zip(self.downs, self.levels[1:], added, strict=True):
             skips.append(x)
-            x = level(down(x) + more)
+            x = level(down(x) + term)
         for up, decoder, skip in zip(
             reversed(self.ups), reversed(self.decoders), reversed(skips), strict=True
         ):

@@ -45,14 +45,14 @@ class Predictor(ABC):
 
     @abstractmethod
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
-        """The wanted maps at the photo's working size; equal seeds give equal maps, most predictors ignore them.
+        """The maps of these names at the photo's working size; equal seeds give equal maps, most ignore the seed.
 
         `normal` [H, W, 3], where known, sets the scale of a relative depth (docs/predictors.md, "Relative depth").
         """
 
-    def prepare(self, wanted: Collection[str]) -> None:  # noqa: B027 (most predictors load all they need when made)
+    def prepare(self, names: Collection[str]) -> None:  # noqa: B027 (most predictors load all they need when made)
         """Raise SetupError or WeightsError before the first photo where a library or a network is missing."""
 
     def predict(self, photo: Photo, *, seed: int = 0) -> Prediction:
@@ -61,6 +61,7 @@ class Predictor(ABC):
         maps = part.maps
         sources = {name: part.sources[name] for name in MAPS}
         normal = maps["normal"]
+        # A zero vector means unknown: geometry of the depth's own stands in.
         known = np.linalg.norm(normal, axis=-1, keepdims=True) > 0.5
         if not known.all():
             normal = np.where(
@@ -97,17 +98,17 @@ class ConstantPredictor(Predictor):
     name = "constant"
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted maps, with a warning that names them; the normals are unknown, and so follow from the depth."""
         size = photo.linear.shape[:2]
-        values = {name: np.asarray(CONSTANT[name], np.float32) for name in wanted}
+        values = {name: np.asarray(CONSTANT[name], np.float32) for name in names}
         maps = {
             name: np.broadcast_to(value, (*size, *value.shape)).copy()
             for name, value in values.items()
         }
-        note = f"The constant predictor knows nothing of the photo: {', '.join(wanted)} are neutral everywhere."
-        return MapSet(maps, dict.fromkeys(wanted, self.name), (note,))
+        note = f"The constant predictor knows nothing of the photo: {', '.join(names)} are neutral everywhere."
+        return MapSet(maps, dict.fromkeys(names, self.name), (note,))
 
 
 class MixedPredictor(Predictor):
@@ -121,16 +122,16 @@ class MixedPredictor(Predictor):
         self.field_of_view = sources[self.depth_spec].field_of_view
         # As in 'albedo: marigold; roughness, metallic, normal, depth: bundled'.
         self.name = "; ".join(
-            f"{', '.join(names)}: {sources[spec].name}" for spec, names in self.shares.items()
+            f"{', '.join(members)}: {sources[spec].name}" for spec, members in self.shares.items()
         )
 
-    def prepare(self, wanted: Collection[str]) -> None:
-        for spec, names in self.shares.items():
-            if not set(names).isdisjoint(wanted):
-                self.sources[spec].prepare(names)
+    def prepare(self, names: Collection[str]) -> None:
+        for spec, members in self.shares.items():
+            if not set(members).isdisjoint(names):
+                self.sources[spec].prepare(members)
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted maps of all sources together. Each source runs once."""
         maps: dict[str, Array] = {}
@@ -140,10 +141,10 @@ class MixedPredictor(Predictor):
         spread: dict[str, Array] = {}
         # The source of the depth comes last: a known normal map helps to scale a relative depth.
         for spec in sorted(self.sources, key=lambda spec: spec == self.depth_spec):
-            names = [name for name in self.shares[spec] if name in wanted]
-            if names:
+            members = [name for name in self.shares[spec] if name in names]
+            if members:
                 part = self.sources[spec].parts(
-                    photo, names, seed=seed, normal=maps.get("normal", normal)
+                    photo, members, seed=seed, normal=maps.get("normal", normal)
                 )
                 maps |= part.maps
                 sources |= part.sources

@@ -47,18 +47,27 @@ def get_predictor(
         raise InputError(
             f"The {twice[0]} is in the prior and has a predictor of its own; leave one of them out."
         )
+    # --- Which source gives which map: known arrays, then a map's own spec, then the common one ---
     chosen = {name: ARRAYS if name in known else parts.get(name) or spec for name in MAPS}
-    sources = {one: _source(one, device, prior) for one in dict.fromkeys(chosen.values())}
-    for one, source in sources.items():
-        if lacking := [name for name in MAPS if chosen[name] == one and name not in source.gives]:
-            options = ", ".join(f'`{name}="{one}"`' for name in source.gives)
+    # --- Each source is opened once, however many maps it gives ---
+    sources = {
+        source_spec: _source(source_spec, device, prior)
+        for source_spec in dict.fromkeys(chosen.values())
+    }
+    for source_spec, source in sources.items():
+        if lacking := [
+            name for name in MAPS if chosen[name] == source_spec and name not in source.gives
+        ]:
+            options = ", ".join(f'`{name}="{source_spec}"`' for name in source.gives)
             raise InputError(
-                f"'{one}' gives only {', '.join(source.gives)}, not {lacking[0]}: use it beside another predictor, "
-                f"with {options}."
+                f"'{source_spec}' gives only {', '.join(source.gives)}, not {lacking[0]}: use it beside another "
+                f"predictor, with {options}."
             )
-    found = MixedPredictor(chosen, sources) if len(sources) > 1 else next(iter(sources.values()))
-    found.prepare(MAPS)
-    return found
+    predictor = (
+        MixedPredictor(chosen, sources) if len(sources) > 1 else next(iter(sources.values()))
+    )
+    predictor.prepare(MAPS)
+    return predictor
 
 
 def parsed(spec: str) -> tuple[str, str]:

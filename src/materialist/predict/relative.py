@@ -13,13 +13,10 @@ from materialist.types import Array, Camera
 class RelativeSettings:
     """Search for the ratio of the farthest surface to the nearest. Tuned by eye."""
 
-    ratio: float = 4.0  # the ratio where no normal map tells more: a room seen from inside it
+    ratio: float = 4.0  # without a normal map: a room seen from inside it
     range: tuple[float, float] = (1.1, 60.0)  # ratios tried against a normal map
     trials: int = 44  # ratios tried, evenly spaced in their logarithm
-    percentiles: tuple[float, float] = (
-        0.5,
-        99.5,
-    )  # the nearest and the farthest surface; outliers lie beyond
+    percentiles: tuple[float, float] = (0.5, 99.5)  # nearest and farthest surface, less outliers
     side: int = 96  # longer side of the copy on which ratios are tried, pixels
 
 
@@ -31,9 +28,9 @@ def planar(
 ) -> tuple[Array, str, tuple[str, ...]]:
     """Planar depth of a relative one, the note for its source, and the warning that the report gives."""
     depth, ratio, fitted = from_relative(values, camera, normal, inverse=inverse)
-    how = "fitted to the normals" if fitted else "assumed"
-    warning = f"Depth from {name} is relative: far / near = {ratio:.1f} was {how}."
-    return depth, f", far / near {ratio:.1f} {how}", (warning,)
+    origin = "fitted to the normals" if fitted else "assumed"
+    warning = f"Depth from {name} is relative: far / near = {ratio:.1f} was {origin}."
+    return depth, f", far / near {ratio:.1f} {origin}", (warning,)
 
 
 def from_relative(
@@ -47,6 +44,7 @@ def from_relative(
     Returns depth [H, W] float32 > 0 of values [H, W], the ratio, and whether it was fitted to the normals [H, W, 3]
     (unit; zero where unknown).
     """
+    # --- The values as t in about [0, 1] ---
     low, high = np.percentile(values, SETTINGS.percentiles)
     t = ((values - low) / max(high - low, 1e-6 * max(abs(low), abs(high), 1e-6))).astype(np.float32)
 
@@ -55,6 +53,7 @@ def from_relative(
             return (1 / np.maximum(t * (1 - 1 / ratio) + 1 / ratio, 0.5 / ratio)).astype(np.float32)
         return np.maximum(1 + t * (ratio - 1), 0.5).astype(np.float32)
 
+    # --- The ratio whose normals agree best with the map, on a small copy ---
     if normal is not None:
         scale = min(1.0, SETTINGS.side / max(t.shape))
         size = (max(2, round(t.shape[1] * scale)), max(2, round(t.shape[0] * scale)))
@@ -68,8 +67,8 @@ def from_relative(
         view = Camera(*size, camera.fov)
 
         def error(ratio: float) -> float:
-            found = normals_from_depth(depth(ratio, small_t), view, radius=1)[known]
-            return float(np.arccos(np.clip((found * target).sum(-1), -1, 1)).mean())
+            normals = normals_from_depth(depth(ratio, small_t), view, radius=1)[known]
+            return float(np.arccos(np.clip((normals * target).sum(-1), -1, 1)).mean())
 
         if known.sum() >= 16:
             ratio = float(min(np.geomspace(*SETTINGS.range, SETTINGS.trials), key=error))

@@ -38,6 +38,7 @@ def depth(array: Array, size: tuple[int, int]) -> Array:
     nearest = cv2.resize(array, size[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
     known = array > 0
     inverse = np.where(known, 1 / np.where(known, array, 1), 0).astype(np.float32)
+    # A linear interpolation of inverse depth is exact on planes in perspective.
     smooth = 1 / np.maximum(values(inverse, size), 1e-12)
     # The neighbourhood that an area mean or a bilinear lookup may touch, at either size.
     reach = 2 * int(np.ceil(max(1.0, array.shape[0] / size[0], array.shape[1] / size[1]))) + 1

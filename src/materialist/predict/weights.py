@@ -91,6 +91,7 @@ def read_state(path: Path) -> dict[str, Tensor]:
             f"{path} {kind}; give a .safetensors or .pth file of weights, or {INSTEAD}."
         )
     try:
+        # `weights_only`: a pickle can run code, and is refused unless it holds plain tensors.
         safe = path.suffix == ".safetensors"
         content = (
             load_file(path) if safe else torch.load(path, map_location="cpu", weights_only=True)
@@ -104,6 +105,7 @@ def read_state(path: Path) -> dict[str, Tensor]:
             f"{path} is truncated or damaged, or wants to run code, which is refused ({reason(error)}); "
             f"fetch or copy it again, or {INSTEAD}."
         ) from error
+    # --- Checkpoints of training wrap the tensors; nothing but tensors may be left ---
     for key in ("state_dict", "model"):
         if isinstance(content, Mapping) and isinstance(content.get(key), Mapping):
             content = content[key]
@@ -132,6 +134,7 @@ def load_weights(network: nn.Module, state: Mapping[str, Tensor], path: Path) ->
         raise WeightsError(
             f"{path} is not a checkpoint of {type(network).__name__}: {faults}"
         ) from error
+    # Finite on purpose: one NaN spreads over every pixel.
     broken = [
         name
         for name, tensor in state.items()

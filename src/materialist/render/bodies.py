@@ -46,6 +46,7 @@ def body_bsdf(surface: Surface, opaque: dict) -> dict:
     """
     if not is_transparent(surface):
         return opaque
+    # --- The dielectric interface, smooth or rough ---
     tint = {"type": "rgb", "value": [float(np.sqrt(c)) for c in surface.tint]}
     ior = max(float(surface.ior), LEAST_IOR)
     glass: dict = {
@@ -61,6 +62,7 @@ def body_bsdf(surface: Surface, opaque: dict) -> dict:
             "alpha": surface.interface_roughness**2,
         }
         glass = {"type": FROSTED, "interface": {**glass, **rough}}
+    # --- A share of the opaque BRDF on its outside ---
     if surface.transmission >= 1:
         return glass
     weight = {"type": OUTSIDE, "value": float(surface.transmission)}
@@ -74,12 +76,12 @@ def opaque_bsdf(mi, surface: Surface) -> dict:
         "roughness": surface.roughness,
         "metallic": surface.metallic,
     }
-    how = {"type": "bitmap", "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
-    data = {name: tensor(mi, at_least_2x2(np.atleast_3d(values))) for name, values in maps.items()}
-    return {
-        "type": "materialist_disney",
-        **{name: {**how, "data": values} for name, values in data.items()},
-    }
+    # `raw`: the values are linear already. Texture coordinates of meshes repeat beyond [0, 1].
+    bitmap = {"type": "bitmap", "raw": True, "filter_type": "bilinear", "wrap_mode": "repeat"}
+    bsdf: dict[str, Any] = {"type": "materialist_disney"}
+    for name, values in maps.items():
+        bsdf[name] = {**bitmap, "data": tensor(mi, at_least_2x2(np.atleast_3d(values)))}
+    return bsdf
 
 
 def at_least_2x2(values: Array) -> Array:
@@ -89,8 +91,9 @@ def at_least_2x2(values: Array) -> Array:
     return values
 
 
-def register() -> None:
+def register_outside() -> None:
     """Make the texture known to the active variant."""
+    # Imported here: a Mitsuba class can be derived only once a variant is set.
     import drjit as dr
     import mitsuba as mi
 

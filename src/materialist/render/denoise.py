@@ -36,6 +36,7 @@ def denoise(image: Array, albedo: Array, normal: Array, *, quality: str = "high"
     ]
     if on_card:
         pictures = [placed(p) for p in pictures]
+    # `hdr`: the values are linear radiance of any range, not sRGB in [0, 1].
     clean = pyoidn.denoise(*pictures, hdr=True, clean_aux=True, quality=quality)
     clean = clean.cpu().numpy() if on_card else clean
     return np.ascontiguousarray(np.maximum(clean[:height, :width], 0))
@@ -62,6 +63,7 @@ def require_denoiser() -> None:
 
 def _pyoidn(with_torch: bool) -> Any:
     """The module. It imports PyTorch if it can: seconds, and only a GPU needs it. Raises ImportError, OSError."""
+    # None in `sys.modules` makes an import fail at once, which pyoidn takes for "no torch".
     hidden = not with_torch and "torch" not in sys.modules
     if hidden:
         sys.modules["torch"] = None  # type: ignore[assignment]

@@ -17,12 +17,14 @@ def on_mitsuba_grid(envmap, xp):
     second one is a texel centre of ours and the rest lie midway, so that its bilinear lookup equals ours to rounding.
     Its columns are padded by one on either side. To be used with `half_turn`.
     """
+    # --- Rows: pole, texel centres and the means between them, pole ---
     first = envmap[:1]
     last = envmap[-1:]
     middle = (envmap[:-1] + envmap[1:]) / 2
     h = envmap.shape[0]
     inner = xp.stack([envmap[:-1], middle], 1).reshape(2 * (h - 1), *envmap.shape[1:])
     rows = xp.concatenate([first, inner, last, last], 0)
+    # --- Columns: the last before the first and the first after the last, for the seam ---
     return xp.concatenate([rows[:, -1:], rows, rows[:, :1]], 1)
 
 

@@ -41,6 +41,7 @@ def only(scene, names: Sequence[str]):
     """The named shapes of a Mitsuba scene as a scene of their own, to see what hides them."""
     import mitsuba as mi
 
+    # Robust intersections: rays along the edge of two triangles must not slip through.
     chosen = {shape.id(): shape for shape in scene.shapes() if shape.id() in names}
     return mi.load_dict({"type": "scene", "embree_use_robust_intersections": True, **chosen})
 
@@ -58,11 +59,13 @@ def first_hits(
     size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
     """
     whole = box or (slice(0, size[0]), slice(0, size[1]))
+    # --- Only the part of the picture where the bodies can be ---
     rows, columns = _around(scene, camera, bodies, size, whole)
-    found = np.zeros((*(side.stop - side.start for side in whole), 8))
-    inside = found[
+    values = np.zeros((*(side.stop - side.start for side in whole), 8))
+    inside = values[
         tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))
     ]
+    # --- Some rows at a time, so that the rays fit into memory ---
     step = max(1, _RAYS // GRID**2 // max(columns.stop - columns.start, 1))
     for first in range(rows.start, rows.stop, step) if area((rows, columns)) else ():
         strip = slice(first, min(first + step, rows.stop))
@@ -70,16 +73,13 @@ def first_hits(
             scene, camera, bodies, size, (strip, columns)
         )
 
-    def take(v):
-        return np.ascontiguousarray(v, np.float32)
-
-    return FirstHits(
-        take(found[..., 0]), take(found[..., 1:4]), take(found[..., 4:7]), take(found[..., 7])
-    )
+    channels = (values[..., 0], values[..., 1:4], values[..., 4:7], values[..., 7])
+    return FirstHits(*(np.ascontiguousarray(channel, np.float32) for channel in channels))
 
 
 def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box) -> Box:
     """The part of a box where shapes may be seen: around the corners of their bounds; all of it where one is behind."""
+    # The projected corners of a box bound the projection of what is in it.
     bounds = [shape.bbox() for shape in scene.shapes() if shape.id() in names]
     corners = np.array([list(product(*zip(b.min, b.max))) for b in bounds], float).reshape(-1, 3)
     at, depth = project(corners, camera)
@@ -106,6 +106,7 @@ def _strip(
     import mitsuba as mi
 
     pixel = pixel_numbers(size, box)
+    # --- A grid of rays in each pixel, all against the whole scene: what is hidden is not seen ---
     row, column, _ = np.indices((GRID, GRID, pixel.size)).reshape(3, -1)
     x, y = (floats(mi, (place + 0.5) / GRID) for place in (column, row))
     way = directions(camera, size, integers(mi, np.tile(pixel.ravel(), GRID**2)), x, y)
@@ -114,19 +115,21 @@ def _strip(
     normal = np.array(si.sh_frame.n).T
     uv = np.array(si.uv).T
     depth = -np.array(si.p.z)
+    # --- What the rays meet, body by body ---
     shapes = {shape.id(): shape for shape in scene.shapes()}
-    found = np.zeros((len(depth), 8))
+    sums = np.zeros((len(depth), 8))
     for name in bodies.keys() & shapes:
         body = bodies[name]
         hit = np.array(si.is_valid() & (si.shape == mi.ShapePtr(shapes[name])))
         albedo = np.ones((hit.sum(), 3)) if body is None else _albedo(body, uv[hit])
-        found[hit] = np.concatenate(
+        sums[hit] = np.concatenate(
             [np.ones((hit.sum(), 1)), albedo, normal[hit], depth[hit, None]], 1
         )
-    total = found.reshape(GRID**2, pixel.size, 8).sum(0)
-    total[:, 1:] /= np.maximum(total[:, :1], 1)
-    total[:, 0] /= GRID**2
-    return total.reshape(*pixel.shape, 8)
+    # --- Means over the rays that meet one; the share over all rays ---
+    means = sums.reshape(GRID**2, pixel.size, 8).sum(0)
+    means[:, 1:] /= np.maximum(means[:, :1], 1)
+    means[:, 0] /= GRID**2
+    return means.reshape(*pixel.shape, 8)
 
 
 def pixel_numbers(size: tuple[int, ...], where: Box | Array) -> Array:
@@ -158,7 +161,9 @@ def _albedo(body: Body, uv: Array) -> Array:
     """[n, 3] albedo at texture coordinates [n, 2], repeated; white where light goes on in one direction."""
     surface = body.surface
     h, w = surface.albedo.shape[:2]
-    x, y = (np.floor(np.nan_to_num(uv[:, k]) * n).astype(np.int64) % n for k, n in ((0, w), (1, h)))
+    x = np.floor(np.nan_to_num(uv[:, 0]) * w).astype(np.int64) % w
+    y = np.floor(np.nan_to_num(uv[:, 1]) * h).astype(np.int64) % h
+    # A denoiser is guided by what is seen in a mirror, not by the colour of the mirror.
     clear = max(
         surface.transmission, float(surface.metallic.mean() * (surface.roughness.mean() < 0.2))
     )
@@ -184,22 +189,33 @@ def radiance(
     mi = target.mi
     masked = isinstance(where, np.ndarray)
     pixels = pixel_numbers(size, np.s_[:, :] if masked else where)
-    wanted = np.asarray(where if masked else np.ones(pixels.shape, bool)).ravel()
-    each = stratified(spp)
+    traced = np.asarray(where if masked else np.ones(pixels.shape, bool)).ravel()
+    # --- One integrator and one sampler for all strips ---
+    paths = stratified(spp)
     total = np.zeros((pixels.size, 4))
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
-    sampler = mi.load_dict({"type": "multijitter", "sample_count": each})
-    sampler.set_samples_per_wavefront(each)
-    step = max(1, _PATHS // each)  # bounded wavefronts
-    for k, first in enumerate(range(0, pixels.size, step)):
-        strip = slice(first, min(first + step, pixels.size))
-        if wanted[strip].any():
-            sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, (strip.stop - first) * each)
+    sampler = mi.load_dict({"type": "multijitter", "sample_count": paths})
+    sampler.set_samples_per_wavefront(paths)
+    pixels_at_once = max(1, _PATHS // paths)  # bounded wavefronts
+    # Strips are numbered over the whole picture, so that a pixel's seed does not depend on the
+    # mask.
+    for k, first in enumerate(range(0, pixels.size, pixels_at_once)):
+        strip = slice(first, min(first + pixels_at_once, pixels.size))
+        if traced[strip].any():
+            sampler.seed((seed * 9973 + k) & 0xFFFFFFFF, (strip.stop - first) * paths)
             total[strip] = _sums(
-                target, size, pixels.ravel()[strip], wanted[strip], integrator, sampler, each, names
+                target,
+                size,
+                pixels.ravel()[strip],
+                traced[strip],
+                integrator,
+                sampler,
+                paths,
+                names,
             )
+    # --- Mean over the paths that count ---
     mean = (total[:, :3] / np.maximum(total[:, 3:], 1)).astype(np.float32)
-    return mean[wanted] if masked else mean.reshape(*pixels.shape, 3)
+    return mean[traced] if masked else mean.reshape(*pixels.shape, 3)
 
 
 def stratified(spp: int) -> int:
@@ -212,10 +228,10 @@ def _sums(
     target,
     size: tuple[int, ...],
     pixels: Array,
-    wanted: Array,
+    traced: Array,
     integrator,
     sampler,
-    each: int,
+    paths: int,
     names: Sequence[str] | None,
 ) -> Array:
     """[n, 4]: of the wanted pixels' rays that count, the sum of what they bring, and their number."""
@@ -224,24 +240,27 @@ def _sums(
     mi = target.mi
     scene = target.mi_scene
     # Numbers that differ from call to call are data, or every call would be compiled anew.
-    slot = dr.arange(mi.UInt32, len(pixels) * each) // dr.opaque(mi.UInt32, each)
+    slot = dr.arange(mi.UInt32, len(pixels) * paths) // dr.opaque(mi.UInt32, paths)
+    # --- Primary rays: a random place in each pixel for every path ---
     inside = sampler.next_2d()
     way = directions(
         target.camera, size, dr.gather(mi.UInt32, integers(mi, pixels), slot), inside.x, inside.y
     )
     ray = mi.RayDifferential3f(mi.Point3f(0), way)
-    counts = dr.gather(mi.UInt32, integers(mi, wanted), slot) != 0
+    counts = dr.gather(mi.UInt32, integers(mi, traced), slot) != 0
+    # --- With names, only rays count that meet one of these shapes first ---
     if names is not None:
         first = scene.ray_intersect_preliminary(ray)
         known = mi.Bool(False)
-        for one in scene.shapes():
-            if one.id() in names:
-                known |= first.shape == mi.ShapePtr(one)
+        for shape in scene.shapes():
+            if shape.id() in names:
+                known |= first.shape == mi.ShapePtr(shape)
         counts &= known
+    # --- Radiance along the paths, summed by pixel ---
     with recording():
         light = integrator.sample(scene, sampler, ray, None, counts)[0]
         values = [dr.select(counts, value, 0) for value in (light.x, light.y, light.z, mi.Float(1))]
     dr.eval(values)  # together, or each sum would trace the paths again
-    return np.stack([np.array(dr.block_sum(value, each)) for value in values], -1).astype(
+    return np.stack([np.array(dr.block_sum(value, paths)) for value in values], -1).astype(
         np.float64
     )

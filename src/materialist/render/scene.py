@@ -51,12 +51,14 @@ class RenderScene:
             )
         self.mi = mi = setup(device)
         self.camera = camera
+        # --- Planes: each has one material, the mean of the pixels that lie on it ---
         self.planes = [int(k) for k in np.unique(geometry.mesh.face_plane) if k >= 0]
         members = {k: np.flatnonzero(geometry.plane_label.reshape(-1) == k) for k in self.planes}
         # A plane that no pixel lies on keeps the neutral material it starts with.
         self._members = {k: pixels for k, pixels in members.items() if len(pixels)}
         height = camera.height
         width = camera.width
+        # --- The scene as Mitsuba's dictionary ---
         description = {
             "type": "scene",
             "embree_use_robust_intersections": True,
@@ -71,6 +73,7 @@ class RenderScene:
             description[f"body{k}"] = seen_shape(mi, body, bsdf, body_emitter(body.surface))
         for k, lamp in enumerate(lamps):
             description[f"lamp{k}"] = sphere(lamp)
+        # --- Of all its parameters only maps and light change: the others are let go ---
         self.mi_scene = mi.load_dict(description)
         self.params = mi.traverse(self.mi_scene)
         names = list(self.params.keys())
@@ -139,21 +142,24 @@ class RenderScene:
             raise SetupError(
                 'PyTorch here computes on the CPU alone: choose `device="cpu"`, or install one for CUDA.'
             )
+        # Path replay backpropagation: gradients at the cost of a second pass, without storing
+        # the paths.
         integrator = self.mi.load_dict({"type": "prb", "max_depth": max_depth})
 
         @dr.wrap(source="torch", target="drjit")
-        def run(a, r, m, e):
-            self._assign(a, r, m)
-            self.params["light.data"] = e
+        # The whole step is one differentiable operation for torch: maps in, picture out.
+        def run(albedo_map, roughness_map, metallic_map, envmap_data):
+            self._assign(albedo_map, roughness_map, metallic_map)
+            self.params["light.data"] = envmap_data
             self.params.update()
-            how = {
+            options = {
                 "integrator": integrator,
                 "spp": stratified(spp),
                 "seed": seed,
                 "seed_grad": seed + 1,
             }
             with recording():
-                return self.mi.render(self.mi_scene, self.params, **how)
+                return self.mi.render(self.mi_scene, self.params, **options)
 
         return run(
             albedo, roughness[..., None], metallic[..., None], on_mitsuba_grid(envmap, torch)
@@ -175,6 +181,7 @@ class RenderScene:
 
         channels = maps.shape[2]
         index = integers(self.mi, members) * channels
+        # The mean of each channel, as gathers, so that gradients reach the pixels of the plane.
         means = [dr.mean(dr.gather(self.mi.Float, maps.array, index + c)) for c in range(channels)]
         # Mitsuba takes no texture below 2 x 2.
         return self.mi.TensorXf(dr.concat(means * 4), (2, 2, channels))
@@ -199,12 +206,14 @@ def sensor(camera: Camera, transform) -> dict:
         "fov": camera.fov,
         "fov_axis": "x",
         "to_world": transform,
+        # Far from any scene: planar depth has no unit.
         "near_clip": 1e-4,
         "far_clip": 1e7,
         "film": {
             "type": "hdrfilm",
             "width": camera.width,
             "height": camera.height,
+            # A pixel is the mean over its square: pixels then do not depend on one another.
             "rfilter": {"type": "box"},
             "pixel_format": "rgb",
             "component_format": "float32",
@@ -246,6 +255,7 @@ def sphere(lamp: Lamp) -> dict:
 def seen_shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -> Any:
     """`shape` of a mesh, without normals exactly along X: u runs there on what faces the camera, and a shading frame
     about a normal along u is not a number."""
+    # Tilt such normals by 1e-3: invisible, and enough for a frame.
     along = np.abs(mesh.normals[:, :1]) > 1 - 1e-6
     beside = (mesh.normals + np.array([0, 1e-3, 5e-4])) / np.sqrt(1 + 1.25e-6)
     normals = np.where(along, beside, mesh.normals).astype(np.float32)
@@ -255,21 +265,20 @@ def seen_shape(mi, mesh: Mesh | Body, bsdf: dict, emitter: dict | None = None) -
 def shape(mi, mesh: Any, bsdf: dict | None = None, emitter: dict | None = None) -> Any:
     """A Mitsuba mesh of anything with vertices and faces, and, for a BSDF, shading normals and uv."""
     props = mi.Properties()
+    # A shape without a BSDF is only hit by rays: it needs neither normals nor uv.
     seen = bsdf is not None
     for name, plugin in (("mesh_bsdf", bsdf), ("mesh_emitter", emitter)):
         if plugin is not None:
             props[name] = mi.load_dict(plugin)
     count = len(mesh.vertices), len(mesh.faces)
-    made = mi.Mesh("part", *count, has_vertex_normals=seen, has_vertex_texcoords=seen, props=props)
-    params = mi.traverse(made)
-    params["vertex_positions"], params["faces"] = (
-        floats(mi, mesh.vertices),
-        integers(mi, mesh.faces),
+    mitsuba_mesh = mi.Mesh(
+        "part", *count, has_vertex_normals=seen, has_vertex_texcoords=seen, props=props
     )
+    params = mi.traverse(mitsuba_mesh)
+    params["vertex_positions"] = floats(mi, mesh.vertices)
+    params["faces"] = integers(mi, mesh.faces)
     if seen:
-        params["vertex_normals"], params["vertex_texcoords"] = (
-            floats(mi, mesh.normals),
-            floats(mi, mesh.uv),
-        )
+        params["vertex_normals"] = floats(mi, mesh.normals)
+        params["vertex_texcoords"] = floats(mi, mesh.uv)
     params.update()
-    return made
+    return mitsuba_mesh

@@ -46,6 +46,7 @@ def find_llvm() -> LLVM:
     """The LLVM library to use: DRJIT_LIBLLVM_PATH if set, else the best of the usual places, which is the newest up to
     `PREFERRED_LLVM`, else the oldest beyond. Nothing is loaded. Raises SetupError that names the package to install.
     """
+    # --- Candidates: the user's choice alone, else every library in the usual places ---
     chosen = os.environ.get("DRJIT_LIBLLVM_PATH")
     paths = (
         [chosen]
@@ -53,6 +54,7 @@ def find_llvm() -> LLVM:
         else {os.path.realpath(path) for place in _PLACES for path in glob(place)}
     )
     versions = {path: llvm_version(path) for path in paths}
+    # --- The newest up to the version that is tested, else the oldest beyond it ---
     usable = [
         LLVM(path, version)
         for path, version in versions.items()
@@ -63,11 +65,13 @@ def find_llvm() -> LLVM:
             usable,
             key=lambda f: (f.version > PREFERRED_LLVM, abs(f.version - PREFERRED_LLVM), f.path),
         )
+    # --- None: say what is there, and how to install one ---
     seen = ", ".join(map(str, sorted({version for version in versions.values() if version})))
     if chosen:
-        found = f"LLVM {seen}" if seen else "no LLVM library"
+        described = f"LLVM {seen}" if seen else "no LLVM library"
         raise SetupError(
-            f"DRJIT_LIBLLVM_PATH is {chosen}, {found}; LLVM {MINIMUM_LLVM} or later is needed: unset it, or {_remedy()}"
+            f"DRJIT_LIBLLVM_PATH is {chosen}, {described}; LLVM {MINIMUM_LLVM} or later is needed: "
+            f"unset it, or {_remedy()}"
         )
     raise SetupError(
         f"No LLVM {MINIMUM_LLVM} or later found{f' (only {seen})' if seen else ''}; {_remedy()}"
@@ -114,6 +118,7 @@ def usable_gpus() -> int:
     import ctypes
 
     try:
+        # The driver alone, without Mitsuba: whoever asks may want to stay on the CPU.
         driver = ctypes.CDLL("libcuda.so.1")
         ctypes.CDLL(os.environ.get("DRJIT_LIBOPTIX_PATH", "libnvoptix.so.1"))
     except OSError:
@@ -137,6 +142,7 @@ def setup(device: str = "auto"):
     """
     if device not in ("auto", "cpu", "cuda"):
         raise InputError(f"Device is '{device}'; choose auto, cpu or cuda.")
+    # LLVM must be chosen before Dr.Jit is imported, which `import mitsuba` does.
     check_process()
     _point_to_llvm(device)
     try:
@@ -144,18 +150,20 @@ def setup(device: str = "auto"):
     except (ImportError, NameError) as error:  # Dr.Jit hides a loader's error behind a NameError
         raise SetupError(f"Mitsuba does not start: {unloaded(error)}") from error
 
-    current = mi.variant()
+    # --- Which variant; one process has one ---
+    running_variant = mi.variant()
     if device == "auto":
-        running = {variant: name for name, variant in _VARIANTS.items()}.get(current or "")
+        devices = {variant_name: name for name, variant_name in _VARIANTS.items()}
+        running = devices.get(running_variant or "")
         device = running or ("cuda" if usable_gpus() else "cpu")
-    wanted = _VARIANTS[device]
-    if current != wanted:
-        if current in _VARIANTS.values():
+    variant = _VARIANTS[device]
+    if running_variant != variant:
+        if running_variant in _VARIANTS.values():
             raise SetupError(
-                f'This process already renders with {current}; start a new one for `device="{device}"`.'
+                f'This process already renders with {running_variant}; start a new one for `device="{device}"`.'
             )
         _start(mi, device)
-    _register_plugins(wanted)
+    _register_plugins(variant)
     return mi
 
 
@@ -177,6 +185,7 @@ def _start(mi, device: str) -> None:
         raise SetupError(
             'No CUDA driver with OptiX answers; use `device="cpu"`, or install the NVIDIA driver.'
         )
+    # An unusable LLVM aborts the process in its first kernel: refuse it before.
     if device == "cpu":
         loaded = dr.detail.llvm_version()[0] if dr.has_backend(dr.JitBackend.LLVM) else 0
         if loaded < MINIMUM_LLVM:
@@ -188,6 +197,7 @@ def _start(mi, device: str) -> None:
         mi.set_variant(_VARIANTS[device])
     except ImportError as error:
         raise SetupError(f"Mitsuba's {_VARIANTS[device]} did not start ({error}).") from error
+    # Dr.Jit does not read OpenMP's variable; the user means both.
     asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0]
     if device == "cpu" and asked.isdigit() and 0 < int(asked) < dr.thread_count():
         dr.set_thread_count(int(asked))
@@ -215,6 +225,6 @@ def _register_plugins(variant: str) -> None:
     from materialist.bsdf import rough_dielectric as frosted
     from materialist.render import bodies
 
-    bsdf.register()
-    bodies.register()
-    frosted.register()
+    bsdf.register_disney()
+    bodies.register_outside()
+    frosted.register_frosted()

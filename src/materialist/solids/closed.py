@@ -22,7 +22,7 @@ from materialist.geometry.silhouette import (
     window,
 )
 from materialist.geometry.slopes import SHARP, back_normals, blurred_normals, continued, sampled
-from materialist.solids.shell import Shell, closed, inside_out, joined, region
+from materialist.solids.shell import Shell, closed_shell, inside_out, joined_shells, region
 from materialist.types import Array, Camera
 
 
@@ -30,17 +30,15 @@ from materialist.types import Array, Camera
 class ClosedSettings:
     """How the closed object is made of its front and its thickness."""
 
-    margin: int = 3  # pixels by which an object that the frame cuts goes on, so that its wall stays out of view
-    grid: int = 300  # grid points along a small object; larger objects have one a pixel
-    finest: int = 6  # grid points along a pixel, at most
-    clear: float = 0.02  # pixels by which its outline keeps from the points of the grid; derived: no tiny triangles
-    nearest: float = (
-        0.995  # the back keeps before this part of the depth behind the object; tuned by eye
-    )
-    thin: float = 0.004  # least thickness, part of the object's size: front and back never touch; tuned by eye
-    least: float = 1e-4  # the same at the border, part of the depth
-    smooth: float = 0.01  # standard deviation of the blur of the normals, part of the object's size; tuned by eye
-    grazing: float = 0.35  # least n.v by which a wall seen at a slant gets longer; tuned by eye
+    frame_margin: int = 3  # pixels by which an object goes on beyond the frame: hides its wall
+    grid_points: int = 300  # along a small object; larger objects have one a pixel
+    max_points_per_pixel: int = 6  # grid points along a pixel
+    min_grid_distance: float = 0.02  # pixels from outline to grid points: no tiny triangles
+    max_back_depth: float = 0.995  # of the depth behind the object: the back stays before; by eye
+    min_thickness: float = 0.004  # of the object's size: front and back never touch; by eye
+    min_border_thickness: float = 1e-4  # the same at the border, part of the depth
+    normal_blur: float = 0.01  # standard deviation, part of the object's size; tuned by eye
+    min_cosine: float = 0.35  # n.v from which a slanting wall gets no longer; tuned by eye
 
 
 SETTINGS = ClosedSettings()
@@ -78,7 +76,7 @@ def closed_proxy(
     if wall is None:
         return shell
     inner = _cavity(view, wall, camera)
-    return shell if inner is None else joined([shell, inside_out(inner)])
+    return shell if inner is None else joined_shells([shell, inside_out(inner)])
 
 
 @dataclass(frozen=True)
@@ -114,9 +112,11 @@ class _View:
 
 
 def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _View:
-    margin = SETTINGS.margin
+    margin = SETTINGS.frame_margin
     edge = margin + 1
-    y, x = (np.arange(side.start - edge, side.stop + edge) for side in window(inside))
+    rows, columns = window(inside)
+    y = np.arange(rows.start - edge, rows.stop + edge)
+    x = np.arange(columns.start - edge, columns.stop + edge)
     # Beyond the frame everything goes on as at its edge, for some pixels.
     i = np.clip(y, 0, camera.height - 1)[:, None]
     j = np.clip(x, 0, camera.width - 1)[None]
@@ -140,7 +140,7 @@ def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _
 
 def _thickness(view: _View) -> Array:
     """[h, w] along the ray, scene units: never behind what stands there, and never none."""
-    least = SETTINGS.thin * view.size * np.median(view.pixel[view.inside])
+    least = SETTINGS.min_thickness * view.size * np.median(view.pixel[view.inside])
     thick = np.minimum(view.thickness.astype(np.float64), _room(view))
     return np.where(view.inside, np.maximum(thick, least), 0)
 
@@ -148,9 +148,9 @@ def _thickness(view: _View) -> Array:
 def _cavity(view: _View, wall: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
     facing = np.abs((view.normal * view.rays).sum(-1)) / view.length
-    through = wall / np.clip(facing, SETTINGS.grazing, 1)  # [h, w] along the ray, of one wall
+    through = wall / np.clip(facing, SETTINGS.min_cosine, 1)  # [h, w] along the ray, of one wall
     left = view.thickness - 2 * through
-    room = view.inside & (left > SETTINGS.thin * view.size * view.pixel)
+    room = view.inside & (left > SETTINGS.min_thickness * view.size * view.pixel)
     room &= border_distance(view.inside) * view.pixel > wall
     if room.sum() < 16:
         return None
@@ -167,8 +167,11 @@ def _closed(view: _View, camera: Camera) -> Shell:
     length = view.length
     front = view.depth
     thick = view.thickness
+    # --- The outline, triangulated on a grid finer than the pixels of a small object ---
     edge = silhouette_field(known)  # [h, w] pixels
-    factor = int(np.clip(round(SETTINGS.grid / max(known.shape)), 1, SETTINGS.finest))
+    factor = int(
+        np.clip(round(SETTINGS.grid_points / max(known.shape)), 1, SETTINGS.max_points_per_pixel)
+    )
     size = (known.shape[1] * factor, known.shape[0] * factor)
     within = cv2.resize(edge.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     points, faces = region(_ended(within))
@@ -178,18 +181,22 @@ def _closed(view: _View, camera: Camera) -> Shell:
         )
     place = (points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
 
-    def at(values):
+    def at_points(values):
         return sampled(values, place, order=1)
 
+    # --- Front depth and thickness at the vertices ---
     # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
     # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
     middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
-    through = np.sqrt(
-        np.maximum(at(np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)), 0)
+    square = np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)
+    through = np.sqrt(np.maximum(at_points(square), 0))
+    front_depth = np.exp(at_points(middle)) - through / (2 * at_points(length))
+    through = np.maximum(
+        np.minimum(through, at_points(_room(view))), SETTINGS.min_border_thickness * front_depth
     )
-    own = np.exp(at(middle)) - through / (2 * at(length))
-    through = np.maximum(np.minimum(through, at(_room(view))), SETTINGS.least * own)
-    sigma = SETTINGS.smooth * view.size
+
+    # --- Normals: of the map in front; of the back's own map, or of its depth ---
+    sigma = SETTINGS.normal_blur * view.size
     if view.back is None:
         back = back_normals(front + thick / length, known, view.rays, max(sigma, SHARP))
     else:
@@ -198,10 +205,18 @@ def _closed(view: _View, camera: Camera) -> Shell:
         _between(blurred_normals(view.normal, known, sigma), known, place),
         _between(back, known, place),
     )
+
+    # --- The wall between them faces down the slope of the outline's distance field ---
     down, right = np.gradient(edge)
-    outward = np.stack([-at(right), -at(down)], -1)
-    return closed(
-        faces, place + np.array([view.left, view.top]), own, through, normals, outward, camera
+    outward = np.stack([-at_points(right), -at_points(down)], -1)
+    return closed_shell(
+        faces,
+        place + np.array([view.left, view.top]),
+        front_depth,
+        through,
+        normals,
+        outward,
+        camera,
     )
 
 
@@ -214,7 +229,9 @@ def _room(view: _View) -> Array:
     """[h, w] length of the ray between the front and what stands behind, scene units."""
     known = view.inside & (view.behind > 0)
     room = np.where(
-        known, np.maximum(SETTINGS.nearest * view.behind - view.depth, 0) * view.length, NOTHING
+        known,
+        np.maximum(SETTINGS.max_back_depth * view.behind - view.depth, 0) * view.length,
+        NOTHING,
     )
     # Next to the mask the values are those of the last pixels in it.
     return membrane(room, view.inside)
@@ -222,8 +239,6 @@ def _room(view: _View) -> Array:
 
 def _ended(field: Array) -> Array:
     """The field with its outermost points negative, and none so near 0 that its border meets a grid point."""
-    field[[0, -1]], field[:, [0, -1]] = (
-        np.minimum(field[[0, -1]], -1),
-        np.minimum(field[:, [0, -1]], -1),
-    )
-    return np.copysign(np.maximum(np.abs(field), SETTINGS.clear), field)
+    field[[0, -1]] = np.minimum(field[[0, -1]], -1)
+    field[:, [0, -1]] = np.minimum(field[:, [0, -1]], -1)
+    return np.copysign(np.maximum(np.abs(field), SETTINGS.min_grid_distance), field)

@@ -26,27 +26,26 @@ from materialist.types import Array, Camera
 class OutlineSettings:
     """When an outline is taken for that of a surface of revolution, and how its hull is made."""
 
-    fewest: int = 64  # pixels below which an object is too small to tell
-    pierced: float = (
-        1.02  # most of its filled outline, in its area: rings and handles have holes; tuned by eye
-    )
-    alike: float = (
-        0.964  # least share of the mask that lies in its image: boxes have edges where it is round
-    )
-    covered: float = 0.955  # least share of the mask that the body covers
-    leaning: float = 0.12  # least slope of the map's sideways normals over the body's: a face seen straight on has 0
-    stepped: float = 0.9  # least `_stepped`, over normals that look up or down by less than `side`
-    side: float = 0.5  # see `stepped`
-    above: float = 0.3  # sine of the angle between axis and view below which an outline from above says nothing
-    standing: float = 0.15  # distance from the ground, in its heights, up to which it is made to reach it where it is
-    elsewhere: float = (
-        0.3  # relative distance from the depth map's place up to which the ground is believed
-    )
-    stairs: float = 0.1  # root mean square by which pixels move an outline, pixels: it is smoothed by so much; 4 meshes
-    turns: int = 40  # turns at which a place beside the axis must stay inside the outline
-    fine: int = 120  # cells of the hull along the object
-    air: float = 0.004  # part of its height that an object stays above the ground
-    flat: float = 1.25  # slopes up to this multiple of the camera's are of the end caps, which the outline hides
+    # Which outlines are accepted.
+    min_pixels: int = 64  # an object with fewer pixels is too small to judge
+    max_filled_ratio: float = 1.02  # area with holes filled, over area: rings have holes; by eye
+    min_mirror_overlap: float = 0.964  # share of the mask inside its mirror image; boxes have less
+    min_coverage: float = 0.955  # share of the mask that the body covers
+    min_lean: float = 0.12  # slope of the map's sideways normals over the body's; a flat face has 0
+    min_step_ratio: float = 0.9  # of `_step_ratio`, over the normals of the side
+    max_side_tilt: float = 0.5  # normals that look up or down by less than this are of the side
+    min_view_sine: float = 0.3  # sine of the angle between axis and view; from above less shows
+
+    # How the body is scaled until it stands on the ground.
+    max_ground_gap: float = 0.15  # heights between base and ground up to which the base is moved
+    max_depth_change: float = 0.3  # relative change of depth up to which the ground is believed
+    ground_clearance: float = 0.004  # part of its height that an object stays above the ground
+
+    # How the hull is made.
+    outline_noise: float = 0.1  # pixels (rms) by which an outline is smoothed; from 4 meshes
+    hull_turns: int = 40  # turns at which a place beside the axis must stay inside the outline
+    hull_cells: int = 120  # cells of the hull along the object
+    max_cap_slope: float = 1.25  # caps: slopes up to this multiple of the camera's
 
 
 SETTINGS = OutlineSettings()
@@ -65,26 +64,27 @@ def surface_of_revolution(
 
     depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool or weights: one object; one
         that the frame cuts, or that has a hole, is none.
-    up: [3] unit, the axis' direction in the camera's frame, as a support tells it; None: there is no such object.
+    up: [3] unit, direction of the axis in the camera frame, from the surface it stands on; None: no such object.
     behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
     Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
-    cut = inside[[0, -1]].any() or inside[:, [0, -1]].any()
-    pierced = binary_fill_holes(inside).sum() > SETTINGS.pierced * inside.sum()
-    if up is None or cut or inside.sum() < SETTINGS.fewest or pierced:
+    is_cut = inside[[0, -1]].any() or inside[:, [0, -1]].any()
+    has_hole = binary_fill_holes(inside).sum() > SETTINGS.max_filled_ratio * inside.sum()
+    if up is None or is_cut or inside.sum() < SETTINGS.min_pixels or has_hole:
         return None
     rays = pixel_rays(camera).astype(np.float64)
+    # Double precision: thickness is a small difference of two depths.
     depth = np.asarray(depth, np.float64)
     normal = np.asarray(normal, np.float64)
-    found = _along(up, _Seen(inside, depth, normal, rays, behind, camera))
-    if found is None:
+    fitted = _fitted_body(up, _ObjectMaps(inside, depth, normal, rays, behind, camera))
+    if fitted is None:
         return None
-    body, front = found
+    body, front = fitted
     return body, body.thickness(np.where(front > 0, front, depth), inside, rays)
 
 
-class _Seen(NamedTuple):
+class _ObjectMaps(NamedTuple):
     """The maps of the object."""
 
     inside: Array
@@ -95,81 +95,100 @@ class _Seen(NamedTuple):
     camera: Camera
 
 
-def _along(up: Array, seen: _Seen) -> tuple[Revolution, Array] | None:
-    """The body whose axis points along `up` and the depth [H, W] of its front, 0 beside it; None if it does not fit."""
+def _fitted_body(up: Array, seen: _ObjectMaps) -> tuple[Revolution, Array] | None:
+    """The body with its axis along `up`, and the depth [H, W] of its front, 0 beside it; None if it does not fit."""
     middle = seen.rays[seen.inside].mean(0)
-    if np.linalg.norm(np.cross(up, middle)) < SETTINGS.above * np.linalg.norm(middle):
+    if np.linalg.norm(np.cross(up, middle)) < SETTINGS.min_view_sine * np.linalg.norm(middle):
         return None
-    across, alike = _mirror(seen.inside, seen.rays, up, seen.camera)
-    if alike < SETTINGS.alike:
+    # --- The axis: it lies in the upright plane at which the mask mirrors itself ---
+    across, overlap = _mirror_plane(seen.inside, seen.rays, up, seen.camera)
+    if overlap < SETTINGS.min_mirror_overlap:
         return None
     ahead = np.cross(across, up)
     first = Axis(up, ahead * np.sign(ahead @ middle))  # at distance 1
+
+    # --- Two candidates from the visual hull: the upper end is round, or flat ---
     border = _border(silhouette_field(seen.inside), first, seen.camera)
     if border is None:
         return None
-    found = [_placed(first, border, seen, round_top) for round_top in (True, False)]
-    seen_so = [(body, *body.front(seen.inside, seen.rays)) for body in found if body is not None]
-    if not seen_so:
+    bodies = [_placed(first, border, seen, round_top) for round_top in (True, False)]
+    candidates = [
+        (body, *body.front(seen.inside, seen.rays)) for body in bodies if body is not None
+    ]
+    if not candidates:
         return None
-    body, front, leaning = max(seen_so, key=lambda one: float((one[2] * seen.normal).sum()))
-    there = seen.inside & (front > 0)
-    own, other = ((values @ across)[there] for values in (leaning, seen.normal))
-    side = np.abs((leaning @ up)[there]) < SETTINGS.side
-    leans = (own * other).sum() >= SETTINGS.leaning * (own * own).sum()
-    if not leans or _stepped(own[side], other[side]) < SETTINGS.stepped:
+
+    # --- The better one by its normals must agree with the map ---
+    body, front, leaning = max(
+        candidates, key=lambda candidate: float((candidate[2] * seen.normal).sum())
+    )
+    covered = seen.inside & (front > 0)
+    body_side = (leaning @ across)[covered]
+    map_side = (seen.normal @ across)[covered]
+    side = np.abs((leaning @ up)[covered]) < SETTINGS.max_side_tilt
+    leans = (body_side * map_side).sum() >= SETTINGS.min_lean * (body_side * body_side).sum()
+    if not leans or _step_ratio(body_side[side], map_side[side]) < SETTINGS.min_step_ratio:
         return None
-    fits = there.sum() > SETTINGS.covered * seen.inside.sum() and body.profile.lines()
-    return (body, front) if fits else None
+    is_covered = covered.sum() > SETTINGS.min_coverage * seen.inside.sum()
+    return (body, front) if is_covered and body.profile.lines() else None
 
 
-def _stepped(own: Array, other: Array) -> float:
-    """Squares left of `other` [N] by the best step of `own` [N], over those left by a straight line.
+def _step_ratio(body_side: Array, map_side: Array) -> float:
+    """Residual of the best step function of `body_side` [N] fitted to `map_side` [N], over that of the best line.
 
-    Towards the sides the normals of a round thing turn evenly, those of a box by one step at its edge.
+    Both residuals are sums of squares. Towards the sides the normals of a round object turn evenly, those of a box
+    turn in one step at its edge: a low ratio means a box.
     """
-    order = np.argsort(own)
-    x = own[order]
-    y = other[order] - other.mean()
+    order = np.argsort(body_side)
+    x = body_side[order]
+    y = map_side[order] - map_side.mean()
     if len(x) < 8:
         return np.inf
-    line = float(
-        (y**2).sum() - ((x - x.mean()) @ y) ** 2 / max(float(((x - x.mean()) ** 2).sum()), 1e-12)
-    )
+    total_squares = (y**2).sum()
+    centred = x - x.mean()
+    # Residual of linear regression: S_yy - S_xy^2 / S_xx.
+    line = float(total_squares - (centred @ y) ** 2 / max(float((centred**2).sum()), 1e-12))
+    # A step after the k-th value explains k m1^2 + (n - k) m2^2, with the means m1, m2 of its sides; y sums to 0.
     count = np.arange(1, len(y))
     total = np.cumsum(y)[:-1]
-    explained = total**2 / count + total**2 / (len(y) - count)  # y sums to 0
-    return float((y**2).sum() - explained.max()) / max(line, 1e-9)
+    explained = total**2 / count + total**2 / (len(y) - count)
+    return float(total_squares - explained.max()) / max(line, 1e-9)
 
 
-def _mirror(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
-    """[3] unit: across the upright plane through the camera in which the mask is its own image best, and how well."""
-    own = rays[inside]
-    middle = own.mean(0)
+def _mirror_plane(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
+    """The upright plane through the camera at which the mask mirrors itself best.
+
+    Returns its unit normal [3], and the share of the mask that lies inside the mirrored mask.
+    """
+    object_rays = rays[inside]
+    middle = object_rays.mean(0)
     first = unit(np.cross(up, -middle))  # across the plane through the middle of the mask
     second = np.cross(up, first)
 
     def plane(angle: float) -> Array:
         return np.cos(angle) * first + np.sin(angle) * second
 
-    def unlike(angle: float) -> float:
+    def mismatch(angle: float) -> float:
         normal = plane(angle)
-        place, ahead = project(own - 2 * (own @ normal)[:, None] * normal, camera)
+        mirrored = object_rays - 2 * (object_rays @ normal)[:, None] * normal
+        place, ahead = project(mirrored, camera)
         x, y = np.floor(place).astype(int).T
-        there = (ahead > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
-        return 1 - float((inside[np.where(there, y, 0), np.where(there, x, 0)] & there).mean())
+        in_frame = (ahead > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+        hits = inside[np.where(in_frame, y, 0), np.where(in_frame, x, 0)] & in_frame
+        return 1 - float(hits.mean())
 
-    width = np.ptp(own @ first) / np.linalg.norm(middle)
-    best = min(np.linspace(-0.2, 0.2, 21) * width, key=unlike)
-    found = minimize_scalar(
-        unlike, bounds=(best - 0.02 * width, best + 0.02 * width), method="bounded"
+    # The mismatch has steps of whole pixels: a coarse search first, then a local one that may not do worse.
+    width = np.ptp(object_rays @ first) / np.linalg.norm(middle)
+    best = min(np.linspace(-0.2, 0.2, 21) * width, key=mismatch)
+    refined = minimize_scalar(
+        mismatch, bounds=(best - 0.02 * width, best + 0.02 * width), method="bounded"
     )
-    angle = min((best, float(found.x)), key=unlike)
-    return plane(angle), 1 - unlike(angle)
+    angle = min((best, float(refined.x)), key=mismatch)
+    return plane(angle), 1 - mismatch(angle)
 
 
 def _placed(
-    first: Axis, border: tuple[Array, float], seen: _Seen, round_top: bool
+    first: Axis, border: tuple[Array, float], seen: _ObjectMaps, round_top: bool
 ) -> Revolution | None:
     """The body where the depth map has its front, or as far away as the ground that it stands on.
 
@@ -179,19 +198,26 @@ def _placed(
     line = _capped(whole, float(np.linalg.norm(first.foot)), seen.camera, cell, round_top)
     if line is None:
         return None
+
+    # --- Scale: the body, traced at distance 1, against the depth map ---
     base = float(line[0, 1])
     high = float(np.ptp(line[:, 1]))
     front, _ = Revolution(first, Profile.of(line, cell, base)).front(seen.inside, seen.rays)
     both = seen.inside & (front > 0)
     away = float(np.median(seen.depth[both] / front[both])) if both.any() else 1.0
+
+    # --- Ground: the base is moved to it where both nearly agree ---
     ground = ground_height(Axis(first.up, np.zeros(3)), seen.behind, seen.inside, seen.rays)
     floor = base * away
     if np.isfinite(ground):
-        near = abs(ground - floor) < SETTINGS.standing * high * away
-        if not near and base < 0 and abs(ground / base / away - 1) < SETTINGS.elsewhere:
+        near = abs(ground - floor) < SETTINGS.max_ground_gap * high * away
+        if not near and base < 0 and abs(ground / base / away - 1) < SETTINGS.max_depth_change:
             away = ground / base
-        lowest, highest = ((base + side * SETTINGS.standing * high) * away for side in (-1, 1))
-        floor = float(np.clip(ground + SETTINGS.air * high * away, lowest, highest))
+        lowest = (base - SETTINGS.max_ground_gap * high) * away
+        highest = (base + SETTINGS.max_ground_gap * high) * away
+        floor = float(np.clip(ground + SETTINGS.ground_clearance * high * away, lowest, highest))
+
+    # --- The whole line at its true scale ---
     line = line * away
     # Down to the base it goes on straight.
     down = unit(line[0] - line[3])
@@ -210,8 +236,9 @@ def _border(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | N
     rows, columns = np.nonzero(field > 0)
     if not len(rows):  # thinner than a pixel
         return None
+    # --- The grid of the half plane beside the axis: twice the object's extent, in cells ---
     extent = max(np.ptp(rows), np.ptp(columns)) * pixel * 1.3
-    cell = extent / SETTINGS.fine
+    cell = extent / SETTINGS.hull_cells
     place, _ = project(axis.foot[None], camera)
     middle = (
         (camera.height / 2 - (rows.min() + rows.max()) / 2) * pixel / max(float(axis.up[1]), 0.3)
@@ -220,6 +247,7 @@ def _border(field: Array, axis: Axis, camera: Camera) -> tuple[Array, float] | N
     low = base - 0.7 * extent
     r = np.arange(int(0.6 * extent / cell)) * cell
     h = low + np.arange(int(1.4 * extent / cell)) * cell
+    # --- The border is the zero line of the hull's distance field ---
     values = -_hull(field, axis, r, h, camera) * pixel / cell
     lines = find_contours(values, 0.0)
     if not lines or len(longest := max(lines, key=len)) < 12:
@@ -236,12 +264,14 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
     first = unit(np.cross(axis.up, axis.foot))
     halves = []
     for half in (0.0, np.pi):
+        # A place is in the hull where the smallest distance over all turns is still inside.
         least = np.full((len(h), len(r)), np.inf)
-        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, SETTINGS.turns // 2):
+        for angle in half + np.linspace(-np.pi / 2, np.pi / 2, SETTINGS.hull_turns // 2):
             out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
             points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
             x, y = np.moveaxis(project(points, camera)[0], -1, 0)
             inner = map_coordinates(field, [y - 0.5, x - 0.5], order=1, mode="nearest")
+            # Beyond the frame the field is unknown: the distance to the frame counts as outside.
             beyond = np.maximum(np.maximum(-x, x - camera.width), np.maximum(-y, y - camera.height))
             least = np.minimum(least, inner - np.maximum(beyond, 0))
         halves.append(least)
@@ -253,15 +283,18 @@ def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: boo
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
-    spline, along = splprep(line.T, s=len(line) * (SETTINGS.stairs * far / camera.focal) ** 2)
+    spline, along = splprep(
+        line.T, s=len(line) * (SETTINGS.outline_noise * far / camera.focal) ** 2
+    )
     smooth = np.stack(splev(along, spline), -1)
     step = unit(np.stack(splev(along, spline, der=1), -1))
     # The lower end is seen from above over its near rim, the upper one over its far rim.
-    lower, upper = (
-        np.abs(smooth[:, 1]) / np.maximum(far + side * smooth[:, 0], 0.1 * far) for side in (-1, 1)
-    )
+    height = np.abs(smooth[:, 1])
+    lower = height / np.maximum(far - smooth[:, 0], 0.1 * far)
+    upper = height / np.maximum(far + smooth[:, 0], 0.1 * far)
     half = np.arange(len(line)) < np.argmax(smooth[:, 0])
-    limit = SETTINGS.flat * np.where(half, lower, upper)
+    limit = SETTINGS.max_cap_slope * np.where(half, lower, upper)
+    # What is less steep than the line of sight is part of the hidden ends; the side lies between.
     steep = np.flatnonzero(np.abs(step[:, 1]) > limit * np.abs(step[:, 0]))
     if len(steep) < 4:
         return None

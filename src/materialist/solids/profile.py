@@ -35,9 +35,11 @@ class Profile:
         low = min(float(line[:, 1].min()), floor) - MARGIN * cell
         corners = (line - [0, low]) / cell  # (column, row)
         shape = tuple(int(np.ceil(n)) + MARGIN for n in corners.max(0)[::-1])
+        # The polygon reaches one cell beyond the axis, whose column is inside.
         closed = np.concatenate([corners, [[-1, corners[-1, 1]], [-1, corners[0, 1]]]])
         inside = grid_points_in_poly(shape, closed[:, ::-1])
         along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+        # Distance to the border: to the nearest of points every tenth of a cell along it.
         fine = np.arange(0, along[-1], 0.1)
         border = np.stack([np.interp(fine, along, corners[:, k]) for k in (0, 1)], -1)
         rows, columns = np.indices(shape)
@@ -54,11 +56,10 @@ class Profile:
 
     def at(self, places: Array) -> Array:
         """[...] the function at places [..., 2]: below 0 in the body, outside at most the cells to its border."""
-        own = ((places - [0, self.low]) / self.cell).reshape(-1, 2)
-        flat = sampled(self.values, own, order=1).reshape(places.shape[:-1])
-        under = (
-            self.floor - places[..., 1]
-        ) / self.cell  # below the base the distance to the line is no bound
+        cells = ((places - [0, self.low]) / self.cell).reshape(-1, 2)
+        flat = sampled(self.values, cells, order=1).reshape(places.shape[:-1])
+        # Below the base the distance to the line is no bound: the height below it is.
+        under = (self.floor - places[..., 1]) / self.cell
         return np.where(under > 0, under, np.maximum(flat, under))
 
     def slope(self, places: Array) -> Array:
@@ -75,8 +76,10 @@ class Profile:
         bottom = (self.floor + level - self.low) / self.cell  # rows
         rows = np.arange(self.values.shape[0])[:, None]
         cut = np.maximum(self.values + level / self.cell, bottom - rows)
-        cut[[0, -1]], cut[:, -1] = np.maximum(cut[[0, -1]], 1), np.maximum(cut[:, -1], 1)
-        found = []
+        # The outermost cells count as outside, so that every contour closes or ends at the axis.
+        cut[[0, -1]] = np.maximum(cut[[0, -1]], 1)
+        cut[:, -1] = np.maximum(cut[:, -1], 1)
+        lines = []
         for line in find_contours(cut, 0.0):
             line = line[:, ::-1]  # (column, row)
             line = line[np.r_[True, np.abs(np.diff(line, axis=0)).max(1) > 1e-6]]
@@ -88,17 +91,17 @@ class Profile:
             normal = unit(
                 np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line))
             )
+            # Turn the line round where the outward normal is to its left: the body must be there.
             along = np.gradient(line, axis=0)
             if np.sum(along[:, 0] * normal[:, 1] - along[:, 1] * normal[:, 0]) > 0:
                 place = place[::-1]
                 normal = normal[::-1]
-            found.append((place, normal))
-        return found
+            lines.append((place, normal))
+        return lines
 
     def _slope(self, at: Array) -> Array:
         """[K, 2] gradient at (column, row)."""
-        whole = np.concatenate(
-            [self.values[:, 1:2], self.values], 1
-        )  # the same on the other side of the axis
-        (up, out), beside = np.gradient(whole), at + np.array([1, 0])
-        return sampled(np.stack([out, up], -1), beside, order=1)
+        # One more column, mirrored at the axis, makes the difference there a central one.
+        whole = np.concatenate([self.values[:, 1:2], self.values], 1)
+        up, out = np.gradient(whole)
+        return sampled(np.stack([out, up], -1), at + np.array([1, 0]), order=1)

@@ -7,7 +7,7 @@ import numpy as np
 from materialist.camera import project, unit
 from materialist.geometry.planes import axes
 from materialist.solids.profile import Profile
-from materialist.solids.shell import Shell, inside_out, joined
+from materialist.solids.shell import Shell, inside_out, joined_shells
 from materialist.types import Array, Camera
 
 
@@ -15,15 +15,12 @@ from materialist.types import Array, Camera
 class RevolutionSettings:
     """How a profile is swept."""
 
-    step: float = 0.5  # least step along a ray, cells
-    around: int = 256  # corners of the swept circles
-    side: float = (
-        0.5  # least outward part of the normals of a side; above the last of it is the lid
-    )
-    under: float = (
-        3.5  # walls below the rim by which what lies a wall deep still feels the lid; tuned by eye
-    )
-    lip: int = 12  # points of the rounded rim of an open vessel
+    min_step_cells: float = 0.5  # of a step along a ray
+    corners: int = 256  # of the swept circles
+    min_side_lean: float = 0.5  # outward part of the normals of a side; above the side is the lid
+    # wall thicknesses below the rim to which the lid changes the inside; by eye
+    lid_reach: float = 3.5
+    lip_points: int = 12  # of the rounded rim of an open vessel
 
 
 SETTINGS = RevolutionSettings()
@@ -67,7 +64,7 @@ class Revolution:
         inner = (
             [_swept(*line, self.axis, camera) for line in self.profile.lines(wall)] if wall else []
         )
-        return joined([*outer, *map(inside_out, inner)])
+        return joined_shells([*outer, *map(inside_out, inner)])
 
     def vessel(self, camera: Camera, wall: float) -> Shell | None:
         """The body as one surface around a wall (scene units), open at the top; None where the profile has no room."""
@@ -78,11 +75,11 @@ class Revolution:
         """[H, W] float32 scene units along rays: from the front [H, W] planar depth to the last surface of the body."""
         nearest, reach = self._reach(rays[inside])
         last = self._met(rays[inside], nearest + reach, -2 * reach)
-        found = np.zeros(depth.shape, np.float32)
-        found[inside] = np.maximum(np.nan_to_num(last) - depth[inside], 0) * np.linalg.norm(
+        thickness = np.zeros(depth.shape, np.float32)
+        thickness[inside] = np.maximum(np.nan_to_num(last) - depth[inside], 0) * np.linalg.norm(
             rays[inside], axis=-1
         )
-        return found
+        return thickness
 
     def front(self, inside: Array, rays: Array) -> tuple[Array, Array]:
         """[H, W] planar depth at which rays enter the body, and its unit normals [H, W, 3] there; 0 where they pass."""
@@ -96,6 +93,7 @@ class Revolution:
 
     def _reach(self, rays: Array) -> tuple[Array, Array]:
         """[N] planar depths of rays [N, 3]: nearest to the body's middle, and how far the body goes from there."""
+        # A bounding sphere around the middle of the axis.
         wide, high = self.profile.size
         middle = self.axis.foot + (self.profile.floor + high / 2) * self.axis.up
         length = np.linalg.norm(rays, axis=-1)
@@ -106,25 +104,31 @@ class Revolution:
 
         The function is a bound on the distance to the body: it tells the next step (sphere tracing, Hart 1996).
         """
-        found = np.full(len(rays), np.nan)
-        at = start
+        depth = np.full(len(rays), np.nan)
+        here = start
         length = np.linalg.norm(rays, axis=-1)
         along = np.sign(way)
         left = np.arange(len(rays))
-        last = at
+        last = here
         before = np.ones(len(rays))
         while len(left):
-            value = self.profile.at(self.axis.of(rays[left] * at[:, None]))
+            value = self.profile.at(self.axis.of(rays[left] * here[:, None]))
+            # The ray has entered: the zero lies between the last two values, linearly.
             inner = value < 0
             share = before / np.maximum(before - value, 1e-12)
-            found[left[inner]] = (last + np.clip(share, 0, 1) * (at - last))[inner]
-            step = along[left] * np.maximum(value, SETTINGS.step) * self.profile.cell / length[left]
-            on = ~inner & (np.abs(at + step - start[left]) < np.abs(way[left]))
-            last = at[on]
+            depth[left[inner]] = (last + np.clip(share, 0, 1) * (here - last))[inner]
+            step = (
+                along[left]
+                * np.maximum(value, SETTINGS.min_step_cells)
+                * self.profile.cell
+                / length[left]
+            )
+            on = ~inner & (np.abs(here + step - start[left]) < np.abs(way[left]))
+            last = here[on]
             before = value[on]
-            at = (at + step)[on]
+            here = (here + step)[on]
             left = left[on]
-        return found
+        return depth
 
 
 def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
@@ -137,16 +141,22 @@ def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) 
 
 def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     """One line [K, 2] with normals [K, 2], the body to its left, swept around the axis; ends at the axis are poles."""
-    angle = 2 * np.pi * np.arange(SETTINGS.around) / SETTINGS.around
+    angle = 2 * np.pi * np.arange(SETTINGS.corners) / SETTINGS.corners
     out = np.stack([np.cos(angle), np.sin(angle)], -1) @ axes(axis.up)  # [A, 3]
     ring = bool(np.allclose(line[0], line[-1]))
-    rows, lean = (line[:-1], leaning[:-1]) if ring else (line, leaning)
+    rows = line[:-1] if ring else line
+    lean = leaning[:-1] if ring else leaning
+
+    # --- Every point of the line on every turn: K rings of A corners ---
     points = axis.foot + rows[:, None, :1] * out + rows[:, None, 1:] * axis.up  # [K, A, 3]
     normals = lean[:, None, :1] * out + lean[:, None, 1:] * axis.up
-    index = np.arange(points.shape[0] * SETTINGS.around).reshape(-1, SETTINGS.around)
+
+    # --- Two triangles for each quad between neighbouring rings ---
+    index = np.arange(points.shape[0] * SETTINGS.corners).reshape(-1, SETTINGS.corners)
     if not ring:  # a pole is one vertex
         index[0], index[-1] = index[0, 0], index[-1, 0]
-    below, above = (index, np.roll(index, -1, 0)) if ring else (index[:-1], index[1:])
+    below = index if ring else index[:-1]
+    above = np.roll(index, -1, 0) if ring else index[1:]
     a = below
     b = np.roll(below, -1, 1)
     c = np.roll(above, -1, 1)
@@ -154,6 +164,7 @@ def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     faces = np.concatenate(
         [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
     )
+    # At a pole one side of a quad has no length: its triangle is dropped.
     faces = faces[
         (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     ]
@@ -175,37 +186,42 @@ def _vessel_line(profile: Profile, wall: float) -> tuple[Array, Array] | None:
     Places [K, 2] (distance, height) of the line and their unit outward normals [K, 2], glass to its left, from the
     axis to the axis; None where the profile is no single body around its axis, or has no room inside a `wall`.
     """
+    # --- The lines of the outside and of the inside, where each is a single one ---
     outer = _around(profile.lines())
     inner = _around(profile.lines(wall))
     if outer is None or inner is None:
         return None
     place, lean = outer
+
+    # --- Where the side ends below the lid, outside and inside ---
     top = _last_side(outer)
-    rim = (
-        None if top is None else _last_side(outer, place[top, 1] - wall / 2)
-    )  # the round lip ends where the side did
-    within = None if rim is None else _last_side(inner, place[rim, 1] - SETTINGS.under * wall)
+    # The lip adds half a wall of height: it begins that much lower, and ends where the side did.
+    rim = None if top is None else _last_side(outer, place[top, 1] - wall / 2)
+    within = None if rim is None else _last_side(inner, place[rim, 1] - SETTINGS.lid_reach * wall)
     if rim is None or within is None:
         return None
+
+    # --- The inside, from the rim down ---
     # Next to the lid the inside is as far from the outside as the wall is thick.
     near = np.flatnonzero(
-        (place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > SETTINGS.side)
+        (place[: rim + 1, 1] > inner[0][within, 1]) & (lean[: rim + 1, 0] > SETTINGS.min_side_lean)
     )[::-1]
     upper = place[near] - wall * lean[near]
     if not len(near) or upper[:, 0].min() <= 0 or inner[0][within, 0] >= place[: rim + 1, 0].max():
         return None
     inside = np.concatenate([upper, inner[0][: within + 1][::-1]])
     facing = -np.concatenate([lean[near], inner[1][: within + 1][::-1]])
+
+    # --- The lip: half a circle between outside and inside ---
     r = upper[0, 0]
     height = place[rim, 1]
     half = (place[rim, 0] - r) / 2
     middle = (place[rim, 0] + r) / 2
-    angle = np.pi * np.arange(1, SETTINGS.lip) / SETTINGS.lip
+    angle = np.pi * np.arange(1, SETTINGS.lip_points) / SETTINGS.lip_points
     round_ = np.stack([np.cos(angle), np.sin(angle)], -1)
     lip = np.array([middle, height]) + half * round_
-    return np.concatenate([place[: rim + 1], lip, inside]), np.concatenate(
-        [lean[: rim + 1], round_, facing]
-    )
+    whole = np.concatenate([place[: rim + 1], lip, inside])
+    return whole, np.concatenate([lean[: rim + 1], round_, facing])
 
 
 def _around(lines: list[tuple[Array, Array]]) -> tuple[Array, Array] | None:
@@ -219,5 +235,5 @@ def _around(lines: list[tuple[Array, Array]]) -> tuple[Array, Array] | None:
 def _last_side(line: tuple[Array, Array], below: float = np.inf) -> int | None:
     """The last point of a line, up to a height, that is on a side."""
     place, lean = line
-    sides = np.flatnonzero((lean[:, 0] > SETTINGS.side) & (place[:, 1] <= below))
+    sides = np.flatnonzero((lean[:, 0] > SETTINGS.min_side_lean) & (place[:, 1] <= below))
     return int(sides[-1]) if len(sides) else None

@@ -20,12 +20,11 @@ class Shell(Triangles):
     """Whether one of its parts bounds a cavity."""
 
 
-def joined(shells: Sequence[Shell]) -> Shell:
+def joined_shells(shells: Sequence[Shell]) -> Shell:
     """Several surfaces as one; none of them shares a vertex with another."""
     vertices, faces = joined_faces(shells)
-    normals, uv = (
-        np.concatenate([getattr(shell, name) for shell in shells]) for name in ("normals", "uv")
-    )
+    normals = np.concatenate([shell.normals for shell in shells])
+    uv = np.concatenate([shell.uv for shell in shells])
     return Shell(vertices, faces, normals, uv, any(shell.hollow for shell in shells))
 
 
@@ -49,7 +48,7 @@ def region(field: Array) -> tuple[Array, Array]:
     return np.asarray(above.vertices[:, :2]), np.asarray(above.faces)
 
 
-def closed(
+def closed_shell(
     region: Array,
     place: Array,
     front: Array,
@@ -67,9 +66,12 @@ def closed(
     outward: [V, 2] direction (y down) in the picture in which the region ends, on its border.
     """
     count = len(place)
+    # --- The border: edges that no second face runs through the other way ---
     edges = np.concatenate([region[:, [0, 1]], region[:, [1, 2]], region[:, [2, 0]]])
     border = edges[~np.isin(edges[:, 0] * count + edges[:, 1], edges[:, 1] * count + edges[:, 0])]
     rim = np.unique(border)
+
+    # --- Vertices: front, back, and the two rims of the wall ---
     index = np.concatenate(
         [np.arange(count), np.arange(count), rim, rim]
     )  # front, back, the wall's two sides
@@ -78,6 +80,8 @@ def closed(
     rays = rays_through(screen, camera)
     vertices = rays * (front[index] + beyond / np.linalg.norm(rays, axis=-1))[:, None]
     uv = np.clip(screen / [camera.width, camera.height], 0, 1).astype(np.float32)
+
+    # --- Faces: the region, the region reversed, and two triangles of wall for each border edge ---
     a, b = 2 * count + np.searchsorted(rim, border).T
     wall = [np.stack([b, a, a + len(rim)], -1), np.stack([b, a + len(rim), b + len(rim)], -1)]
     faces = np.concatenate([region, region[:, ::-1] + count, *wall])

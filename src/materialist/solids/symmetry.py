@@ -19,14 +19,12 @@ from materialist.types import Array, Camera
 class SymmetrySettings:
     """Where the plane of the silhouette is, and how thick a mirrored body may be; RefractionNet is trained on these."""
 
-    ring: float = 3.0  # pixels from the silhouette within which the surface tells where its plane is, at least
+    ring_pixels: float = 3.0  # width of the ring at the silhouette that gives its plane, at least
     ring_share: float = 0.06  # the same as a part of the object's size
-    steepest: float = 0.06  # smallest n.v that is believed: maps are not exact at a silhouette
-    grazing: float = (
-        4.0  # power of 1 - n.v by which pixels lose weight where the surface does not turn away
-    )
-    floor: float = 0.25  # least thickness, part of that of a body as deep as wide: a box seen face on has no silhouette
-    deepest: float = 2.0  # largest thickness, in object sizes
+    min_cosine: float = 0.06  # smallest n.v that is believed: maps are not exact at a silhouette
+    grazing_power: float = 4.0  # weight (1 - n.v)^power: pixels count where the surface turns away
+    min_thickness: float = 0.25  # of that of a body as deep as wide: a box seen face on is not flat
+    max_thickness: float = 2.0  # in object sizes
 
 
 SETTINGS = SymmetrySettings()
@@ -39,10 +37,10 @@ def symmetric_thickness(depth: Array, normal: Array, mask: Array, camera: Camera
     Raises InputError for maps of different sizes, or a mask without any surface.
     """
     inside = surface_in(mask, depth, camera)
-    return mirrored(depth, normal, inside, pixel_rays(camera))
+    return mirrored_thickness(depth, normal, inside, pixel_rays(camera))
 
 
-def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
+def mirrored_thickness(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     """`symmetric_thickness` on any window of a picture.
 
     depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
@@ -56,12 +54,11 @@ def mirrored(depth: Array, normal: Array, inside: Array, rays: Array) -> Array:
     back = 1 / np.maximum(2 * plane - 1 / front, 0.2 / front)
     width = border * front * spacing(rays)  # [H, W] scene units to the silhouette
     widest = width[inside].max()
-    inflated = 2 * np.sqrt(
-        np.maximum(width * (2 * widest - width), 0)
-    )  # a body with a round section
-    limit = SETTINGS.deepest * object_size(inside, depth, rays)
+    # Chord of a circle with radius `widest` at distance `width` from its edge: a body with a round section.
+    inflated = 2 * np.sqrt(np.maximum(width * (2 * widest - width), 0))
+    limit = SETTINGS.max_thickness * object_size(inside, depth, rays)
     thickness = np.clip(
-        (back - front) * length, np.minimum(SETTINGS.floor * inflated, limit), limit
+        (back - front) * length, np.minimum(SETTINGS.min_thickness * inflated, limit), limit
     )
     return np.where(inside, thickness, 0).astype(np.float32)
 
@@ -70,18 +67,18 @@ def _silhouette_plane(
     front: Array, normal: Array, rays: Array, border: Array, inside: Array
 ) -> Array:
     """[H, W] inverse planar depth of the plane through the silhouette: linear over the picture, as for every plane."""
-    widest = max(SETTINGS.ring, SETTINGS.ring_share * np.sqrt(inside.sum()))
+    widest = max(SETTINGS.ring_pixels, SETTINGS.ring_share * np.sqrt(inside.sum()))
     # The outermost pixels are known too badly: where in them the silhouette runs is open.
     ring = inside & (border <= widest) & (border > 0.6)
     if not ring.any():
         ring = inside
     length = np.linalg.norm(rays, axis=-1)[ring]
-    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, SETTINGS.steepest, 1)
+    cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, SETTINGS.min_cosine, 1)
     # The surface just inside lies before the silhouette. With a round section of radius r, a point at distance e from
     # the border has e = r (1 - sin) and lies r cos before it. The picture's plane is not across a slanting ray.
     gap = border[ring] * front[ring] * spacing(rays) / length
     before = gap * cosine / (1 - np.sqrt(1 - cosine**2))
-    weight = (1 - cosine) ** SETTINGS.grazing + 1e-4
+    weight = (1 - cosine) ** SETTINGS.grazing_power + 1e-4
     a, b, c = _robust_plane(rays[ring][:, 0], rays[ring][:, 1], 1 / (front[ring] + before), weight)
     return a + b * rays[..., 0] + c * rays[..., 1]
 
@@ -93,13 +90,14 @@ def _robust_plane(x: Array, y: Array, values: Array, weight: Array) -> tuple[flo
     spread = max(float(np.std(x) + np.std(y)), 1e-9)
     typical = float(np.average(values, weights=weight))
     w = weight / weight.sum()
-    found = np.zeros(3)
+    solution = np.zeros(3)
     for _ in range(12):
         # A faint pull to a plane that faces the camera, for a silhouette that shows on one side only.
         pull = np.diag([0, 1, 1]) * (1e-3 * spread**2)
-        found = np.linalg.solve(
+        # Iteratively reweighted least squares: weights 1/|residual| give least absolute deviations.
+        solution = np.linalg.solve(
             basis.T @ (basis * w[:, None]) + pull * w.sum(), basis.T @ (values * w)
         )
-        w = weight / np.maximum(np.abs(values - basis @ found), 1e-3 * typical)
+        w = weight / np.maximum(np.abs(values - basis @ solution), 1e-3 * typical)
         w /= w.sum()
-    return float(found[0] - found[1:] @ centre), float(found[1]), float(found[2])
+    return float(solution[0] - solution[1:] @ centre), float(solution[1]), float(solution[2])

@@ -13,6 +13,7 @@ from importlib.resources import files
 class StudioSettings:
     """Limits and sizes of the studio; tuned by eye."""
 
+    # What one sender may send and keep.
     upload_megabytes: float = 60  # largest upload
     request_bytes: int = 2_000_000  # largest body of any other request
     upload_pixels: int = 60_000_000  # largest picture, from its header
@@ -20,15 +21,12 @@ class StudioSettings:
     disk_left: int = 2_000_000_000  # bytes of the disk that stay free
     opening_memory: int = 2_000_000_000  # bytes of data of the process that opens an upload
     opening_seconds: float = 30.0  # in which it must be done
-    openings: int = (
-        3  # uploads that are opened at a time, one of each sender; falls count among them
-    )
+    openings: int = 3  # uploads opened at a time, one of each sender; falls count among them
     uploads: int = 8  # that one sender sends at a time
     body_seconds: float = 60.0  # in which the next part of an upload must come
     pages: int = 40  # that one sender has open
-    requests: int = (
-        16  # of one sender that change something at a time, fewer than the page has threads (40)
-    )
+    requests: int = 16  # of one sender that change something at a time; the page has 40 threads
+    # What is read of it.
     edit_pixels: int = 8_000_000  # largest picture of an edit, to which a larger one is shrunk
     mesh_faces: int = 200_000  # of an object's mesh
     scene_pixels: int = 1_500_000  # largest zipped scene, at working size
@@ -37,50 +35,35 @@ class StudioSettings:
     job_seconds: float = 3600.0  # in which it must be done
     edits: int = 200  # longest list of edits of a photo
     unpacked_bytes: int = 1_500_000_000  # largest zip once unpacked
-    decoded_bytes: int = (
-        1_000_000_000  # largest zipped scene in memory, from the headers of its files
-    )
+    decoded_bytes: int = 1_000_000_000  # largest zipped scene in memory, by its files' headers
+    # Who may work at a time.
     jobs_a_person: int = 6  # that wait or run
     jobs: int = 60  # of all
     wrong_passwords: int = 20  # a minute, of one address
     addresses: int = 10_000  # whose wrong passwords are remembered
     people: int = 10_000  # whose last photo is remembered
     person_seconds: int = 31_536_000  # a browser stays the same person: a year
-    page_seconds: float = (
-        60.0  # a page that never showed that it is open is forgotten after its last request
-    )
-    unfinished_seconds: float = (
-        86_400.0  # then photos that were not taken apart to the end go, uploads and results
-    )
-    free_for_scene: float = (
-        0.8e9  # bytes of memory that must be free before another scene is opened, and
-    )
-    free_a_pixel: float = (
-        2600.0  # bytes for each pixel of it at working size; measured at 1.2 megapixels
-    )
-    free_for_glass: float = 2.0e9  # bytes of memory that must be free before glass is traced
-    glass_idle: float = 900.0  # seconds without a request after which the glass process ends
-    glass_niceness: int = (
-        3  # after live previews, before inversions and final pictures: somebody waits at a slider
-    )
-    glass_bodies: int = (
-        2  # bodies that the glass process keeps: going between two objects builds nothing anew
-    )
+    # After which idle things are forgotten.
+    page_seconds: float = 60.0  # since the last request of a page that never showed it is open
+    unfinished_seconds: float = 86_400.0  # photos not taken apart to the end, uploads, results
+    # Bytes of memory that must be free.
+    free_for_scene: float = 0.8e9  # before another scene is opened, and
+    free_a_pixel: float = 2600.0  # for each of its pixels at working size; from 1.2 megapixels
+    free_for_glass: float = 2.0e9  # before glass is traced
+    # The process that traces glass.
+    glass_idle: float = 900.0  # seconds without a request after which it ends
+    glass_niceness: int = 3  # between previews and inversions: somebody waits at a slider
+    glass_bodies: int = 2  # that it keeps: going between two objects builds nothing anew
+    # The live preview.
     undo_steps: int = 60  # length of the undo history
-    scenes_kept: int = (
-        24  # edited scenes that a preview keeps: moving the last step must not replay those before
-    )
-    kept_bytes: float = 3e8  # bytes of the bodies in them
-    triangles: int = (
-        12_000  # of all bodies in a sketch; of a finer mesh every n-th, and the gaps are closed
-    )
+    scenes_kept: int = 24  # edited scenes: moving the last step must not replay those before
+    kept_bytes: float = 3e8  # of the bodies in them
+    triangles: int = 12_000  # of all bodies in a sketch; of a finer mesh every n-th
     jpeg_quality: int = 88  # of live pictures
     video_frames: int = 24  # of the turning light
     message_seconds: float = 12  # a message stays on the page
     poll_seconds: float = 0.3  # between two looks at a job
-    lamp_share: float = (
-        0.75  # a new lamp hangs at this share of the way from the camera to the clicked surface
-    )
+    lamp_share: float = 0.75  # of the way from the camera to the surface: there a new lamp hangs
 
 
 SETTINGS = StudioSettings()

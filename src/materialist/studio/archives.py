@@ -34,21 +34,22 @@ _UNREADABLE = (
 )
 
 
-def pack(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
+def pack_edits(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
     """Write the list `edits` and every file that its steps name."""
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as made:
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in sorted({edits.name, *_named(steps)}):
-            made.write(edits.parent / name, name)
+            archive.write(edits.parent / name, name)
 
 
 def unpack(workspace: Path, archive: Path, allowance: Allowance) -> tuple[Step, ...]:
-    """The steps of a zip that `pack` wrote, their files in the workspace under names of ours.
+    """The steps of a zip that `pack_edits` wrote, their files in the workspace under names of ours.
 
     Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
     """
     with tempfile.TemporaryDirectory(dir=workspace, prefix=".load-") as place:
         folder = Path(place)
-        steps, readable = uploads.opened(extract_list, archive, allowance, folder=folder)
+        # Unpacked beside the workspace first: what is refused leaves nothing behind.
+        steps, readable = uploads.opened_upload(extract_list, archive, allowance, folder=folder)
 
         def moved(option: str, name: str) -> str:
             file = folder / name
@@ -67,7 +68,7 @@ def unpack_scene(archive: Path, target: Path, allowance: Allowance) -> None:
     Raises InputError for what is no zip, holds no scene, or would fill the disk; `target` is then left absent.
     """
     try:
-        uploads.opened(extract_scene, archive, allowance, target=target)
+        uploads.opened_upload(extract_scene, archive, allowance, target=target)
         allowance.claim(folder_size(target))
     except InputError:
         shutil.rmtree(target, ignore_errors=True)
@@ -91,6 +92,7 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
         _extract(archive, {name: members[name]}, folder, shown)
         steps = read_recipe(folder / name)
         options = _named(steps)
+        # A list without its files could not be replayed.
         lacking = sorted(options.keys() - members.keys())
         if lacking:
             raise InputError(
@@ -98,7 +100,8 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
             )
         _extract(archive, {name: members[name] for name in options}, folder, shown)
     readable = {
-        name: uploads.checked(report, folder / name, option) for name, option in options.items()
+        name: uploads.checked_upload(report, folder / name, option)
+        for name, option in options.items()
     }
     return steps, readable
 
@@ -108,7 +111,8 @@ def extract_scene(report: Any, file: Path, target: Path) -> None:
     shown = uploads.shown_name(file)
     missing = "no scene package (no scene.json); zip the folder that invert wrote"
     with _members(file, shown, r"scene\.json", missing) as (archive, members):
-        known = {name: one for name, one in members.items() if _MEMBER.fullmatch(name)}
+        # Anything else in the zip stays packed.
+        known = {name: info for name, info in members.items() if _MEMBER.fullmatch(name)}
         _extract(archive, known, target, shown)
     camera = load_scene(target, most=SETTINGS.decoded_bytes).camera
     if camera.width * camera.height > SETTINGS.scene_pixels:
@@ -127,37 +131,44 @@ def _members(
     Raises InputError for what is no zip, and where there is no marker.
     """
     try:
-        with zipfile.ZipFile(archive) as given:
-            infos = given.infolist()[:10_000]
-            names = [one.filename for one in infos if not one.filename.startswith("__MACOSX/")]
-            found = next(
+        with zipfile.ZipFile(archive) as opened:
+            # A zip may promise millions of members; macOS adds a folder of its own.
+            infos = opened.infolist()[:10_000]
+            names = [info.filename for info in infos if not info.filename.startswith("__MACOSX/")]
+            marker_name = next(
                 (name for name in names if re.fullmatch(rf"([^/]+/)?{marker}", name)), None
             )
-            if found is None:
+            if marker_name is None:
                 raise InputError(f"{shown} holds {missing}.")
-            root = found[: found.rfind("/") + 1]
+            root = marker_name[: marker_name.rfind("/") + 1]
             yield (
-                given,
-                {one.filename[len(root) :]: one for one in infos if one.filename.startswith(root)},
+                opened,
+                {
+                    info.filename[len(root) :]: info
+                    for info in infos
+                    if info.filename.startswith(root)
+                },
             )
     except _UNREADABLE as error:
         raise InputError(f"{shown} is not a readable zip file ({error}); zip it again.") from error
 
 
 def _extract(
-    given: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder: Path, shown: str
+    archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], folder: Path, shown: str
 ) -> None:
     """Write members under their names here into a folder; `zipfile` reads no more of one than its header promises."""
+    # By the promised sizes, before anything is written; `extract` reads no more than that.
     total = sum(entry.file_size for entry in members.values())
     if total > SETTINGS.unpacked_bytes:
         most = f"{SETTINGS.unpacked_bytes / 1e9:g} GB"
         raise InputError(f"{shown} unpacks to {total / 1e9:.1f} GB; the studio takes up to {most}.")
     folder.mkdir(parents=True, exist_ok=True)
+    # Room for the others must stay.
     if shutil.disk_usage(folder).free - total < SETTINGS.disk_left:
         raise InputError(f"The disk of the studio has no room for {shown}.")
     for name, entry in members.items():
         entry.filename = name
-        given.extract(entry, folder)
+        archive.extract(entry, folder)
 
 
 def _named(steps: Iterable[Step]) -> dict[str, str]:

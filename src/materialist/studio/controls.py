@@ -34,6 +34,7 @@ def hex_colour(value: Any) -> str:
     value = str(value)
     if re.fullmatch(r"#[0-9a-fA-F]{6}", value):
         return value.lower()
+    # Gradio's picker gives rgba(r, g, b, a) after some moves.
     numbers = [float(v) for v in re.findall(r"[\d.]+", value)[:3]]
     if len(numbers) == 3 and all(0 <= v <= 255 for v in numbers):
         return "#" + "".join(f"{round(v):02x}" for v in numbers)
@@ -99,14 +100,14 @@ def slider(name: str, label: str, step: float, **narrower: Any) -> Any:
     """A slider for a control, by the range and default of its option; `narrower` are arguments of Gradio's instead."""
     control = CONTROLS[name]
     declared = declarations(control.operation)[control.option][0]
-    given = {
+    arguments = {
         "minimum": declared.low,
         "maximum": declared.high,
         "value": control.default,
         "elem_id": name,
         **narrower,
     }
-    return gr.Slider(step=step, label=label, buttons=[], **given)
+    return gr.Slider(step=step, label=label, buttons=[], **arguments)
 
 
 def file_field(name: str, label: str, suffixes: Iterable[str]) -> Any:
@@ -119,11 +120,12 @@ def file_field(name: str, label: str, suffixes: Iterable[str]) -> Any:
 def set_option(name: str, session: Session, value: Any) -> None:
     """Set the option of a control, or clear it by the default."""
     control = CONTROLS[name]
+    # The default is left out of the list: it says nothing.
     text = None if value == control.default else control.text(value)
     if control.operation is Relight:
         session.light(**{control.option: text})
     elif control.operation is Insertion:
-        objects.set_option(session, control.option, text)
+        objects.set_object_option(session, control.option, text)
     else:
         session.set(control.operation.operation, **{control.option: text})
 
@@ -136,24 +138,29 @@ def control_values(session: Session) -> dict[str, Any]:
     """
     step = session.edits.current_step
     light = session.edits.light
+    # --- The options that each group of controls shows ---
     kind, options = (step.kind, step.options) if step is not None else ("", {})
-    given: dict[type[OperationOptions], dict[str, Any]] = {
+    options_by_kind: dict[type[OperationOptions], dict[str, Any]] = {
         MaterialEdit: options if kind == "edit" else {},
         Glass: options if kind == "glass" else {},
         Relight: session.edits.steps[light].options if light is not None else {},
     }
-    given |= {Insertion: options} if kind in objects.KINDS else {}
-    given |= {Drop: options} if kind == "drop" else {}
+    options_by_kind |= {Insertion: options} if kind in objects.KINDS else {}
+    options_by_kind |= {Drop: options} if kind == "drop" else {}
     values: dict[str, Any] = {}
+    # A value that is not valid, as from a list made by hand, leaves its control as it is.
     for name, control in CONTROLS.items():
-        if control.operation in given:
+        if control.operation in options_by_kind:
             with suppress(TypeError, ValueError, InputError):
                 values[name] = control.value(
-                    given[control.operation].get(control.option, control.default)
+                    options_by_kind[control.operation].get(control.option, control.default)
                 )
-    for name, usual in (("roughness", 0.5), ("metallic", 0.0)):
-        if str(given[MaterialEdit].get(name, "+"))[0] in "+-":  # not set, or relative to the fit
+    # Sliders of what an edit leaves as it was show what was fitted under the selection.
+    for name, neutral in (("roughness", 0.5), ("metallic", 0.0)):
+        if (
+            str(options_by_kind[MaterialEdit].get(name, "+"))[0] in "+-"
+        ):  # not set, or relative to the fit
             mask = session.selection.mask
             fitted = getattr(session.scene.materials, name)
-            values[name] = usual if mask is None else round(float(fitted[mask].mean()), 2)
+            values[name] = neutral if mask is None else round(float(fitted[mask].mean()), 2)
     return values

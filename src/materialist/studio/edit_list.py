@@ -33,7 +33,7 @@ _NAMES = {
 """Options that are not called so on the page."""
 _OURS = re.compile(r"(?:thing|light)-([a-z]+)")
 """The name of a file that the studio computes."""
-_OWN = re.compile(r"[a-z]+-[0-9a-f]{12}")
+_UPLOADED = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """The name that `workspace.store` gives an uploaded file."""
 
 
@@ -65,6 +65,7 @@ class EditList:
         if not 0 <= other < len(self.steps):
             return self
         steps = list(self.steps)
+        # Swapped with its neighbour.
         steps[index], steps[other] = steps[other], steps[index]
         current = (
             other if self.current == index else index if self.current == other else self.current
@@ -104,21 +105,25 @@ def with_options(step: Step, **options: Any) -> Step:
 
 def key_of(steps: tuple[Step, ...]) -> str:
     """The key of some steps in the store of `kept`."""
+    # Device and seed do not change what a step makes.
     entries = [[step.kind, step.options, str(step.folder)] for step in steps]
     return json.dumps(entries, default=str)
 
 
-def kept(store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any], most: int) -> Any:
+def kept(
+    store: dict[str, Any], steps: tuple[Step, ...], make: Callable[[], Any], max_items: int
+) -> Any:
     """What a store holds for some steps, made where it is missing; it keeps those that were last asked for."""
     key = key_of(steps)
-    found = store.pop(key, None)
-    store[key] = found = make() if found is None else found
-    for old in list(store)[:-most]:
+    # Taken out and put back last: a dict keeps its order, so that the oldest come first.
+    value = store.pop(key, None)
+    store[key] = value = make() if value is None else value
+    for old in list(store)[:-max_items]:
         store.pop(old, None)
-    return found
+    return value
 
 
-def summary(step: Step) -> str:
+def step_summary(step: Step) -> str:
     """A step in a few words."""
     shown = {name: value for name, value in step.options.items() if name not in _SILENT}
     parts = [
@@ -135,8 +140,9 @@ def _short(value: Any) -> str:
             if value and isinstance(value[0], list | tuple)
             else ",".join(_short(v) for v in value)
         )
+    # File names say more without their ending; those of the studio by the thing alone.
     file = re.fullmatch(r"(.*[A-Za-z_].*)\.\w+", str(value))
     if file is None:
         return str(value)
     ours = _OURS.fullmatch(file[1])
-    return "own" if _OWN.fullmatch(file[1]) else ours[1] if ours else file[1]
+    return "own" if _UPLOADED.fullmatch(file[1]) else ours[1] if ours else file[1]

@@ -80,6 +80,7 @@ class GlassClient:
         """Request the picture of a glass step of this list; once for equal requests."""
         request = _request(steps, step)
         with self.changed:
+            # A slider sends the same value more than once.
             if request == self._asked:
                 return
             self._asked = request
@@ -120,6 +121,7 @@ class GlassClient:
         """Send a request to the process; start one where none runs."""
         try:
             if self._worker is None:
+                # Tracing needs a scene of its own in memory.
                 if psutil.virtual_memory().available < SETTINGS.free_for_glass:
                     raise InputError(
                         "This machine has too little memory free to trace glass while sliders move; press Final "
@@ -154,6 +156,7 @@ class GlassClient:
             self._worker = None
             if self.state.waiting:
                 self._asked = None
+                # A process that ends without a request at work was idle.
                 words = "The tracing of glass ended by itself; move a slider to start it again."
                 self.state = GlassState(False, words, True)
         elif not self.state.waiting or message.number != self._number:
@@ -168,7 +171,7 @@ class GlassClient:
 
 
 def _request(steps: tuple[Step, ...], step: Step) -> Request:
-    return tuple(one for one in steps if one is not step), with_options(step, skip=None)
+    return tuple(other for other in steps if other is not step), with_options(step, skip=None)
 
 
 def _place(step: Step) -> str:
@@ -185,16 +188,18 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
     """The pane of a glass step after other steps; None where a newer request came meanwhile. Raises InputError."""
     options = options_of(step)
     report("build", 0, 1)
+    # The body is the same for all values of these options.
     fixed = with_options(step, **dict.fromkeys(VALUES))
 
     def build() -> Any:
-        from materialist.edits.glass.preview import GlassPreview
+        from materialist.edits.glass.glass_preview import GlassPreview
 
         loaded = _loaded(scene)
         return GlassPreview(
             apply(loaded, list(others)), region_of(loaded, fixed), options_of(fixed)
         )
 
+    # Building takes half a minute: meanwhile a newer request may have come.
     preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:
         return None

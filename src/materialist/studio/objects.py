@@ -39,6 +39,7 @@ def last(session: Session) -> int | None:
 def place(session: Session, x: float, y: float) -> None:
     """Stand the current object at a pixel, or let it fall there if it fell; else a new one. Raises InputError."""
     with session.lock:
+        # As texts: the list of edits holds nothing else.
         at = [str(v) for v in session.pixel(x, y)]
         edits = session.edits
         if session.current_kind not in KINDS:
@@ -48,11 +49,12 @@ def place(session: Session, x: float, y: float) -> None:
         session.put(edits, at=at)
 
 
-def set_option(session: Session, name: str, value: str | None) -> None:
+def set_object_option(session: Session, name: str, value: str | None) -> None:
     """Set or clear (None) an option of the current object, and of the next one. Raises InputError."""
     with session.lock:
         if name == "mesh":  # another object is a new one
             session.edits = session.edits.chosen(None)
+        # A fallen object knows fewer options: it cannot be turned.
         if session.current_kind == "insert" or (
             session.current_kind == "drop" and name in STEPS["drop"]
         ):
@@ -76,6 +78,7 @@ def let_fall(session: Session, height: float) -> list[str]:
         _ = session.scene
         if index is None or session.live is None:
             raise InputError("Place an object first; it falls where it stands.")
+        # Only what this fall adds is told.
         known = session.live.edited(session.edits.active).report.warnings
         step = session.edits.steps[index]
         kept = {

@@ -38,6 +38,7 @@ def build(studio: Studio) -> Any:
     with gr.Blocks(title="Materialist studio", analytics_enabled=False, fill_width=True) as page:
         gr.State()  # with one, a page holds a request as long as it is open
         gr.HTML(_HEAD, elem_id="head", js_on_load=None)
+        # --- The stage on the left, the tabs on the right ---
         with gr.Row(elem_id="body"):
             with gr.Column(scale=5, min_width=320, elem_id="left"):
                 _left(parts)
@@ -48,6 +49,7 @@ def build(studio: Studio) -> Any:
                 parts["tabs"] = tabs
                 for tab in (tab_open, *TABS):
                     tab.layout(context)
+        # --- Events: all components are there now ---
         _wire(context)
         for tab in TABS:
             tab.wire(context)
@@ -73,6 +75,7 @@ def _left(parts: dict[str, Any]) -> None:
                 "Stop", size="sm", variant="stop", visible=False, min_width=70, elem_id="stop"
             )
     with gr.Row(elem_id="tools"):
+        # --- Tools of the pointer, and what a selection does to the one before ---
         tools = [("Click", "click"), ("Box", "box"), ("Brush", "brush"), ("Place a lamp", "lamp")]
         tools.append(("Place an object", "place"))
         parts["tool"] = gr.Radio(
@@ -91,7 +94,8 @@ def _left(parts: dict[str, Any]) -> None:
             buttons=[],
             elem_id="brush",
         )
-    missing = sam.missing()
+    # Shown even where it cannot be used, with the way to get it.
+    missing = sam.sam_problem()
     parts["sam"] = gr.Checkbox(
         False,
         label="Find objects with SAM 2",
@@ -128,14 +132,14 @@ def _wire(context: PageContext) -> None:
 def _pick(
     session: Session, data: Any, sam: bool, kelvin: float, power: float, before: float
 ) -> None:
-    wanted = read_pick(data)
-    if wanted["tool"] == "lamp":
-        x, y = wanted["at"]
+    picked = read_pick(data)
+    if picked["tool"] == "lamp":
+        x, y = picked["at"]
         tab_light.place_lamp(session, x, y, kelvin, power, before)
-    elif wanted["tool"] == "place":
-        place(session, *wanted["at"])
+    elif picked["tool"] == "place":
+        place(session, *picked["at"])
     else:
-        session.pick(wanted, "sam2" if sam else "network")
+        session.pick(picked, "sam2" if sam else "network")
 
 
 def _act(session: Session, data: Any) -> Updates:

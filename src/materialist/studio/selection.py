@@ -43,6 +43,7 @@ class Selection:
             return {"fill": "", "outline": ""}
         inside = mask.astype(np.uint8)
         kernel = np.ones((3, 3), np.uint8)
+        # A light line inside and a dark one outside: one of them shows on every ground.
         light = inside - cv2.erode(inside, kernel)
         dark = cv2.dilate(inside, kernel) - inside
         outline = np.zeros((*mask.shape, 4), np.uint8)
@@ -51,8 +52,8 @@ class Selection:
         fill = np.zeros((*mask.shape, 4), np.uint8)
         fill[mask] = (255, 255, 255, 255)
         return {
-            name: data_url(encoded(one), "png")
-            for name, one in (("fill", fill), ("outline", outline))
+            "fill": data_url(encoded(fill), "png"),
+            "outline": data_url(encoded(outline), "png"),
         }
 
     def click(
@@ -60,9 +61,11 @@ class Selection:
     ) -> Selection:
         """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
         height, width = scene.depth.shape
+        # The right and bottom edge belong to the last pixel.
         row = min(int(y), height - 1)
         column = min(int(x), width - 1)
         inside = any(part[row, column] for part in self.parts)
+        # A second click on a selected object takes it out.
         if (inside and mode != ADD) or mode == REMOVE:
             return (
                 Selection(tuple(part for part in self.parts if not part[row, column]))
@@ -86,6 +89,7 @@ class Selection:
         stroke = np.zeros(scene.depth.shape, np.uint8)
         line = np.round(np.clip(np.array(points, np.float64)[:, :2], -1e4, 1e4)).astype(np.int32)
         cv2.polylines(stroke, [line[:, None]], False, 1, thickness=max(1, round(2 * radius)))
+        # Round ends: `polylines` ends its thick lines flat.
         for x, y in line[[0, -1]]:
             cv2.circle(stroke, (int(x), int(y)), max(1, round(radius)), 1, -1)
         painted = stroke > 0
@@ -116,6 +120,7 @@ def read_pick(data: Any) -> dict[str, Any]:
             or min(numbers, default=0) < 0
         ):
             raise ValueError("not a place")
+        # Each tool sends as many numbers as it needs.
         if {"click": 2, "box": 4, "brush": 0, "lamp": 2, "place": 2}[tool] != len(numbers):
             raise ValueError("not the numbers of the tool")
         if mode not in (REPLACE, ADD, REMOVE):

@@ -27,6 +27,7 @@ def check_host(host: str, password: str | None, everyone: bool, proxy: str | Non
             f"--behind-proxy takes the HOST or HOST:PORT that people ask for, not {proxy!r}."
         )
     try:
+        # Behind a proxy everybody comes from this machine.
         local = proxy is None and (host == "localhost" or ipaddress.ip_address(host).is_loopback)
     except ValueError:
         local = False
@@ -46,18 +47,19 @@ def password_of(word: str | None, file: Path | None) -> str | None:
         raise InputError("Give --password or --password-file, not both.")
     try:
         with file.open(encoding="utf-8") as lines:
-            found = lines.readline().strip()
+            password = lines.readline().strip()
     except (OSError, ValueError) as error:
         raise InputError(f"The password file {file} cannot be read: {error}.") from error
-    if not found:
+    if not password:
         raise InputError(
             f"The password file {file} has an empty first line; write the password there."
         )
-    return found
+    return password
 
 
 def check_port(host: str, port: int) -> None:
     """Raises InputError where the port is taken."""
+    # Bound once and released: the error comes before anything is loaded.
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -82,6 +84,7 @@ def checked_target(target: str) -> Path:
 def first_shown(work: WorkFolder, path: Path) -> Project | Path:
     """A scene package as a project; a photo as it is."""
     scene = path.resolve()
+    # Opened before: its edits are there.
     known = next((p for p in work.projects() if p.scene == scene), None)
     return path if path.is_file() else known or work.new(path.stem, LOCAL_PERSON, scene=scene)
 
@@ -113,6 +116,7 @@ def serve(
     thread = threading.Thread(target=server.run, name="server", daemon=True)
     try:
         thread.start()
+        # --- Wait until it answers, then until it is told to end ---
         while not server.started and thread.is_alive():
             time.sleep(0.01)
         if server.started:
@@ -124,6 +128,7 @@ def serve(
     except KeyboardInterrupt:
         return
     finally:
+        # Jobs first: they would run on without anyone.
         studio.jobs.close()
         server.should_exit = True
         thread.join(3)
@@ -154,6 +159,7 @@ def application(
     from materialist.studio.page import build
 
     page = build(studio)
+    # Gradio has put pictures of the page itself into the cache: they stay.
     studio.work.kept |= {*studio.work.cache.iterdir()}
     _fetch_nothing()
     page.queue(default_concurrency_limit=8, max_size=200)
@@ -182,7 +188,7 @@ def _fetch_nothing() -> None:
     """Let Gradio open no address that a request names in place of a file."""
     from gradio import processing_utils as fetching
 
-    async def refused(url: str, *_: Any, **how: Any) -> Any:
+    async def refused(url: str, *_: Any, **options: Any) -> Any:
         raise InputError(
             f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file."
         )

@@ -16,7 +16,7 @@ from materialist.studio.access.quota import Allowance
 from materialist.studio.archives import read_list, unpack
 from materialist.studio.edit_list import EditList, with_options
 from materialist.studio.glass import GlassClient
-from materialist.studio.preview import LivePreview
+from materialist.studio.live_preview import LivePreview
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.workspace import Project, located, read_steps, write_mask
 from materialist.types import Scene
@@ -108,7 +108,7 @@ class Session:
 
     def note_job(self, job: Job) -> None:
         """Note a job that this page asked for, to stop it by a button, or when the page is closed."""
-        self.running = [*(one for one in self.running if not one.over), job]
+        self.running = [*(earlier for earlier in self.running if not earlier.over), job]
 
     def stop(self, jobs: JobQueue, *kinds: str) -> None:
         """Stop the jobs of some kinds, or all, that this page asked for."""
@@ -124,6 +124,7 @@ class Session:
     def open(self, project: Project) -> None:
         loaded = mt.load_scene(project.scene)
         workspace = project.workspace(self.person)
+        # --- Everything that can fail, before the page changes ---
         kept = _content(workspace / EDITS)
         try:
             steps = read_steps(workspace, workspace / EDITS) if kept is not None else ()
@@ -201,6 +202,7 @@ class Session:
         """
         with self.lock:
             _ = self.scene
+            # --- A new step over the selection, unless one of its kind is current ---
             mask = self.selection.mask
             edits = self.edits
             if self.current_kind != kind:
@@ -228,19 +230,23 @@ class Session:
         step = edits.current_step
         assert index is not None and step is not None
         new = with_options(step, **options)
+        # A light without options would be a step that does nothing.
         empty = new.kind == "relight" and not {*new.options} - {"skip"}
         after = edits.without(index) if empty else edits.put(index, new)
         if after.steps != self.edits.steps:
             changed = [name for name in options if new.options.get(name) != step.options.get(name)]
-            moving = all(_slides(one.options.get(name)) for one in (step, new) for name in changed)
+            moving = all(
+                _slides(state.options.get(name)) for state in (step, new) for name in changed
+            )
             self.change(f"{', '.join(options)} of {index}", after, moving=moving)
 
-    def act(self, what: str, index: int) -> None:
+    def act(self, action: str, index: int) -> None:
         """One of the buttons of the list: toggle, up, down, remove, choose."""
         with self.lock:
             if not 0 <= index < len(self.edits.steps):
                 raise InputError("That edit is no longer there.")
             edits = self.edits
+            # Lazily: only the pressed button's list is made.
             changed = {
                 "toggle": lambda: edits.toggled(index),
                 "up": lambda: edits.moved(index, -1),
@@ -248,11 +254,12 @@ class Session:
                 "remove": lambda: edits.without(index),
                 "choose": lambda: edits.chosen(None if edits.current == index else index),
             }
-            if what not in changed:
+            if action not in changed:
                 raise InputError("That button is not known; reload the page.")
-            after = changed[what]()
-            region = self._region_of(after) if what == "choose" else None
-            self.remember(what)
+            after = changed[action]()
+            # First everything that can fail, then the changes.
+            region = self._region_of(after) if action == "choose" else None
+            self.remember(action)
             self.edits = after
             if region is not None:
                 self.selection = region
@@ -262,11 +269,13 @@ class Session:
     def undo(self, *, again: bool = False) -> None:
         """Take back the last change, or do it again. Raises InputError where there is none."""
         with self.lock:
+            # Undo and redo are the same move between two stacks.
             source, target = (self._future, self._past) if again else (self._past, self._future)
             if not source:
                 raise InputError(
                     "There is nothing to do again." if again else "There is nothing to take back."
                 )
+            # Two pages may edit one photo: whoever comes second must not overwrite.
             self._check_unchanged()
             target.append(("", self.edits, self.selection))
             _, self.edits, self.selection = source.pop()
@@ -284,20 +293,23 @@ class Session:
             if file.suffix.lower() == ".zip":
                 steps = unpack(self.workspace, file, self.allowance)
             else:
-                steps = located(self.workspace, uploads.opened(read_list, file, self.allowance))
+                steps = located(
+                    self.workspace, uploads.opened_upload(read_list, file, self.allowance)
+                )
             self.change("load", EditList(steps))
 
     # Within
 
-    def change(self, what: str, after: EditList, *, moving: bool = False) -> None:
+    def change(self, action: str, after: EditList, *, moving: bool = False) -> None:
         """Set another list of edits, with a way back. Raises InputError, and changes nothing, where it is not valid."""
         assert self.live is not None
         if len(after.steps) > SETTINGS.edits:
             raise InputError(
                 f"That would be {len(after.steps)} edits; a photo takes up to {SETTINGS.edits}. Take some away first."
             )
+        # Applied once before it counts: an edit that cannot be applied is refused.
         self.live.edited(after.active)
-        self.remember(what, moving=moving)
+        self.remember(action, moving=moving)
         self.edits = after
         self.save()
 
@@ -315,13 +327,13 @@ class Session:
                 if k in step.options
             }
 
-    def remember(self, what: str, moving: bool = False) -> None:
+    def remember(self, action: str, moving: bool = False) -> None:
         """Keep the state for undo; a slider (or colour) that moves on adds no further entry."""
-        if what != "select":
+        if action != "select":
             self._check_unchanged()
         self._future = []
-        if not (moving and self._past and self._past[-1][0] == what):
-            self._past = [*self._past, (what, self.edits, self.selection)][-SETTINGS.undo_steps :]
+        if not (moving and self._past and self._past[-1][0] == action):
+            self._past = [*self._past, (action, self.edits, self.selection)][-SETTINGS.undo_steps :]
 
     def _region_of(self, edits: EditList) -> Selection:
         """The selection that the current step was made with."""
@@ -358,7 +370,7 @@ class Session:
 def _slides(value: Any) -> bool:
     """Whether an option's value is one that sliders and colour pickers set."""
     if isinstance(value, list):
-        return all(isinstance(one, str) and _slides(one) for one in value)
+        return all(isinstance(item, str) and _slides(item) for item in value)
     return _SLIDES.fullmatch(str(value)) is not None
 
 

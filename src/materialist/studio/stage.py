@@ -12,7 +12,7 @@ from materialist.errors import MaterialistError
 from materialist.io import display
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import EditList
-from materialist.studio.preview import LIVE
+from materialist.studio.live_preview import LIVE
 from materialist.studio.selection import Selection, data_url
 from materialist.studio.session import Session
 from materialist.studio.tasks import before_of
@@ -41,11 +41,13 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     held; empty where `picture` is the photo itself, which the page keeps for live previews (None). At rest the page
     asks for the full picture after a `coarse` one.
     """
+    # Pictures may arrive out of order: the page keeps the newest.
     serial = time()
     with session.lock:
         live = session.live
         edits = session.edits
         final = session.final
+        # Taken together under the lock; the picture is made without it.
         masks = session.selection.pictures
         client = session.glass
     shown = {**_EMPTY, "serial": serial, "before": None, **masks}
@@ -56,15 +58,18 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     shown |= {"width": camera.width, "height": camera.height, "lamps": _lamps(edits)}
     current = edits.current_step
     off = "; the current edit is switched off" if current is not None and current.skipped else ""
+    # --- A path-traced picture of just these edits ---
     if final is not None and final.of(steps):
         badge = f"Path traced{off}"
         picture, before = (
             jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path))
         )
         return {**shown, "picture": picture, "before": before, "badge": badge}
+    # --- Glass is asked for while everything else is shown ---
     if current is not None and client is not None and current in steps and glass.is_traced(current):
         client.ask(steps, current)
     waiting = client is not None and with_edits and client.state.waiting
+    # --- The live preview: not there yet, refused, or shown ---
     if steps and not live.ready:
         del shown["picture"]
         return {**shown, "badge": "Getting the live preview ready …"}
@@ -98,6 +103,7 @@ def _lamps(edits: EditList) -> list[list[float]]:
 
 def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: bool) -> str:
     """The label of a picture that is not path traced: its kind, and its omissions."""
+    # What the picture lacks is said on it.
     panes = [step for step in steps if glass.is_traced(step)]
     sketched = (
         "; objects are sketched"
@@ -131,7 +137,7 @@ def jpeg_file(file: Path) -> str:
     return data_url(file.read_bytes(), "jpeg")
 
 
-def maps(scene: Scene) -> list[tuple[Array, str]]:
+def named_maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
     shown = display.maps(scene)
     return [
@@ -153,8 +159,11 @@ def report(scene: Scene) -> str:
     """How good the scene is, in Markdown and plain words."""
     metrics = scene.report.metrics
     value = metrics.get("rerender_psnr_path", float("nan"))
-    told = f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. Edits start from the photo."
-    lines = [told] if np.isfinite(value) else []
+    quality = (
+        f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. "
+        "Edits start from the photo."
+    )
+    lines = [quality] if np.isfinite(value) else []
     camera = scene.camera
     source = {
         "exif": "from the photo's EXIF data",

@@ -22,7 +22,7 @@ from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
-from materialist.studio.preview import free_memory
+from materialist.studio.live_preview import free_memory
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
 
@@ -76,10 +76,11 @@ class Studio:
         now = time.monotonic()
         with self._lock:
             last = now - SETTINGS.page_seconds
+            # Pages that never held a request, and were not heard of for a while.
             gone = [
                 name
-                for name, one in self._sessions.items()
-                if not one.beats and one.seen < last and name != page
+                for name, session in self._sessions.items()
+                if not session.beats and session.seen < last and name != page
             ]
             known = self._sessions.get(page or "")
             if known is None and page:
@@ -98,7 +99,7 @@ class Studio:
         """Raise InputError where a person's sender has too many pages open."""
         sender = self.sender(person)
         if (
-            sum(self.sender(one.person) == sender for one in self._sessions.values())
+            sum(self.sender(session.person) == sender for session in self._sessions.values())
             >= SETTINGS.pages
         ):
             raise InputError(
@@ -149,6 +150,7 @@ class Studio:
         project = self.project(name, session.person)
         if session.left:
             raise InputError("The page was closed.")
+        # The old scene goes first: both at once may not fit into memory.
         had_scene = session.live is not None
         session.close()
         if had_scene:
@@ -162,6 +164,7 @@ class Studio:
 
     def note_last(self, person: str, name: str) -> None:
         """Note the project that a person opened or began last; those who did so longest ago are forgotten."""
+        # Put back last: the oldest entries go first.
         self.last.pop(person, None)
         self.last = dict([*self.last.items(), (person, name)][-SETTINGS.people :])
 
@@ -172,6 +175,7 @@ class Studio:
         """
         unfinished = self.jobs.unfinished()
         sender = self.sender(session.person)
+        # Counted by sender, not by person: a new cookie is free.
         mine = sum(self.sender(job.owner) == sender for job in unfinished)
         all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
@@ -197,6 +201,7 @@ class Studio:
             if session is not None:
                 session.left = True
                 self._left.append(session)
+                # One closing takes all who left meanwhile: many tabs are often closed together.
                 first = len(self._left) == 1
         if session is not None:
             session.stop(self.jobs, *ENDING)
@@ -228,6 +233,7 @@ class Studio:
         folder = self.work.cache / secrets.token_hex(16)
         with writing(file.name):
             folder.mkdir()
+            # A copy: the original may be replaced while somebody downloads it.
             copy = Path(shutil.copyfile(file, folder / (name or file.name)))
         return self.files.hand_out(person, copy, str(copy))
 

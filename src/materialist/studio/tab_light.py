@@ -17,12 +17,13 @@ from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
 from materialist.types import Array
 
-OWN = "The photo's own"
+PHOTO_LIGHT = "The photo's own"
 
 
 def layout(context: PageContext) -> None:
     parts = context.parts
     with gr.Tab("Light", id="light"):
+        # --- Light from all around: computed maps, or one's own ---
         parts["lights"] = gr.Gallery(
             _gallery(),
             label="Light from all around",
@@ -41,6 +42,7 @@ def layout(context: PageContext) -> None:
         )
         parts["rotate"] = slider("rotate", "Turn the light, degrees", 1, minimum=-180, maximum=180)
         parts["ambient"] = slider("ambient", "Dim or brighten", 0.02, maximum=2)
+        # --- Lights that are added ---
         with gr.Accordion("Sun", open=False):
             parts["sun_on"] = gr.Checkbox(False, label="A sun in the sky")
             parts["azimuth"] = gr.Slider(
@@ -75,6 +77,7 @@ def wire(context: PageContext) -> None:
     context.upload("own_map", _uploaded)
     context.bind("rotate", "ambient", coarse=True)
     sunny = ("sun_on", "azimuth", "elevation", "sun_power")
+    # Any of the four sets the whole sun: the list of edits has it as one option.
     for name in sunny:
         context.live(parts[name].input, _sun, *sunny, coarse=True)
     context.live(
@@ -83,6 +86,7 @@ def wire(context: PageContext) -> None:
 
 
 def _choose(session: Session, data: Any) -> None:
+    # The first picture of the gallery stands for the photo's own light.
     if data["index"] == 0:
         session.light(envmap=None, gain=None)
     else:
@@ -116,6 +120,7 @@ def place_lamp(
     depth = float(session.scene.depth[row, column])
     if depth <= 0:
         raise InputError("There is no surface to hang the lamp before; click on an object.")
+    # The lamp hangs between the camera and the clicked surface.
     new = [str(column), str(row), *(number_text(v) for v in (depth * before, kelvin, power))]
     place = session.edits.light
     known = session.edits.steps[place].options.get("lamps", []) if place is not None else []
@@ -126,11 +131,14 @@ def _written(session: Session, name: str) -> str:
     """A computed light as a file in the workspace, so that the recipe can be replayed anywhere."""
     file = session.workspace / f"light-{name.lower()}.exr"
     if not file.is_file():
-        write_image(file, presets.light(name), force=True)
+        write_image(file, presets.preset_light(name), force=True)
     return file.name
 
 
 @cache
 def _gallery() -> list[tuple[Array, str]]:
-    own = np.full((64, 128, 3), 225, np.uint8)
-    return [(own, OWN), *((light(presets.light(name, 64)), name) for name in presets.LIGHTS)]
+    blank = np.full((64, 128, 3), 225, np.uint8)
+    return [
+        (blank, PHOTO_LIGHT),
+        *((light(presets.preset_light(name, 64)), name) for name in presets.LIGHTS),
+    ]

@@ -6,7 +6,7 @@ import gradio as gr
 
 from materialist.studio import tasks
 from materialist.studio.session import Session
-from materialist.studio.stage import maps, report
+from materialist.studio.stage import named_maps, report
 from materialist.studio.widgets import PageContext, Updates
 
 MESH = "mesh.glb"
@@ -45,7 +45,7 @@ def wire(context: PageContext) -> None:
         if session.live is not None:
             yield {
                 "report": session.without_folders(report(session.scene)),
-                "maps": maps(session.scene),
+                "maps": named_maps(session.scene),
             }
 
     def show_mesh(session: Session) -> Iterator[Updates]:

@@ -46,6 +46,7 @@ def wire(context: PageContext) -> None:
         "hue", "saturation", "value", "roughness", "metallic", "texture_scale", "grow", "feather"
     )
     context.live(parts["colour"].input, _coloured, "colour")
+    # Buttons that take options back to what was fitted.
     cleared = {
         "own": ("albedo", "texture", "hue", "saturation", "value"),
         "as_fitted": ("roughness", "metallic"),
@@ -60,6 +61,7 @@ def _clear(names: tuple[str, ...], session: Session) -> None:
 
 
 def _coloured(session: Session, value: str) -> None:
+    # A colour and a texture exclude each other.
     session.set("edit", texture=None, albedo=hex_colour(value))
 
 

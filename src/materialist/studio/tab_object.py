@@ -10,7 +10,7 @@ import gradio as gr
 from materialist.studio import objects, uploads
 from materialist.studio.controls import file_field, hex_colour, slider
 from materialist.studio.session import Session
-from materialist.studio.widgets import PageContext, Updates, box
+from materialist.studio.widgets import PageContext, Updates, message_box
 
 _INSIDE = [("solid", ""), ("hollow", "true"), ("open at the top", "open")]
 
@@ -74,29 +74,32 @@ def wire(context: PageContext) -> None:
     )
     for name in ("made_of", "thing_colour"):
         context.live(parts[name].input, _made_of, "made_of", "thing_colour")
+    # Filling a hole takes seconds: in the queue, with a sign of work.
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
     context.live(parts["remove"].click, _remove, "shadow", **slow)
     context.live(parts["glass"].click, partial(Session.set, kind="glass"), everything=True)
+    # The stage itself asks for this where its glass is still to come.
     context.long(parts["stage"].follow, partial(_follow, context), trigger_mode="always_last")
     context.long(parts["rest"].click, partial(_fall, context), "height")
 
 
 def _choose(session: Session, name: str | None) -> Updates:
+    # Only names of ours: anything else would be a path from a stranger.
     if name in objects.LIBRARY:
-        objects.set_option(session, "mesh", objects.library_file(session, str(name)))
+        objects.set_object_option(session, "mesh", objects.library_file(session, str(name)))
     return {"tool": "place", "own_mesh": None}
 
 
 def _uploaded(session: Session, file: Path) -> Updates:
     def use(name: str) -> None:
-        objects.set_option(session, "mesh", name)
+        objects.set_object_option(session, "mesh", name)
 
     uploads.used(session.workspace, file, uploads.MESH, session.allowance, use)
     return {"tool": "place", "thing": None}
 
 
 def _made_of(session: Session, kind: str, colour: str) -> None:
-    objects.set_option(session, "material", hex_colour(colour) if kind == "colour" else kind)
+    objects.set_object_option(session, "material", hex_colour(colour) if kind == "colour" else kind)
 
 
 def _remove(session: Session, shadow: bool) -> None:
@@ -110,17 +113,20 @@ def _follow(context: PageContext, session: Session) -> Iterator[Updates]:
     while client is not None and client is session.glass:
         state = client.state
         if not state.waiting:
-            told = box(session.without_folders(state.words), bad=True) if state.bad else ""
-            yield context.picture(session) | {"progress": told}
+            message = (
+                message_box(session.without_folders(state.words), bad=True) if state.bad else ""
+            )
+            yield context.picture(session) | {"progress": message}
             return
+        # Only what is new: every update is a message to the page.
         if state.words != said:
             said = state.words
-            yield {"progress": box(said)}
+            yield {"progress": message_box(said)}
         with client.changed:
             client.changed.wait(0.5)
 
 
 def _fall(context: PageContext, session: Session, height: float) -> Iterator[Updates]:
-    yield {"progress": box("It falls …")}
+    yield {"progress": message_box("It falls …")}
     notes = session.without_folders(" ".join(objects.let_fall(session, float(height))))
-    yield context.everything(session) | {"progress": box(notes) if notes else ""}
+    yield context.everything(session) | {"progress": message_box(notes) if notes else ""}

@@ -18,7 +18,7 @@ from materialist.studio import archives, tasks, uploads
 from materialist.studio.controls import file_field
 from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
-from materialist.studio.widgets import LONG, PREDICTORS, PageContext, Updates, box
+from materialist.studio.widgets import LONG, PREDICTORS, PageContext, Updates, message_box
 from materialist.studio.workspace import Project
 from materialist.types import Array
 
@@ -80,13 +80,16 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
     studio = context.studio
 
     def uploaded(session: Session, file: str | None) -> Iterator[Updates]:
+        # A zip is opened when the button is pressed; a photo is checked at once.
         name = Path(file or "").name
         if name.lower().endswith(".zip"):
-            yield {"facts": box(f"{name} will be opened as a scene.")}
+            yield {"facts": message_box(f"{name} will be opened as a scene.")}
             return
         if file is not None:
-            uploads.opened(uploads.checked, Path(file), session.allowance, option=uploads.PHOTO)
-        yield {"facts": box(f"{name} is ready.") if file else ""}
+            uploads.opened_upload(
+                uploads.checked_upload, Path(file), session.allowance, option=uploads.PHOTO
+            )
+        yield {"facts": message_box(f"{name} is ready.") if file else ""}
 
     def choose_example(session: Session, data: Any) -> Iterator[Updates]:
         name = [*EXAMPLES][int(data["index"])]
@@ -104,9 +107,11 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
             yield from _follow_inversion(context, session, project, job)
 
     def arrive(session: Session) -> Iterator[Updates]:
+        # --- What this person can go on with ---
         known = _projects(context, session)
         last = studio.last.get(session.person)
         yield {"projects": gr.update(choices=known, value=known[0][1] if known else None)}
+        # --- What the page shows first: the last photo, or what the studio was started on ---
         if not any(value == last for _, value in known):
             last = studio.start.name if isinstance(studio.start, Project) else None
         if last is not None:
@@ -145,7 +150,8 @@ def _start_inversion(
     if predictor not in {value for _, value in PREDICTORS}:
         raise InputError("Choose one of the listed ways to make the first guess.")
     source = Path(file)
-    uploads.opened(uploads.checked, source, session.allowance, option=uploads.PHOTO)
+    uploads.opened_upload(uploads.checked_upload, source, session.allowance, option=uploads.PHOTO)
+    # --- A project of its own, with a copy of the photo ---
     suffix = source.suffix.lower()
     project = studio.work.new(source.name, session.person)
     photo = project.folder / f"original{suffix}"
@@ -189,12 +195,13 @@ def _follow_inversion(
     yield {"start": gr.update(interactive=False)}
     shown = 0
     for update in context.following(session, job):
-        if len(job.found) > shown:
-            latest = {f["name"]: project.folder / f["file"] for f in job.found}
+        if len(job.intermediate) > shown:
+            latest = {facts["name"]: project.folder / facts["file"] for facts in job.intermediate}
+            # The photo goes to the stage, maps go to the gallery.
             photo = latest.pop(tasks.PHOTO)
             if not shown:
                 update["stage"] = waiting_photo(photo)
-            shown = len(job.found)
+            shown = len(job.intermediate)
             pictures = [
                 (studio.public_copy(session.person, file), name) for name, file in latest.items()
             ]
@@ -203,6 +210,7 @@ def _follow_inversion(
     if not job.over:  # the page was closed, or follows the inversion anew; it goes on
         return
     failed = job.state != "done"
+    # Nothing to go on with: the folder goes.
     if failed and not project.ready:
         shutil.rmtree(project.folder, ignore_errors=True)
     before = (
@@ -222,6 +230,7 @@ def _resume(context: PageContext, session: Session, name: str | None) -> Iterato
     if not name:
         raise InputError("Choose one of your photos in the list first.")
     project = studio.project(name, session.person)
+    # A page that was reloaded follows the inversion that still runs.
     running = [
         j for j in studio.jobs.unfinished(session.person, "invert") if j.folder == project.folder
     ]
@@ -236,7 +245,7 @@ def _resume(context: PageContext, session: Session, name: str | None) -> Iterato
 
 def _show_project(context: PageContext, session: Session, project: Project) -> Iterator[Updates]:
     """Show a project: its photo at once, the edits when the preview is ready."""
-    yield {"progress": box("Opening …")}
+    yield {"progress": message_box("Opening …")}
     context.studio.open(session, project.name)
     live = session.live
     if live is None:
@@ -247,18 +256,19 @@ def _show_project(context: PageContext, session: Session, project: Project) -> I
         "tabs": gr.Tabs(selected="material"),
         "projects": gr.update(choices=known, value=project.name),
         "found": gr.update(visible=False, value=[]),
-        "progress": box("Getting the live preview ready; select something meanwhile.", 0.6),
+        "progress": message_box("Getting the live preview ready; select something meanwhile.", 0.6),
     }
+    # Another photo may have been opened meanwhile.
     live.wait()
     if session.live is live:
-        yield context.everything(session) | {"progress": box(_READY)}
+        yield context.everything(session) | {"progress": message_box(_READY)}
 
 
 def _projects(context: PageContext, session: Session) -> list[tuple[str, str]]:
-    found = context.studio.projects(session.person)
+    projects = context.studio.projects(session.person)
     running = {j.folder for j in context.studio.jobs.unfinished(session.person, "invert")}
     return [
         (f"{p.title} · {p.name}" + ("" if p.ready else " (in work)"), p.name)
-        for p in found
+        for p in projects
         if p.ready or p.folder in running
     ]

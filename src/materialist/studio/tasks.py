@@ -45,7 +45,7 @@ def invert(
     fov: float | str,
     seed: int,
 ) -> None:
-    """`materialist invert`; maps and light go to `found` as soon as they are there."""
+    """`materialist invert`; maps and light are sent as intermediate results as soon as they are there."""
     from dataclasses import replace
 
     picture = replace(mt.read_photo(photo, size=size, fov=fov), path=title)
@@ -54,6 +54,7 @@ def invert(
     def show(name, value):
         return _show(report, folder, name, value)
 
+    # The photo first: the page shows it while the rest is computed.
     show(PHOTO, picture.linear)
     done = mt.invert(
         picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show
@@ -63,6 +64,7 @@ def invert(
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
+    # Each stage brings other maps: all of the prediction, then materials, then light.
     if isinstance(value, Prediction):
         shown = display.maps(value)
     elif isinstance(value, Materials):
@@ -76,7 +78,7 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
     for title, pixels in shown.items():
         file = folder / f"found-{title}.jpg"
         write_pixels(file, pixels)
-        report.found(name=title, file=file.name)
+        report.intermediate(name=title, file=file.name)
 
 
 def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
@@ -109,6 +111,7 @@ def fallen(report: Reporter, scene: str, steps: Steps) -> dict[str, Any]:
     from materialist.edits.recipe import apply
 
     loaded = mt.load_scene(scene)
+    # A fall meets surfaces alone: colours and light are left out.
     earlier = [step for step in steps[:-1] if step.kind in ("insert", "drop", "remove")]
     before = apply(loaded, earlier)
     after = apply(loaded, [steps[-1]], onto=before)
@@ -130,23 +133,25 @@ def mesh(report: Reporter, scene: str, output: str) -> None:
     write_whole(output, glb_bytes(loaded, scene_parts(loaded, PAGE_TRIANGLES)[:1]))
 
 
-def take(report: Reporter, scene: str, steps: Steps, output: str, what: str) -> None:
+def take(report: Reporter, scene: str, steps: Steps, output: str, kind: str) -> None:
     """One thing to take away, as a single file at `output` (its suffix included); several files come as a zip."""
     from materialist.exporters.run import FOLDERS
 
-    (loaded, edited), file = _edited(report, scene, steps), Path(output)
-    if what == "turn":
+    loaded, edited = _edited(report, scene, steps)
+    file = Path(output)
+    if kind == "turn":
         _turntable(report, loaded, edited, file)
-    elif what == "scene":
+    elif kind == "scene":
         with _zipped(file) as folder:
             _package(report, loaded, edited, folder)
     else:
         report("export", 0, 1)
         if file.suffix != ".zip":
-            mt.export(edited, file, to=what, force=True)
+            mt.export(edited, file, to=kind, force=True)
             return
         with _zipped(file) as folder:
-            mt.export(edited, folder / ("scene" if what in FOLDERS else f"scene.{what}"), to=what)
+            name = "scene" if kind in FOLDERS else f"scene.{kind}"
+            mt.export(edited, folder / name, to=kind)
 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
@@ -174,6 +179,7 @@ def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> 
     from materialist.io.video import ensure_video_writable, write_frames
 
     ensure_video_writable(output, force=True)
+    # The same light function as of the command, so that both films are equal.
     scenes = list(moving_light(edited, SETTINGS.video_frames, rotate=360.0))
     film = pictures(loaded, scenes, progress=report)
     write_frames(output, film, fps=12, force=True)
@@ -187,6 +193,7 @@ def _zipped(output: Path) -> Iterator[Path]:
     folder.mkdir(parents=True)
     try:
         yield folder
+        # Zipped beside, then renamed: a half zip is never seen.
         os.replace(shutil.make_archive(str(folder), "zip", place, folder.name), output)
     finally:
         shutil.rmtree(place, ignore_errors=True)

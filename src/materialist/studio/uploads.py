@@ -32,7 +32,9 @@ _COLOURS = ("texture", "background", "envmap")
 # --- In the server ---
 
 
-def opened(task: Callable[..., Any], file: Path, allowance: Allowance, **arguments: Any) -> Any:
+def opened_upload(
+    task: Callable[..., Any], file: Path, allowance: Allowance, **arguments: Any
+) -> Any:
     """What `task(report, file=..., **arguments)` returns of an uploaded file, done in a process with limits.
 
     Raises InputError, which names the file as its owner does, or says that too many are being opened.
@@ -41,6 +43,7 @@ def opened(task: Callable[..., Any], file: Path, allowance: Allowance, **argumen
     check_bytes(file, shown)
     limits = Limits(SETTINGS.opening_memory, SETTINGS.opening_seconds)
     try:
+        # In a process with limits: a file made by a stranger may be a bomb.
         with allowance.opening():
             return run_limited(task, limits, file=file, **arguments)
     except InputError as error:
@@ -52,7 +55,8 @@ def used(
     workspace: Path, file: Path, option: str, allowance: Allowance, use: Callable[[str], Any]
 ) -> None:
     """Check an uploaded file, copy it to a workspace and `use(name)` it; one that is refused does not stay."""
-    readable = opened(checked, file, allowance, option=option)
+    readable = opened_upload(checked_upload, file, allowance, option=option)
+    # Equal content has an equal name: a file that was there before stays.
     before = {*workspace.iterdir()}
     content = readable.read_bytes()
     allowance.claim(len(content))
@@ -86,12 +90,13 @@ def shown_name(path: Path) -> str:
 # --- In the process with limits ---
 
 
-def checked(report: Any, file: Path, option: str) -> Path:
+def checked_upload(report: Any, file: Path, option: str) -> Path:
     """The file that the server may read for an option: the given one, or a smaller one of the same picture beside it.
 
     Its header is read first, then all of it; of a photo the header alone: its inversion has a process of its own.
     Raises InputError for what cannot be read, and for what would be too large for the server.
     """
+    # Meshes are read in full: a header does not tell how large one becomes.
     if option == MESH:
         checked_mesh(file)
         _read_mesh(file)
@@ -111,6 +116,7 @@ def checked_picture(path: Path) -> str:
             f"{shown} is not a photo this program reads; give a PNG, JPEG, HEIC, TIFF, WEBP, EXR or HDR."
         )
     check_bytes(path, shown)
+    # Headers of RAW do not tell the size that it decodes to.
     if suffix not in RAW_SUFFIXES:
         try:
             (width, height), peak = image_size(path), peak_bytes(path)
@@ -158,6 +164,7 @@ def _shrunk(path: Path) -> Path:
     """A picture of colours that is small enough for the server: the file itself, or a PNG or EXR beside it."""
     decoded = decode(path)
     height, width = decoded.linear.shape[:2]
+    # Both sides by the root: the limit is one of pixels.
     scale = math.sqrt(SETTINGS.edit_pixels / (width * height))
     if scale >= 1:
         return path

@@ -19,7 +19,7 @@ from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.controls import CONTROLS, control_values, set_option
-from materialist.studio.edit_list import summary
+from materialist.studio.edit_list import step_summary
 from materialist.studio.session import EDITS, FinalPicture, Session
 from materialist.studio.stage import stage
 from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
@@ -79,19 +79,20 @@ class PageContext:
         coarse: bool = False,
         more: tuple[str, ...] = (),
         data: bool = False,
-        **how: Any,
+        **settings: Any,
     ) -> Any:
         """Let an event call change(session, *values of inputs) at once, and show the (coarse) picture, or everything.
 
         `change` may return further updates, of the components `more`. With `data` the event's own come before the
-        values. `how` are arguments of Gradio's event beside LIVE.
+        values. `settings` are arguments of Gradio's event beside LIVE.
         """
 
-        def run(request: gr.Request, told: gr.EventData, *values: Any) -> Any:
+        def run(request: gr.Request, event_data: gr.EventData, *values: Any) -> Any:
             try:
                 session = self.session(request)
+                # Counted: one page must not keep all threads busy.
                 with session.allowance.request():
-                    further = change(session, *([told._data] if data else []), *values) or {}
+                    further = change(session, *([event_data._data] if data else []), *values) or {}
                     shown = (
                         self.everything(session) if everything else self.picture(session, coarse)
                     )
@@ -99,9 +100,11 @@ class PageContext:
             except Exception as error:
                 raise self.message(error) from error
 
+        # Components that this event may update.
         names = [*PICTURE, *(CONTROLS if everything else ()), *more]
-        given, outputs = ([self.parts[name] for name in group] for group in (inputs, names))
-        return event(run, given, outputs, **LIVE | how)
+        input_parts = [self.parts[name] for name in inputs]
+        outputs = [self.parts[name] for name in names]
+        return event(run, input_parts, outputs, **LIVE | settings)
 
     def long(
         self,
@@ -109,15 +112,15 @@ class PageContext:
         change: Callable[..., Iterator[Updates]],
         *inputs: str,
         data: bool = False,
-        **how: Any,
+        **settings: Any,
     ) -> Any:
         """Let an event call change(session, *values of inputs), which yields updates of any components."""
 
-        def run(request: gr.Request, told: gr.EventData, *values: Any) -> Iterator[Any]:
+        def run(request: gr.Request, event_data: gr.EventData, *values: Any) -> Iterator[Any]:
             updates = None
             try:
                 for updates in change(
-                    self.session(request), *([told._data] if data else []), *values
+                    self.session(request), *([event_data._data] if data else []), *values
                 ):
                     yield self._outputs(updates)
                 if updates is None:  # Gradio would send None to every component
@@ -127,7 +130,7 @@ class PageContext:
                 raise self.message(error) from error
 
         return event(
-            run, [self.parts[name] for name in inputs], [*self.parts.values()], **LONG | how
+            run, [self.parts[name] for name in inputs], [*self.parts.values()], **LONG | settings
         )
 
     def bind(self, *names: str, coarse: bool = False) -> None:
@@ -135,16 +138,16 @@ class PageContext:
         for name in names:
             self.live(self.parts[name].input, partial(set_option, name), name, coarse=coarse)
 
-    def upload(self, name: str, change: Callable[[Session, Path], Any], **how: Any) -> None:
+    def upload(self, name: str, change: Callable[[Session, Path], Any], **settings: Any) -> None:
         """Let an uploaded file call change(session, file); a file that is refused is taken off the page."""
         part = self.parts[name]
         sent = self.live(
-            part.upload, lambda session, file: change(session, Path(file)), name, **how
+            part.upload, lambda session, file: change(session, Path(file)), name, **settings
         )
         sent.failure(lambda: None, None, part, **LIVE)
 
     def session(self, request: Any) -> Session:
-        """The session of a request, whose person the gate has told."""
+        """The session of a request; the gate has put its person into a header."""
         person = LOCAL_PERSON if self.studio.single_user else request.headers.get(PERSON_HEADER, "")
         return self.studio.session(request.session_hash, person)
 
@@ -181,12 +184,14 @@ class PageContext:
         Between two looks the thread is free for others. It ends early where the page is closed, or follows the job
         anew; `follows` tells.
         """
+        # Of several followers, as after a reload, the last one counts.
         follower = session.followers[id(job)] = object()
         last = None
         while not job.over and self.follows(session, job, follower):
             state = self.state(job)
             yield {"progress": state, "stop": gr.update(visible=True)} if state != last else {}
             last = state
+            # A job reports through its queue; looking at it costs nothing.
             time.sleep(SETTINGS.poll_seconds)
         if self.follows(session, job, follower):
             yield {"progress": self.state(job), "stop": gr.update(visible=False)}
@@ -198,17 +203,17 @@ class PageContext:
     def state(self, job: Job) -> str:
         """The state of a job as HTML."""
         if job.state == QUEUED:
-            return box(f"Waiting: {self.studio.jobs.ahead(job)} before yours.", 0.0)
+            return message_box(f"Waiting: {self.studio.jobs.ahead(job)} before yours.", 0.0)
         if job.state == STOPPED:
-            return box("Stopped; nothing was changed.")
+            return message_box("Stopped; nothing was changed.")
         if job.state == FAILED:
-            return box(self.studio.without_folders(failure(job)), bad=True)
+            return message_box(self.studio.without_folders(failure_message(job)), bad=True)
         if job.over:
             pictures = job.kind in ("final", "take")
             notes = noise_notes() if pictures else []
-            return box(" ".join([f"Done in {job.seconds:.0f} s.", *notes]))
+            return message_box(" ".join([f"Done in {job.seconds:.0f} s.", *notes]))
         part = min(1.0, job.done / job.total) if job.total else 0.0
-        return box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
+        return message_box(f"{words(job.stage)} … {job.seconds:.0f} s", part)
 
     def work(
         self, session: Session, task: tasks.Task, output: Path, **arguments: Any
@@ -227,25 +232,27 @@ class PageContext:
         Returns the picture, which the session keeps; None where the job failed or was stopped.
         """
         steps = session.edits.active
+        # A picture of just these edits is there already.
         known = session.final
         if known is not None and known.of(steps):
             return known
-        made = FinalPicture(steps, self.studio.work.cache / f"final-{secrets.token_hex(16)}")
+        picture = FinalPicture(steps, self.studio.work.cache / f"final-{secrets.token_hex(16)}")
         try:
-            if (yield from self.work(session, tasks.final, made.path, steps=steps)):
+            if (yield from self.work(session, tasks.final, picture.path, steps=steps)):
                 known = session.final
-                session.final = made
+                session.final = picture
                 if known is not None:
                     known.remove()
-                return made
+                return picture
             return None
         finally:
-            if session.final is not made:  # it failed, was stopped, or the page was closed
-                made.remove()
+            if session.final is not picture:  # it failed, was stopped, or the page was closed
+                picture.remove()
 
 
-def failure(job: Job) -> str:
+def failure_message(job: Job) -> str:
     """The reason of a failure; it names the photo by its title."""
+    # The path on this machine is nothing for a page.
     photo = job.arguments.get("photo")
     return job.message.replace(str(photo), job.arguments["title"]) if photo else job.message
 
@@ -257,7 +264,7 @@ def words(stage: str) -> str:
     )
 
 
-def box(text: str, part: float | None = None, bad: bool = False) -> str:
+def message_box(text: str, part: float | None = None, bad: bool = False) -> str:
     bar = "" if part is None else f'<div class="bar"><i style="width:{100 * part:.0f}%"></i></div>'
     kind, role = ("progress bad", "alert") if bad else ("progress", "status")
     return f'<div class="{kind}" role="{role}">{escape(text)}{bar}</div>'
@@ -265,7 +272,7 @@ def box(text: str, part: float | None = None, bad: bool = False) -> str:
 
 def steps(session: Session) -> list[dict[str, Any]]:
     return [
-        {"text": summary(step), "on": not step.skipped, "current": k == session.edits.current}
+        {"text": step_summary(step), "on": not step.skipped, "current": k == session.edits.current}
         for k, step in enumerate(session.edits.steps)
     ]
 
@@ -275,6 +282,7 @@ def commands(session: Session) -> str:
     project = session.project
     if project is None:
         return ""
+    # Whoever has no command line here gets the names alone.
     place = str if session.local else session.without_folders
     lines = [f"cd {quote(place(str(project.folder)))}"]
     scene = quote(place(str(project.scene)))

@@ -105,6 +105,7 @@ class WorkFolder:
 
     def _sweep_caches(self) -> None:
         """Remove the caches of studios that were killed: whoever works holds a lock on theirs."""
+        # A lock ends with its process, however that ended.
         for cache in self.root.glob(f"{_CACHE}*"):
             if not (cache / _CACHE_MARK).is_file():
                 continue  # not ours
@@ -121,20 +122,22 @@ class WorkFolder:
                     target = edits.with_name(f"edits-{person_of(cookie)}")
                     edits.rename(_free_name(target))
             if _COOKIE.fullmatch(project.owner):
+                # The card names its owner, too.
                 card = json.loads((project.folder / CARD).read_text("utf-8"))
                 card["owner"] = person_of(project.owner)
                 write_whole(project.folder / CARD, json.dumps(card, indent=1))
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
-        found = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
-        mine = [p for p in found if p is not None and person in (None, p.owner)]
+        projects = [_read(folder) for folder in self.root.iterdir() if _NAME.fullmatch(folder.name)]
+        mine = [p for p in projects if p is not None and person in (None, p.owner)]
         return sorted(mine, key=lambda p: int(p.name[6:]), reverse=True)
 
     def new(self, title: str, owner: str, *, scene: Path | None = None) -> Project:
         """An empty project; with `scene` one that uses a package elsewhere. Old unfinished ones go."""
         self.sweep()
         with self._lock:  # two people may ask at once
+            # Numbers are never used again while a folder has them.
             taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
             for number in count(max(taken, default=0) + 1):
                 folder = self.root / f"photo-{number:03d}"
@@ -144,6 +147,7 @@ class WorkFolder:
         project = Project(
             folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE
         )
+        # Relative: the work folder may be moved.
         place = os.path.relpath(project.scene, folder) if scene is None else str(project.scene)
         content = {"title": project.title, "owner": project.owner, "scene": place}
         with writing(folder):
@@ -162,6 +166,7 @@ class WorkFolder:
                 ):
                     shutil.rmtree(place) if place.is_dir() else place.unlink()
         for project in self.projects():
+            # Only folders of the studio's own, without edits of anybody.
             idle = time.time() - project.folder.stat().st_mtime > SETTINGS.unfinished_seconds
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
             if idle and ours and not project.ready:

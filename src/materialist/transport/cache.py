@@ -18,7 +18,7 @@ import torch
 
 from materialist.bsdf.disney import diffuse_coefficients, schlick
 from materialist.bsdf.ggx import alpha_of, smith_g1
-from materialist.bsdf.lobes import face_towards, lifted, visible_normal
+from materialist.bsdf.lobes import face_towards, lifted, visible_normal_vector
 from materialist.buffers import floats, integers, placed
 from materialist.transport.environment import EnvmapPyramid
 from materialist.types import Array, Camera, Geometry, Mesh
@@ -91,6 +91,7 @@ class TransportCache:
         self.seed = seed
         self.settings = s = settings or CacheSettings()
         self.scene = build_scene(geometry.mesh)
+        # Slots: one a pixel, and one more for each face of a continued plane, which no pixel shows.
         continued = geometry.mesh.face_plane >= 0
         slots = geometry.mesh.face_pixel.astype(np.uint32)
         slots[continued] = camera.width * camera.height + np.arange(
@@ -103,9 +104,10 @@ class TransportCache:
         self.roughness = [np.array([r], np.float32) for r in ROUGHNESS_LEVELS]
         """Of each level of the specular lobe, [1], or [P] of the pixels."""
         if roughness is not None:
-            own = np.clip(roughness.reshape(-1)[self.pixels], ROUGHNESS_LEVELS[0], 1)
+            pixel_roughness = np.clip(roughness.reshape(-1)[self.pixels], ROUGHNESS_LEVELS[0], 1)
             counts = (1.0,)
-            self.roughness = [own.astype(np.float32)]
+            self.roughness = [pixel_roughness.astype(np.float32)]
+        # Wider lobes take more rays; at its own roughness a pixel needs one level.
         specular = (max(1, round(share * s.specular_samples)) for share in counts)
         alphas = (floats(mi, alpha_of(r)) for r in self.roughness)
         self.lobes = [
@@ -117,29 +119,37 @@ class TransportCache:
         self._progress = progress
 
     def _primary(self) -> None:
+        """Trace one ray through each pixel; keep what the pixels with a surface need for shading."""
+        # --- Primary rays, in the camera frame: pinhole at the origin, looking down -Z ---
         cam = self.camera
         index = dr.arange(mi.UInt32, cam.width * cam.height)
         columns = dr.opaque(mi.UInt32, cam.width)
         # Numbers of one photo are data: as literals they would have the kernel compiled anew.
-        middle, centre = (dr.opaque(mi.Float, (side - 1) / 2) for side in (cam.width, cam.height))
-        across = mi.Float(index % columns) - middle + _OFF_DIAGONAL[0]
-        up = centre - mi.Float(index // columns) - _OFF_DIAGONAL[1]
+        middle_x = dr.opaque(mi.Float, (cam.width - 1) / 2)
+        middle_y = dr.opaque(mi.Float, (cam.height - 1) / 2)
+        across = mi.Float(index % columns) - middle_x + _OFF_DIAGONAL[0]
+        up = middle_y - mi.Float(index // columns) - _OFF_DIAGONAL[1]
         d = dr.normalize(mi.Vector3f(across, up, -dr.opaque(mi.Float, cam.focal)))
         si = self.scene.ray_intersect(mi.Ray3f(mi.Point3f(0), d))
         dr.eval(d, si)  # together, or each part of it would trace the rays again
+
+        # --- Surface points of the pixels that see one ---
         pixels = dr.compress(si.is_valid())
         self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
         take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
         normal = take(si.sh_frame.n)
         view = -take(d)
+        # `face` keeps sampled directions above the triangle, `frame` shades by the smooth normal.
         self.position = take(si.p)
         self.geometric_normal = take(si.n)
         self.normal = _towards(normal, view)
         self.face = face_towards(self.geometric_normal, self.normal)
         self.frame = mi.Frame3f(self.normal)
         self.wo = self.frame.to_local(view)
+        # Each pixel of a tile rotates the point set by another amount, see `joint_filter`.
         shift = pixel_shift(cam.height, cam.width, self.seed).reshape(-1, 2)[self.pixels]
         self.shift = mi.Point2f(*(floats(mi, s) for s in shift.T))
+        # Evaluated here, or every later kernel would trace the primary rays again.
         dr.eval(
             self.position,
             self.geometric_normal,
@@ -209,6 +219,7 @@ class TransportCache:
             # from the whole picture, or be in all of it twice.
             level = pyramid.level(4 * np.pi * alpha * alpha / count)
             dr.make_opaque(level)
+            # Sum over the rays of this lobe: incoming radiance times the lobe's factors.
             sums = _gather_loop(
                 hits,
                 slots,
@@ -224,6 +235,7 @@ class TransportCache:
                 diffuse=k == 0,
             )
             dr.eval(*sums)
+            # The mean over `count` samples is the Monte Carlo estimate.
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
         return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous())
 
@@ -263,7 +275,7 @@ def _drawn(diffuse: bool, wo, alpha, sample):
     if diffuse:
         wi = mi.warp.square_to_cosine_hemisphere(sample)
         return wi, dr.normalize(wi + wo)
-    h = visible_normal(wo, alpha, sample)
+    h = visible_normal_vector(wo, alpha, sample)
     return mi.reflect(wo, h), h
 
 
@@ -288,6 +300,7 @@ def _trace_loop(
     while i < count:
         wi, _ = _drawn(diffuse, wo, alpha, point(i, count, shift))
         above = wi.z > 0
+        # --- Trace: only which slot is hit is kept ---
         ray = spawn(position, geometric_normal, lifted(frame.to_world(wi), face))
         pi = scene.ray_intersect_preliminary(ray, coherent=False, active=above)
         slot = dr.gather(mi.UInt32, slots, pi.prim_index, pi.is_valid())
@@ -296,6 +309,7 @@ def _trace_loop(
 
 
 def _incoming(hits, slots, env, level, index, direction, above):
+    """L_i: the sky where the ray misses, else the radiance of the slot that it hits; 0 below the surface."""
     slot = dr.gather(mi.UInt32, hits, index)
     miss = slot == MISS
     sky = env.lookup(direction, level, above & miss)
@@ -306,8 +320,10 @@ def _incoming(hits, slots, env, level, index, direction, above):
 def _added(sums, diffuse: bool, wi, wo, h, alpha, light):
     """The sums of a lobe with one more sample: those of D0, D1, D2, or of S0, S1."""
     if diffuse:
+        # f_d cos / pdf of cosine-weighted rays leaves pi f_d / A = c0 + c1 R + c2 R^2.
         terms = [c * light for c in diffuse_coefficients(wi.z, wo.z, dr.dot(h, wi))]
     else:
+        # f_s cos / pdf of visible normals leaves F G1(wi), and F = C_0 (1 - s) + s by Schlick.
         fresnel = schlick(dr.dot(h, wo))
         weighted = light * smith_g1(wi.z, alpha)
         terms = [(1 - fresnel) * weighted, fresnel * weighted]
@@ -333,6 +349,7 @@ def _gather_loop(
 
 def pixel_shift(height: int, width: int, seed: int) -> Array:
     """[H, W, 2] float32 rotation of the point set per pixel: stratified over each tile, the same in all tiles."""
+    # The TILE^2 pixels of a tile draw as many consecutive points of the R2 sequence, shuffled.
     rank = np.random.default_rng(seed).permutation(TILE * TILE).reshape(TILE, TILE)
     rows, cols = np.indices((height, width))
     order = rank[rows % TILE, cols % TILE].astype(np.float64)

@@ -17,11 +17,12 @@ class EnvmapPyramid:
 
     def __init__(self, envmap: Array):
         maps = [np.asarray(envmap, np.float32)]
+        # Halved down to 8 rows: below that, a texel is wider than any lobe.
         while maps[-1].shape[0] % 2 == 0 and maps[-1].shape[0] > 8:
             maps.append(halve(maps[-1]))
-        self.heights, self.widths = (
-            integers(mi, np.array([m.shape[k] for m in maps])) for k in (0, 1)
-        )
+        self.heights = integers(mi, np.array([m.shape[0] for m in maps]))
+        self.widths = integers(mi, np.array([m.shape[1] for m in maps]))
+        # All maps lie in one buffer, so that one gather serves every level.
         sizes = [m.shape[0] * m.shape[1] for m in maps]
         self.starts = integers(mi, np.cumsum([0, *sizes[:-1]]))
         self.data = floats(mi, np.concatenate([m.reshape(-1, 3) for m in maps]))
@@ -29,6 +30,7 @@ class EnvmapPyramid:
     def level(self, solid_angle):
         """UInt32 number of the map whose texels at the horizon cover about a quarter of `solid_angle` steradians."""
         texel = (dr.two_pi / mi.Float(dr.gather(mi.UInt32, self.widths, 0))) ** 2
+        # Each level has texels of four times the solid angle.
         k = dr.floor(0.5 * dr.log2(dr.maximum(solid_angle, 1e-9) / (4 * texel)))
         return mi.UInt32(dr.clip(k, 0, dr.width(self.widths) - 1))
 
@@ -37,11 +39,13 @@ class EnvmapPyramid:
         height, width, start = (
             dr.gather(mi.UInt32, v, level, active) for v in (self.heights, self.widths, self.starts)
         )
+        # --- Direction to texel coordinates: d(u, v) inverted, the middle column along -Z ---
         u = dr.atan2(d.x, -d.z) * dr.inv_two_pi + 0.5
         v = dr.safe_acos(d.y) * dr.inv_pi
         x = u * mi.Float(width) - 0.5
         y = dr.clip(v * mi.Float(height) - 0.5, 0, mi.Float(height) - 1)
         x = dr.select(x < 0, x + mi.Float(width), x)
+        # --- The four texels around them: wrapped in azimuth, clamped at the poles ---
         x0 = dr.minimum(mi.UInt32(x), width - 1)
         y0 = mi.UInt32(y)
         fx = x - mi.Float(x0)

@@ -18,11 +18,11 @@ from materialist.types import Array
 
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
-_SHARPNESS = 32
+_NORMAL_POWER = 32
 """Power of the cosine between normals (by eye)."""
-_SMOOTHED = 0.2
+_MIN_ROUGHNESS = 0.2
 """Least roughness of a level that is filtered (by eye)."""
-_LEAST = 1e-4
+_MIN_WEIGHT = 1e-4
 """Weight of a neighbour below which it is left out (derived: time)."""
 
 
@@ -42,10 +42,11 @@ class Guide:
         normal = _shifted(self.normal, dy, dx)
         position = _shifted(self.position, dy, dx)
         cosine = np.clip((self.normal * normal).sum(-1), 0, 1)
+        # Distance of the neighbour from the pixel's tangent plane, in pixel sizes.
         away = (self.normal * (position - self.position)).sum(-1) / (
             self.scale * np.sqrt(1 + dy * dy + dx * dx)
         )
-        return cosine**_SHARPNESS * np.exp(-0.5 * away * away)
+        return cosine**_NORMAL_POWER * np.exp(-0.5 * away * away)
 
     @cached_property
     def mean(self) -> csr_array:
@@ -57,13 +58,14 @@ class Guide:
         weight = np.stack(
             [share * self.alike(dy, dx).ravel() for dy, dx, share in taps], -1
         ).astype(np.float32)
+        # A mean: the weights of the neighbours of each pixel sum to 1.
         weight /= np.maximum(weight.sum(-1, keepdims=True), 1e-6)
         column = np.arange(h * w, dtype=np.int32)[:, None] + np.array(
             [dy * w + dx for dy, dx, _ in taps], np.int32
         )
-        some = weight > _LEAST
-        rows = np.concatenate([[0], some.sum(-1).cumsum()]).astype(np.int32)
-        return csr_array((weight[some], column[some], rows), shape=(h * w, h * w))
+        kept = weight > _MIN_WEIGHT
+        rows = np.concatenate([[0], kept.sum(-1).cumsum()]).astype(np.int32)
+        return csr_array((weight[kept], column[kept], rows), shape=(h * w, h * w))
 
 
 def surface_guide(cache: TransportCache) -> Guide:
@@ -82,7 +84,8 @@ def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
 
 def _shifted(image: Array, dy: int, dx: int) -> Array:
     """`image` [H, W, ...] with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
-    (h, w), reach = image.shape[:2], len(_TAPS) // 2
+    h, w = image.shape[:2]
+    reach = len(_TAPS) // 2
     padded = np.pad(image, [(reach, reach), (reach, reach), *[(0, 0)] * (image.ndim - 2)])
     return padded[reach + dy : reach + dy + h, reach + dx : reach + dx + w]
 
@@ -90,15 +93,17 @@ def _shifted(image: Array, dy: int, dx: int) -> Array:
 def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:
     """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
     # Sharper levels are nearly noise-free and carry reflected detail.
-    wide = [roughness[:, None] >= _SMOOTHED for roughness in cache.roughness]
-    some = [k for k, pixels in enumerate(wide) if pixels.any()]
-    stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in some)], -1)
+    wide = [roughness[:, None] >= _MIN_ROUGHNESS for roughness in cache.roughness]
+    filtered = [k for k, pixels in enumerate(wide) if pixels.any()]
+    # --- All tables that are filtered, side by side on the image grid: one product filters them ---
+    stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in filtered)], -1)
     grid = stack.new_zeros(guide.scale.size, stack.shape[1])
     pixels = torch.from_numpy(cache.pixels.astype("int64"))
     grid[pixels] = stack
     smooth = joint_filter(grid.view(*guide.scale.shape, -1), guide).view(len(grid), -1)[pixels]
+    # --- Back into the tables: 9 diffuse channels, then 6 a level ---
     levels = list(tables.specular)
-    for n, k in enumerate(some):  # none where every pixel is nearly a mirror
+    for n, k in enumerate(filtered):  # none where every pixel is nearly a mirror
         first = 9 + 6 * n
         levels[k] = torch.where(placed(wide[k]), smooth[:, first : first + 6], levels[k])
     return Tables(smooth[:, :9].contiguous(), torch.stack(levels))

@@ -45,6 +45,7 @@ class LightMatrix:
     def indirect(self, slot_radiance: torch.Tensor) -> torch.Tensor:
         """[2, Q, 3] light of each part by way of other surfaces, given what leaves each slot [S, 3]."""
         light = slot_radiance[self.hit_index[1]]
+        # A sparse product, row by row: many rays of a row meet few slots.
         sums = light.new_zeros(2, len(self.pixels), 3)
         for part in range(2):
             sums[part].index_add_(0, self.hit_index[0], light * self.hit_weight[:, part : part + 1])
@@ -88,24 +89,28 @@ def light_matrix(
     specular_samples: further rays of a pixel along its specular lobe.
     """
     pixels = cache.pixels[rows]
+    # --- Materials of the chosen pixels ---
     maps = materials.roughness, materials.metallic, materials.albedo
     rough, metallic, albedo = (values.reshape(-1, *values.shape[2:])[pixels] for values in maps)
     shape = (height, 2 * height)
+
+    # --- Trace all rays, some rows at a time ---
     per_texel = max(1, round(sphere_samples / (2 * height * height)))
     scene: Any = cache.scene
     parts = torch.zeros(2, len(rows), height * 2 * height)
     hits = []
-    for some in LobeRays(cache, rows, rough, metallic, shape, per_texel, specular_samples).parts():
-        pi = scene.ray_intersect_preliminary(some.ray, coherent=False)
+    for batch in LobeRays(cache, rows, rough, metallic, shape, per_texel, specular_samples).parts():
+        pi = scene.ray_intersect_preliminary(batch.ray, coherent=False)
         slots_met = dr.gather(mi.UInt32, cache.slots, pi.prim_index, pi.is_valid())
-        slot = np.array(
-            dr.select(pi.is_valid(), slots_met, MISS)
-        )  # [N] uint32 radiance slot that each ray meets
-        index, share = texels_around(np.array(some.ray.d).T, shape)
+        slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] radiance slot of each ray
+        index, share = texels_around(np.array(batch.ray.d).T, shape)
+        # Rays that leave the scene fill T (of T E + b), those that hit a surface give b.
         leaves = slot == MISS
-        for part, weight in zip(parts, some.weights, strict=True):
-            add_footprints(part, index[leaves], share[leaves], weight[leaves], some.row[leaves])
-        hits.append((some.row[~leaves], slot[~leaves], np.stack(some.weights, -1)[~leaves]))
+        for part, weight in zip(parts, batch.weights, strict=True):
+            add_footprints(part, index[leaves], share[leaves], weight[leaves], batch.row[leaves])
+        hits.append((batch.row[~leaves], slot[~leaves], np.stack(batch.weights, -1)[~leaves]))
+
+    # --- One list of the rays that hit a surface ---
     row, slots, hit_weight = (placed(np.concatenate(h)) for h in zip(*hits, strict=True))
     return LightMatrix(
         torch.from_numpy(pixels.astype(np.int64)),

@@ -14,14 +14,14 @@ import mitsuba as mi
 import numpy as np
 
 from materialist.bsdf.disney import (
-    base_reflectance,
+    combine_by_albedo,
     diffuse_coefficients,
     half_vector_density,
     quadratic,
     schlick,
 )
 from materialist.bsdf.ggx import alpha_of, smith_g1
-from materialist.bsdf.lobes import half_vector, lifted, visible_normal
+from materialist.bsdf.lobes import half_vector, lifted, visible_normal_vector
 from materialist.buffers import floats, integers
 from materialist.transport.cache import R2, TransportCache, point, spawn
 from materialist.types import Array
@@ -72,6 +72,7 @@ class LobeRays:
     def parts(self) -> Iterator[Rays]:
         """All rays, some rows at a time."""
         total = dr.width(self._rows)
+        # Whole rows at a time, so that memory stays bounded whatever the size of the map.
         at_once = max(
             1, LANES // max(self.shape[0] * self.shape[1] * self.per_texel, self.specular)
         )
@@ -83,6 +84,7 @@ class LobeRays:
 
     def _through_texels(self, first: Any, count: int) -> Rays:
         """A ray of every row through some place of every part of every texel; uniform in solid angle there."""
+        # --- Lanes: (part of a texel, row); those below the surface are dropped first ---
         lane = dr.arange(mi.UInt32, count * self.shape[0] * self.shape[1] * self.per_texel)
         normal = self._take(self.cache.normal, first + lane % count)
         lane = mi.UInt32(
@@ -93,6 +95,7 @@ class LobeRays:
         wi = mi.Frame3f(self._take(self.cache.normal, row)).to_local(world)
         wo = self._take(self.cache.wo, row)
         rough = dr.gather(mi.Float, self._rough, row)
+        # --- Weight of the diffuse lobe: (pi f_d / A) cos / pi, over the density of rays ---
         cos_d = half_vector(wi, wo)[2]
         diffuse = (
             quadratic(diffuse_coefficients(wi.z, wo.z, cos_d), rough)
@@ -109,7 +112,9 @@ class LobeRays:
         wo = self._take(self.cache.wo, row)
         shift = self._take(self.cache.shift, row)
         sample = point(lane // count, dr.opaque(mi.UInt32, self.specular), shift)
-        wi = mi.reflect(wo, visible_normal(wo, dr.gather(mi.Float, self._alpha, row), sample))
+        wi = mi.reflect(
+            wo, visible_normal_vector(wo, dr.gather(mi.Float, self._alpha, row), sample)
+        )
         world = mi.Frame3f(self._take(self.cache.normal, row)).to_world(wi)
         base, grazing = (dr.select(wi.z > 0, w, 0) for w in self._reflected(world, wi, wo, row))
         return self._rays(world, row, 0, (base, grazing))
@@ -120,14 +125,16 @@ class LobeRays:
         part = number % self.per_texel
         height, width = self.shape
         shift = self._take(self.cache.shift, row)
-        # UInt32 as a fraction of 2^32, and its place in the point set
+        # UInt32 as a fraction of 2^32: the top 24 bits, as many as a float holds. Rotated by the pixel's shift.
         u, v = (
-            mi.Float(number * step >> 8) * 2.0**-24 + s
-            for step, s in zip(STEPS, (shift.x, shift.y), strict=True)
+            mi.Float(number * step >> 8) * 2.0**-24 + offset
+            for step, offset in zip(STEPS, (shift.x, shift.y), strict=True)
         )
         u = u - dr.floor(u)
         v = (mi.Float(part) + v - dr.floor(v)) / self.per_texel
-        above, below = (dr.cos(mi.Float(texel // width + k) * (dr.pi / height)) for k in (0, 1))
+        # Uniform in solid angle: evenly spread in the cosine of the polar angle.
+        above = dr.cos(mi.Float(texel // width) * (dr.pi / height))
+        below = dr.cos(mi.Float(texel // width + 1) * (dr.pi / height))
         y = dr.lerp(above, below, u)
         azimuth = ((mi.Float(texel % width) + v) / width - 0.5) * dr.two_pi
         flat = dr.safe_sqrt(1 - y * y)
@@ -138,6 +145,7 @@ class LobeRays:
         """Rays through texels in a unit of solid angle, by direction."""
         height, width = self.shape
         row = dr.clip(dr.floor(dr.safe_acos(world.y) * (height / dr.pi)), 0, height - 1)
+        # Solid angle of a texel: 2 pi / width times the difference of the cosines of its edges.
         y = dr.cos(row * (dr.pi / height)) - dr.cos((row + 1) * (dr.pi / height))
         return self.per_texel * width / (dr.two_pi * dr.maximum(y, 1e-9))
 
@@ -146,22 +154,27 @@ class LobeRays:
         alpha = dr.gather(mi.Float, self._alpha, row)
         _, sin2, cos_d = half_vector(wi, wo)
         along = half_vector_density(wo.z, sin2, alpha)  # of mirrored rays
+        # Balance heuristic: f / (p_texels + n p_mirrored); of f_s cos the factor F stays out.
         value = smith_g1(wi.z, alpha) * along / (self._density(world) + self.specular * along)
         fresnel = schlick(cos_d)
         return (1 - fresnel) * value, fresnel * value
 
     def _rays(self, world: Any, row: Any, diffuse: Any, specular: tuple[Any, Any]) -> Rays:
-        """A (1 - M) diffuse + C_0 base + grazing, with C_0 = R_0 (1 - M) + M A, as A times something and the rest."""
+        """Rays with their weights, split into the factor of the albedo A and the rest.
+
+        f_r cos = A (1 - M) diffuse + C_0 base + grazing, with C_0 = R_0 (1 - M) + M A.
+        """
         cache = self.cache
-        m = dr.gather(mi.Float, self._metallic, row)
+        metal = dr.gather(mi.Float, self._metallic, row)
         base, grazing = specular
-        weights = m * base + (1 - m) * diffuse, base_reflectance(0, m) * base + grazing
-        origin = self._take(cache.position, row), self._take(cache.geometric_normal, row)
-        ray = spawn(*origin, lifted(world, self._take(cache.face, row)))
-        dr.eval(ray, row, *weights)
-        return Rays(
-            ray, np.array(row).astype(np.int64), (np.array(weights[0]), np.array(weights[1]))
-        )
+        albedo_weight, rest_weight = combine_by_albedo(metal, diffuse, base, grazing)
+        position = self._take(cache.position, row)
+        geometric_normal = self._take(cache.geometric_normal, row)
+        # The ray leaves the surface on the side of its face, whatever the shading normal says.
+        ray = spawn(position, geometric_normal, lifted(world, self._take(cache.face, row)))
+        dr.eval(ray, row, albedo_weight, rest_weight)
+        weights = (np.array(albedo_weight), np.array(rest_weight))
+        return Rays(ray, np.array(row).astype(np.int64), weights)
 
     def _take(self, values: Any, row: Any) -> Any:
         return dr.gather(type(values), values, dr.gather(mi.UInt32, self._rows, row))

@@ -11,7 +11,7 @@ def shade(
 ) -> torch.Tensor:
     """[P, 3] outgoing linear radiance by the paper's simplified Disney BRDF (Preliminary), with gradients.
 
-    A (1 - M) (D0 + D1 R + D2 R^2) + C0 S0(R) + S1(R), with C0 = R_0 (1 - M) + M A.
+    L_o = A (1 - M) (D0 + D1 R + D2 R^2) + C_0 S0(R) + S1(R), with C_0 = R_0 (1 - M) + M A.
     tables: light transport at P pixels. albedo: [P, 3] in [0, 1]; roughness: [P] perceptual; metallic: [P].
     """
     r = roughness[:, None]
@@ -28,9 +28,11 @@ def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
     if len(tables.specular) == 1:
         return tables.specular[0]
     levels = torch.tensor(ROUGHNESS_LEVELS).to(roughness)
+    # --- The two levels around each pixel's roughness, and its place between them ---
     r = roughness.clamp(levels[0], levels[-1])
     low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
     t = ((r - levels[low]) / (levels[low + 1] - levels[low]))[:, None]
+    # --- Both tables at each pixel, by one index into [L * P, 6] ---
     flat = tables.specular.view(-1, 6)
     index = low * len(r) + torch.arange(len(r), device=r.device)
     s_low = flat[index]

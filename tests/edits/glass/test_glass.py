@@ -9,7 +9,7 @@ from geometry_scenes import plane_depth, sphere_depth
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import LID, NARROW, NO_ROOM, SOLID, glass
-from materialist.edits.glass.preview import GlassPreview
+from materialist.edits.glass.glass_preview import GlassPreview
 from materialist.edits.glass.thickness import object_thickness, objects_in
 from materialist.errors import InputError
 from materialist.solids.revolution import Revolution

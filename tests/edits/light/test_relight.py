@@ -171,7 +171,7 @@ def test_a_full_turn_is_closed_and_paths_reach_their_ends():
 
 
 def test_lights_are_environment_maps():
-    made = {name: presets.light(name, 64) for name in presets.LIGHTS}
+    made = {name: presets.preset_light(name, 64) for name in presets.LIGHTS}
     assert all(
         checked_envmap(light).shape == (64, 128, 3) and 0 < light.mean() < 20
         for light in made.values()

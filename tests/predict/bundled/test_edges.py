@@ -7,8 +7,8 @@ import pytest
 from materialist.camera import pixel_rays
 from materialist.predict.bundled.edges import (
     GuidedFilter,
+    demanded_slopes,
     least_squares_change,
-    slopes,
     weighted_median,
     with_relief,
 )
@@ -118,11 +118,11 @@ def test_a_plane_has_the_slopes_of_its_depth():
     rays = pixel_rays(Camera(160, 120, 40.0))
     normal = np.array([0.3, -0.2, 0.9]) / np.linalg.norm([0.3, -0.2, 0.9])
     log_depth = np.log(-2.0 / (rays @ normal))
-    across, down = slopes(np.broadcast_to(normal, rays.shape), rays)
+    across, down = demanded_slopes(np.broadcast_to(normal, rays.shape), rays)
     assert np.abs((across[:, 1:] + across[:, :-1]) / 2 - np.diff(log_depth, axis=1)).max() < 1e-6
     assert np.abs((down[1:] + down[:-1]) / 2 - np.diff(log_depth, axis=0)).max() < 1e-6
     away = np.broadcast_to(np.array([1.0, 0, 0]), rays.shape)
-    assert np.isfinite(slopes(away, rays)).all()  # grazing
+    assert np.isfinite(demanded_slopes(away, rays)).all()  # grazing
 
 
 def test_the_change_solves_the_dense_least_squares_problem():

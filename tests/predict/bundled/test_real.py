@@ -1,11 +1,11 @@
 """The weights that ship, on real photos: a measured depth, and another network's maps."""
 
-from materialist.bench.real.captures import garage_photo, garages
-from materialist.bench.real.photos import Reading
 from materialist.io.photo import read_photo
-from materialist.metrics.maps import depth_figures, mean_angle, ordinal_accuracy
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.maps import MapsPredictor
+from materialist_lab.bench.real.captures import garage_photo, garages
+from materialist_lab.bench.real.photos import Reading
+from materialist_lab.metrics.maps import depth_figures, mean_angle, ordinal_accuracy
 
 
 def test_a_cluttered_garage_is_mostly_in_the_right_order(real_data):

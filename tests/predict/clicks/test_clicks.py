@@ -6,9 +6,9 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.predict.clicks.features import BOX, CHANNELS, NORMAL_X, SPOT, features
+from materialist.predict.clicks.features import BOX, CHANNELS, NORMAL_X, SPOT, click_features
 from materialist.predict.clicks.network import ClickNet
-from materialist.predict.clicks.segment import object_at
+from materialist.predict.clicks.segment import object_likelihood
 from materialist.predict.network import UNetArchitecture
 from materialist.types import Camera
 
@@ -55,7 +55,7 @@ def untrained(tmp_path_factory):
 
 def test_features_have_closed_forms():
     photo, _ = scene()
-    maps = features(*photo, [(80, 66)])
+    maps = click_features(*photo, [(80, 66)])
     assert maps.shape == (CHANNELS, 120, 160) and maps.dtype == np.float32
     y, x = np.indices((120, 160))
     np.testing.assert_allclose(maps[DISTANCE], np.hypot(x - 80, y - 66) / 160, atol=1e-6)
@@ -67,7 +67,7 @@ def test_features_have_closed_forms():
 
 def test_a_box_stands_for_a_click_in_its_middle():
     photo, _ = scene()
-    maps = features(*photo, box=(60, 40, 101, 91))
+    maps = click_features(*photo, box=(60, 40, 101, 91))
     rows, columns = np.nonzero(maps[BOX])
     assert (columns.min(), rows.min(), columns.max(), rows.max()) == (60, 40, 100, 90)
     assert maps[BOX].sum() == 41 * 51 and not maps[SPOT].any() and maps[DISTANCE, 65, 80] == 0
@@ -75,28 +75,31 @@ def test_a_box_stands_for_a_click_in_its_middle():
     np.testing.assert_allclose(
         maps[COLOUR], np.moveaxis(np.abs(photo[0] - inner), -1, 0), atol=1e-6
     )
-    assert not features(*photo, [(80, 66)])[BOX].any()
+    assert not click_features(*photo, [(80, 66)])[BOX].any()
 
 
 def test_a_mirrored_photo_has_mirrored_features():
     (rgb, normal, depth), _ = scene()
     other = rgb[:, ::-1], normal[:, ::-1] * [-1, 1, 1], depth[:, ::-1]
-    there = features(*other, [(159 - 70, 50)])[..., ::-1].copy()
+    there = click_features(*other, [(159 - 70, 50)])[..., ::-1].copy()
     there[NORMAL_X] *= -1
-    np.testing.assert_allclose(there, features(rgb, normal, depth, [(70, 50)]), atol=1e-6)
+    np.testing.assert_allclose(there, click_features(rgb, normal, depth, [(70, 50)]), atol=1e-6)
 
 
 @pytest.mark.parametrize("size", [(40, 300), (9, 9)])
 def test_photos_of_any_shape(untrained, size):
     rng = np.random.default_rng(0)
     photo = [rng.random((*size, *more), np.float32) for more in ((3,), (3,), ())]
-    assert object_at(*photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape == size
+    assert (
+        object_likelihood(*photo, [(size[1] - 1, 0), (0, size[0] - 1)], weights=untrained).shape
+        == size
+    )
 
 
 @pytest.mark.parametrize("box", [(158, 0, 160, 1), (0, 0, 160, 119), (3, 50, 4, 120)])
 def test_boxes_of_any_shape(untrained, box):
     photo, _ = scene()
-    found = object_at(*photo, box=box, weights=untrained)
+    found = object_likelihood(*photo, box=box, weights=untrained)
     assert found.shape == (120, 160) and np.isfinite(found).all()
 
 
@@ -105,7 +108,7 @@ def test_boxes_of_any_shape(untrained, box):
 )
 def test_places_outside_are_errors(untrained, where):
     with pytest.raises(InputError, match="inside 160 x 120 pixels"):
-        object_at(*scene()[0], **where, weights=untrained)
+        object_likelihood(*scene()[0], **where, weights=untrained)
 
 
 @pytest.mark.parametrize(
@@ -113,5 +116,5 @@ def test_places_outside_are_errors(untrained, where):
 )
 def test_the_weights_that_ship_find_a_ball(where):
     photo, ball = scene()
-    found = object_at(*photo, **where) > 0.5
+    found = object_likelihood(*photo, **where) > 0.5
     assert (found & ball).sum() / (found | ball).sum() > 0.6

@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from materialist.predict.matnet.network import MatNet
-from materialist.predict.matnet.predictor import infer
+from materialist.predict.matnet.predictor import infer_matnet
 
 MAPS = ("albedo", "roughness", "metallic", "normal", "depth")
 
@@ -65,6 +65,6 @@ def test_forward_is_the_published_one(network, expected):
 
 
 def test_inference_is_the_published_one(network, expected):
-    outputs = infer(network, expected["image"], input_size=140)
+    outputs = infer_matnet(network, expected["image"], input_size=140)
     for name in MAPS:
         assert worst(outputs[name], expected[f"infer140_{name}"]) < 1e-4, name

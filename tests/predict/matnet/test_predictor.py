@@ -12,7 +12,12 @@ from safetensors.torch import save_file
 from materialist.errors import WeightsError
 from materialist.predict import get_predictor
 from materialist.predict.matnet.network import PATCH, MatNet
-from materialist.predict.matnet.predictor import MatNetPredictor, infer, network_size, planar_depth
+from materialist.predict.matnet.predictor import (
+    MatNetPredictor,
+    infer_matnet,
+    network_size,
+    planar_depth,
+)
 from materialist.predict.weights import write_weights
 
 
@@ -44,7 +49,7 @@ def test_prediction_is_the_networks_answer_in_our_conventions(tmp_path, state):
     photo = made_photo()
     predictor = MatNetPredictor(saved(tmp_path / "w.pth", state), input_size=28)
     prediction = predictor.predict(photo)
-    raw = infer(made_network(), photo.linear, input_size=28)
+    raw = infer_matnet(made_network(), photo.linear, input_size=28)
     assert np.array_equal(prediction.materials.albedo, raw["albedo"].clip(0, 1))
     assert np.array_equal(prediction.materials.roughness, raw["roughness"].clip(0, 1))
     assert np.array_equal(prediction.materials.metallic, raw["metallic"].clip(0, 1))
@@ -151,7 +156,7 @@ def test_a_network_trained_here_answers_with_depth_itself(tmp_path, state):
     photo = made_photo(42, 56)
     write_weights(tmp_path / "own.safetensors", state, {"format": MatNet.FORMAT})
     published = MatNetPredictor(saved(tmp_path / "plain.pth", state), device="cpu", input_size=28)
-    output = infer(published.network, photo.linear, input_size=published.input_size)["depth"]
+    output = infer_matnet(published.network, photo.linear, input_size=published.input_size)["depth"]
     assert np.ptp(output) > 0
     np.testing.assert_allclose(published.predict(photo).depth, planar_depth(output), rtol=1e-5)
     own = (

@@ -5,7 +5,7 @@ import pytest
 from geometry_scenes import ball
 
 from materialist.camera import pixel_rays
-from materialist.predict.refraction.network import LEAST
+from materialist.predict.refraction.network import MIN_THICKNESS
 from materialist.predict.refraction.thickness import WEIGHTS, best_thickness, thickness
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Camera
@@ -24,7 +24,7 @@ def test_an_untrained_network_gives_the_symmetry_prior(untrained, size):
     photo, mask, normal, depth, _ = seen(camera)
     found = thickness(photo, mask, normal, depth, camera, weights=untrained)
     mirror = symmetric_thickness(depth, normal, mask, camera)
-    step = LEAST * np.sqrt(mask.sum()) * np.median(depth[mask]) / camera.focal
+    step = MIN_THICKNESS * np.sqrt(mask.sum()) * np.median(depth[mask]) / camera.focal
     assert np.abs(found.solid - mirror - step)[mask].mean() < 0.12 * mirror[mask].mean()
     np.testing.assert_allclose(found.hollow[mask], found.solid[mask] / 2, rtol=1e-4)
     assert found.solid.shape == mask.shape and found.solid.dtype == np.float32

@@ -199,7 +199,7 @@ def test_uploads_have_a_quota(shared, monkeypatch):
     def send(size, browser=page):
         return browser.post("/gradio_api/upload", content=b"x" * size)
 
-    monkeypatch.setattr(quota, "SMALLEST", 1)
+    monkeypatch.setattr(quota, "MIN_BYTES", 1)
     monkeypatch.setattr(shared.quota, "settle", lambda claim, stored: None)  # as if all was stored
     assert send(600).status_code == 200
     assert send(300).status_code == 200

@@ -68,7 +68,7 @@ def test_what_was_promised_and_never_came_is_given_back(page, shared):
     browser(page).post(
         "/gradio_api/upload", content=FORM, headers=kind | {"content-length": "50000000"}
     )
-    assert shared.quota._stored("1.2.3.4") <= quota.SMALLEST
+    assert shared.quota._stored("1.2.3.4") <= quota.MIN_BYTES
 
 
 def test_a_folder_of_the_user_is_never_swept(tmp_path):
@@ -150,7 +150,7 @@ def test_few_uploads_are_opened_at_once_and_one_of_each_sender(monkeypatch, tmp_
     def open_one(sender):
         allowance = quota.Allowance(shared_quota, lambda: sender)
         try:
-            uploads.opened(uploads.checked, file, allowance, option="texture")
+            uploads.opened_upload(uploads.checked_upload, file, allowance, option="texture")
         except InputError as error:
             refusals.append(str(error))
 
@@ -180,7 +180,7 @@ def test_a_promise_is_settled_with_the_address_that_made_it(shared):
     shared.quota.settle(claim, 0)
     assert shared.quota._stored("1.2.3.4") == 0
     shared.quota.settle(claim, 90_000_000)
-    assert shared.quota._stored("1.2.3.4") <= quota.SMALLEST
+    assert shared.quota._stored("1.2.3.4") <= quota.MIN_BYTES
     assert shared.quota._stored("5.6.7.8") == 0
 
 
@@ -230,20 +230,20 @@ def test_a_large_texture_is_shrunk_before_the_server_reads_it(tmp_path, monkeypa
     rng = np.random.default_rng(0)
     write_png(tmp_path / "wood.png", rng.integers(0, 255, (60, 80, 3)).astype(np.uint8))
     write_exr(tmp_path / "sky.exr", rng.random((40, 80, 3), np.float32) * 9)
-    smaller = uploads.checked(None, tmp_path / "wood.png", "texture")
+    smaller = uploads.checked_upload(None, tmp_path / "wood.png", "texture")
     assert smaller.suffix == ".png" and math.prod(image_size(smaller)) <= 1000
-    light = uploads.checked(None, tmp_path / "sky.exr", "envmap")
+    light = uploads.checked_upload(None, tmp_path / "sky.exr", "envmap")
     assert light.suffix == ".exr" and math.prod(image_size(light)) <= 1000
     assert read_exr(light).mean() == pytest.approx(4.5, rel=0.02)
     with pytest.raises(InputError, match="may have up to"):
-        uploads.checked(None, tmp_path / "wood.png", "mask")
+        uploads.checked_upload(None, tmp_path / "wood.png", "mask")
 
 
 def test_a_mesh_of_many_faces_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(mesh_faces=10))
     box_file(tmp_path / "box.ply")
     with pytest.raises(InputError, match="12 faces; the studio takes up to 10"):
-        uploads.checked(None, tmp_path / "box.ply", uploads.MESH)
+        uploads.checked_upload(None, tmp_path / "box.ply", uploads.MESH)
 
 
 def test_a_large_scene_is_refused(tmp_path, monkeypatch):

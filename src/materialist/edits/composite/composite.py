@@ -125,11 +125,15 @@ def _base(
     )
 
 
-def _same_base(scene: Scene, one: Scene, other: Scene) -> bool:
-    if dimmed_emitters(scene, one) != dimmed_emitters(scene, other) or one.photo is not other.photo:
+def _same_base(scene: Scene, first: Scene, second: Scene) -> bool:
+    """Whether two edits are compared with the same base, which then is rendered once."""
+    if first.photo is not second.photo:
         return False
-    return one.photo is scene.photo or (
-        one.geometry is other.geometry and one.materials is other.materials
+    if dimmed_emitters(scene, first) != dimmed_emitters(scene, second):
+        return False
+    # A photo of its own shows what a removal disclosed: then maps and geometry count, too.
+    return first.photo is scene.photo or (
+        first.geometry is second.geometry and first.materials is second.materials
     )
 
 
@@ -145,6 +149,7 @@ def _picture(
     progress=None,
 ) -> Array:
     """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
+    # --- The plain rendering, as in the paper ---
     if full_render:
         if is_pictured(edited):
             raise InputError(
@@ -153,11 +158,12 @@ def _picture(
         picture = renderer.pair(edited)[1](spp, seed)
         picture = denoised(picture, *renderer.guides(edited)) if denoise else picture
         return picture if upscale is None else _enlarged(picture, upscale)
+    # --- The composite: the difference of two renderings, laid on the photo ---
     shared: dict[str, Any] = {"seed": seed, "clean": denoise, "progress": progress}
     layers = render_layers(renderer, edited, spp=spp, **shared)
     dimmed = dimmed_emitters(scene, edited)
     lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
-    return into_photo(renderer.scene.photo, layers, lights)
+    return into_photo(renderer.scene.photo, layers, lights, progress)
 
 
 def _enlarged(picture: Array, upscale: Upscale) -> Array:
@@ -185,6 +191,7 @@ def developed(
 
     Edits of it start there.
     """
+    # --- The composite as a photo of its own ---
     size = (scene.camera.width, scene.camera.height)
     same = picture.shape[:2] == size[::-1]
     linear = (
@@ -198,6 +205,7 @@ def developed(
         deep=is_deep(scene.photo),
         exif=copied_exif(scene.photo).tobytes(),
     )
+    # --- Its re-rendering, and how well that agrees ---
     again = rendered(edited, spp=RERENDERED, seed=seed, device=device)
     figures = {"rerender_psnr_path": metrics.psnr(again, photo.linear)}
     figures["rerender_ssim_path"] = metrics.ssim(again, photo.linear)

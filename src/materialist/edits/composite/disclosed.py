@@ -13,7 +13,7 @@ from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
 from materialist.types import Array, Materials, Scene
 
-LEAST = 1e-3
+MIN_CHANGE = 1e-3
 """Relative change of the radiance below which a filled pixel stays as it was filled."""
 
 RIM = 3
@@ -67,20 +67,26 @@ def without_traces(
     base = compared(scene, edited)
     if base.photo is scene.photo:
         return base
+    # --- What the renderings say: the scene with the object, and without it ---
+    # --- What the renderings say: the scene with the object, and without it ---
     hole = _disclosed(scene, edited)
     photo = base.photo
     # Planes that the rest of the picture suggests when the object is gone were there before.
     before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
-    guides = [(one.materials.albedo, one.normal) for one in (before, base)] if denoise else None
+    guides = (
+        [(shown.materials.albedo, shown.normal) for shown in (before, base)] if denoise else None
+    )
     pair = EditRenderer(before, device=device).pair(base)
     tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
+    # Nothing is known under the hole: its surroundings are carried over it.
     spanned = grown(hole, RIM)
     layers = difference(
         *pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp, seed=seed, progress=tick
     )
+    # --- Their ratio, spanned over the hole, and applied to the photo ---
     factor = np.log((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor))
     factor = np.where(spanned[..., None], membrane(factor, ~spanned), factor)
-    reached = np.where(spanned, np.abs(factor).max(-1) > LEAST, layers.reached)
+    reached = np.where(spanned, np.abs(factor).max(-1) > MIN_CHANGE, layers.reached)
     layers = replace(
         layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached
     )

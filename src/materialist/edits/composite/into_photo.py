@@ -11,37 +11,32 @@ from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import grown, window
-from materialist.types import Array, Photo
+from materialist.types import Array, Photo, Progress
 
 
 @dataclass(frozen=True)
 class CompositeSettings:
     """How the photo's residual over the fit follows an edit; tuned by eye unless derived."""
 
-    floor: float = 0.02  # radiance added to both sides of edited / base; larger trusts ratios of dark pixels less
-    most_detail: float = (
-        2.0  # largest factor on the photo's detail beyond working size under another light
-    )
-    edge: int = (
-        2  # working pixels to either side of a changed surface's border; derived: the matte's reach
-    )
-    rim: float = 4.0  # working pixels by which the change beside a body goes on under it; derived: upsampling's reach
-    white: float = 0.995  # channel of a linear photo from which it is clipped; derived: 8 bits
-    clipped: float = (
-        0.97  # least channel of a pixel of an emitter from which it is clipped; derived: 8 bits
-    )
-    nearly: float = (
-        0.9  # least channel from which a pixel of an emitter may be brighter than it looks
-    )
-    threads: int = (
-        4  # strips of a large photo that are made at a time, about 0.2 GB each; derived: memory
-    )
+    floor: float = 0.02  # radiance added to edited and base: ratios of dark pixels count less
+    max_detail_factor: float = 2.0  # on the photo's finest detail, under another light
+    edge_pixels: int = 2  # working pixels beside a changed border; derived: the matte's reach
+    rim_pixels: float = 4.0  # by which a change goes on under a body; derived: upsampling's reach
+    clipped_photo: float = 0.995  # channel of a linear photo that is clipped; derived: 8 bits
+    clipped_emitter: float = 0.97  # least channel of an emitter's clipped pixel; derived: 8 bits
+    bright_emitter: float = 0.9  # least channel from which it may be brighter than it looks
+    max_threads: int = 4  # strips of a large photo made together, 0.2 GB each; derived: memory
 
 
 SETTINGS = CompositeSettings()
 
 
-def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None = None) -> Array:
+def into_photo(
+    photo: Photo,
+    layers: Layers,
+    lights: tuple[Array, dict] | None = None,
+    progress: Progress | None = None,
+) -> Array:
     """[H0, W0, 3] the photo with the difference of two renderings added.
 
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
@@ -53,34 +48,41 @@ def into_photo(photo: Photo, layers: Layers, lights: tuple[Array, dict] | None =
 
     lights: of in-photo emitters that are dimmed: where they are seen, and what is known of them; see `in_photo`.
     """
-    picture = _changed(photo, layers) if layers.reached.any() else photo.original.copy()
+    tick = progress or (lambda *_: None)
+    picture = _changed(photo, layers, tick) if layers.reached.any() else photo.original.copy()
     if lights is not None:
         picture = in_photo(picture, photo, *lights)
-    if layers.native is None:
+    if layers.native is None or not layers.native.share.any():
         return picture
-    share = layers.native.share[..., None]
-    own = layers.native.picture
-    own = own if photo.hdr else np.where(share < 1, np.minimum(own, 1), own)
-    return np.where(share > 0, share * own + (1 - share) * picture, picture).astype(np.float32)
+    # --- New bodies, where they are seen ---
+    box = window(layers.native.share > 0)
+    share = layers.native.share[box][..., None]
+    bodies = layers.native.picture[box]
+    bodies = bodies if photo.hdr else np.where(share < 1, np.minimum(bodies, 1), bodies)
+    here = picture[box]
+    picture[box] = np.where(share > 0, share * bodies + (1 - share) * here, here)
+    return picture
 
 
-def _changed(photo: Photo, layers: Layers) -> Array:
+def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
     """[H0, W0, 3] the same without the new bodies."""
-    out = photo.original.copy()
+    # --- All terms at working size, and how they are enlarged ---
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     upsample = GuidedUpsample(photo.linear, photo.original)
-    native = out.shape[:2]
+    native = photo.original.shape[:2]
     alpha = matte(layers.changed, photo.original)
     stack, clear = _under_bodies(stack, layers)
     changed = layers.changed
     reached = (stack[..., :3] != 0).any(-1)
+    out = photo.original.copy()
     if not reached.any():
         return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
+    # Two sides of the border of a replaced surface: each is enlarged from its own pixels.
     sides = [
-        (stack[nearest(own)] if upsample.same and own.any() else stack * own.any(), own)
-        for own in (changed & clear, ~changed & clear)
+        (stack[nearest(side)] if upsample.same and side.any() else stack * side.any(), side)
+        for side in (changed & clear, ~changed & clear)
     ]
 
     def laid(rows: slice) -> None:
@@ -88,11 +90,13 @@ def _changed(photo: Photo, layers: Layers) -> Array:
         share = alpha[rows, columns]
         large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
         for part, side in zip((share, 1 - share), sides, strict=True):
-            where = np.flatnonzero((part > 0).any(0))
-            if where.size:
-                own = slice(int(where[0]), int(where[-1]) + 1)
-                there = slice(columns.start + own.start, columns.start + own.stop)
-                large[:, own] += part[:, own, None] * upsample(*side, rows, there)
+            # Only the columns that this side has a share in.
+            used = np.flatnonzero((part > 0).any(0))
+            if used.size:
+                local = slice(int(used[0]), int(used[-1]) + 1)
+                native_columns = slice(columns.start + local.start, columns.start + local.stop)
+                large[:, local] += part[:, local, None] * upsample(*side, rows, native_columns)
+        # out = photo + change + (factor - 1) (photo - reference), see `into_photo`.
         change = large[..., :3]
         excess = large[..., 3:6]
         reference = large[..., 6:]
@@ -100,8 +104,12 @@ def _changed(photo: Photo, layers: Layers) -> Array:
         moved = np.maximum(held + change + excess * (held - reference), 0)
         out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
 
-    with ThreadPoolExecutor(min(SETTINGS.threads, os.cpu_count() or 1)) as threads:
-        list(threads.map(laid, strips(box.stop, start=box.start)))
+    # --- Strip by strip, which bounds the memory ---
+    parts = list(strips(box.stop, start=box.start))
+    with ThreadPoolExecutor(min(SETTINGS.max_threads, os.cpu_count() or 1)) as threads:
+        for done, _ in enumerate(threads.map(laid, parts)):
+            tick("photo", done, len(parts))
+    tick("photo", len(parts), len(parts))
     return out
 
 
@@ -121,12 +129,14 @@ def _terms(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     change, excess, reference = (_other_light if layers.relit else _same_light)(photo, layers)
     if layers.covered is not None:
         # A body in place of the photo's surface: the rendering alone is seen, and no residual of the photo.
-        own = layers.covered[..., None]
-        change = np.where(own, layers.edited - reference, change)
-        excess = np.where(own, -1, excess)
+        covered = layers.covered[..., None]
+        change = np.where(covered, layers.edited - reference, change)
+        excess = np.where(covered, -1, excess)
     if not (photo.hdr or layers.relit):
         # As with the rim of bodies: where a surface ends, white is mixed in, not what outshines it.
-        edge = grown(layers.changed, SETTINGS.edge) & grown(~layers.changed, SETTINGS.edge)
+        edge = grown(layers.changed, SETTINGS.edge_pixels) & grown(
+            ~layers.changed, SETTINGS.edge_pixels
+        )
         change = np.where(edge[..., None], np.minimum(change, np.maximum(1 - reference, 0)), change)
     return change.astype(np.float32), excess.astype(np.float32), reference
 
@@ -137,6 +147,7 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
     factor = edited / base, and does not grow (a ratio above 1 is taken as 1). New metal hides it.
     """
+    # A brighter surface does not amplify what the fit misses of the photo.
     factor = np.minimum((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor), 1)
     if layers.diffuse is not None:
         factor = factor * layers.diffuse[..., None]
@@ -153,13 +164,14 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     edited = np.maximum(layers.edited, 0)
     floor = SETTINGS.floor
     factor = (edited + floor) / (base + floor)
+    # g: the change of the light as a whole.
     overall = np.exp(np.median(np.log(factor).reshape(-1, 3), axis=0))
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
     dimmed = overall * held
     moved = np.clip(
         (held + floor) * factor - floor, np.minimum(dimmed, edited), np.maximum(dimmed, edited)
     )
-    return moved - photo.linear, np.minimum(factor, SETTINGS.most_detail) - 1, photo.linear
+    return moved - photo.linear, np.minimum(factor, SETTINGS.max_detail_factor) - 1, photo.linear
 
 
 def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
@@ -171,35 +183,38 @@ def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
     if clear.all() or not clear.any():
         return stack, clear
     away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
-    return stack[row, column], away <= SETTINGS.rim
+    return stack[row, column], away <= SETTINGS.rim_pixels
 
 
 def _unclipped(photo: Array, base: Array) -> Array:
     """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
-    return np.where(photo >= SETTINGS.white, np.maximum(photo, base), photo)
+    return np.where(photo >= SETTINGS.clipped_photo, np.maximum(photo, base), photo)
 
 
-def in_photo(picture: Array, photo: Photo, seen: Array, found: dict) -> Array:
+def in_photo(picture: Array, photo: Photo, seen: Array, emitters: dict) -> Array:
     """[H0, W0, 3] a composite in which emitters show the photo itself, dimmed: with the trees in the window.
 
-    Clipped pixels have the estimated radiance of the emitters. seen: [H, W] bool: where lights are seen. found:
+    Clipped pixels have the estimated radiance of the emitters. seen: [H, W] bool: where lights are seen. emitters:
     `core.surfaces.KEY` of the provenance.
     """
-    dim = float(found["dim"])
+    dim = float(emitters["dim"])
     if dim == 1 or not seen.any():
         return picture
     share = matte(seen, photo.original)
     picture = picture.copy()
     box = window(seen, picture.shape[:2], 4)
     share = share[box][..., None]
-    seen_so = photo.original[box]
+    original = photo.original[box]
     here = picture[box]
-    white = seen_so.min(-1, keepdims=True)
-    own = dim * seen_so
+    white = original.min(-1, keepdims=True)
+    light = dim * original
     if not photo.hdr:
-        whole = np.clip((white - SETTINGS.nearly) / (SETTINGS.clipped - SETTINGS.nearly), 0, 1)
-        lifted = own * (1 + max(found["radiance"] - 1, 0) * whole)
+        # From bright to clipped, pixels rise from the photo's radiance to the estimated one.
+        span = SETTINGS.clipped_emitter - SETTINGS.bright_emitter
+        clipped = np.clip((white - SETTINGS.bright_emitter) / span, 0, 1)
+        lifted = light * (1 + max(emitters["radiance"] - 1, 0) * clipped)
         # What is not clipped is as bright as it is, and dimming brightens nothing.
-        own = np.where((white < SETTINGS.clipped) & (dim < 1), np.minimum(lifted, seen_so), lifted)
-    picture[box] = np.where(share > 0, share * own + (1 - share) * here, here)
+        unclipped = (white < SETTINGS.clipped_emitter) & (dim < 1)
+        light = np.where(unclipped, np.minimum(lifted, original), lifted)
+    picture[box] = np.where(share > 0, share * light + (1 - share) * here, here)
     return picture

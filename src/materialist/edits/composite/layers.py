@@ -22,20 +22,21 @@ from materialist.types import Array, Scene
 class LayerSettings:
     """What counts as a difference, and as a firefly; tuned by eye unless derived."""
 
-    first: int = 16  # one in so many of all paths, in each half, finds out where the edit reaches
-    least_first: int = (
-        8  # paths of each half that do so at the least, below 144 paths; at 16 all of them
-    )
-    lattice: int = 256  # pixels along the longer side that do so
-    window: int = 9  # pixels across, over which a difference and its noise are measured; larger sees fainter light
-    visible: float = (
-        1 / 255
-    )  # least change of an sRGB-encoded channel; derived: a level of an 8-bit picture
-    sigmas: float = 3.0  # standard errors by which a mean difference must stand out; derived: 1 in 400 by chance
-    least_gain: float = 0.25  # gain below which a difference is none
-    margin: int = 16  # pixels around them that the denoiser sees
-    bright: float = 1.0  # radiance up to which nothing is a firefly: below white a sparkle does no harm; derived
-    times: float = 3.0  # multiple of the second brightest of the eight neighbours from which a pixel is a firefly
+    # Probing: few paths on a lattice of pixels find out where the edit reaches.
+    probe_divisor: int = 16  # one in so many of all paths probes, in each half
+    min_probe_paths: int = 8  # of each half, below 144 paths; at 16 paths all of them
+    lattice: int = 256  # pixels along the longer side that probe
+
+    # What counts as a difference.
+    window: int = 9  # pixels across, over which it is measured; larger sees fainter light
+    min_change: float = 1 / 255  # of an sRGB-encoded channel; derived: a level of 8 bits
+    min_sigmas: float = 3.0  # standard errors that it must exceed; derived: 1 in 400 by chance
+    min_gain: float = 0.25  # below it a difference is none
+    denoiser_margin: int = 16  # pixels around it that the denoiser sees
+
+    # Fireflies.
+    min_firefly: float = 1.0  # radiance; below white a sparkle does no harm; derived
+    firefly_ratio: float = 3.0  # to the second brightest of the eight neighbours
 
 
 SETTINGS = LayerSettings()
@@ -84,7 +85,10 @@ def render_layers(
     if not changed.any() and same_shapes(scene, edited):
         nothing = np.zeros_like(scene.photo.linear)
         return Layers(nothing, nothing, changed, changed)
-    guides = [(one.materials.albedo, one.normal) for one in (scene, edited)]
+    guides = [(shown.materials.albedo, shown.normal) for shown in (scene, edited)]
+
+    # Bodies and lamps that only one of the scenes has: at native size, with an outline of
+    # their own.
     alone = None
     covered = None
     hidden = None
@@ -98,8 +102,10 @@ def render_layers(
             hidden = inner(alone.inside == 1)
         if clean:
             guides[1] = renderer.guides(edited, anything)
-    how: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
-    layers = difference(base, other, changed, guides if clean else None, **how)
+
+    # --- Everything else, at working size ---
+    options: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
+    layers = difference(base, other, changed, guides if clean else None, **options)
     return replace(
         layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited)
     )
@@ -107,7 +113,9 @@ def render_layers(
 
 def diffuse_left(scene: Scene, edited: Scene) -> Array:
     """[H, W] in [0, 1]: `Layers.diffuse` of an edit."""
-    old, new = (np.maximum(1 - one.materials.metallic, 1e-3) for one in (scene, edited))
+    # The diffuse lobe has the factor (1 - M).
+    old = np.maximum(1 - scene.materials.metallic, 1e-3)
+    new = np.maximum(1 - edited.materials.metallic, 1e-3)
     return np.minimum(new / old, 1)
 
 
@@ -151,53 +159,64 @@ def difference(
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     half = -(-spp // 2)
-    first = min(half, max(SETTINGS.least_first, spp // SETTINGS.first))
+    probe_paths = min(half, max(SETTINGS.min_probe_paths, spp // SETTINGS.probe_divisor))
     tick = progress or (lambda *_: None)
     seeds = (2 * seed, 2 * seed + 1)
     done = count()
-    steps = 2 * (1 + (not changed.all()) + (half > first))
-    wanted = np.ones_like(changed) if hidden is None else ~hidden
+    steps = 2 * (1 + (not changed.all()) + (half > probe_paths))
+    shown_pixels = np.ones_like(changed) if hidden is None else ~hidden
 
     def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
         tick("render", next(done), steps)
-        return base(paths, seed, of_base & wanted), edited(paths, seed, of_edited & wanted)
+        return base(paths, seed, of_base & shown_pixels), edited(
+            paths, seed, of_edited & shown_pixels
+        )
 
+    # --- Probe: where does the edit reach beyond the pixels that it replaces? ---
     near = changed
     if not changed.all():
         step = max(1, round(max(changed.shape) / SETTINGS.lattice))
         lattice = np.zeros_like(changed)
         lattice[::step, ::step] = True
-        few = [p[::step, ::step] for k in seeds for p in traced(first, k, lattice, lattice)]
+        few = [p[::step, ::step] for k in seeds for p in traced(probe_paths, k, lattice, lattice)]
         # Parts that chance makes are as large as a window or two.
         large = remove_small_objects(_gain(*few) > 0, max_size=2 * SETTINGS.window**2 // step**2)
         near = (
             changed
             | np.kron(large, np.ones((step, step), bool))[: len(changed), : changed.shape[1]]
         )
-    if half > first:
+    if half > probe_paths:
         near = grown(near, SETTINGS.window)
-    shown = grown(near, SETTINGS.margin)
+
+    # --- Trace both pictures there, in two halves of different seeds ---
+    shown = grown(near, SETTINGS.denoiser_margin)
     pairs = []
     for k in seeds:
-        pair = [np.where(shown[..., None], one, 0) for one in traced(first, k, shown, near)]
-        if half > first:
-            added = traced(half - first, k + 2, near, near)
-            share = (half - first) / half * near[..., None]
+        probed = traced(probe_paths, k, shown, near)
+        pair = [np.where(shown[..., None], picture, 0) for picture in probed]
+        if half > probe_paths:
+            added = traced(half - probe_paths, k + 2, near, near)
+            share = (half - probe_paths) / half * near[..., None]
             pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
         pairs.append((pair[0], np.where(near[..., None], pair[1], pair[0])))
     tick("render", steps, steps)
+
+    # --- What the halves agree on is the edit, what they disagree on is noise ---
     (b0, e0), (b1, e1) = pairs
     differs = ((e0 != b0) | (e1 != b1)).any(-1)  # [H, W]
-    b, e = ((one + other) / 2 for one, other in ((b0, b1), (e0, e1)))
+    b = (b0 + b1) / 2
+    e = (e0 + e1) / 2
     if not differs.any():
         return Layers(b, b, differs, differs)
     gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
+
+    # --- Denoise both, and keep the difference by its gain ---
     if guides is not None:
-        box = window(near, margin=SETTINGS.margin)
-        for picture, noisy, maps in zip(
+        box = window(near, margin=SETTINGS.denoiser_margin)
+        for picture, noisy, (albedo, normal) in zip(
             (b, e), (b, without_fireflies(e, changed)), guides, strict=True
         ):
-            picture[box] = denoised(noisy[box], *(one[box] for one in maps))
+            picture[box] = denoised(noisy[box], albedo[box], normal[box])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
@@ -210,23 +229,19 @@ def inner(hidden: Array) -> Array:
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
     """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
-    base, edited = (
-        np.maximum(_mean(((one + other) / 2).astype(np.float32)), 0)
-        for one, other in ((b0, b1), (e0, e1))
-    )
+    base = np.maximum(_mean(((b0 + b1) / 2).astype(np.float32)), 0)
+    edited = np.maximum(_mean(((e0 + e1) / 2).astype(np.float32)), 0)
+    # Above white both are scaled down together: a change there is seen by its share.
     white = np.maximum(np.maximum(base, edited), 1)
-    seen = (
-        np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1)
-        >= SETTINGS.visible
-    )
-    return np.where(seen, significance(e0 - b0, e1 - b1), 0)
+    change = np.abs(linear_to_srgb(edited / white) - linear_to_srgb(base / white)).max(-1)
+    return np.where(change >= SETTINGS.min_change, significance(e0 - b0, e1 - b1), 0)
 
 
 def significance(d0: Array, d1: Array) -> Array:
     """[H, W] in [0, 1]: how far the mean of a difference over a window stands out from its noise.
 
     d0, d1: [H, W, 3] the difference in two independent half renderings. With m the mean of (d0 + d1) / 2 over the
-    window and s its standard error, from (d0 - d1) / 2, the gain is max(0, 1 - (sigmas s / m)^2), the positive part
+    window and s its standard error, from (d0 - d1) / 2, the gain is max(0, 1 - (min_sigmas s / m)^2), the positive part
     of a Wiener filter; a gain below 1/4 is 0, so that nothing is left of mere noise. It is the larger one of the sum of
     the channels, where a change is seen first, and of the three together, among which another hue cancels in the sum.
     """
@@ -237,8 +252,8 @@ def significance(d0: Array, d1: Array) -> Array:
         for k in range(first.shape[-1]):
             m2 += _mean((first[..., k] + second[..., k]) / 2) ** 2
             variance += _mean(((first[..., k] - second[..., k]) / 2) ** 2) / SETTINGS.window**2
-        gain = np.maximum(gain, 1 - SETTINGS.sigmas**2 * variance / np.maximum(m2, 1e-30))
-    return np.where(gain > SETTINGS.least_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
+        gain = np.maximum(gain, 1 - SETTINGS.min_sigmas**2 * variance / np.maximum(m2, 1e-30))
+    return np.where(gain > SETTINGS.min_gain, np.clip(gain, 0, 1), 0).astype(np.float32)
 
 
 def _mean(values: Array) -> Array:
@@ -257,10 +272,12 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
     light = luminance(picture)
     around = np.ones((3, 3), bool)
     around[1, 1] = False
+    # The second brightest neighbour: a highlight of two pixels has one beside it.
     limit = np.maximum(
-        SETTINGS.times * rank_filter(light, -2, footprint=around, mode="nearest"), SETTINGS.bright
+        SETTINGS.firefly_ratio * rank_filter(light, -2, footprint=around, mode="nearest"),
+        SETTINGS.min_firefly,
     )
-    found = (light > limit) & (True if where is None else where)
-    return (picture * np.where(found, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(
+    fireflies = (light > limit) & (True if where is None else where)
+    return (picture * np.where(fireflies, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(
         np.float32
     )

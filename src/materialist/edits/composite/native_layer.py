@@ -22,15 +22,13 @@ Box = tuple[slice, slice]
 class NativeSettings:
     """Resolution and paths of the native-resolution layer; tuned by eye unless derived."""
 
-    pixels: int = 1_500_000  # most that are traced; a larger layer is traced smaller, and enlarged; derived: time
-    fewest_paths: int = 32  # paths a native pixel, at least, as the denoiser needs
-    most_paths: int = 4  # most paths a native pixel, times those of the picture, and twice that in glass; derived: time
-    budget: float = 0.5  # all paths, of those of a whole picture of working size; derived: time
-    margin: int = 3  # working pixels around the bodies that the denoiser sees
-    contact: float = (
-        0.05  # share of a body's extent up to which a surface before it is the ground it stands on
-    )
-    lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
+    max_pixels: int = 1_500_000  # a larger layer is traced smaller, and enlarged; derived: time
+    min_paths: int = 32  # a native pixel, as the denoiser needs
+    max_path_factor: int = 4  # on the picture's paths a pixel, twice that in glass; derived: time
+    path_budget: float = 0.5  # all paths, of those of a whole working-size picture; derived: time
+    denoiser_margin: int = 3  # working pixels around the bodies that the denoiser sees
+    max_contact: float = 0.05  # share of a body's extent: a nearer surface is what it stands on
+    max_lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
 
 
 SETTINGS = NativeSettings()
@@ -62,8 +60,8 @@ def native_layer(
     lamps = [f"lamp{k}" for k in range(len(edited.lamps)) if is_relit(scene, edited)]
     bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
     # The photo's own lights have the outline that the photo shows.
-    own = (name for name, body in bodies.items() if not body.name.startswith(PHOTO_LIGHT))
-    names = [name for name in own if bodies[name] not in scene.bodies] + lamps
+    placed = (name for name, body in bodies.items() if not body.name.startswith(PHOTO_LIGHT))
+    names = [name for name in placed if bodies[name] not in scene.bodies] + lamps
     if not names:
         return None
     target = renderer.render_scene(renderer.lit(edited, edited))
@@ -71,35 +69,37 @@ def native_layer(
     native = scene.photo.original.shape[:2]
     working = scene.depth.shape
     chosen = {name: bodies.get(name) for name in names}
+    # Where they are seen: at working size, then at native size, in the scene and by themselves
     small = first_hits(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
-    there = window(small > 0, native, SETTINGS.margin)
+    there = window(small > 0, native, SETTINGS.denoiser_margin)
     sight = first_hits(target.mi_scene, camera, chosen, native, there)
     everything = [*bodies, *(f"lamp{k}" for k in range(len(edited.lamps)))]
     bare = only(target.mi_scene, everything)  # without the photo's surface
     alone = first_hits(bare, camera, chosen, native, there)
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     stands = names != lamps
-    gap = (SETTINGS.contact if stands else SETTINGS.lamp_contact) * _extent(alone)
+    gap = (SETTINGS.max_contact if stands else SETTINGS.max_lamp_contact) * _extent(alone)
+
+    # --- Their radiance: as many paths as the budget allows ---
     size, part = _traced_size(native, there)
-    most = SETTINGS.most_paths * (
-        1 + any(body and is_transparent(body.surface) for body in chosen.values())
-    )
-    paths = max(
-        SETTINGS.fewest_paths, min(most * spp, int(SETTINGS.budget * spp * small.size / area(part)))
-    )
+    has_glass = any(body and is_transparent(body.surface) for body in chosen.values())
+    max_factor = SETTINGS.max_path_factor * (1 + has_glass)
+    budget = int(SETTINGS.path_budget * spp * small.size / area(part))
+    paths = max(SETTINGS.min_paths, min(max_factor * spp, budget))
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
     picture = radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names)
-    few = (
-        _resized((sight.share < alone.share / 2).astype(np.float32), picture.shape[:2])[..., None]
-        > 0
-    )
-    picture = spread(np.where(few, 0, picture))  # too few paths met the body there
+    # Where most of a pixel's body is hidden, too few paths met it: its neighbours' radiance is taken.
+    hidden = (sight.share < alone.share / 2).astype(np.float32)
+    few = _resized(hidden, picture.shape[:2])[..., None] > 0
+    picture = spread_known(np.where(few, 0, picture))
     if clean:
         guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
-        picture = spread(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
+        picture = spread_known(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
+
+    # --- Coverage and radiance at native size ---
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
     share[there] = _behind_things(target.mi_scene, sight, alone, scene, there, gap, stands=stands)
@@ -112,7 +112,7 @@ def native_layer(
 
 def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Box]:
     """Size of the picture that is traced, and the native box in it."""
-    factor = min(1.0, np.sqrt(SETTINGS.pixels / area(box)))
+    factor = min(1.0, np.sqrt(SETTINGS.max_pixels / area(box)))
     size = tuple(max(2, round(n * factor)) for n in native)
     sides = []
     for side, whole, traced in zip(box, native, size):
@@ -121,8 +121,8 @@ def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Bo
     return (size[0], size[1]), (sides[0], sides[1])
 
 
-def _resized(values: Array, shape: tuple[int, ...], how: str = "LINEAR") -> Array:
-    return np.asarray(cv2.resize(values, shape[1::-1], interpolation=getattr(cv2, f"INTER_{how}")))
+def _resized(values: Array, shape: tuple[int, ...], kind: int = cv2.INTER_LINEAR) -> Array:
+    return np.asarray(cv2.resize(values, shape[1::-1], interpolation=kind))
 
 
 def _behind_things(
@@ -147,8 +147,8 @@ def _behind_things(
         return share
     near = grown(hidden, int(np.ceil(2 * max(native[0] / working[0], 1.0))))
     whole = np.zeros(native, np.float32)
-    whole[there] = spread(alone.depth)
-    depth = spread(_resized(whole, working, "NEAREST"))
+    whole[there] = spread_known(alone.depth)
+    depth = spread_known(_resized(whole, working, cv2.INTER_NEAREST))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
     cut = alone.share * (1 - matte(thing, scene.photo.original)[there])
     return np.where(near, cut, share).astype(np.float32)
@@ -162,7 +162,7 @@ def _extent(alone: Any) -> float:
     return max(size, float(alone.depth.max()) * float(np.sqrt((alone.share > 0).mean())) * 0.05)
 
 
-def spread(values: Array) -> Array:
+def spread_known(values: Array) -> Array:
     """[h, w] or [h, w, 3] with every 0 replaced by the nearest other value."""
     known = np.asarray(values.reshape(*values.shape[:2], -1).any(-1))
     return values[nearest(known)] if known.any() else values

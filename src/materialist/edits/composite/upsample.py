@@ -16,24 +16,19 @@ class MatteSettings:
     """Shares of a surface in the photo's pixels along its outline; tuned by eye unless derived."""
 
     tile: int = 32  # working pixels: side of the parts in which a matte is made; derived: memory
-    border: int = (
-        4  # working pixels from the mask's border up to which a matte may reach; derived: `near`
-    )
+    # working pixels from the mask's border up to which a matte may reach; derived: `near`
+    border: int = 4
     near: float = 2.5  # standard deviation of the windows of mean colours, working pixels; larger averages texture
-    grain: float = (
-        0.03  # standard deviation of an even surface's colour, sRGB-encoded, channels added
-    )
-    apart: tuple[float, float] = (
-        2.0,
-        5.0,
-    )  # mean colours' distance, standard deviations: not told apart, and clearly
-    beside: tuple[float, float] = (
-        0.3,
-        0.6,
-    )  # a colour's distance from the line between both: a mixture, and none
-    beyond: float = (
-        0.75  # continuation of that line beyond its ends, as the halos of sharpened edges need
-    )
+    # least standard deviation, pixels, of those windows on the grid where they are computed; derived: time
+    coarse: float = 6.0
+    # standard deviation of an even surface's colour, sRGB-encoded, channels added
+    grain: float = 0.03
+    # mean colours' distance, standard deviations: not told apart, and clearly
+    apart: tuple[float, float] = (2.0, 5.0)
+    # a colour's distance from the line between both: a mixture, and none
+    beside: tuple[float, float] = (0.3, 0.6)
+    # continuation of that line beyond its ends, as the halos of sharpened edges need
+    beyond: float = 0.75
 
 
 @dataclass(frozen=True)
@@ -140,29 +135,36 @@ def matte(mask: Array, large: Array) -> Array:
 
 def _shares(soft: Array, large: Array, scale: float) -> Array:
     """[h, w] float32: `matte` of a window, of `scale` native pixels a working pixel; `soft` the enlarged mask."""
-    reach = 2 * int(np.ceil(1.5 * scale)) + 1
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
-    sure_in = cv2.erode(soft, kernel) >= 0.999
-    sure_out = cv2.dilate(soft, kernel) <= 0.001
+    reach = np.ceil(1.5 * scale)
+    sure_in = _distance_to(soft < 0.999) > reach
+    sure_out = _distance_to(soft > 0.001) > reach
     encoded = linear_to_srgb(large)
+
+    # The place of each colour on the line between the mean colours of both sides: 0 is outside, 1 inside.
     front, front_variance, known_front = _mean_of(encoded, sure_in, MATTE.near * scale)
     back, back_variance, known_back = _mean_of(encoded, sure_out, MATTE.near * scale)
     line = front - back
     length = np.sqrt(np.maximum((line**2).sum(-1), 1e-6))
-    place = ((encoded - back) * line).sum(-1) / length**2  # on the line: 0 is back, 1 front
+    place = ((encoded - back) * line).sum(-1) / length**2
+
+    # How far the place is to be trusted: the sides differ, and the colour is a mixture of them.
     deviation = np.sqrt(np.maximum(front_variance, back_variance) + MATTE.grain**2)
+    distinct = _ramp(length / deviation, *MATTE.apart)
     nearest = np.clip(place, -MATTE.beyond, 1 + MATTE.beyond)[..., None]
     away = np.sqrt(((encoded - back - nearest * line) ** 2).sum(-1))
-    off = np.maximum(away - 2 * MATTE.grain, 0) / length
-    told = (
-        _ramp(length / deviation, *MATTE.apart)
-        * (1 - _ramp(off, *MATTE.beside))
-        * known_front
-        * known_back
-    )
-    alpha = soft + told * (np.clip(place, 0, 1) - soft)
+    foreign = _ramp(np.maximum(away - 2 * MATTE.grain, 0) / length, *MATTE.beside)
+    trust = distinct * (1 - foreign) * known_front * known_back
+
+    alpha = soft + trust * (np.clip(place, 0, 1) - soft)
     alpha = np.where(sure_in | (alpha > 0.999), 1, np.where(sure_out | (alpha < 0.001), 0, alpha))
     return alpha.astype(np.float32)
+
+
+def _distance_to(mask: Array) -> Array:
+    """[H, W] pixels from each pixel to the nearest of the mask, infinite where there is none."""
+    if not mask.any():
+        return np.full(mask.shape, np.inf, np.float32)
+    return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
 
 
 def _ramp(values: Array, low: float, high: float) -> Array:
@@ -171,10 +173,21 @@ def _ramp(values: Array, low: float, high: float) -> Array:
 
 
 def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array, Array]:
-    """[H0, W0, 3] Gaussian mean of the members nearby, [H0, W0] its variance, channels added, and if there are any."""
+    """Colours of the members [H, W] bool near each pixel, weighted by a Gaussian of `sigma` pixels.
 
-    def blurred(values):
-        return cv2.GaussianBlur(values, (0, 0), sigma, borderType=cv2.BORDER_REFLECT)
+    Returns their mean [H, W, 3], its variance [H, W], channels added, and where there are any [H, W] bool.
+    """
+    # A wide Gaussian is as smooth on a coarser grid: its cost stays the same whatever the photo's size.
+    factor = max(1, int(sigma / MATTE.coarse))
+    height, width = members.shape
+    coarse = (-(-width // factor), -(-height // factor))
+
+    def blurred(values: Array) -> Array:
+        small = cv2.resize(values, coarse, interpolation=cv2.INTER_AREA) if factor > 1 else values
+        small = cv2.GaussianBlur(small, (0, 0), sigma / factor, borderType=cv2.BORDER_REFLECT)
+        if factor == 1:
+            return small
+        return cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
 
     weight = members.astype(np.float32)
     norm = np.maximum(blurred(weight), 1e-12)

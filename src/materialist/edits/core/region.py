@@ -6,7 +6,7 @@ import numpy as np
 from materialist.edits.core.renderer import EditRenderer
 from materialist.errors import InputError
 from materialist.geometry.silhouette import disc
-from materialist.option_kinds import numbers
+from materialist.option_kinds import parse_numbers
 from materialist.types import Array, Scene
 
 HIDDEN = 0.5
@@ -29,6 +29,7 @@ def checked_region(scene: Scene, mask: Array) -> Array:
         raise InputError(
             f"The mask is {mask.shape}, the photo at working size {shape} (rows, columns); resize it."
         )
+    # --- Weights: finite, in [0, 1], some of them on a surface ---
     weight = mask.astype(np.float32)
     if not (np.isfinite(weight).all() and weight.min() >= 0 and weight.max() <= 1):
         raise InputError(
@@ -41,10 +42,13 @@ def checked_region(scene: Scene, mask: Array) -> Array:
         raise InputError(
             "The mask covers only sky, where the scene has no surface to edit; mark a surface."
         )
+    # --- Edits act on what the photo shows, not on what covers it ---
     if scene.bodies and float((body_coverage(scene) * weight).sum()) > HIDDEN * float(weight.sum()):
         emitters = EditRenderer(scene).emitter_pixels(scene)
-        what = DIMMED if float((emitters * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
-        raise InputError(f"What is marked is {what}, or mark something else.")
+        obstacle = (
+            DIMMED if float((emitters * weight).sum()) > HIDDEN * float(weight.sum()) else PLACED
+        )
+        raise InputError(f"What is marked is {obstacle}, or mark something else.")
     return weight
 
 
@@ -76,7 +80,7 @@ def checked_pixel(scene: Scene, point: tuple[float, float], name: str = "click")
     """(column, row) of a point (x, y) at working size. Raises InputError when it lies outside the picture."""
     width = scene.camera.width
     height = scene.camera.height
-    x, y = numbers(point, 2, name)
+    x, y = parse_numbers(point, 2, name)
     if not (0 <= x < width and 0 <= y < height):
         rows, columns = scene.photo.original.shape[:2]
         small = f"{int(x * width / columns)},{int(y * height / rows)}"

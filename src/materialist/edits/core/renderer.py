@@ -20,7 +20,7 @@ SKY_ROWS = 768
 """Rows of the largest map with the photo's sky (derived: memory)."""
 
 
-Made = dict[tuple[int, int], tuple[Array, Array]]
+Pictures = dict[tuple[int, int], tuple[Array, Array]]
 """Pictures [H, W, 3], and where they are traced [H, W] bool, by paths a pixel and seed."""
 
 
@@ -32,22 +32,22 @@ class Render:
     """
 
     def __init__(
-        self, traced: Callable[..., Array], shape: tuple[int, ...], made: Made | None = None
+        self, trace: Callable[..., Array], shape: tuple[int, ...], pictures: Pictures | None = None
     ):
-        self._traced = traced
+        self._trace = trace
         self._shape = shape
-        self._made: Made = {} if made is None else made
+        self._pictures: Pictures = {} if pictures is None else pictures
 
     def __call__(self, spp: int, seed: int, where: Array | None = None) -> Array:
-        if (spp, seed) not in self._made:
-            self._made[spp, seed] = (
+        if (spp, seed) not in self._pictures:
+            self._pictures[spp, seed] = (
                 np.zeros((*self._shape, 3), np.float32),
                 np.zeros(self._shape, bool),
             )
-        picture, known = self._made[spp, seed]
+        picture, known = self._pictures[spp, seed]
         missing = ~known if where is None else where & ~known
         if missing.any():
-            picture[missing] = self._traced(spp=spp, seed=seed, where=missing)[missing]
+            picture[missing] = self._trace(spp=spp, seed=seed, where=missing)[missing]
             known |= missing
         return picture
 
@@ -65,7 +65,7 @@ class EditRenderer:
         self.device = device
         self._built: dict[bool, tuple[Scene, Any]] = {}
         """The base's (True) and those of the last edit of other shapes."""
-        self._base: dict[tuple, Made] = {}
+        self._base: dict[tuple, Pictures] = {}
         self._sky: Array | None = None
 
     def pair(self, edited: Scene) -> tuple[Render, Render]:
@@ -75,12 +75,10 @@ class EditRenderer:
         depth = max(path_depth(s) for s in (scene, edited))
         shape = self.scene.depth.shape
         key = (scene is self.scene, depth)
-        made = self._base.setdefault(
-            key, {}
-        )  # alone: a `Render` of its own would keep this renderer alive
-        return Render(partial(self._render, scene, depth), shape, made), Render(
-            partial(self._render, edited, depth), shape
-        )
+        # Only the pictures are kept: a `Render` of its own would keep this renderer alive.
+        pictures = self._base.setdefault(key, {})
+        base = Render(partial(self._render, scene, depth), shape, pictures)
+        return base, Render(partial(self._render, edited, depth), shape)
 
     def lit(self, shown: Scene, edited: Scene) -> Scene:
         """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
@@ -97,9 +95,9 @@ class EditRenderer:
         """[H, W] bool: where a body or lamp is seen, at least in part, that the other of the two scenes lacks."""
         seen = np.zeros(self.scene.depth.shape, bool)
         for scene, other in ((self.scene, edited), (edited, self.scene)):
-            own = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
-            own += [f"lamp{k}" for k, lamp in enumerate(scene.lamps) if lamp not in other.lamps]
-            seen |= self._seen(scene, own) > 0
+            names = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
+            names += [f"lamp{k}" for k, lamp in enumerate(scene.lamps) if lamp not in other.lamps]
+            seen |= self._seen(scene, names) > 0
         return seen
 
     def body_coverage(self, scene: Scene) -> Array:
@@ -130,6 +128,7 @@ class EditRenderer:
         )
         albedo = edited.materials.albedo.copy()
         normal = edited.normal.copy()
+        # --- Guides mix as the picture does: by the share of each pixel that the bodies cover ---
         share = np.where(covered[part], sight.share, 0)[..., None]
         albedo[part] = share * sight.albedo + (1 - share) * albedo[part]
         normal[part] = share * sight.normal + (1 - share) * normal[part]
@@ -142,8 +141,8 @@ class EditRenderer:
         target.set_envmap(scene.envmap)
         return target
 
-    def _render(self, scene: Scene, depth: int, **how: Any) -> Array:
-        return self.render_scene(scene).render(max_depth=depth, **how)
+    def _render(self, scene: Scene, depth: int, **options: Any) -> Array:
+        return self.render_scene(scene).render(max_depth=depth, **options)
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
@@ -173,9 +172,12 @@ class EditRenderer:
         return known[1]
 
 
-def same_shapes(one: Scene, other: Scene) -> bool:
+def same_shapes(first: Scene, second: Scene) -> bool:
     """Whether the two scenes have the same geometry, bodies and lamps."""
-    return one.geometry is other.geometry and (one.lamps, one.bodies) == (other.lamps, other.bodies)
+    return first.geometry is second.geometry and (first.lamps, first.bodies) == (
+        second.lamps,
+        second.bodies,
+    )
 
 
 def photo_sky(scene: Scene) -> Array:
@@ -188,6 +190,7 @@ def photo_sky(scene: Scene) -> Array:
     if (scene.depth > 0).all():
         return scene.envmap
     rows = int(np.clip(np.pi * camera.focal, len(scene.envmap), max(SKY_ROWS, len(scene.envmap))))
+    # The fitted map, enlarged until a texel is about a pixel of the photo.
     sky = environment(texel_directions(rows, 2 * rows).reshape(-1, 3), scene.envmap).reshape(
         rows, 2 * rows, 3
     )

@@ -47,19 +47,21 @@ def base_of(scene: Scene, edited: Scene) -> Scene:
 
     Both give the photo; without the surfaces the light of the emitters is in the environment map.
     """
-    found = dimmed_emitters(scene, edited)
-    if found is None:
+    facts = dimmed_emitters(scene, edited)
+    if facts is None:
         return scene
     lights = [body for body in edited.bodies if body.name.startswith(PHOTO_LIGHT)]
     return with_emitters(
-        scene, [emitting(body, own) for body, own in zip(lights, found["emission"])], found
+        scene,
+        [emitting(body, emission) for body, emission in zip(lights, facts["emission"])],
+        facts,
     )
 
 
-def with_emitters(scene: Scene, emitters: Sequence[Body], found: dict) -> Scene:
+def with_emitters(scene: Scene, emitters: Sequence[Body], facts: dict) -> Scene:
     """The scene with emitters as further bodies, and without their light in the environment map."""
     return replace(
-        scene, envmap=scene.envmap * np.float32(found["ambient"]), bodies=(*scene.bodies, *emitters)
+        scene, envmap=scene.envmap * np.float32(facts["ambient"]), bodies=(*scene.bodies, *emitters)
     )
 
 
@@ -76,7 +78,9 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
     """
     extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
     corners = welded(np.round((vertices - vertices.min(0)) / extent * 1e6))[faces]
+    # Triangles of no area have no edges that count.
     corners = corners[(np.diff(np.sort(corners, 1), axis=1) > 0).all(1)]
+    # An edge inside a closed surface belongs to exactly two faces.
     _, count = np.unique(edge_keys(corners), return_counts=True)
     return int((count == 1).sum()), int((count > 2).sum())
 
@@ -84,6 +88,7 @@ def edge_faults(vertices: Array, faces: Array) -> tuple[int, int]:
 def welded(vertices: Array) -> Array:
     """[V] int32 number of the place of each vertex [V, n], in float32: equal ones share a number."""
     places = np.asarray(vertices, np.float32) + np.float32(0)  # no -0
+    # Sorted places: a new number begins where a place differs from the one before.
     order = np.lexsort(places.T)
     steps = np.zeros(len(places), np.int32)
     steps[1:] = (places[order[1:]] != places[order[:-1]]).any(1)

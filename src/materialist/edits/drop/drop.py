@@ -11,15 +11,15 @@ import numpy as np
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
-from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, load
-from materialist.edits.insert.insert import Support, moved, put, surface_points
+from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, load_library
+from materialist.edits.insert.insert import Support, moved_body, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
 from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
 from materialist.keywords import DropKeywords
-from materialist.option_kinds import documented, numbers, several
+from materialist.option_kinds import documented, parse_numbers, several
 from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
@@ -28,12 +28,10 @@ from materialist.types import Array, Body, Scene
 class DropSettings:
     """What is a floor, and when things are at rest; tuned by eye."""
 
-    upright: float = (
-        0.5  # cosine to the camera's up from which a plane can be a floor or a table top
-    )
-    longest: float = 20.0  # seconds after which a thing that still rolls is left where it is
-    looks: int = 24  # looks at the things a second
-    still: int = 12  # looks in a row without motion after which things are at rest
+    min_floor_cosine: float = 0.5  # to the camera's up: a plane can be a floor or a table top
+    max_seconds: float = 20.0  # after which a thing that still rolls is left where it is
+    looks_per_second: int = 24  # how often motion is looked for
+    looks_at_rest: int = 12  # in a row without motion, after which things are at rest
 
 
 SETTINGS = DropSettings()
@@ -72,17 +70,18 @@ def drop(
         InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
             missing.
     """
-    wanted = Drop.given(options, **values)
+    options = Drop.given(options, **values)
+    # --- Options and places, before anything is computed ---
     if not 2 <= frames <= MAX_FRAMES:
         raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
     if not 1 <= fps <= 240:
         raise InputError(f"The frame rate is {fps:g}; it must lie in [1, 240].")
-    falling = _prepared(scene, meshes, at, wanted)
+    falling = _prepared(scene, meshes, at, options)
     film = []
     last = scene
     poses: list[Pose] | None = None
     for frame in fall(falling.things, falling.ground, frames=frames, fps=fps):
-        if poses is None or moves(poses, frame, wanted.metres):
+        if poses is None or moves(poses, frame, options.metres):
             last = falling.at(frame)
             poses = frame
         film.append(last)
@@ -111,7 +110,7 @@ def settle(
     """
     falling = _prepared(scene, meshes, at, Drop.given(options, **values))
     poses, gone, rests = _rested(falling)
-    names = falling.what["meshes"]
+    names = falling.facts["meshes"]
     if len(gone) == len(names):
         raise InputError(
             f"{', '.join(names)} falls beside everything that the photo shows; choose a place further from the edge of "
@@ -123,7 +122,7 @@ def settle(
     ]
     if not rests:
         notes.append(
-            f"After {SETTINGS.longest:g} seconds not everything that fell is at rest; it stays where it is then."
+            f"After {SETTINGS.max_seconds:g} seconds not everything that fell is at rest; it stays where it is then."
         )
     edited = falling.at(poses, gone)
     return warned(edited, *notes, *[UNSEEN] * (not _in_view(scene, edited)))
@@ -153,7 +152,7 @@ class Falling:
     factor: float
     """Metres a scene unit."""
     notes: tuple[str, ...]
-    what: dict[str, Any]
+    facts: dict[str, Any]
     """For the provenance."""
 
     def at(self, poses: list[Pose], gone: frozenset[int] = frozenset()) -> Scene:
@@ -163,58 +162,63 @@ class Falling:
             turn = self.to_up.T @ pose.turn @ self.to_up
             # In metres, z up: x -> R (x + shift - first centre) + centre.
             move = (pose.turn @ (shift - thing.centre) + pose.centre) / self.factor @ self.to_up
-            placed += [moved(body, turn, move) for body in bodies if k not in gone]
+            placed += [moved_body(body, turn, move) for body in bodies if k not in gone]
         dropped = replace(self.scene, bodies=(*self.scene.bodies, *placed))
-        return noted(warned(dropped, *self.notes), "drop", self.what)
+        return noted(warned(dropped, *self.notes), "drop", self.facts)
 
 
-def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, wanted: Drop) -> Falling:
-    load("mujoco")
+def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, options: Drop) -> Falling:
+    load_library("mujoco")
     meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
     models = [
-        repainted(m if isinstance(m, MeshModel) else read_model(m, up=wanted.up), wanted.material)
+        repainted(m if isinstance(m, MeshModel) else read_model(m, up=options.up), options.material)
         for m in meshes
     ]
     if not models:
         raise InputError("Nothing falls; give at least one mesh.")
     places = _places(at, len(models))
-    stood = [put(scene, model, place, scale=wanted.scale) for model, place in zip(models, places)]
-    direction = down(scene, stood[0][1], wanted.gravity)
+    # --- As they would stand; then in the frame of the simulation: metres, z up ---
+    stood = [put(scene, model, place, scale=options.scale) for model, place in zip(models, places)]
+    direction = down(scene, stood[0][1], options.gravity)
     to_up = np.concatenate([axes(-direction), -direction[None]])
-    factor = wanted.metres / max(longest for *_, longest in stood)
+    factor = options.metres / max(longest for *_, longest in stood)
     points = [
         np.concatenate([surface_points(b) for b in bodies]) @ to_up.T * factor
         for bodies, *_ in stood
     ]
-    lifts = _lifts(points, wanted.height * wanted.metres)
-    high = np.array([own[:, 2].max() + lift for own, lift in zip(points, lifts)])
-    middles = np.array([(own.min(0) + own.max(0))[:2] / 2 for own in points])
+    lifts = _lifts(points, options.height * options.metres)
+
+    # --- The ground below them, as convex blocks ---
+    high = np.array([corners[:, 2].max() + lift for corners, lift in zip(points, lifts)])
+    middles = np.array([(corners.min(0) + corners.max(0))[:2] / 2 for corners in points])
     field = ground_field(
-        scene, to_up, factor, places=middles, tops=high + wanted.metres, metres=wanted.metres
+        scene, to_up, factor, places=middles, tops=high + options.metres, metres=options.metres
     )
     # What would start in a bump lifts them all.
-    clear = max(
-        0.0, *(depth_in(field, own + np.array([0, 0, lift])) for own, lift in zip(points, lifts))
+    overlaps = (
+        depth_in(field, corners + np.array([0, 0, lift])) for corners, lift in zip(points, lifts)
     )
-    if clear >= wanted.metres:
+    clear = max(0.0, *overlaps)
+    if clear >= options.metres:
         raise InputError(
             f"There is no room at {places[0][0]:g},{places[0][1]:g}: the things would start inside of something; "
             "choose another place, or a larger height."
         )
+    # --- Where they start, and what the provenance keeps ---
     starts = [(bodies, np.array([0, 0, lift + clear])) for (bodies, *_), lift in zip(stood, lifts)]
-    things = _things(starts, to_up, factor, wanted)
-    ground = blocks(field, metres=wanted.metres)
-    what: dict[str, Any] = {
+    things = _things(starts, to_up, factor, options)
+    ground = blocks(field, metres=options.metres)
+    facts: dict[str, Any] = {
         "meshes": [model.name for model in models],
         "at": [[float(v) for v in place] for place in places],
         **{
-            name: getattr(wanted, name)
+            name: getattr(options, name)
             for name in ("height", "spin", "scale", "material", "metres", "seed", "up")
         },
         "gravity": [round(float(v), 6) for v in direction],
     }
     notes = tuple(note for model in models for note in model.warnings)
-    return Falling(scene, things, ground, starts, to_up, factor, notes, what)
+    return Falling(scene, things, ground, starts, to_up, factor, notes, facts)
 
 
 def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | None) -> Array:
@@ -226,14 +230,14 @@ def down(scene: Scene, support: Support, gravity: tuple[float, float, float] | N
                 f"The gravity is {gravity}; give a direction X,Y,Z in the camera frame, such as 0,-1,0."
             )
         return direction / np.linalg.norm(direction)
-    if support.normal[1] > SETTINGS.upright:
+    if support.normal[1] > SETTINGS.min_floor_cosine:
         return -support.normal
     floor = upright(scene.normal, scene.geometry.plane_label)
     return np.array([0.0, -1.0, 0.0]) if floor is None else -floor
 
 
 def _places(at: Any, count: int) -> list[Any]:
-    places = [numbers(place, 2, "place") for place in several(at)]
+    places = [parse_numbers(place, 2, "place") for place in several(at)]
     places = places * count if len(places) == 1 else places
     if len(places) != count:
         raise InputError(
@@ -246,9 +250,9 @@ def _lifts(points: list[Array], height: float) -> list[float]:
     """How far each thing, that stands with its points [n, 3], is lifted: by `height`, or clear of those below it."""
     boxes: list[tuple[Array, Array]] = []
     lifts = []
-    for own in points:
-        low = own.min(0)
-        high = own.max(0)
+    for corners in points:
+        low = corners.min(0)
+        high = corners.max(0)
         over = [
             top[2] - low[2] + 0.25 * (high[2] - low[2])
             for bottom, top in boxes
@@ -256,24 +260,25 @@ def _lifts(points: list[Array], height: float) -> list[float]:
         ]
         lift = float(max([height, *over]))
         lifts.append(lift)
+        # Later things must clear this one as well.
         up = np.array([0, 0, lift])
         boxes.append((low + up, high + up))
     return lifts
 
 
 def _things(
-    starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, wanted: Drop
+    starts: list[tuple[tuple[Body, ...], Array]], to_up: Array, factor: float, options: Drop
 ) -> list[RigidBody]:
     """What the simulation needs to know of each thing; all turn as fast, each about an axis of its own."""
-    rng = np.random.default_rng(wanted.seed)
+    rng = np.random.default_rng(options.seed)
     things = []
     for bodies, shift in starts:
         vertices, faces = joined_faces(bodies)
         points = vertices.astype(np.float64) @ to_up.T * factor + shift
         centre = (points.min(0) + points.max(0)) / 2
         axis = rng.normal(size=3)
-        turning = 2 * np.pi * wanted.spin * axis / np.linalg.norm(axis)
-        pieces = convex_pieces(points, faces, seed=wanted.seed)
+        turning = 2 * np.pi * options.spin * axis / np.linalg.norm(axis)
+        pieces = convex_pieces(points, faces, seed=options.seed)
         things.append(RigidBody(tuple(piece - centre for piece in pieces), centre, turning))
     return things
 
@@ -289,20 +294,20 @@ def moves(before: list[Pose], now: list[Pose], metres: float) -> bool:
 def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
     """(the last poses, numbers of the things that fell out of the scene, whether the rest lies still)."""
     bottom = min((float(block[:, 2].min()) for block in falling.ground), default=-np.inf)
-    recent: deque[list[Pose]] = deque(maxlen=SETTINGS.still + 1)
+    recent: deque[list[Pose]] = deque(maxlen=SETTINGS.looks_at_rest + 1)
     gone: frozenset[int] = frozenset()
     for poses in fall(
         falling.things,
         falling.ground,
-        frames=round(SETTINGS.longest * SETTINGS.looks) + 1,
-        fps=SETTINGS.looks,
+        frames=round(SETTINGS.max_seconds * SETTINGS.looks_per_second) + 1,
+        fps=SETTINGS.looks_per_second,
     ):
         gone = frozenset(k for k, pose in enumerate(poses) if pose.centre[2] < bottom)
         recent.append([pose for k, pose in enumerate(poses) if k not in gone])
         # A thing at the top of its flight is slow, too, but not for half a second.
         last = recent[-1]
-        metres = falling.what["metres"]
+        metres = falling.facts["metres"]
         still = all(len(look) == len(last) and not moves(look, last, metres) for look in recent)
-        if not last or (len(recent) > SETTINGS.still and still):
+        if not last or (len(recent) > SETTINGS.looks_at_rest and still):
             return poses, gone, True
     return poses, gone, False

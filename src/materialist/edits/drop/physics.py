@@ -19,25 +19,20 @@ from materialist.types import Array
 class PhysicsSettings:
     """How things move and touch, and the convex pieces that stand for them; tuned by eye unless derived."""
 
-    step: float = 1e-3  # seconds: at 10 m/s a thing moves by a hundredth of a metre, and blocks are deeper; derived
+    step: float = 1e-3  # seconds: at 10 m/s 1 cm, and blocks are deeper; derived
     gravity: float = 9.81  # m / s^2
-    stiff: tuple[float, float] = (
-        4e-3,
-        1.0,
-    )  # of contacts: time constant, as short as the step allows, and damping
-    friction: tuple[float, float, float] = (
-        0.6,
-        0.01,
-        0.0005,
-    )  # sliding, torsional (m) and rolling (m)
+    # time constant, short as step allows; damping
+    contact_spring: tuple[float, float] = (4e-3, 1.0)
+    # sliding, torsional (m), rolling (m)
+    friction: tuple[float, float, float] = (0.6, 0.01, 0.0005)
     density: float = 600.0  # kg / m^3: wood; things of one density fall alike
-    same: float = (
-        1.05  # volume of the hull over that of the shape up to which the hull alone stands for it
-    )
-    concave: float = 0.12  # concavity that is left in a piece (CoACD's threshold)
-    pieces: int = 16  # most pieces
-    fine: int = 1500  # triangles from which a mesh is thinned out before it is taken apart
-    coarse: int = 24  # cells along the longest side to which it is thinned out
+
+    # Convex pieces.
+    max_hull_ratio: float = 1.05  # volume of hull over shape up to which one hull is enough
+    max_concavity: float = 0.12  # that is left in a piece (CoACD's threshold)
+    max_pieces: int = 16
+    max_triangles: int = 1500  # beyond, a mesh is thinned out before it is taken apart
+    thinned_cells: int = 24  # along the longest side to which it is thinned out
 
 
 SETTINGS = PhysicsSettings()
@@ -68,20 +63,19 @@ class Pose:
 
 
 def fall(
-    things: list[RigidBody], ground: list[Array], *, frames: int, fps: float
+    bodies_at_start: list[RigidBody], ground: list[Array], *, frames: int, fps: float
 ) -> Iterator[list[Pose]]:
     """Poses of all things at the times 0, 1 / fps, ...: `frames` lists. The same input gives the same poses.
 
     Raises SetupError where mujoco is not installed, InputError where the motion cannot be followed.
     """
-    mujoco = load("mujoco")
-    mujoco.set_mju_user_warning(
-        lambda message: None
-    )  # it would write a file where the command was called
-    model = _world(mujoco, things, ground)
+    mujoco = load_library("mujoco")
+    # MuJoCo would write its warnings to a file in the current folder.
+    mujoco.set_mju_user_warning(lambda message: None)
+    model = _world(mujoco, bodies_at_start, ground)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    for k, thing in enumerate(things):
+    for k, thing in enumerate(bodies_at_start):
         body = data.body(f"thing{k}")
         # It turns about its centre of mass, which stands still; a free joint moves the body's own origin.
         data.qvel[6 * k : 6 * k + 3] = -np.cross(thing.spin, body.xipos - body.xpos)
@@ -89,6 +83,7 @@ def fall(
     mujoco.mj_forward(model, data)
     warnings = mujoco.mjtWarning
     diverged = warnings.mjWARN_BADQPOS, warnings.mjWARN_BADQVEL, warnings.mjWARN_BADQACC
+    # --- Steps of the simulation until each frame is due ---
     done = 0
     for frame in range(frames):
         target = round(frame / fps / SETTINGS.step)
@@ -103,11 +98,11 @@ def fall(
         mujoco.mj_energyPos(model, data)
         mujoco.mj_energyVel(model, data)
         energy = float(data.energy.sum())
-        bodies = [data.body(f"thing{k}") for k in range(len(things))]
+        bodies = [data.body(f"thing{k}") for k in range(len(bodies_at_start))]
         yield [Pose(b.xpos.copy(), b.xmat.reshape(3, 3).copy(), energy) for b in bodies]
 
 
-def load(name: str) -> Any:
+def load_library(name: str) -> Any:
     """The module mujoco or coacd. Raises SetupError with the command that installs it."""
     try:
         return importlib.import_module(name)
@@ -121,13 +116,11 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     spec = mujoco.MjSpec()
     spec.option.timestep = SETTINGS.step
     spec.option.gravity = [0, 0, -SETTINGS.gravity]
-    spec.option.integrator = (
-        mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    )  # stable for things that spin fast
+    # Implicit: stable for things that spin fast. A simulation that fails must not start again by itself.
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    if hasattr(
-        mujoco.mjtEnableBit, "mjENBL_MULTICCD"
-    ):  # later versions always find several contacts
+    # Several contacts between two pieces, which later versions always find.
+    if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):
         spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     for number, corners in enumerate(ground):
@@ -154,7 +147,7 @@ def _piece(mujoco, spec, body, name: str, corners: Array) -> None:
         density=SETTINGS.density,
         friction=list(SETTINGS.friction),
         condim=4,
-        solref=list(SETTINGS.stiff),
+        solref=list(SETTINGS.contact_spring),
         solimp=[0.95, 0.99, 1e-4, 0.5, 2],
         margin=0.0,
     )
@@ -178,18 +171,21 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
     vertices = np.asarray(vertices, np.float64)
     outer = hull(vertices)
     mesh = Trimesh(vertices, faces, validate=True)
-    if mesh.is_watertight and ConvexHull(outer).volume <= SETTINGS.same * abs(mesh.volume):
+    if mesh.is_watertight and ConvexHull(outer).volume <= SETTINGS.max_hull_ratio * abs(
+        mesh.volume
+    ):
         return [outer]
-    coacd = load("coacd")
+    # --- Taken apart into nearly convex pieces, thinned out before where it is fine ---
+    coacd = load_library("coacd")
     logging.getLogger("coacd").setLevel(logging.ERROR)
     coacd.set_log_level("error")
-    if len(faces) > SETTINGS.fine:
-        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / SETTINGS.coarse
+    if len(faces) > SETTINGS.max_triangles:
+        cell = max(float(np.ptp(vertices, axis=0).max()), 1e-30) / SETTINGS.thinned_cells
         mesh = Trimesh(np.round(vertices / cell) * cell, faces, validate=True)
     parts = coacd.run_coacd(
         coacd.Mesh(mesh.vertices, mesh.faces),
-        threshold=SETTINGS.concave,
-        max_convex_hull=SETTINGS.pieces,
+        threshold=SETTINGS.max_concavity,
+        max_convex_hull=SETTINGS.max_pieces,
         preprocess_resolution=30,
         resolution=400,
         mcts_nodes=8,

@@ -20,7 +20,7 @@ from materialist.options import Glass
 from materialist.predict import resample
 from materialist.predict.refraction.thickness import Thickness
 from materialist.solids.closed import closed_proxy
-from materialist.solids.shell import Shell, joined
+from materialist.solids.shell import Shell, joined_shells
 from materialist.types import Array, Body, Scene, Surface
 
 SOLID = "The two-interface model knows no walls: this glass is solid."
@@ -49,21 +49,23 @@ def glass(
     Raises InputError for an option out of its range, or a mask that cannot be used; WeightsError without weights.
     """
     options = Glass.given(options, **values)
-    own = checked_region(scene, mask) > 0.5
+    region = checked_region(scene, mask) > 0.5
     removed = remove(scene, mask, options, fitted=fitted)
+    # --- The thickness of each object under the mask ---
     each = [
         (part, object_thickness(scene, part, options.thickness, behind=removed.depth))
-        for part in objects_in(own)
+        for part in objects_in(region)
     ]
     if options.model == "two-interface":
         edited = _two_interface(scene, removed, each, options, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if options.hollow else edited
     else:
+        # All objects are one body: they have one material, and none touches another.
         shells, notes = zip(
-            *(_shell(scene, removed, part, found, options.hollow) for part, found in each),
+            *(_shell(scene, removed, part, thick, options.hollow) for part, thick in each),
             strict=True,
         )
-        shell = joined(shells)
+        shell = joined_shells(shells)
         body = Body(
             shell.vertices,
             shell.faces,
@@ -73,7 +75,7 @@ def glass(
             PHOTO_GLASS,
         )
         edited = warned(replace(removed, bodies=(*removed.bodies, body)), *chain(*notes))
-    what = {
+    facts = {
         "ior": options.ior,
         "transmission": options.transmission,
         "tint": list(options.tint),
@@ -81,36 +83,37 @@ def glass(
         "hollow": options.hollow,
         "model": options.model,
         "back": options.back,
-        "thickness": ", ".join(dict.fromkeys(found.method for _, found in each)),
-        "pixels": int(own.sum()),
+        "thickness": ", ".join(dict.fromkeys(thick.method for _, thick in each)),
+        "pixels": int(region.sum()),
     }
-    return noted(edited, "glass", what)
+    return noted(edited, "glass", facts)
 
 
 def _shell(
-    scene: Scene, removed: Scene, part: Array, found: Thickness, hollow: bool | str
+    scene: Scene, removed: Scene, part: Array, thick: Thickness, hollow: bool | str
 ) -> tuple[Shell, list[str]]:
-    """(the body of one object, what of a hollow could not be made, in words)."""
+    """(the body of one object, notes on a wall or an opening that could not be made)."""
     camera = scene.camera
-    whole = found.revolution
-    wall = wall_of(scene, part, found) if hollow else None
-    if whole is None:
+    revolution = thick.revolution
+    wall = wall_of(scene, part, thick) if hollow else None
+    if revolution is None:
         shell = closed_proxy(
             scene.depth,
             scene.normal,
             part,
-            found.solid,
+            thick.solid,
             camera,
             wall=wall,
             behind=removed.depth,
-            back=found.back,
+            back=thick.back,
         )
     else:
-        opened = whole.vessel(camera, wall) if wall and hollow == "open" else None
+        opened = revolution.vessel(camera, wall) if wall and hollow == "open" else None
         if opened is not None:
             return opened, []
-        shell = whole.body(camera, wall=wall)
-    note = NO_ROOM if not shell.hollow else LID if whole is None else NARROW
+        shell = revolution.body(camera, wall=wall)
+    # Of several reasons the note names the first that holds.
+    note = NO_ROOM if not shell.hollow else LID if revolution is None else NARROW
     return shell, [note] * (hollow == "open" or (bool(hollow) and not shell.hollow))
 
 
@@ -137,40 +140,39 @@ def _two_interface(
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
     from materialist.edits.glass.two_interface import Backdrop, two_interface
 
-    own: Array = np.zeros(scene.depth.shape, bool)
+    glass_seen: Array = np.zeros(scene.depth.shape, bool)
     photo = removed.photo
     picture: Array = np.zeros(scene.photo.linear.shape, np.float32)
     clear = options.transmission
     behind = Backdrop(photo.linear, removed.depth, envmap)
-    for part, found in each:
-        seen, front, facing = _front(scene, part, found)
-        one = two_interface(
-            scene.camera, facing, front, seen, found.solid, behind, options, found.back
+    for part, thick in each:
+        seen, front, facing = _front(scene, part, thick)
+        glass_picture = two_interface(
+            scene.camera, facing, front, seen, thick.solid, behind, options, thick.back
         )
-        picture = np.where(seen[..., None], one, picture)
-        own |= seen
+        picture = np.where(seen[..., None], glass_picture, picture)
+        glass_seen |= seen
     # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.
-    picture = clear * picture + (1 - clear) * scene.photo.linear * own[..., None]
-    linear = np.where(own[..., None], picture, photo.linear).astype(np.float32)
+    picture = clear * picture + (1 - clear) * scene.photo.linear * glass_seen[..., None]
+    linear = np.where(glass_seen[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
-    share = np.clip(resample.values(own.astype(np.float32), native), 0, 1)[..., None]
-    near = resample.values(
-        picture[nearest(own)], native
-    )  # with nothing else mixed in where it is enlarged
+    share = np.clip(resample.values(glass_seen.astype(np.float32), native), 0, 1)[..., None]
+    # Glass is continued beyond its outline first: enlarging it then mixes nothing else in.
+    near = resample.values(picture[nearest(glass_seen)], native)
     original = (share * near + (1 - share) * photo.original).astype(np.float32)
     return replace(removed, photo=replace(photo, linear=linear, original=original))
 
 
-def _front(scene: Scene, own: Array, found: Thickness) -> tuple[Array, Array, Array]:
+def _front(scene: Scene, region: Array, thick: Thickness) -> tuple[Array, Array, Array]:
     """Where glass is seen, [H, W] bool, and its front's depth and normals: of a surface of revolution, or the maps.
 
     Normals of the maps are blurred as for the closed proxy.
     """
-    if found.revolution is None:
+    if thick.revolution is None:
         return (
-            own,
+            region,
             scene.depth,
-            blurred_normals(scene.normal, own, 0.01 * float(np.sqrt(own.sum()))),
+            blurred_normals(scene.normal, region, 0.01 * float(np.sqrt(region.sum()))),
         )
-    depth, normal = found.revolution.front(own, pixel_rays(scene.camera).astype(np.float64))
+    depth, normal = thick.revolution.front(region, pixel_rays(scene.camera).astype(np.float64))
     return depth > 0, depth, normal

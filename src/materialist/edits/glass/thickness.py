@@ -24,13 +24,11 @@ METHODS = ("auto", "network", "symmetry")
 class WallSettings:
     """The wall of a hollow object, as parts of its size, and what an object is; tuned by eye."""
 
-    usual: float = 0.05  # where nothing tells it
-    least: float = 0.015  # bounds on what RefractionNet says
-    most: float = 0.12
-    thick: float = 0.02  # pixels inside its outline that a part of a mask has to reach, or it gives no body; derived
-    part: float = (
-        0.01  # share of the largest part of a mask from which a part is an object of its own
-    )
+    default_share: float = 0.05  # of the object's size, where nothing tells the wall
+    min_share: float = 0.015  # bounds on what RefractionNet predicts
+    max_share: float = 0.12
+    min_depth_pixels: float = 0.02  # inside its outline that a part must reach; derived
+    min_part: float = 0.01  # share of the mask's largest part from which a part is an object
 
 
 WALL = WallSettings()
@@ -41,11 +39,12 @@ def objects_in(mask: Array) -> list[Array]:
 
     Specks, and lines too thin for a body, count to the nearest object.
     """
+    # Connected parts, diagonally as well; thin ones have no pixel deep enough inside.
     number, _ = label(mask, np.ones((3, 3)))
-    thick = np.isin(number, number[mask & (silhouette_field(mask) > WALL.thick)])
+    thick = np.isin(number, number[mask & (silhouette_field(mask) > WALL.min_depth_pixels)])
     area = np.bincount(number[thick] if thick.any() else number.ravel())
     area[0] = 0
-    large = np.flatnonzero(area >= max(WALL.part * area.max(), 1))
+    large = np.flatnonzero(area >= max(WALL.min_part * area.max(), 1))
     whose = number[nearest(np.isin(number, large))]
     return [mask & (whose == k) for k in large]
 
@@ -67,8 +66,8 @@ def object_thickness(
     inside = surface_in(mask, scene.depth, scene.camera)
     maps = (scene.photo.linear, inside, scene.normal, scene.depth, scene.camera)
     if not (isinstance(method, str) and method in METHODS):
-        given = np.where(inside, _given(method, inside), 0).astype(np.float32)
-        return Thickness(given, np.zeros_like(given), method="given")
+        solid = np.where(inside, _thickness_map(method, inside), 0).astype(np.float32)
+        return Thickness(solid, np.zeros_like(solid), method="given")
     if method == "symmetry":
         mirrored = symmetric_thickness(scene.depth, scene.normal, inside, scene.camera)
         return Thickness(mirrored, np.zeros_like(mirrored), method=method)
@@ -78,39 +77,41 @@ def object_thickness(
     return best_thickness(*maps, up=up, behind=behind)
 
 
-def wall_of(scene: Scene, mask: Array, found: Thickness) -> float:
+def wall_of(scene: Scene, mask: Array, thick: Thickness) -> float:
     """Thickness of the wall of the object under a mask [H, W] bool, were it hollow; scene units."""
     inside = surface_in(mask, scene.depth, scene.camera)
     rays = pixel_rays(scene.camera)
     size = object_size(inside, scene.depth, rays)
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
-    across = inside & (found.hollow > 0) & (found.hollow < 0.8 * found.solid)
+    across = inside & (thick.hollow > 0) & (thick.hollow < 0.8 * thick.solid)
     wall = (
-        float(np.median((found.hollow * facing / 2)[across])) if across.any() else WALL.usual * size
+        float(np.median((thick.hollow * facing / 2)[across]))
+        if across.any()
+        else WALL.default_share * size
     )
-    return float(np.clip(wall, WALL.least * size, WALL.most * size))
+    return float(np.clip(wall, WALL.min_share * size, WALL.max_share * size))
 
 
-def _given(method: str | Array | Path, inside: Array) -> Array:
+def _thickness_map(method: str | Array | Path, inside: Array) -> Array:
     if isinstance(method, str | Path):
         if not Path(method).is_file():
             raise InputError(
                 f"The thickness is {str(method)!r}; give a file, or one of {', '.join(METHODS)}."
             )
         method = read_map(method)
-    given = np.asarray(method, np.float32)
-    given = given[..., 0] if given.ndim == 3 else given
-    if given.shape != inside.shape:
+    values = np.asarray(method, np.float32)
+    values = values[..., 0] if values.ndim == 3 else values
+    if values.shape != inside.shape:
         raise InputError(
-            f"The thickness map is {given.shape}, the photo at working size {inside.shape} (rows, columns)."
+            f"The thickness map is {values.shape}, the photo at working size {inside.shape} (rows, columns)."
         )
-    if not (np.isfinite(given).all() and given.min() >= 0):
+    if not (np.isfinite(values).all() and values.min() >= 0):
         raise InputError(
             "The thickness map has negative or infinite values; give scene units >= 0."
         )
-    if not (given[inside] > 0).any():
+    if not (values[inside] > 0).any():
         raise InputError(
             "The thickness is 0 all over the mask; give scene units along the camera rays."
         )
-    return given
+    return values

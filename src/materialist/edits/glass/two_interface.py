@@ -83,6 +83,7 @@ def two_interface(
             `thickness` describes, with its normals.
         back: [H, W, 3] unit outward normals of that surface, where they are known better than by its depth.
     """
+    # --- Front and back: the back's own normals, or the front's turned (the paper) ---
     inside = surface_in(mask, depth, camera)
     rays = pixel_rays(camera).astype(np.float64)
     if options.back == "same":
@@ -97,6 +98,7 @@ def two_interface(
     side = SIDES[options.roughness > 0]
     tint = np.asarray(options.tint, float)
     total = np.zeros((int(inside.sum()), 3))
+    # --- A grid of rays in each pixel: the mean of what they see ---
     for k in range(side**2):
         front.through((np.array([k % side, k // side]) + 0.5) / side - 0.5)
         crossing = cross(
@@ -130,17 +132,17 @@ class Front:
     ):
         self.camera = camera
         self._centres = np.argwhere(inside)[:, ::-1] + 0.5  # [N, 2] x, y
-        own = nearest(inside)
-        self._inverse = 1 / depth[own].astype(np.float64)[..., None]  # [H, W, 1], linear on planes
-        self._normals = normal[own].astype(np.float64)  # [H, W, 3]
+        inner_pixel = nearest(inside)
+        # [H, W, 1], linear on planes
+        self._inverse = 1 / depth[inner_pixel].astype(np.float64)[..., None]
+        self._normals = normal[inner_pixel].astype(np.float64)  # [H, W, 3]
         self.through(np.zeros(2))
-        self._backs = None if back is None else back[own].astype(np.float64)
+        self._backs = None if back is None else back[inner_pixel].astype(np.float64)
         self._ends: Array | None = None
         if thickness is not None:
-            ends = depth + thickness / np.linalg.norm(
-                pixel_rays(camera), axis=-1
-            )  # [H, W] planar depth of the back
-            self._ends = ends[own]
+            # Planar depth [H, W] of the back.
+            ends = depth + thickness / np.linalg.norm(pixel_rays(camera), axis=-1)
+            self._ends = ends[inner_pixel]
             self._longest = LONGEST * float(thickness[inside].max())
 
     def through(self, offset: Array) -> None:
@@ -162,8 +164,8 @@ class Front:
         """[N] d1 of rays of unit directions [N, 3] inside: to the back where it is known, else d1 [N] as it is."""
         if self._ends is None:
             return d1
-        found = background_distance(self.point, inner, self._ends, self.camera)
-        return np.minimum(np.where(np.isfinite(found), found, d1), self._longest)
+        distance = background_distance(self.point, inner, self._ends, self.camera)
+        return np.minimum(np.where(np.isfinite(distance), distance, d1), self._longest)
 
 
 def cross(
@@ -173,14 +175,17 @@ def cross(
 
     `sample` (k, n) is the k-th of n facets of rough surfaces.
     """
+    # --- The k-th of n facets, by irrational steps: well spread over the unit square ---
     k, n = sample
     points = [((k + 0.5) * g) % 1 for g in (0.7320508076, 1 / n, 0.6180339887, 0.4142135623)]
     facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
+    # At the front: omega_t1 inside (Snell), the reflection, and what share goes which way (Fresnel)
     inner, _ = refract(front.direction, facet, 1 / ior)
     mirrored = reflect(front.direction, facet)
     fresnel = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
     reflectance = fresnel * _unmasked(mirrored, front.normal, alpha, below=False)
     share = (1 - fresnel) * _unmasked(inner, front.normal, alpha, below=True)
+    # --- At the back: x + d1 omega_t1, where omega_t2 leaves ---
     exit_point = front.point + front.way(inner, d1)[:, None] * inner
     outward = front.back_at(exit_point)
     # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
@@ -232,12 +237,14 @@ def background_distance(origin: Array, direction: Array, depth: Array, camera: C
     low = np.zeros(len(origin))
     high = np.full(len(origin), np.inf)
     open_ = np.ones(len(origin), bool)
+    # --- March: the first step after which a ray is behind the surface ---
     for a, b in pairwise(length):
         hit = open_.copy()
         hit[open_] = _behind(
             origin[open_], direction[open_], np.full(int(open_.sum()), b), surface, camera
         )
-        low[hit], high[hit] = a, b
+        low[hit] = a
+        high[hit] = b
         open_ &= ~hit
         if not open_.any():
             break
@@ -245,10 +252,8 @@ def background_distance(origin: Array, direction: Array, depth: Array, camera: C
     for _ in range(12):
         middle = (low[met] + high[met]) / 2
         beyond = _behind(origin[met], direction[met], middle, surface, camera)
-        high[met], low[met] = (
-            np.where(beyond, middle, high[met]),
-            np.where(beyond, low[met], middle),
-        )
+        low[met] = np.where(beyond, low[met], middle)
+        high[met] = np.where(beyond, middle, high[met])
     return high
 
 

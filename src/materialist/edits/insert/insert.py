@@ -24,19 +24,13 @@ from materialist.types import Array, Body, Scene
 class InsertSettings:
     """Size of an inserted mesh, and the plane that it stands on; tuned by eye."""
 
-    width: float = (
-        1 / 6
-    )  # longest side at scale 1, share of the width that the picture shows at its depth
-    nearest: float = (
-        0.02  # depth that nothing may come nearer than, share of the depth of its place
-    )
+    width: float = 1 / 6  # longest side at scale 1, share of the picture's width at its depth
+    min_depth: float = 0.02  # that a mesh may reach, share of the depth of its place
     samples: int = 6000  # points that stand for its surface where it falls
-    alike: float = 0.7  # cosine from which a neighbour's normal counts as that of the same surface
-    fewest: int = 12  # pixels whose median counts, at least; with fewer the one pixel decides
-    nearby: float = (
-        1 / 24
-    )  # radius around the place, share of the picture's width, where no radius is given
-    air: float = 0.005  # under glass, share of its longest side: glass and floor without any are one block; derived
+    min_cosine: float = 0.7  # of a neighbour's normal that counts as of the same surface
+    min_pixels: int = 12  # whose median counts; with fewer the one pixel decides
+    support_radius: float = 1 / 24  # share of the picture's width, where no radius is given
+    glass_gap: float = 0.005  # air under glass, share of its side: else one block with the floor
 
 
 SETTINGS = InsertSettings()
@@ -78,24 +72,24 @@ def insert(
     Raises InputError for a place outside the photo, on the sky, or so near that the mesh would reach behind the
     camera; a mesh that cannot be used; a number out of its range.
     """
-    wanted = Insertion.given(options, **values)
+    options = Insertion.given(options, **values)
     model = repainted(
-        mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=wanted.up), wanted.material
+        mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=options.up), options.material
     )
     placed, _, longest = put(
-        scene, model, at, scale=wanted.scale, turn=wanted.turn, size=wanted.size
+        scene, model, at, scale=options.scale, turn=options.turn, size=options.size
     )
-    what: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "mesh": model.name,
         "at": [float(v) for v in at],
-        "scale": wanted.scale,
-        "turn": wanted.turn,
-        "material": wanted.material,
+        "scale": options.scale,
+        "turn": options.turn,
+        "material": options.material,
         "size": longest,
         "triangles": sum(len(body.faces) for body in placed),
     }
     return noted(
-        warned(replace(scene, bodies=(*scene.bodies, *placed)), *model.warnings), "insert", what
+        warned(replace(scene, bodies=(*scene.bodies, *placed)), *model.warnings), "insert", facts
     )
 
 
@@ -115,6 +109,7 @@ def put(
     low = model.vertices.min(0).astype(np.float64)
     high = model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
+    # Size: the plane under the place tells the scale, then the plane under the whole footprint
     first = support_at(scene, at)
     factor = (
         scale
@@ -123,17 +118,16 @@ def put(
     )
     footprint = factor * float(np.hypot(high[0] - low[0], high[2] - low[2])) / 2
     support = support_at(scene, at, footprint)
+    # --- Place: the middle of the base on the plane, turned about its normal ---
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    turned = frame(support) @ Rotation.from_euler("y", turn, degrees=True).as_matrix()
-    air = (
-        SETTINGS.air * factor * longest
-        if any(is_transparent(part.surface) for part in model.parts)
-        else 0.0
-    )
+    turned = support_frame(support) @ Rotation.from_euler("y", turn, degrees=True).as_matrix()
+    has_glass = any(is_transparent(part.surface) for part in model.parts)
+    air = SETTINGS.glass_gap * factor * longest if has_glass else 0.0
     origin = support.point + air * support.normal - (turned * factor) @ base
-    bodies = tuple(moved(part, turned * factor, origin) for part in model.parts)
+    bodies = tuple(moved_body(part, turned * factor, origin) for part in model.parts)
+    # --- A mesh behind the camera would fill the picture ---
     nearest = -max(float(body.vertices[:, 2].max()) for body in bodies)
-    if nearest < SETTINGS.nearest * support.depth:
+    if nearest < SETTINGS.min_depth * support.depth:
         raise InputError(
             f"{model.name} would reach behind the camera at scale {scale:g}; choose a smaller scale, or a place "
             "further away."
@@ -159,14 +153,16 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
     camera = scene.camera
     ray = rays_through(np.array(at), camera)
     point = ray * depth
-    reach = radius if radius else picture_width(scene, depth) * SETTINGS.nearby
+    reach = radius if radius else picture_width(scene, depth) * SETTINGS.support_radius
+    # --- The normal: over the plane that the point lies on, else over alike pixels nearby ---
     near = _near(scene, point, reach, row, column)
     label = scene.geometry.plane_label[row, column]
     members = (scene.geometry.plane_label == label) & (scene.depth > 0) if label >= 0 else near
     normal = scene.normal[row, column].astype(np.float64)
-    if members.sum() >= SETTINGS.fewest:
+    if members.sum() >= SETTINGS.min_pixels:
         normal = unit(np.median(scene.normal[members].astype(np.float64), axis=0))
-    if near.sum() >= SETTINGS.fewest:
+    # --- The place along the normal: the median of the surface nearby ---
+    if near.sum() >= SETTINGS.min_pixels:
         points = unproject(scene.depth, camera)[near].astype(np.float64)
         offset = np.median(points @ normal)
         along = float(ray @ normal)
@@ -186,10 +182,10 @@ def _near(scene: Scene, point: Array, reach: float, row: int, column: int) -> Ar
     close = ((points - point) ** 2).sum(-1) < reach**2
     window = np.s_[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
     facing = unit(np.median(scene.normal[window].reshape(-1, 3), axis=0))
-    return close & (scene.depth > 0) & (scene.normal @ facing > SETTINGS.alike)
+    return close & (scene.depth > 0) & (scene.normal @ facing > SETTINGS.min_cosine)
 
 
-def frame(support: Support) -> Array:
+def support_frame(support: Support) -> Array:
     """[3, 3] rotation whose columns are right, up (the normal) and front: towards the camera along the surface.
 
     Where the surface faces the camera, front is down the picture instead.
@@ -199,9 +195,8 @@ def frame(support: Support) -> Array:
     front = towards - (towards @ up) * up
     down = np.array([0.0, -1.0, 0.0])
     down = down - (down @ up) * up
-    share = np.clip(
-        (np.linalg.norm(front) - 0.2) / 0.2, 0, 1
-    )  # a steep wall turns gently from one to the other
+    # A steep wall turns gently from one to the other.
+    share = np.clip((np.linalg.norm(front) - 0.2) / 0.2, 0, 1)
     front = share * front + (1 - share) * down
     if np.linalg.norm(front) < 1e-6:
         front = np.cross([1.0, 0.0, 0.0], up)
@@ -209,7 +204,7 @@ def frame(support: Support) -> Array:
     return np.stack([np.cross(up, front), up, front], -1)
 
 
-def moved(body: Body, linear: Array, shift: Array) -> Body:
+def moved_body(body: Body, linear: Array, shift: Array) -> Body:
     """The body under x -> linear x + shift; `linear` [3, 3] is a rotation times a factor."""
     factor = np.cbrt(np.linalg.det(linear))
     vertices = (body.vertices.astype(np.float64) @ linear.T + shift).astype(np.float32)

@@ -30,7 +30,7 @@ READERS = {
     ".gltf": read_gltf,
     ".glb": read_gltf,
 }
-FARTHEST_UV = 1e6
+MAX_UV = 1e6
 """Texture coordinates beyond are cut off: as float32 they could not tell pixels apart."""
 
 
@@ -67,15 +67,15 @@ def read_model(path: str | Path, *, up: str = "auto") -> MeshModel:
     if up not in ("auto", "y", "z"):
         raise InputError(f"The axis that points up is '{up}'; choose y, z or auto.")
     source = MeshSource(path, LIMITS)
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # numbers of damaged files; what is not finite is refused
+    # Numbers of damaged files may overflow; what is not finite is refused afterwards.
+    with np.errstate(over="ignore", invalid="ignore"):
         content = READERS[source.suffix](source)
         parts = _bodies(source, content)
     if up == "z" or (up == "auto" and source.suffix == ".stl"):
         parts = [
             replace(p, vertices=_upright(p.vertices), normals=_upright(p.normals)) for p in parts
         ]
+    # --- Notes on what the model has not ---
     missing = [f"{name} is missing; a constant takes its place." for name in source.folder.missing]
     left_out = [f"{thing} is left out." for thing in content.left_out]
     notes = [f"{path.name}: {note}" for note in left_out + missing + content.notes]
@@ -119,6 +119,7 @@ def repainted(model: MeshModel, material: str) -> MeshModel:
 
 def _bodies(source: MeshSource, content: MeshContent) -> list[Body]:
     """The parts of a file as bodies about the middle of all, one for each material."""
+    # --- One part for each material, as far as their data can be joined ---
     groups: dict[tuple, list[MeshPart]] = {}
     for part in content.parts:
         key = (part.paint, part.face_colours is None, part.normals is None)
@@ -132,6 +133,7 @@ def _bodies(source: MeshSource, content: MeshContent) -> list[Body]:
             parts.append(part)
     if not parts:
         raise InputError(f"{source.path} has no triangles with an area; give a mesh with faces.")
+    # --- All about one middle, so that float32 is exact enough ---
     low = np.min([part.vertices.min(0) for part in parts], axis=0)
     high = np.max([part.vertices.max(0) for part in parts], axis=0)
     origin = (low + high) / 2  # in float64: scans lie far from their origin
@@ -154,6 +156,7 @@ def _without_empty(source: MeshSource, part: MeshPart) -> MeshPart:
         raise InputError(
             f"{source.path} has vertices that are NaN or infinite; repair it, in Blender for example."
         )
+    # Triangles of no area have no normal.
     kept = area_vectors(part.vertices, faces).any(1)
     if kept.all() and used.all():
         return replace(part, vertices=part.vertices.astype(np.float64, copy=False))
@@ -207,7 +210,7 @@ def _body(source: MeshSource, content: MeshContent, part: MeshPart, paint: Paint
         uv = np.repeat(of_face, 3, 0)
         return Body(vertices[corners], faces, normals[corners], uv, surface, part.name)
     uv = np.zeros((len(vertices), 2)) if part.uv is None else part.uv
-    uv = np.clip(np.nan_to_num(uv), -FARTHEST_UV, FARTHEST_UV)
+    uv = np.clip(np.nan_to_num(uv), -MAX_UV, MAX_UV)
     surface, uv, exact = wrapped(
         paint.surface, uv, faces, paint.layout.wrap, source.limits.texture_pixels
     )
@@ -222,6 +225,7 @@ def _body(source: MeshSource, content: MeshContent, part: MeshPart, paint: Paint
 
 def coloured(surface: Surface, colours: Array) -> tuple[Surface, Array]:
     """(the surface with a texture of one texel a face, uv [F, 2] of each face's texel) of linear colours [F, 3]."""
+    # A square texture: one row of many thousand texels would exceed what renderers take.
     side = max(1, int(np.ceil(np.sqrt(len(colours)))))
     texture = np.zeros((side * side, 3), np.float32)
     texture[: len(colours)] = np.clip(np.nan_to_num(colours), 0, 1)

@@ -24,9 +24,11 @@ def creased_normals(
     corners = welded(places)[faces]
     flat = _unit(area_vectors(vertices, faces))
     group = _smooth_groups(corners, flat, np.cos(np.radians(degrees)))
+    # --- One normal for each pair of smooth group and vertex ---
     key = group[:, None].astype(np.int64) * (int(corners.max(initial=0)) + 1) + corners
     _, inverse = np.unique(key, return_inverse=True)
     number = inverse.astype(np.int32).reshape(-1, 3)
+    # --- Sums of the faces' normals, weighted by their angles there ---
     weights = _angles(vertices, faces)
     total = np.empty((int(number.max(initial=-1)) + 1, 3))
     for axis in range(3):
@@ -46,12 +48,14 @@ def area_vectors(vertices: Array, faces: Array) -> Array:
 
 def _smooth_groups(corners: Array, flat: Array, cosine: float) -> Array:
     """[F] number of the group of each face."""
+    # --- Pairs of faces that share an edge: equal keys stand side by side once sorted ---
     keys = edge_keys(corners)
     order = np.argsort(keys, kind="stable").astype(np.int32)
     keys = keys[order]
     shared = np.flatnonzero(keys[1:] == keys[:-1])
     first = order[shared] // 3
     second = order[shared + 1] // 3
+    # --- Groups: faces linked by edges that are not sharp ---
     smooth = np.einsum("ij,ij->i", flat[first], flat[second]) >= cosine
     first = first[smooth]
     second = second[smooth]

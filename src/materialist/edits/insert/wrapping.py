@@ -29,7 +29,8 @@ def wrapped(
     uv = np.array(uv, np.float64)
     for axis, mode in enumerate(wrap):
         if mode == "mirror":
-            surface, uv[:, axis] = _mirrored(surface, 1 - axis), uv[:, axis] / 2
+            surface = _mirrored(surface, 1 - axis)
+            uv[:, axis] /= 2
         elif mode == "clamp":
             surface, uv[:, axis], fits = _clamped(surface, uv[:, axis], faces, 1 - axis, pixels)
             exact = exact and fits
@@ -54,11 +55,11 @@ def _clamped(
     step = 1 / math.gcd(*sizes)  # whole pixels of every map
     corner = u[faces]
     crossing = ~((corner <= 0).all(1) | (corner >= 1).all(1))
-    inner = u[
-        np.unique(faces[crossing])
-    ]  # the others show the border alone, however far they reach
+    # Faces wholly outside show the border alone, however far they reach.
+    inner = u[np.unique(faces[crossing])]
     before = math.ceil(max(-inner.min(initial=0), 0) / step) + 1
     after = math.ceil(max(inner.max(initial=1) - 1, 0) / step) + 1
+    # --- As far as the limit of pixels allows ---
     largest = max(values.shape[0] * values.shape[1] for values in maps)
     room = max(int((pixels / largest - 1) / step), 2)
     exact = before + after <= room

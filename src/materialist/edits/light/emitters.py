@@ -28,22 +28,21 @@ from materialist.types import Array, Body, Photo, Scene
 class EmitterSettings:
     """What counts as an emitter, and how bright it is; tuned by eye unless derived."""
 
-    clipped: float = 0.97  # least channel of a linear photo from which a pixel's radiance is unknown; derived: 8 bits
-    beside: float = 0.6  # share of `clipped` from which pixels beside an emitter belong to it, as its shade does
-    reach: float = 0.015  # how far beside it, share of the longer side
-    gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; share of the longer side
-    upward: float = (
-        0.7  # mean Y of the normals above which a surface reflects a light, or lies in the sun
-    )
-    area: float = 0.001  # smallest share of the picture; less is a highlight
-    pixels: int = 9  # smallest part of a mask, pixels; derived: a surface needs some triangles
-    hdr: float = 4.0  # least multiple of the median of an HDR photo
-    known: float = 0.1  # share of clipped pixels up to which the photo tells the radiance
-    white: float = 0.5  # share of clipped pixels above which an emitter is taken as white
-    lift: float = (
-        2e-3  # distance of an emitter before its surface, share of the depth; derived: ray offsets
-    )
-    spp: int = 32  # paths a pixel of the rendering that estimates the radiance; derived: sums over the whole picture
+    # Which pixels are of an emitter.
+    clipped: float = 0.97  # least channel from which a pixel's radiance is unknown; derived: 8 bits
+    min_hdr_ratio: float = 4.0  # to the median radiance of an HDR photo
+    min_rim: float = 0.6  # share of `clipped` from which pixels beside it belong to it, as a shade
+    max_rim_reach: float = 0.015  # how far beside it, share of the longer side
+    gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; likewise
+    max_upward: float = 0.7  # mean Y of the normals; above, a surface reflects or lies in the sun
+    min_area: float = 0.001  # share of the picture; less is a highlight
+    min_pixels: int = 9  # of a part of a mask; derived: a surface needs some triangles
+
+    # How bright it is.
+    max_clipped_known: float = 0.1  # share of clipped pixels up to which the photo tells it
+    min_clipped_white: float = 0.5  # share of clipped pixels above which it is taken as white
+    lift: float = 2e-3  # before its surface, share of the depth; derived: ray offsets
+    spp: int = 32  # paths a pixel of the rendering that estimates it; derived: sums over all
 
 
 SETTINGS = EmitterSettings()
@@ -56,17 +55,20 @@ def visible_lights(scene: Scene) -> list[Array]:
     """
     photo = scene.photo
     surface = scene.depth > 0
-    least = SETTINGS.clipped
+    threshold = SETTINGS.clipped
     if photo.hdr and surface.any():
-        least = max(least, SETTINGS.hdr * float(np.median(photo.linear[surface].mean(-1))))
+        threshold = max(
+            threshold, SETTINGS.min_hdr_ratio * float(np.median(photo.linear[surface].mean(-1)))
+        )
     value = photo.linear.min(-1)
     longer = max(surface.shape)
-    bright = (value >= least) & surface
+    bright = (value >= threshold) & surface
     if not bright.any():
         return []
-    near = ndimage.distance_transform_edt(~bright) <= max(1, round(SETTINGS.reach * longer))
+    # --- Grown over the bright pixels beside them, and gaps closed ---
+    near = ndimage.distance_transform_edt(~bright) <= max(1, round(SETTINGS.max_rim_reach * longer))
     grown = ndimage.binary_propagation(
-        bright, mask=(value >= SETTINGS.beside * least) & surface & near
+        bright, mask=(value >= SETTINGS.min_rim * threshold) & surface & near
     )
     closed = (
         cv2.morphologyEx(
@@ -76,9 +78,9 @@ def visible_lights(scene: Scene) -> list[Array]:
     )
     masks = [
         mask
-        for mask in _parts(closed, SETTINGS.area * closed.size)
-        if (mask & bright).sum() >= SETTINGS.area * mask.size
-        and scene.normal[mask][:, 1].mean() <= SETTINGS.upward
+        for mask in _parts(closed, SETTINGS.min_area * closed.size)
+        if (mask & bright).sum() >= SETTINGS.min_area * mask.size
+        and scene.normal[mask][:, 1].mean() <= SETTINGS.max_upward
     ]
     return sorted(masks, key=lambda mask: -int(mask.sum()))
 
@@ -105,43 +107,46 @@ def dimmed(
         raise InputError(
             "The lights of a photo are found in the scene before its edits; dim that one, and edit it afterwards."
         )
+    # --- Where the emitters are: marked, or clipped regions of the photo ---
     known = fitted or scene
     masks = (
         visible_lights(known)
         if lights is None
-        else _parts(checked_region(known, lights) > 0.5, SETTINGS.pixels)
+        else _parts(checked_region(known, lights) > 0.5, SETTINGS.min_pixels)
     )
-    if not any(mask.sum() >= SETTINGS.pixels for mask in masks):
+    if not any(mask.sum() >= SETTINGS.min_pixels for mask in masks):
         raise InputError(
             "The photo shows no light: no clipped region on a surface covers a thousandth of it and does not face up; "
             "mark the lights that you mean."
             if lights is None
-            else f"The mask of lights has no connected part of {SETTINGS.pixels} pixels; mark the whole light."
+            else f"The mask of lights has no connected part of {SETTINGS.min_pixels} pixels; mark the whole light."
         )
+    # --- Less what earlier edits took away ---
     gone = (scene.depth != known.depth) | (scene.photo.linear != known.photo.linear).any(-1)
-    masks = [part for mask in masks for part in _parts(mask & ~gone, SETTINGS.pixels)]
+    masks = [part for mask in masks for part in _parts(mask & ~gone, SETTINGS.min_pixels)]
     if not masks:
         raise InputError(
             "The lights of this photo were taken away by an earlier step; leave the dimming out."
         )
+    # --- How bright they are, and how much light that leaves to the environment map ---
     colours, radiance = _looks(known.photo, masks)
     patches = [_patch(scene, mask, f"{PHOTO_LIGHT} {k}") for k, mask in enumerate(masks)]
     shining = tuple(emitting(body, colour) for body, colour in zip(patches, colours))
     ambient, radiance, share = _estimated(known, shining, np.any(masks, 0), radiance)
     emission = [[radiance * c for c in colour] for colour in colours]
-    found = {
+    facts = {
         "ambient": ambient,
         "radiance": radiance,
         "dim": dim,
         "share": share,
         "emission": emission,
     }
-    bodies = [emitting(body, [dim * c for c in own]) for body, own in zip(patches, emission)]
-    edited = with_emitters(scene, bodies, found)
+    bodies = [emitting(body, [dim * c for c in colour]) for body, colour in zip(patches, emission)]
+    edited = with_emitters(scene, bodies, facts)
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
     kind = "clipped regions" if lights is None else "regions"
     note = f"Taken for lights, {radiance:.3g} times as bright as the photo's white: the {kind} around {places}."
-    return warned(replace(edited, provenance={**scene.provenance, KEY: found}), note)
+    return warned(replace(edited, provenance={**scene.provenance, KEY: facts}), note)
 
 
 def _parts(mask: Array, least: float) -> list[Array]:
@@ -163,11 +168,14 @@ def _looks(
     if (
         photo.hdr
         or np.concatenate([pixels.max(-1) >= SETTINGS.clipped for pixels in inside]).mean()
-        < SETTINGS.known
+        < SETTINGS.max_clipped_known
     ):
         peak = max(*(float(mean.max()) for mean in means), OFF)
         return [triple(mean / peak) for mean in means], peak
-    white = [(pixels.min(-1) >= SETTINGS.clipped).mean() > SETTINGS.white for pixels in inside]
+    white = [
+        (pixels.min(-1) >= SETTINGS.clipped).mean() > SETTINGS.min_clipped_white
+        for pixels in inside
+    ]
     means = [np.ones(3) if is_white else mean for is_white, mean in zip(white, means)]
     return [triple(mean / max(float(mean.max()), 1e-6)) for mean in means], None
 
@@ -183,6 +191,7 @@ def _estimated(
     """
     from materialist.render.scene import RenderScene
 
+    # --- What the emitters alone give: the environment map is next to nothing ---
     target = RenderScene(scene.geometry, scene.camera, bodies=(*scene.bodies, *emitters))
     target.set_materials(scene.materials)
     target.set_envmap(np.full((8, 16, 3), OFF, np.float32))
@@ -191,11 +200,19 @@ def _estimated(
     seen = (scene.depth > 0) & ~masked & (photo.max(-1) < SETTINGS.clipped)
     if not seen.any():
         return 1.0, 1.0 if radiance is None else radiance, 0.0
-    wanted, base, lit = (v[seen].astype(np.float64) for v in (photo, scene.rerender, by_emitters))
-    weight = 1 / (wanted.mean(-1, keepdims=True) + 0.05)  # errors count relative to the brightness
+    photo_values, base, lit = (
+        v[seen].astype(np.float64) for v in (photo, scene.rerender, by_emitters)
+    )
+    # --- Weighted least squares over unclipped pixels of other surfaces ---
+    weight = 1 / (
+        photo_values.mean(-1, keepdims=True) + 0.05
+    )  # errors count relative to the brightness
     sides = np.stack([(weight * base).ravel(), (weight * lit).ravel()], -1)
+    # A known radiance is a bound so narrow that it is fixed; the solver takes no equal bounds.
     low, high = (1.0, 1e3) if radiance is None else (radiance, radiance * (1 + 1e-9) + 1e-12)
-    factor, radiance = lsq_linear(sides, (weight * wanted).ravel(), bounds=([0, low], [2, high])).x
+    factor, radiance = lsq_linear(
+        sides, (weight * photo_values).ravel(), bounds=([0, low], [2, high])
+    ).x
     return float(factor), float(radiance), float(radiance * lit.mean() / max(base.mean(), 1e-6))
 
 

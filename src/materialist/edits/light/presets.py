@@ -11,7 +11,7 @@ ROWS = 128
 Colour = tuple[float, float, float]
 
 
-def light(name: str, rows: int = ROWS) -> Array:
+def preset_light(name: str, rows: int = ROWS) -> Array:
     """[rows, 2 rows, 3] float32 linear radiance, centre column along -Z; see docs/conventions.md."""
     elevation = 90 - 180 * (np.arange(rows) + 0.5) / rows
     azimuth = 360 * (np.arange(2 * rows) + 0.5) / (2 * rows) - 180
@@ -22,6 +22,7 @@ def _panel(
     az: Array, el: Array, at: tuple[float, float], size: tuple[float, float], colour: Colour
 ) -> Array:
     """[h, w, 3]: a soft-edged rectangle; `at` and `size` in degrees."""
+    # 1 at the border of the rectangle, below inside; a logistic curve makes it soft.
     across = np.abs((az - at[0] + 180) % 360 - 180) / (size[0] / 2)
     up = np.abs(el - at[1]) / (size[1] / 2)
     return (1 / (1 + np.exp(np.clip(14 * (np.maximum(across, up) - 1), -60, 60))))[
@@ -31,6 +32,7 @@ def _panel(
 
 def _spot(az: Array, el: Array, at: tuple[float, float], width: float, colour: Colour) -> Array:
     """[h, w, 3]: a Gaussian of `width` degrees around a direction."""
+    # Spherical law of cosines: the angle between each direction and the spot.
     a, e, a0, e0 = (np.radians(v) for v in (az, el, *at))
     cosine = np.sin(e) * np.sin(e0) + np.cos(e) * np.cos(e0) * np.cos(a - a0)
     return np.exp(-((np.degrees(np.arccos(np.clip(cosine, -1, 1))) / width) ** 2))[

@@ -28,12 +28,10 @@ from materialist.types import Array, Lamp, Scene
 class AddedLightSettings:
     """Sizes of added lights."""
 
-    map_rows: int = 256  # of the largest map; derived: memory
-    sun_radius: float = 6.0  # of an added sun, degrees: a hard shadow shows each step of a predicted depth; 5 photos
-    lamp_unit: float = (
-        0.25  # share of the median depth from which a lamp of power 1 shows a white wall as white
-    )
-    lamp_radius: float = 0.015  # radius of a lamp, share of the median depth; tuned by eye
+    max_map_rows: int = 256  # derived: memory
+    min_sun_radius: float = 6.0  # degrees: hard shadows show each step of the depth; 5 photos
+    lamp_unit: float = 0.25  # share of the median depth at which power 1 shows white as white
+    lamp_radius: float = 0.015  # share of the median depth; tuned by eye
 
 
 SETTINGS = AddedLightSettings()
@@ -57,48 +55,50 @@ def relight(
     Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
     notes: list[str] = []
-    wanted = resolved(scene, Relight.given(options, **values), notes)
-    if isinstance(wanted.rotate, tuple):
+    changes = resolved(scene, Relight.given(options, **values), notes)
+    if isinstance(changes.rotate, tuple):
         raise InputError(
-            f"The rotation is {'..'.join(map('{:g}'.format, wanted.rotate))}; one picture has one number."
+            f"The rotation is {'..'.join(map('{:g}'.format, changes.rotate))}; one picture has one number."
         )
-    if wanted.dim is not None:
+    if changes.dim is not None:
         from materialist.edits.light.emitters import dimmed
 
-        scene = dimmed(scene, wanted.dim, lights=wanted.lights, fitted=fitted)
-    elif wanted.lights is not None:
+        scene = dimmed(scene, changes.dim, lights=changes.lights, fitted=fitted)
+    elif changes.lights is not None:
         raise InputError("The mask of lights says nothing without a dimming; give dim, too.")
+    # --- The environment map, in the order of the options: another one, turned, with a sun ---
     light = scene.envmap
-    lamps = wanted.lamps
-    if wanted.envmap is not None:
-        light = wanted.envmap * _gain(wanted.gain, wanted.envmap, scene.envmap)
-    if wanted.rotate:
-        light = rotated(light, wanted.rotate)
+    lamps = changes.lamps
+    if changes.envmap is not None:
+        light = changes.envmap * _gain(changes.gain, changes.envmap, scene.envmap)
+    if changes.rotate:
+        light = rotated(light, changes.rotate)
     disc = np.zeros_like(light)
-    if wanted.sun is not None:
-        light, disc = with_sun(light, *wanted.sun, power=wanted.sun_power)
-    light = (light * np.float32(wanted.ambient) + disc).astype(np.float32)
+    if changes.sun is not None:
+        light, disc = with_sun(light, *changes.sun, power=changes.sun_power)
+    light = (light * np.float32(changes.ambient) + disc).astype(np.float32)
     if not light.any() and not (
         lamps or scene.lamps or any(max(b.surface.emission) > 0 for b in scene.bodies)
     ):
         raise InputError("The new light is black; give an ambient above 0, a sun or a lamp.")
-    what = {
-        "envmap": None if wanted.envmap is None else list(np.shape(wanted.envmap)),
-        "gain": wanted.gain if wanted.envmap is not None else None,
-        "rotate": wanted.rotate or None,
-        "sun": wanted.sun,
-        "ambient": wanted.ambient if wanted.ambient != 1 else None,
+    facts = {
+        "envmap": None if changes.envmap is None else list(np.shape(changes.envmap)),
+        "gain": changes.gain if changes.envmap is not None else None,
+        "rotate": changes.rotate or None,
+        "sun": changes.sun,
+        "ambient": changes.ambient if changes.ambient != 1 else None,
         "lamps": len(lamps) or None,
-        "dim": wanted.dim,
+        "dim": changes.dim,
     }
+    # --- The scene, and what the provenance keeps of the options ---
     new = replace(scene, envmap=light, lamps=(*scene.lamps, *lamps))
-    return noted(warned(new, *_warnings(fitted or scene), *notes), "light", what)
+    return noted(warned(new, *_warnings(fitted or scene), *notes), "light", facts)
 
 
 def resolved(scene: Scene, options: Relight, notes: list[str] | None = None) -> Any:
     """The options with the environment map [h, 2h, 3] itself, its gain, and `types.Lamp` objects.
 
-    `notes` get what its reader assumed. Raises InputError.
+    The notes of the file's reader are added to `notes`. Raises InputError.
     """
     envmap = options.envmap
     gain = options.gain
@@ -108,7 +108,7 @@ def resolved(scene: Scene, options: Relight, notes: list[str] | None = None) -> 
     elif envmap is not None:
         envmap = checked_envmap(envmap)
         gain = 1.0 if gain is None else gain
-    lamps = tuple(one if isinstance(one, Lamp) else lamp(scene, *one) for one in options.lamps)
+    lamps = tuple(item if isinstance(item, Lamp) else lamp(scene, *item) for item in options.lamps)
     return replace(options, envmap=envmap, gain=gain, lamps=lamps)
 
 
@@ -134,6 +134,7 @@ def kelvin_colour(kelvin: float) -> Array:
 
     Chromaticity by the cubic fits of Kim et al. (2002). Raises InputError outside 1667 to 25000 K.
     """
+    # --- Chromaticity (x, y) of the Planckian locus ---
     if not 1667 <= kelvin <= 25000:
         raise InputError(
             f"The lamp has {kelvin:g} K; a colour temperature lies between 1667 and 25000."
@@ -149,6 +150,7 @@ def kelvin_colour(kelvin: float) -> Array:
         y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
     else:
         y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    # --- CIE XYZ at luminance 1, and the matrix to linear Rec.709 ---
     xyz = np.array([x / y, 1.0, (1 - x - y) / y])
     to_rgb = np.array(
         [
@@ -173,13 +175,13 @@ def checked_envmap(envmap: Array) -> Array:
 def read_envmap(path: str | Path, notes: list[str] | None = None) -> Array:
     """[h, 2h, 3] float32 from an EXR, HDR or display file, shrunk to at most `map_rows` rows.
 
-    `notes` get what its reader assumed. Raises InputError.
+    The notes of its reader are added to `notes`. Raises InputError.
     """
     decoded = decode_photo(Path(path))
     if notes is not None:
         notes += [f"The environment map {Path(path).name}: {note}" for note in decoded.warnings]
     envmap = checked_envmap(decoded.linear)
-    if len(envmap) > (rows := SETTINGS.map_rows):
+    if len(envmap) > (rows := SETTINGS.max_map_rows):
         envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))
     return envmap
 
@@ -209,13 +211,16 @@ def with_sun(
     az = np.radians(azimuth)
     el = np.radians(elevation)
     towards = np.array([np.cos(el) * np.sin(az), np.sin(el), -np.cos(el) * np.cos(az)])
+    # --- A disc with a soft border of one texel around the sun's direction ---
     cosine = texel_directions(*envmap.shape[:2]) @ towards
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))  # [h, 2h]
     solid = row_solid_angle(envmap.shape[0])[:, None]  # [h, 1]
     texel = 180 / envmap.shape[0]
-    disc = np.clip((max(SETTINGS.sun_radius, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
+    disc = np.clip((max(SETTINGS.min_sun_radius, 1.5 * texel) - angle) / texel + 0.5, 0, 1)
+    # --- Its radiance: an irradiance of `power` times that of a map of the mean radiance, pi L ---
     mean = luminance((envmap * solid[..., None]).sum((0, 1)) / (4 * np.pi))
     radiance = power * np.pi * mean / (disc * solid).sum()
+    # --- The map without its own sun: texels above the 98th percentile are brought down ---
     bright = luminance(envmap)
     limit = max(float(np.quantile(bright, 0.98)), float(mean))
     calm = envmap * np.minimum(1, limit / np.maximum(bright, 1e-12))[..., None]
@@ -271,32 +276,29 @@ def moving_light(
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
     film = [scene] * count if isinstance(scene, Scene) else scene
     notes: list[str] = []
-    wanted = resolved(film[0], Relight.given(options, **values), notes)
-    lamps, (first, last) = (
-        wanted.lamps,
-        wanted.rotate if isinstance(wanted.rotate, tuple) else (0.0, wanted.rotate),
-    )
+    changes = resolved(film[0], Relight.given(options, **values), notes)
+    lamps = changes.lamps
+    first, last = changes.rotate if isinstance(changes.rotate, tuple) else (0.0, changes.rotate)
     if not (first or last) and len(suns) < 2 and len(lamps) < 2:
         last = 360.0
     turn = last - first
-    if isinstance(scene, Scene) and (wanted.dim is not None or wanted.lights is not None):
+    if isinstance(scene, Scene) and (changes.dim is not None or changes.lights is not None):
         # Once: finding the lights takes a rendering.
-        film = [relight(scene, dim=wanted.dim, lights=wanted.lights)] * count
-        wanted = replace(wanted, dim=None, lights=None)
-    closed = (
-        turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2
-    )  # the last frame then meets the first
+        film = [relight(scene, dim=changes.dim, lights=changes.lights)] * count
+        changes = replace(changes, dim=None, lights=None)
+    # After a full turn the last frame would be the first again: the film then stops one step before.
+    closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2
     for k in range(count):
         t = k / (count if closed else count - 1)
         sun = tuple(_between(suns, t)) if suns else None
         placed: tuple[Lamp, ...] = ()
         if lamps:
             x, y, z, *power, radius = _between(
-                [(*one.position, *one.power, one.radius) for one in lamps], t
+                [(*station.position, *station.power, station.radius) for station in lamps], t
             )
             placed = (Lamp((x, y, z), triple(power), radius),)
         yield warned(
-            relight(film[k], wanted, rotate=first + t * turn, sun=sun, lamps=placed), *notes
+            relight(film[k], changes, rotate=first + t * turn, sun=sun, lamps=placed), *notes
         )
 
 

@@ -37,27 +37,30 @@ def edit(
     options, values: see `options.MaterialEdit`; `values` are fields of it, as in `edit(scene, mask, hue=120)`.
     Raises InputError for a mask of another size or empty, or a value out of its range.
     """
-    wanted = MaterialEdit.given(options, **values)
-    weight = reshaped(checked_region(scene, mask), wanted.grow, wanted.feather) * (scene.depth > 0)
+    changes = MaterialEdit.given(options, **values)
+    weight = reshaped(checked_region(scene, mask), changes.grow, changes.feather) * (
+        scene.depth > 0
+    )
     materials = scene.materials
-    colour, texture = _base_colour(scene, weight, wanted)
-    if wanted.hue or wanted.saturation or wanted.value:
-        colour = shifted_hsv(colour, wanted.hue, wanted.saturation, wanted.value)
+    colour, texture = _base_colour(scene, weight, changes)
+    if changes.hue or changes.saturation or changes.value:
+        colour = shifted_hsv(colour, changes.hue, changes.saturation, changes.value)
+    # Mixed by the weight, so that a feathered border fades.
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
-        _mix(materials.roughness, _changed(materials.roughness, wanted.roughness), weight),
-        _mix(materials.metallic, _changed(materials.metallic, wanted.metallic), weight),
+        _mix(materials.roughness, _changed(materials.roughness, changes.roughness), weight),
+        _mix(materials.metallic, _changed(materials.metallic, changes.metallic), weight),
     )
     names = ("hue", "saturation", "value", "grow", "feather")
-    what: dict[str, Any] = {name: getattr(wanted, name) or None for name in names}
-    what |= {
-        "albedo": wanted.albedo,
-        "roughness": wanted.roughness,
-        "metallic": wanted.metallic,
+    facts: dict[str, Any] = {name: getattr(changes, name) or None for name in names}
+    facts |= {
+        "albedo": changes.albedo,
+        "roughness": changes.roughness,
+        "metallic": changes.metallic,
         "texture": texture,
     }
     return noted(
-        replace(scene, materials=new), "material", {**what, "pixels": int((weight > 0.5).sum())}
+        replace(scene, materials=new), "material", {**facts, "pixels": int((weight > 0.5).sum())}
     )
 
 
@@ -69,9 +72,8 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     """
     shape = albedo.shape
     encoded = linear_to_srgb(albedo).reshape(-1, 1, 3)
-    hsv = cv2.cvtColor(
-        np.ascontiguousarray(encoded), cv2.COLOR_RGB2HSV
-    )  # float: H in [0, 360), S and V in [0, 1]
+    # Of floats: H in [0, 360), S and V in [0, 1].
+    hsv = cv2.cvtColor(np.ascontiguousarray(encoded), cv2.COLOR_RGB2HSV)
     h = hsv[..., 0]
     s = hsv[..., 1]
     v = hsv[..., 2]
@@ -83,33 +85,31 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
 
 
 def _base_colour(
-    scene: Scene, weight: Array, wanted: MaterialEdit
+    scene: Scene, weight: Array, changes: MaterialEdit
 ) -> tuple[Array, list[int] | None]:
     """([H, W, 3] albedo before hue, saturation and value act, shape of the texture that it has)."""
-    if wanted.albedo is not None and wanted.texture is not None:
+    if changes.albedo is not None and changes.texture is not None:
         raise InputError(
             "Give an albedo or a texture, not both; hue, saturation and value can go with either."
         )
-    if wanted.texture is not None:
-        picture = wanted.texture
+    if changes.texture is not None:
+        picture = changes.texture
         if isinstance(picture, str | Path):
             picture = np.clip(decode_photo(Path(picture)).exposed(), 0, 1)
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
-        return projected(scene, region, picture, wanted.texture_scale), list(np.shape(picture))
-    if wanted.albedo is not None:
+        return projected(scene, region, picture, changes.texture_scale), list(np.shape(picture))
+    if changes.albedo is not None:
         return np.broadcast_to(
-            np.asarray(wanted.albedo, np.float32), scene.materials.albedo.shape
+            np.asarray(changes.albedo, np.float32), scene.materials.albedo.shape
         ), None
     return scene.materials.albedo, None
 
 
-def _changed(old: Array, wanted: float | str | None) -> Array:
+def _changed(old: Array, value: float | str | None) -> Array:
     """[H, W] property set to a number, or shifted by a signed text, and kept in [0, 1]."""
-    if wanted is None:
+    if value is None:
         return old
-    return (
-        np.clip(old + float(wanted), 0, 1) if isinstance(wanted, str) else np.full_like(old, wanted)
-    )
+    return np.clip(old + float(value), 0, 1) if isinstance(value, str) else np.full_like(old, value)
 
 
 def _mix(old: Array, new: Array, weight: Array) -> Array:
@@ -134,17 +134,16 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
     use = region & (scene.depth > 0)
     points = unproject(scene.depth, scene.camera)
     normal = unit(scene.normal[use].mean(0))
-    right, up = axes(normal) * (
-        -1 if normal[1] >= 0.9 else 1
-    )  # on a floor the way up leads into the depth
-    across, along = (
-        points @ right,
-        points @ -up,
-    )  # [H, W], scene units, along growing downwards as rows do
+    # On a floor the way up leads into the depth.
+    right, up = axes(normal) * (-1 if normal[1] >= 0.9 else 1)
+    # [H, W] scene units; `along` grows downwards as rows do.
+    across = points @ right
+    along = points @ -up
     h, w = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
     extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h, 1e-9) * scale
-    u, v = ((place - place[use].min()) / (extent * n) for place, n in ((across, w), (along, h)))
+    u = (across - across[use].min()) / (extent * w)
+    v = (along - along[use].min()) / (extent * h)
     return _repeated(picture, u, v, use)
 
 
@@ -161,6 +160,7 @@ def _repeated(picture: Array, u: Array, v: Array, use: Array) -> Array:
             picture, (max(1, round(w * k)), max(1, round(h * k))), interpolation=cv2.INTER_AREA
         )
         return _repeated(small, u, v, use) if small.shape != picture.shape else small
+    # One pixel of the opposite side around it: the bilinear lookup then repeats without a seam.
     padded = cv2.copyMakeBorder(picture, 1, 1, 1, 1, cv2.BORDER_WRAP)
     return cv2.remap(padded, x.astype(np.float32) + 1, y.astype(np.float32) + 1, cv2.INTER_LINEAR)
 

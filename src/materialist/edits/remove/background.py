@@ -29,11 +29,11 @@ LONGEST = 768
 
 
 def picture_behind(
-    scene: Scene, options: Removal, hole: Array, usable: Array, found: HiddenGeometry
+    scene: Scene, options: Removal, hole: Array, usable: Array, hidden: HiddenGeometry
 ) -> tuple[Array, str, list[str]]:
     """([h, w, 3] linear picture of what is behind a hole [H, W] bool, what made it, warnings of its file).
 
-    usable [H, W] bool: what patches may come from. found: what stands there. Raises InputError for a picture that
+    usable [H, W] bool: what patches may come from. hidden: the surfaces behind. Raises InputError for a picture that
     is none of this view; see `inpainter` and `patches.patched`.
     """
     background = options.background
@@ -41,7 +41,11 @@ def picture_behind(
     if background is not None and inpaint is not None:
         raise InputError("Give a background or an inpainter, not both.")
     if background is None and inpaint is None:
-        return patched(scene.photo.original, hole, usable, found.label, options.seed), "patches", []
+        return (
+            patched(scene.photo.original, hole, usable, hidden.label, options.seed),
+            "patches",
+            [],
+        )
     name = "background" if inpaint is None else "inpainter"
     notes = list[str]()
     if isinstance(inpaint, str):
@@ -51,12 +55,14 @@ def picture_behind(
             background = np.asarray(inpaint(scene.photo.linear, hole), np.float32)
         except Exception as error:  # whatever a user's function raises
             raise InputError(f"The inpainter failed: {type(error).__name__}: {error}.") from error
+    # --- A file: display pictures have white at 1, HDR ones the photo's exposure ---
     if isinstance(background, str | Path):
         decoded = decode_photo(Path(background))
         notes = [f"The background {Path(background).name}: {note}" for note in decoded.warnings]
         background = decoded.exposed() * np.float32(
             2.0**scene.photo.stops if decoded.scene_linear else 1
         )
+    # --- Whatever made it, it must be of this view ---
     picture = np.asarray(background, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or not same_aspect(picture.shape, hole.shape):
         raise InputError(
@@ -99,6 +105,7 @@ def _diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int
     import torch
 
     height, width = hole.shape
+    # Sides must be multiples of what the pipeline's encoder shrinks by.
     unit = 8 * max(1, getattr(pipeline, "vae_scale_factor", 8) // 8)
     scale = min(1.0, LONGEST / max(height, width))
     w, h = (max(unit, round(n * scale / unit) * unit) for n in (width, height))

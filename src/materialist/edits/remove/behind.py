@@ -25,13 +25,16 @@ class ContinuationSettings:
     Tuned by eye on 14 photos and 19 rooms of `bench glass`.
     """
 
-    ring: float = 0.1  # width, in sizes, of the ring around the hole whose surfaces may go on
-    share: float = 0.01  # least part of that ring of a surface that goes on
-    firm: float = 0.5  # part of the ring from which planes leave nothing hidden to what is no plane; 22 pasted objects
-    window: float = 0.4  # width, in sizes, of the surroundings that are looked at
-    fades: float = 0.2  # distance from the hole, in sizes, at which a pixel counts 1 / e for lines between surfaces
-    straight: float = 0.9  # least part of the surroundings that such lines must sort rightly; else a membrane does
-    gap: float = 1e-3  # least part of the depth between what was hidden and what hid it
+    # Which surfaces go on.
+    ring_width: float = 0.1  # of the ring around the hole whose surfaces may go on
+    min_ring_share: float = 0.01  # of that ring, for a surface that goes on
+    min_plane_share: float = 0.5  # of the ring: then only planes go on; from 22 pasted objects
+
+    # Where they part.
+    window: float = 0.4  # width of the surroundings that are looked at
+    fading: float = 0.2  # distance from the hole at which a pixel counts 1 / e for lines
+    min_sorted: float = 0.9  # part of the surroundings that lines must sort rightly
+    min_gap: float = 1e-3  # part of the depth between what was hidden and what hid it
 
 
 SETTINGS = ContinuationSettings()
@@ -70,11 +73,13 @@ def behind(
     around = _Surroundings(
         depth[box], normal[box], known[box], hole[box], pixel_rays(camera)[box].astype(float)
     )
+    # --- Each hidden pixel gets the label of a surface around, then its depth and normal ---
     label = around.labels()
     for k in np.unique(label[around.hole]):
         here = around.hole & (label == k)
         new_depth, new_normal = around.surface(int(k), here, front[box])
-        out.depth[box][here], out.normal[box][here] = new_depth, new_normal
+        out.depth[box][here] = new_depth
+        out.normal[box][here] = new_normal
     out.label[box] = label
     return out
 
@@ -90,7 +95,7 @@ class _Surroundings:
         surface = depth > 0
         self.inverse = np.where(surface, 1 / np.where(surface, depth, 1), 0).astype(np.float64)
         self.spanned = membrane(self.inverse, ~hole & surface)
-        self.ring = _ring(hole, SETTINGS.ring)
+        self.ring = _ring(hole, SETTINGS.ring_width)
 
     def labels(self) -> Array:
         """[h, w] int: the labels around, carried into the hole."""
@@ -98,9 +103,14 @@ class _Surroundings:
         shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(
             self.ring.sum(), 1
         )
-        kept = kinds[shares >= SETTINGS.share] if self.ring.any() else kinds[count.argmax()][None]
-        if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= SETTINGS.firm:
+        kept = (
+            kinds[shares >= SETTINGS.min_ring_share]
+            if self.ring.any()
+            else kinds[count.argmax()][None]
+        )
+        if shares[np.isin(kinds, kept) & (kinds >= 0)].sum() >= SETTINGS.min_plane_share:
             kept = kept[kept != LOOSE]
+        # --- Straight lines part planes; what is no plane has no straight borders ---
         chosen = None if LOOSE in kept else self._parted(kept)
         if chosen is None:
             indicator = np.stack([self.known == k for k in kept], -1).astype(np.float32)
@@ -116,34 +126,41 @@ class _Surroundings:
         rows, columns = np.nonzero(np.isin(self.known, kinds) & _ring(self.hole, SETTINGS.window))
         if not len(rows):
             return None
-        wanted = self.known[rows, columns][:, None] == kinds  # [N, K]
+        target = self.known[rows, columns][:, None] == kinds  # [N, K]
         y, x = (v / size for v in np.indices(self.hole.shape, float))
+        # --- A linear classifier of places; each surface counts alike, near pixels more ---
         basis = np.stack([np.ones_like(y), y - y[rows, 0].mean(), x - x[0, columns].mean()], -1)
-        near = np.exp(-distance_transform_edt(~self.hole)[rows, columns] / size / SETTINGS.fades)
-        balance = near / np.maximum(near @ wanted, 1e-12)[wanted.argmax(1)]
-        scores = basis @ _softmax(basis[rows, columns], wanted, balance / balance.sum())
-        right = scores[rows, columns].argmax(-1) == wanted.argmax(-1)
-        return kinds[scores.argmax(-1)] if right @ near >= SETTINGS.straight * near.sum() else None
+        near = np.exp(-distance_transform_edt(~self.hole)[rows, columns] / size / SETTINGS.fading)
+        balance = near / np.maximum(near @ target, 1e-12)[target.argmax(1)]
+        scores = basis @ _softmax(basis[rows, columns], target, balance / balance.sum())
+        # --- Trusted where it sorts the pixels around rightly ---
+        right = scores[rows, columns].argmax(-1) == target.argmax(-1)
+        return (
+            kinds[scores.argmax(-1)] if right @ near >= SETTINGS.min_sorted * near.sum() else None
+        )
 
-    def surface(self, label: int, here: Array, front: Array) -> tuple[Array, Array]:
-        """Depth [P] and normals [P, 3] of one surface at the pixels `here` [h, w] bool of the hole."""
+    def surface(self, label: int, pixels: Array, front: Array) -> tuple[Array, Array]:
+        """Depth [P] and normals [P, 3] of one surface at `pixels` [h, w] bool of the hole."""
         if label == SKY:
-            return np.zeros(here.sum()), self.normal[here]
-        own = ~self.hole & (self.known == label) & (self.inverse > 0)
-        spanned = self._on_plane(own) if label >= 0 else membrane(self.inverse, own)
-        spanned = np.where(spanned > 0, spanned, self.spanned)[here]
+            return np.zeros(pixels.sum()), self.normal[pixels]
+        members = ~self.hole & (self.known == label) & (self.inverse > 0)
+        spanned = self._on_plane(members) if label >= 0 else membrane(self.inverse, members)
+        spanned = np.where(spanned > 0, spanned, self.spanned)[pixels]
         limit = np.where(
-            front[here] > 0, (1 - SETTINGS.gap) / np.maximum(front[here], 1e-12), np.inf
+            front[pixels] > 0, (1 - SETTINGS.min_gap) / np.maximum(front[pixels], 1e-12), np.inf
         )
         return 1 / np.clip(np.minimum(spanned, limit), 1e-9, None), unit(
-            membrane(self.normal, own)[here]
+            membrane(self.normal, members)[pixels]
         )
 
-    def _on_plane(self, own: Array) -> Array:
-        """[h, w] inverse depth of the plane through the pixels `own` [h, w] bool, bent to meet them at the hole."""
-        flat = self.rays @ through(self.rays[own], 1 / np.maximum(self.inverse[own], 1e-12))
-        sound = flat > 0.2 * np.median(self.inverse[own])
-        bend = membrane(np.where(sound, self.inverse / np.where(sound, flat, 1), 1), own & sound)
+    def _on_plane(self, members: Array) -> Array:
+        """[h, w] inverse depth of the plane through the pixels `members` [h, w] bool, bent to meet them at the hole."""
+        flat = self.rays @ through(self.rays[members], 1 / np.maximum(self.inverse[members], 1e-12))
+        # Where the plane runs to infinity it says nothing.
+        sound = flat > 0.2 * np.median(self.inverse[members])
+        bend = membrane(
+            np.where(sound, self.inverse / np.where(sound, flat, 1), 1), members & sound
+        )
         return np.where(sound, flat * bend, 0)
 
 
@@ -152,21 +169,23 @@ def _ring(hole: Array, width: float) -> Array:
     return grown(hole, max(2, round(width * float(np.sqrt(hole.sum()))))) & ~hole
 
 
-def _softmax(basis: Array, wanted: Array, weight: Array) -> Array:
-    """[F, K] weights of the softmax classifier of features [N, F] into wanted [N, K] bool, samples weighted [N].
+def _softmax(basis: Array, target: Array, weight: Array) -> Array:
+    """[F, K] weights of the softmax classifier of features [N, F] into target [N, K] bool, samples weighted [N].
 
     Nearly without a penalty, and converged: where lines part the samples, they run in the middle of the gap.
     """
-    shape = (basis.shape[1], wanted.shape[1])
-    slack = 1e-7
+    shape = (basis.shape[1], target.shape[1])
+    penalty = 1e-7
 
     def loss(flat: Array) -> tuple[float, Array]:
-        at = flat.reshape(shape)
-        logs = log_softmax(basis @ at, axis=-1)
-        slope = basis.T @ ((np.exp(logs) - wanted) * weight[:, None]) + slack * at
-        return float(-(logs[wanted] * weight).sum() + slack / 2 * (at**2).sum()), slope.ravel()
+        weights = flat.reshape(shape)
+        logs = log_softmax(basis @ weights, axis=-1)
+        slope = basis.T @ ((np.exp(logs) - target) * weight[:, None]) + penalty * weights
+        return float(
+            -(logs[target] * weight).sum() + penalty / 2 * (weights**2).sum()
+        ), slope.ravel()
 
-    found = minimize(
+    fit = minimize(
         loss, np.zeros(shape).ravel(), jac=True, method="L-BFGS-B", options={"maxiter": 500}
     )
-    return found.x.reshape(shape)
+    return fit.x.reshape(shape)

@@ -16,17 +16,13 @@ from materialist.types import Array, Scene
 class HoleSettings:
     """When there is no hole, and what else is filled."""
 
-    most: float = (
-        0.9  # part of the photo's surfaces beyond which nothing is left to tell what stood behind
-    )
-    shadow: float = 0.15  # how far around the object the ground is filled by default, part of the root of its area
-    island: float = (
-        0.01  # part of the object up to which what is surrounded by filled pixels is filled as well
-    )
-    large: float = (
-        0.15  # part of the photo from which a filled hole is a guess; tuned by eye on 6 photos
-    )
-    cut: float = 0.1  # part of its outline that the frame cuts from which it is one, too; tuned by eye on 6 photos
+    max_share: float = 0.9  # of the photo's surfaces; more leaves nothing to tell what stood behind
+    shadow: float = 0.15  # ground filled around the object, part of the root of its area
+    max_island: float = 0.01  # part of the object: what filled pixels surround is filled, too
+
+    # When the filling is a guess; tuned by eye on 6 photos.
+    large_share: float = 0.15  # of the photo
+    cut_share: float = 0.1  # of its outline that the frame cuts
 
 
 SETTINGS = HoleSettings()
@@ -52,40 +48,42 @@ def make_hole(
     `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay.
     Raises InputError for a mask that is empty, of another size, all sky, or (nearly) all of the photo.
     """
-    own = checked_region(scene, mask) > 0.5
-    if not own.any():
+    region = checked_region(scene, mask) > 0.5
+    if not region.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
-    gone = grown(own, round(grow * max(own.shape)))
+    gone = grown(region, round(grow * max(region.shape)))
     surface = scene.depth > 0
     plane = scene.geometry.plane_label
+    # Shadow and reflection lie on the ground: planes that face up.
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
     share = SETTINGS.shadow if shadow is None else shadow
-    painted = gone | (ground & grown(gone, round(share * float(np.sqrt(own.sum())))))
-    if (painted & surface).sum() > SETTINGS.most * surface.sum() or (painted | ~surface).all():
-        mask_share, whole = (
-            (part & surface).sum() / max(surface.sum(), 1) for part in (own, painted)
-        )
+    painted = gone | (ground & grown(gone, round(share * float(np.sqrt(region.sum())))))
+    if (painted & surface).sum() > SETTINGS.max_share * surface.sum() or (painted | ~surface).all():
+        mask_share = (region & surface).sum() / max(surface.sum(), 1)
+        whole = (painted & surface).sum() / max(surface.sum(), 1)
         raise InputError(
             f"The mask covers {mask_share:.0%} of the photo's surfaces (sky is none), {whole:.0%} with a shadow of "
             f"{share:g}, so that nothing tells what stands behind; mark one object only, or give a smaller shadow."
         )
     return Hole(
-        own, gone, remove_small_holes(painted, max_size=int(SETTINGS.island * own.sum())) & ~bodies
+        region,
+        gone,
+        remove_small_holes(painted, max_size=int(SETTINGS.max_island * region.sum())) & ~bodies,
     )
 
 
 def evidence_notes(hole: Hole) -> list[str]:
     """What to say of a hole whose surroundings tell little of what was hidden."""
-    here = hole.painted
-    frame = np.pad(np.zeros(tuple(n - 2 for n in here.shape), bool), 1, constant_values=True)
-    outline = here & ~binary_erosion(here)
-    share = float(here.mean())
-    cut = float((here & frame).sum() / max(int(outline.sum()), 1))
-    why = [f"it takes {share:.0%} of the photo"] * (share > SETTINGS.large)
-    why += [f"{cut:.0%} of its outline lies on the frame"] * (cut > SETTINGS.cut)
-    if not why:
+    painted = hole.painted
+    frame = np.pad(np.zeros(tuple(n - 2 for n in painted.shape), bool), 1, constant_values=True)
+    outline = painted & ~binary_erosion(painted)
+    share = float(painted.mean())
+    cut = float((painted & frame).sum() / max(int(outline.sum()), 1))
+    reasons = [f"it takes {share:.0%} of the photo"] * (share > SETTINGS.large_share)
+    reasons += [f"{cut:.0%} of its outline lies on the frame"] * (cut > SETTINGS.cut_share)
+    if not reasons:
         return []
     return [
-        f"The photo tells little of what the object hid: {' and '.join(why)}. What is there now is a guess from the "
-        "rest of the photo; where you have the view without the object, give it as the background."
+        f"The photo tells little of what the object hid: {' and '.join(reasons)}. What is there now is a guess from "
+        "the rest of the photo; where you have the view without the object, give it as the background."
     ]

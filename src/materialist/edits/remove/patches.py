@@ -24,20 +24,12 @@ from materialist.types import Array
 class PatchSettings:
     """How a hole is filled; tuned on 6 photos by eye, 10 photos with an object pasted in and 6 made ones."""
 
-    longest: int = (
-        768  # longer side, pixels, at which patches are matched; more: finer texture, slower
-    )
-    radius: float = (
-        1 / 150
-    )  # of a patch, in longer sides, and at least 2 pixels; more: longer edges, fewer fit
-    near: float = 0.4  # distance to the hole, in its sizes, up to which anything may be copied; more: other things
-    guide: float = (
-        0.25  # weight of the guide beside the patches' colours; more: less from other surfaces
-    )
-    surface: float = 0.1  # guide: from one surface to another
-    floor: float = (
-        0.05  # radiance below which HDR values are compared by difference, above by ratio; by eye
-    )
+    max_side: int = 768  # longer side at which patches are matched; more: finer, slower
+    radius: float = 1 / 150  # of a patch, in longer sides, at least 2 pixels; more: longer edges
+    max_distance: float = 0.4  # from the hole, in its sizes, from where anything may be copied
+    guide_weight: float = 0.25  # beside the patches' colours; more: less from other surfaces
+    guide_step: float = 0.1  # of the guide from one surface to the next
+    floor: float = 0.05  # radiance: HDR values differ by sums below, by ratios above; by eye
 
 
 SETTINGS = PatchSettings()
@@ -46,31 +38,33 @@ _LOCK = threading.Lock()
 
 
 def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 0) -> Array:
-    """[h, w, 3] float32 linear: a photo [H0, W0, 3] with the hole [H, W] bool filled, at its size or `longest`.
+    """[h, w, 3] float32 linear: a photo [H0, W0, 3] with the hole [H, W] bool filled, at its size or `max_side`.
 
     usable [H, W] bool: what may be copied. label: [H, W] int: the surface of a pixel, as `behind.HiddenGeometry`, in
     the hole that which is hidden. Raises SetupError without a working library.
     """
     native = photo.shape[:2]
-    scale = min(1.0, SETTINGS.longest / max(native))
+    scale = min(1.0, SETTINGS.max_side / max(native))
     shape = tuple(max(1, round(n * scale)) for n in native)
     picture = resample.values(photo, shape)
-    near = grown(hole, max(8, round(SETTINGS.near * float(np.sqrt(hole.sum())))))
+    # --- What may be copied: surfaces that go on behind, and what is near ---
+    near = grown(hole, max(8, round(SETTINGS.max_distance * float(np.sqrt(hole.sum())))))
     behind = np.unique(label[hole])
     planes = behind[behind >= 0]  # the rest is many things
     usable = usable & (near | np.isin(label, planes if planes.size else behind))
-    gap, kept = (resample.values(m.astype(np.float32), shape) > 0 for m in (hole, ~usable & ~hole))
-    kept &= ~gap
+    gap = resample.values(hole.astype(np.float32), shape) > 0
+    excluded = resample.values((~usable & ~hole).astype(np.float32), shape) > 0
+    excluded &= ~gap
+    # --- 8-bit levels, as the library wants them; 0 is left to say that no patch fitted ---
     top = max(1.0, float(picture.max()))
-    levels = np.maximum(np.round(255 * _encoded(picture, top)), 1).astype(
-        np.uint8
-    )  # 0: no patch fitted
-    surface = resample.values((SETTINGS.surface * label).astype(np.float32), shape)
+    levels = np.maximum(np.round(255 * _encoded(picture, top)), 1).astype(np.uint8)
+    surface = resample.values((SETTINGS.guide_step * label).astype(np.float32), shape)
     guide = np.stack([surface, 0 * surface, 0 * surface], -1)
-    filled = _inpainted(levels, gap, kept, guide, seed).astype(np.float32) / 255
+    filled = _inpainted(levels, gap, excluded, guide, seed).astype(np.float32) / 255
+    # --- Where no patch fitted, a smooth surface ---
     plain = gap & (filled == 0).all(-1)
     if plain.any():
-        filled = np.where(plain[..., None], membrane(filled, ~gap & ~kept), filled)
+        filled = np.where(plain[..., None], membrane(filled, ~gap & ~excluded), filled)
     return np.where(gap[..., None], _decoded(filled, top), picture).astype(np.float32)
 
 
@@ -85,8 +79,8 @@ def _decoded(values: Array, top: float) -> Array:
     return srgb_to_linear(values) if top <= 1 else floor * np.expm1(values * np.log1p(top / floor))
 
 
-def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) -> Array:
-    """uint8 levels [h, w, 3] with `gap` [h, w] bool filled, nothing of it from `kept` [h, w] bool."""
+def _inpainted(levels: Array, gap: Array, excluded: Array, guide: Array, seed: int) -> Array:
+    """uint8 levels [h, w, 3] with `gap` [h, w] bool filled, nothing of it from `excluded` [h, w] bool."""
     try:
         import patchmatch
 
@@ -98,9 +92,9 @@ def _inpainted(levels: Array, gap: Array, kept: Array, guide: Array, seed: int) 
                     levels,
                     gap,
                     guide,
-                    global_mask=kept,
+                    global_mask=excluded,
                     patch_size=radius,
-                    guide_weight=SETTINGS.guide,
+                    guide_weight=SETTINGS.guide_weight,
                 )
             )
     except (ImportError, RuntimeError) as error:

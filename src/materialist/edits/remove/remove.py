@@ -52,38 +52,41 @@ def remove(
         if photographed.bodies
         else np.zeros(scene.depth.shape, bool)
     )
+    # --- What is taken away, and what stands behind it ---
     hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow, bodies=bodies)
     front = np.where(hole.object, scene.depth, 0)
-    found = behind(
+    hidden = behind(
         scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera
     )
-    picture, how, warnings = picture_behind(scene, options, hole.painted, ~bodies, found)
+    picture, method, warnings = picture_behind(scene, options, hole.painted, ~bodies, hidden)
+    # --- The photo, maps and re-rendering are filled alike ---
     photo = with_hole(scene.photo, picture, hole.painted)
     old = scene.materials
     shown = denoised(scene.rerender, old.albedo, scene.normal)
-    spanned = (membrane(np.clip(v, 0, 1), ~hole.painted) for v in (old.roughness, old.metallic))
+    roughness = membrane(np.clip(old.roughness, 0, 1), ~hole.painted)
+    metallic = membrane(np.clip(old.metallic, 0, 1), ~hole.painted)
     removed = replace(
         scene,
         photo=photo,
-        depth=found.depth,
-        normal=found.normal,
-        geometry=rebuilt(scene, found.depth, found.normal, scene.camera),
+        depth=hidden.depth,
+        normal=hidden.normal,
+        geometry=rebuilt(scene, hidden.depth, hidden.normal, scene.camera),
         materials=Materials(
-            np.minimum(carried(old.albedo, photo.linear, hole.painted), 1), *spanned
+            np.minimum(carried(old.albedo, photo.linear, hole.painted), 1), roughness, metallic
         ),
         rerender=np.where(
             hole.painted[..., None], carried(shown, photo.linear, hole.painted), scene.rerender
         ),
     )
-    what = {
-        "filled_by": how,
+    facts = {
+        "filled_by": method,
         "pixels": int(hole.object.sum()),
         "grow": options.grow,
         "shadow": "auto" if options.shadow is None else options.shadow,
     }
-    if how == "patches":
+    if method == "patches":
         warnings += evidence_notes(hole)
-    return noted(warned(removed, *warnings), "remove", what)
+    return noted(warned(removed, *warnings), "remove", facts)
 
 
 def carried(values: Array, photo: Array, hole: Array) -> Array:
@@ -92,8 +95,8 @@ def carried(values: Array, photo: Array, hole: Array) -> Array:
     Their ratio around the hole is spanned over it: light is smooth, and the texture is the photo's.
     """
     ratio = membrane(np.log((values + FLOOR) / (photo + FLOOR)), ~hole)
-    told = np.maximum((photo + FLOOR) * np.exp(ratio) - FLOOR, 0)
-    return np.where(hole[..., None], told, values).astype(np.float32)
+    filled = np.maximum((photo + FLOOR) * np.exp(ratio) - FLOOR, 0)
+    return np.where(hole[..., None], filled, values).astype(np.float32)
 
 
 def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
@@ -117,6 +120,7 @@ def _outline(mask: Array, native: tuple[int, ...]) -> Array:
         return hard.astype(np.float32)
     smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
     share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
+    # A smoothed outline would lose lines one pixel wide: they stay hard.
     thin = mask & (
         cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0
     )

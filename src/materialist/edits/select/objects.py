@@ -22,35 +22,34 @@ from materialist.types import Array, Scene
 class SelectSettings:
     """Where ClickNet and GrabCut look; lengths in longer sides; tuned by eye unless said otherwise."""
 
-    least: float = (
-        0.25  # overlap of an object's own box with the given one below which the box is misplaced
-    )
-    core: float = 0.01  # radius around a click that is certainly of the object
-    probable: float = (
-        0.08  # the same that GrabCut takes for the object at first; tuned on 54 clicks
-    )
-    possible: float = (
-        0.24  # radius around a click beyond which GrabCut does not look; tuned on 54 clicks
-    )
+    min_box_overlap: float = 0.25  # of the object's box with the given one; less: misplaced
     gap: float = 0.015  # half of the gap across which two parts are one
-    # Likelihood from which a pixel is of the object, and above 1 - sure it may be; 74 clicks, 12 photos.
-    sure: float = 0.9
-    side: int = 256  # longer side at which the unsure pixels are shared out
-    edge: float = 2000.0  # weight of the photo's edges in that; larger keeps to them more; 74 clicks, 12 photos
-    reach: float = 0.02  # how far the outline may move to an edge of the photo; tuned on 206 clicks
-    grain: float = (
-        0.01  # standard deviation of colour that is no edge, sRGB-encoded; tuned on 206 clicks
-    )
+
+    # GrabCut: radii around a click; tuned on 54 clicks.
+    core_radius: float = 0.01  # certainly of the object
+    probable_radius: float = 0.08  # taken for the object at first
+    max_radius: float = 0.24  # beyond, GrabCut does not look
+
+    # ClickNet: unsure pixels are shared out by a random walk; tuned on 74 clicks in 12 photos.
+    min_sure: float = 0.9  # likelihood of a pixel of the object; below 1 - min_sure it is not
+    walk_side: int = 256  # longer side at which they are shared out, pixels
+    walk_edge_weight: float = 2000.0  # of the photo's edges; larger keeps to them more
+
+    # The outline moves to edges of the photo; tuned on 206 clicks.
+    outline_reach: float = 0.02  # how far
+    colour_noise: float = 0.01  # standard deviation of colour that is no edge, sRGB-encoded
 
 
 SETTINGS = SelectSettings()
 
 
-def object_at(scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True) -> Array:
+def object_at_points(
+    scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True
+) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on."""
     if network:
         photo = linear_to_srgb(scene.photo.linear)
-        likely = segment.object_at(photo, scene.normal, scene.depth, points)
+        likely = segment.object_likelihood(photo, scene.normal, scene.depth, points)
         return outlined(photo, _divided(photo, likely), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
@@ -64,29 +63,29 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
         photo = linear_to_srgb(scene.photo.linear)
-        found = outlined(
-            photo, segment.object_at(photo, scene.normal, scene.depth, box=box) * inside, ()
+        mask = outlined(
+            photo, segment.object_likelihood(photo, scene.normal, scene.depth, box=box) * inside, ()
         )
     else:
-        found = tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
-    return found if box_overlap(found, box) >= SETTINGS.least else np.zeros_like(found)
+        mask = tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
+    return mask if box_overlap(mask, box) >= SETTINGS.min_box_overlap else np.zeros_like(mask)
 
 
 def box_overlap(mask: Array, box: Box) -> float:
     """Intersection over union of the bounding box of a mask [H, W] bool with a box; 0 for an empty mask."""
     if not mask.any():
         return 0.0
-    own = np.zeros(mask.shape, bool)
-    given = np.zeros(mask.shape, bool)
-    own[window(mask)] = True
-    given[box[1] : box[3], box[0] : box[2]] = True
-    return overlap(own, given)
+    object_box = np.zeros(mask.shape, bool)
+    given_box = np.zeros(mask.shape, bool)
+    object_box[window(mask)] = True
+    given_box[box[1] : box[3], box[0] : box[2]] = True
+    return overlap(object_box, given_box)
 
 
 def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     """[H, W] uint8 labels for GrabCut: discs around the clicks."""
     label = np.zeros(scene.depth.shape, np.uint8)
-    shares = (SETTINGS.possible, SETTINGS.probable, SETTINGS.core)
+    shares = (SETTINGS.max_radius, SETTINGS.probable_radius, SETTINGS.core_radius)
     for share, value in zip(shares, (cv2.GC_PR_BGD, cv2.GC_PR_FGD, cv2.GC_FGD), strict=True):
         for x, y in points:
             cv2.circle(label, (int(x), int(y)), max(2, round(share * max(label.shape))), value, -1)
@@ -98,8 +97,8 @@ def outlined(photo: Array, likely: Array, points: Sequence[tuple[int, int]]) -> 
 
     The outline moves to edges of the photo near it (guided filter, He et al. 2013).
     """
-    radius = max(2, round(SETTINGS.reach * max(likely.shape)))
-    guide = GuidedFilter(photo, radius=radius, eps=SETTINGS.grain**2)
+    radius = max(2, round(SETTINGS.outline_reach * max(likely.shape)))
+    guide = GuidedFilter(photo, radius=radius, eps=SETTINGS.colour_noise**2)
     return tidy(guide.share(likely) > 0.5, points)
 
 
@@ -109,18 +108,28 @@ def _divided(photo: Array, likely: Array) -> Array:
     A random walk (Grady 2006) at a small size. A click leaves much unsure; what a box finds is worse with it.
     """
     height, width = likely.shape
-    scale = min(1.0, SETTINGS.side / max(height, width))
+    scale = min(1.0, SETTINGS.walk_side / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
-    small, seen = (
-        np.asarray(cv2.resize(v.astype(np.float32), size, interpolation=cv2.INTER_AREA))
-        for v in (likely, photo)
-    )
-    seeds = np.where(small > SETTINGS.sure, 1, np.where(small < 1 - SETTINGS.sure, 2, 0))
+
+    def shrunk(picture: Array) -> Array:
+        small = cv2.resize(picture.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+        return np.asarray(small)
+
+    small = shrunk(likely)
+    seen = shrunk(photo)
+    # --- Seeds: 1 surely the object, 2 surely not, 0 unsure ---
+    seeds = np.where(small > SETTINGS.min_sure, 1, np.where(small < 1 - SETTINGS.min_sure, 2, 0))
     if len(np.unique(seeds)) < 3:  # one side has none, or nothing is unsure
         return likely.astype(np.float32)
     with warnings.catch_warnings(action="ignore"):  # that other solvers are faster
+        # The chance that a walk from each pixel reaches the object's seeds first.
         share = random_walker(
-            seen, seeds, beta=SETTINGS.edge, mode="cg_j", channel_axis=-1, return_full_prob=True
+            seen,
+            seeds,
+            beta=SETTINGS.walk_edge_weight,
+            mode="cg_j",
+            channel_axis=-1,
+            return_full_prob=True,
         )[0]
     return np.asarray(
         cv2.resize(share.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
@@ -132,6 +141,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
 
     Without points, or where no part holds one, all parts are kept that are not crumbs.
     """
+    # Opening takes away lines of single pixels.
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
     # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
     wide = disc(max(2, round(SETTINGS.gap * max(mask.shape))))

@@ -32,17 +32,17 @@ def segment(
     import torch
 
     with hub.advice('leave `method="sam2"` out'):
-        model = hub.load(hub.library("transformers").Sam2Model, locate(where, REPO))
+        model = hub.load_model(hub.import_library("transformers").Sam2Model, locate(where, REPO))
     target = torch.device("cuda" if on_gpu(device) else "cpu")
     model = model.to(target).eval()
     side = int(model.config.vision_config.backbone_config.image_size[0])
     height, width = linear.shape[:2]
     scale = np.array([side / width, side / height])
     corners = [] if box is None else [box[:2], box[2:]]
+    # Clicks are at pixel centres, corners of a box between pixels.
     spots = (np.array([*points, *corners], np.float32) + 0.5 * (box is None)) * scale
-    labels = [1] * len(points) + (
-        [] if box is None else [2, 3]
-    )  # clicks on the object, the two corners
+    # SAM's labels: 1 a click on the object, 2 and 3 the two corners of a box.
+    labels = [1] * len(points) + ([] if box is None else [2, 3])
     with torch.inference_mode():
         output = model(
             pixel_values=_pixels(linear, side).to(target),
@@ -52,6 +52,7 @@ def segment(
         )
     masks = output.pred_masks[0, 0].float()
     scores = output.iou_scores[0, 0]
+    # --- The best of its masks, at the photo's size ---
     best = masks[int(scores.argmax())][None, None]
     large = torch.nn.functional.interpolate(
         best, (height, width), mode="bilinear", align_corners=False
@@ -59,7 +60,7 @@ def segment(
     return (large[0, 0] > 0).cpu().numpy()
 
 
-def missing() -> str | None:
+def sam_problem() -> str | None:
     """Why SAM 2 cannot select here, in a sentence that says what to do; None where it can. Imports nothing large."""
     from importlib.util import find_spec
 

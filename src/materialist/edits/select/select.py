@@ -12,11 +12,11 @@ from materialist.edits.core.region import (
     checked_pixel,
     checked_region,
 )
-from materialist.edits.select.objects import object_at, object_in
+from materialist.edits.select.objects import object_at_points, object_in
 from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.io.image import read_mask
-from materialist.option_kinds import numbers, several
+from materialist.option_kinds import parse_numbers, several
 from materialist.predict.clicks.features import Box
 from materialist.types import Array, Scene
 
@@ -52,25 +52,26 @@ def select(
         mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
     if mask is not None:
         return checked_region(scene, mask) > 0.5
+    # --- The object, by the chosen method ---
     points = [] if click is None else _points(scene, click)
     frame = None if box is None else _box(scene, box)
     if method == "sam2":
         from materialist.edits.select.sam import segment
 
-        found = segment(scene.photo.linear, points, frame, device=device)
+        region = segment(scene.photo.linear, points, frame, device=device)
     elif frame is not None:
-        found = object_in(scene, frame, network=method == "network")
+        region = object_in(scene, frame, network=method == "network")
     else:
-        found = object_at(scene, points, network=method == "network")
-    found = found & (scene.depth > 0)
-    if not found.any():
+        region = object_at_points(scene, points, network=method == "network")
+    region = region & (scene.depth > 0)
+    if not region.any():
         other = (
             "draw the box a little larger"
             if frame is not None
             else "click another place on the object"
         )
         raise InputError(f"Nothing was found there; {other}, or give a mask.")
-    return found
+    return region
 
 
 def _points(scene: Scene, click) -> list[tuple[int, int]]:
@@ -90,7 +91,7 @@ def _points(scene: Scene, click) -> list[tuple[int, int]]:
 
 
 def _box(scene: Scene, box: Sequence[float]) -> Box:
-    x0, y0, x1, y1 = numbers(box, 4, "box")
+    x0, y0, x1, y1 = parse_numbers(box, 4, "box")
     width = scene.camera.width
     height = scene.camera.height
     left, right = np.clip(sorted((x0, x1)), 0, width)

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from materialist.color import ROWS, srgb_levels
-from materialist.io.bitmap import pixel_limit_lifted, rgb_levels, upright
+from materialist.io.bitmap import pixel_limit_lifted, rgb_levels, turned_upright
 from materialist.io.boxes import jp2_profile
 from materialist.io.colour_space import ColourSpace, transformed
 from materialist.io.colour_tags import png_chunks, stated_space
@@ -47,6 +47,7 @@ class PhotoColours:
         if self.space is None:
             return srgb_levels(picture, dtype)
         thresholds = _thresholds(self.space, dtype)
+        # --- Linear Rec.709 back to the photo's primaries, then each channel by its thresholds ---
         inverse = np.linalg.inv(self.space.matrix).T.astype(np.float32)
         out: Array = np.empty(picture.shape, dtype)
         for start in range(0, len(picture), ROWS):  # bounds the memory
@@ -88,6 +89,7 @@ class PhotoColours:
         """
         if self.space is None or self.stored is None or self.stored.shape != shape:
             return np.zeros(picture.shape[:2], bool), picture
+        # --- What clipping to Rec.709 took from the photo ---
         unclipped = np.stack(
             [table[self.stored[rows][..., k]] for k, table in enumerate(self._tables)], -1
         )
@@ -97,6 +99,7 @@ class PhotoColours:
         kept = (np.abs(picture - inside) <= _TOLERANCE).all(-1)
         if not lost.any():
             return kept, picture
+        # --- How much of it an edited pixel keeps ---
         share = np.clip((picture + _TOLERANCE) / (inside + _TOLERANCE), 0, 1).min(-1, keepdims=True)
         share[kept] = 1
         at_end = np.clip(1 - picture / np.maximum(-_MOVED * lost, _TOLERANCE), 0, 1)
@@ -131,6 +134,7 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
 
     register_heif_opener()
     with pixel_limit_lifted(), file.open("rb") as opened, Image.open(opened) as image:
+        # --- What the file says of its colours ---
         tags = image_tags(image)
         kind = image.format
         mode = image.mode
@@ -138,20 +142,26 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
         embedded = jp2_profile(file) if kind == "JPEG2000" else image.info.get("icc_profile")
         profile = None if b"cICP" in chunks else embedded
         colours = matrix_profile(profile) if profile else stated_space(file, kind, tags, [])
+        # --- Kinds that are written as sRGB, or without the stored levels ---
         if mode in ("L", "LA", "1", "I;16") or (colours is None and not profile and mode != "CMYK"):
             return SRGB
         if colours is None or mode == "CMYK" or colours.is_light:
             return PhotoColours(SRGB.profile, notes=(UNKEPT.format(_reason(mode, profile)),))
-        own = profile if profile and profile[16:20] == b"RGB " else profile_of(colours)
+        written_profile = profile if profile and profile[16:20] == b"RGB " else profile_of(colours)
         if colours.is_srgb:
-            return PhotoColours(own if profile else SRGB.profile)
+            return PhotoColours(written_profile if profile else SRGB.profile)
         if "A" in mode or "a" in mode or "transparency" in image.info or (kind == "HEIF" and deep):
-            return PhotoColours(own, colours, notes=(CLIPPED,))
+            return PhotoColours(written_profile, colours, notes=(CLIPPED,))
         if not deep:
-            return PhotoColours(own, colours, upright(np.asarray(image.convert("RGB")), tags))
+            return PhotoColours(
+                written_profile, colours, turned_upright(np.asarray(image.convert("RGB")), tags)
+            )
+    # OpenCV turns TIFF upright itself.
     levels = rgb_levels(file)[0]
     return PhotoColours(
-        own, colours, levels if is_tiff(file.read_bytes()) else upright(levels, tags)
+        written_profile,
+        colours,
+        levels if is_tiff(file.read_bytes()) else turned_upright(levels, tags),
     )
 
 

@@ -30,6 +30,7 @@ def is_deep(photo: Photo) -> bool:
         return len(source) > 24 and source[24] == 16
     if Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
         return True
+    # The header of the first page; Pillow would cut what is deeper.
     if is_tiff(source):
         return TiffFile(io.BytesIO(source)).pages.first.bitspersample > 8
     return source[4:12] in _HEIC and _heic_bits(source) > 8

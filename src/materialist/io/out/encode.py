@@ -35,7 +35,7 @@ QUALITY = {"JPEG": 95, "WEBP": 90, "AVIF": 85}
 """Quality of the formats that lose something, unless the caller says otherwise; by eye."""
 LOSSLESS = 100
 """Quality from which WebP loses nothing."""
-LONGEST = {"JPEG": 65_535, "WEBP": 16_383, "AVIF": 65_535}
+MAX_SIDE = {"JPEG": 65_535, "WEBP": 16_383, "AVIF": 65_535}
 """Longest side that the format has, pixels."""
 _SUBSAMPLING = {"JPEG": 0, "AVIF": "4:4:4"}
 """Colour at every pixel: borders of edits are where both change."""
@@ -77,10 +77,11 @@ def save_image(
     picture = np.asarray(picture, np.float32)
     if picture.ndim != 3 or picture.shape[2] != 3 or not picture.size:
         raise InputError(f"The picture is {list(picture.shape)}; give linear RGB [H, W, 3].")
-    if max(picture.shape[:2]) > LONGEST.get(kind, max(picture.shape)):
+    if max(picture.shape[:2]) > MAX_SIDE.get(kind, max(picture.shape)):
         raise InputError(
-            f"{kind} has at most {LONGEST[kind]} pixels on a side; write {path} as PNG or TIFF."
+            f"{kind} has at most {MAX_SIDE[kind]} pixels on a side; write {path} as PNG or TIFF."
         )
+    # --- EXR: light, in the unit of an HDR photo ---
     colours = SRGB if photo is None else photo_colours(photo)
     if kind == "EXR":
         light = colours.whole(picture)
@@ -88,6 +89,7 @@ def save_image(
         with whole_file(path, force) as temporary:
             write_exr(temporary, light * np.float32(2.0**-stops) if stops else light)
         return ()
+    # --- Display files: levels in the photo's own colours ---
     deep = kind in ("PNG", "TIFF") and (
         bits == 16 or (bits is None and photo is not None and is_deep(photo))
     )
@@ -133,6 +135,7 @@ def _encoded(
     exif = copied_exif(photo, srgb=colours.space is None)
     if kind == "TIFF":
         return tiff_bytes(levels, exif, colours.profile), ()
+    # --- EXIF, as far as the format has room for it ---
     described = exif.tobytes()
     notes: tuple[str, ...] = ()
     if kind == "JPEG" and len(described) > _EXIF_BYTES:
@@ -141,6 +144,7 @@ def _encoded(
         notes = ("The camera maker's own note is left out: JPEG has no room for it.",)
     if levels.dtype == np.uint16:
         return _deep_png(levels, described, colours.profile), notes
+    # --- Pillow writes all but 16-bit PNG ---
     settings: dict[str, Any] = {"exif": described, "icc_profile": colours.profile}
     if kind in QUALITY:
         settings["quality"] = QUALITY[kind] if quality is None else quality

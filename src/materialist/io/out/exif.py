@@ -48,11 +48,13 @@ def copied_exif(photo: Photo | None, *, srgb: bool = True) -> Image.Exif:
 
     The camera, the lens, dates and the place are kept; a preview and the layout of the file are not.
     """
+    # --- Copied tag by tag: a preview or the layout of the old file would be wrong ---
     old = _of_file(photo)
     new = Image.Exif()
     for name in _KEPT:
         if _NUMBER[name] in old:
             new[_NUMBER[name]] = old[_NUMBER[name]]
+    # --- The picture is upright, so that width and height may change places ---
     turned = old.get(ExifTags.Base.Orientation) in _TURNED
     taken = dict(_directory(old, ExifTags.IFD.Exif))
     place = dict(_directory(old, ExifTags.IFD.GPSInfo))
@@ -61,6 +63,7 @@ def copied_exif(photo: Photo | None, *, srgb: bool = True) -> Image.Exif:
         width, height = _SIDES
         taken[width], taken[height] = taken[height], taken[width]
     if taken:
+        # 65535: not sRGB; the profile says which.
         taken[ExifTags.Base.ColorSpace] = 1 if srgb else 65535
         new.get_ifd(ExifTags.IFD.Exif).update(taken)
     if place:
@@ -80,6 +83,7 @@ def _of_file(photo: Photo | None) -> Image.Exif:
             exif = Image.Exif()
             exif.load(photo.exif or b"")
             return exif
+        # RAW files are TIFF inside, which Pillow's opener does not know.
         if is_tiff(source) or Path(photo.path or "").suffix.lower() in RAW_SUFFIXES:
             exif = Image.Exif()
             exif.load_from_fp(io.BytesIO(source))

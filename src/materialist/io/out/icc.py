@@ -57,15 +57,16 @@ def _name(colours: ColourSpace) -> str:
     name = next(known, None)
     if name is None:
         return colours.name
-    usual = power_curve(0) if name == "Adobe RGB" else srgb_curve
+    expected_curve = power_curve(0) if name == "Adobe RGB" else srgb_curve
     same_kind = getattr(colours.curves[0], "func", colours.curves[0]) is getattr(
-        usual, "func", usual
+        expected_curve, "func", expected_curve
     )
     return name if same_kind else f"{name} primaries"
 
 
 def _file(tags: dict[bytes, bytes]) -> bytes:
     """The header, the table and the tags, each from a multiple of four bytes."""
+    # The header has 128 bytes, then the number of tags, and 12 bytes for each.
     start = 132 + 12 * len(tags)
     table = b""
     body = b""
@@ -96,8 +97,10 @@ def _curve(curve: Curve) -> bytes:
     """A curve's formula where it is one of the two that files have, else samples of it."""
     if curve is srgb_curve:
         return b"para" + struct.pack(">IHH", 0, 3, 0) + _s15(*_SRGB)
+    # A `partial` of the power curve carries its exponent.
     exponent = getattr(curve, "keywords", {}).get("exponent")
     if exponent is not None:
         return b"para" + struct.pack(">IHH", 0, 0, 0) + _s15(exponent)
+    # Other curves, such as PQ, by samples of 16 bits.
     samples = np.round(np.clip(curve(np.linspace(0, 1, _SAMPLES)), 0, 1) * 65535).astype(">u2")
     return b"curv" + struct.pack(">II", 0, _SAMPLES) + samples.tobytes()

@@ -12,7 +12,7 @@ import OpenEXR
 from materialist import __version__
 from materialist.errors import OutputError
 from materialist.io.atomic import whole_file
-from materialist.plain import is_utf8
+from materialist.io.native import name_problem
 from materialist.types import Array
 
 LINEAR_REC709 = "lin_rec709_scene"
@@ -38,10 +38,8 @@ def write_layers(
     things: name -> [H, W] coverage in [0, 1], written as a cryptomatte (Friedman and Jones, specification 1.2.0).
     Raises OutputError.
     """
-    if not is_utf8(str(path)):
-        raise OutputError(
-            f"The name {str(path)!r} is not UTF-8, and OpenEXR knows no others; give another."
-        )
+    if problem := name_problem(path):
+        raise OutputError(problem)
     parts = [_part(name, values, plain=k == 0) for k, (name, values) in enumerate(layers.items())]
     parts += _cryptomatte(things) if things else []
     with whole_file(path, force) as temporary:
@@ -88,10 +86,12 @@ def _cryptomatte(things: Mapping[str, Array]) -> list[Any]:
     """The preview part and the parts of ids and coverage, each pixel's things by their coverage."""
     names = list(things)
     coverage = np.stack([np.asarray(share, np.float32) for share in things.values()])
+    # --- Of each pixel the things by their coverage, the largest first ---
     order = np.argsort(-coverage, 0, kind="stable")
     shares = np.take_along_axis(coverage, order, 0)
     ids = np.array([cryptomatte_id(name) for name in names], np.float32)[order]
     ids = np.where(shares > 0, ids, np.float32(0))
+    # --- What the specification asks of the header ---
     key = f"{murmur3(b'CryptoObject'):08x}"[:7]
     manifest = {
         name: f"{struct.unpack('<I', struct.pack('<f', cryptomatte_id(name)))[0]:08x}"
@@ -103,6 +103,7 @@ def _cryptomatte(things: Mapping[str, Array]) -> list[Any]:
         f"cryptomatte/{key}/conversion": "uint32_to_float32",
         f"cryptomatte/{key}/manifest": json.dumps(manifest),
     }
+    # --- Two ranks a part: id and coverage in R, G and B, A ---
     parts = []
     for level in range(-(-len(names) // _RANKS)):
         channels = {}
@@ -126,6 +127,7 @@ def cryptomatte_id(name: str) -> float:
     """The hash of a name as a float that is neither infinite, NaN nor denormal (specification, "uint32_to_float32")."""
     number = murmur3(name.encode("utf-8"))
     if (number >> 23) & 255 in (0, 255):
+        # Flip the lowest bit of the exponent, as the specification says.
         number ^= 1 << 23
     return float(struct.unpack("<f", struct.pack("<I", number))[0])
 

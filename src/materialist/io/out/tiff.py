@@ -23,6 +23,7 @@ def tiff_bytes(levels: Array, exif: Image.Exif, profile: bytes) -> bytes:
     offsets = [0]  # of the directory's end: Pillow adds where that lies
     for strip in strips:
         offsets.append(offsets[-1] + len(strip))
+    # --- The directory: layout of the strips, then the photo's EXIF ---
     layout: dict[str, Any] = {
         "ImageWidth": width,
         "ImageLength": height,
@@ -56,5 +57,6 @@ def tiff_bytes(levels: Array, exif: Image.Exif, profile: bytes) -> bytes:
 def _strip(rows: Array) -> bytes:
     """Rows as differences from the pixel to the left, deflated."""
     differences = rows.copy()
+    # Unsigned numbers wrap around, as the predictor expects.
     differences[:, 1:] -= rows[:, :-1]
     return zlib.compress(differences.astype(rows.dtype.newbyteorder("<")).tobytes(), 6)

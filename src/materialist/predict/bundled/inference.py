@@ -25,35 +25,24 @@ _MIRROR = np.array([-1, 1, 1], np.float32)
 class InferenceSettings:
     """How the network sees a photo and how its answers become a prior."""
 
-    sides: tuple[int, ...] = (
-        192,
-        384,
-    )  # longest sides, pixels, of large photos and small: whole, details; 16 pictures
+    sides: tuple[int, ...] = (192, 384)  # longest sides that it sees, pixels; from 16 pictures
     edge_side: int = 768  # longest side at which edges are sought in the photo, pixels; by eye
-    edge_reach: float = (
-        0.03  # error of the network's edges, as a part of the longest side; tuned on 20 pictures
-    )
-    median_depth: float = (
-        3.0  # scene units; a photo does not tell scale, and this suits rooms in metres
-    )
-    depth_span: float = 50.0  # largest ratio of a depth to the median, either way
-    likely_sky: float = 0.0  # logit of a surface below which a pixel is likely sky; derived
-    sure_sky: float = (
-        -5.0
-    )  # logit of a surface below which a pixel is surely sky; tuned on 8 photos
-    sure_surface: float = 2.0  # logit above which a pixel surely is a surface; by eye
-    unsure_told: float = (
-        0.03  # share of the picture that may be sky from which a note says so; by eye
-    )
-    least_island: float = (
-        0.0005  # part of the picture below which a speck of sky or surface is filled; by eye
-    )
+    edge_reach: float = 0.03  # error of its edges, part of the longest side; from 20 pictures
+    median_depth: float = 3.0  # scene units; suits rooms in metres: a photo tells no scale
+    max_depth_ratio: float = 50.0  # of a depth to the median, either way
+
+    # Sky, by the logit of there being a surface.
+    likely_sky: float = 0.0  # below it a pixel is likely sky; derived
+    sure_sky: float = -5.0  # below it a pixel is surely sky; tuned on 8 photos
+    sure_surface: float = 2.0  # above it a pixel is surely a surface; by eye
+    max_silent_unsure: float = 0.03  # share that may be sky from which a note says so; by eye
+    min_island: float = 0.0005  # share below which a speck of sky or surface is filled; by eye
 
 
 SETTINGS = InferenceSettings()
 
 
-def infer(
+def infer_bundled(
     network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu"
 ) -> Prediction:
     """Maps of a photo [H, W, 3] float32 linear, white about 1, at its own size, as a Prediction without a name.
@@ -65,12 +54,14 @@ def infer(
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
+    # --- What the network answers, at its own size ---
     maps, light, spread = _mean_answer(network, linear, rays, device)
     surface = _without_specks(_surface(maps["mask"], resample.values(linear, maps["mask"].shape)))
     if not surface.any():
         surface[:] = True
     unsure = _unsure_sky(maps["mask"], surface)
     depth = _scaled(maps["depth"], surface)
+    # --- At the photo's size: materials by enlarging, geometry with the photo's edges ---
     albedo, roughness, metallic = (
         resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic")
     )
@@ -82,11 +73,12 @@ def infer(
     materials = Materials(
         srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1)
     )
+    # --- Notes on what was taken for sky ---
     sky = float((depth == 0).mean())
     notes: tuple[str, ...] = (
         (f"{sky:.0%} of the picture was taken for sky and has no surface.",) if sky else ()
     )
-    if unsure > SETTINGS.unsure_told:
+    if unsure > SETTINGS.max_silent_unsure:
         notes += (
             f"{unsure:.0%} of the picture, at its top, may be sky and was taken for a far surface.",
         )
@@ -101,6 +93,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     """
     size = linear.shape[:2]
     middle = resample.with_longer_side(size, min(SETTINGS.edge_side, max(size)))
+    # --- The guide: the photo at the size at which edges are sought ---
     photo = linear_to_srgb(resample.values(linear, middle))
     reach = max(2, round(SETTINGS.edge_reach * max(middle)))
     guide = GuidedFilter(photo, radius=reach)
@@ -108,6 +101,8 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     normal = resample.normals(normal, middle)
     depth = with_sky(depth, guide)
     known = depth > 0
+    # Medians take each pixel to one side of an edge; in log depth, so that near and far count
+    # alike.
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
     sharp = weighted_median(coarse, guide, known)
@@ -116,6 +111,7 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
         for c in np.moveaxis(normal, -1, 0)
     ]
     normal = unit(np.stack(planes, -1))
+    # --- Depth smooth along each surface again, by the normals ---
     logarithm = with_relief(np.where(known, sharp, np.nan), normal, seen)
     depth = np.where(known, np.exp(np.nan_to_num(logarithm)), 0).astype(np.float32)
     if middle != size:
@@ -148,17 +144,19 @@ def _mean_answer(
         photo = resample.values(linear, size)
         seen = rays_at(rays, *photo.shape[:2])
         answers.append(_run(network, photo, seen, device))
+        # The mirror image: x turns round in rays and normals.
         mirrored = (
             np.ascontiguousarray(photo[:, ::-1]),
             np.ascontiguousarray(seen[:, ::-1] * _MIRROR[:2]),
         )
-        found = {
+        turned_back = {
             name: np.ascontiguousarray(m[:, ::-1])
             for name, m in _run(network, *mirrored, device).items()
         }
-        answers.append(found | {"normal": found["normal"] * _MIRROR})
+        answers.append(turned_back | {"normal": turned_back["normal"] * _MIRROR})
     for answer in answers:  # what depth is relative to is every answer's own
         answer["depth"] = answer["depth"] - np.median(answer["depth"])
+    # --- Means: of light and spread in their logarithm, of maps at the largest size ---
     lights = [answer.pop("light") for answer in answers if "light" in answer]
     light = np.exp(np.mean(lights, axis=0)).astype(np.float32) if lights else None
     size = sizes[-1]
@@ -176,6 +174,7 @@ def _mean_answer(
 def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dict[str, Array]:
     """The network's maps at the size of `photo` [h, w, 3]: [h, w] or [h, w, 3] float32."""
     height, width = photo.shape[:2]
+    # --- Padded to whole strides ---
     below = -height % STRIDE
     right = -width % STRIDE
     padded = np.pad(photo, ((0, below), (0, right), (0, 0)), mode="edge")
@@ -184,6 +183,7 @@ def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dic
     tensors = [torch.from_numpy(x).permute(2, 0, 1)[None].to(device) for x in (padded, extended)]
     with torch.inference_mode():
         maps = network(tensors[0].contiguous(memory_format=torch.channels_last), tensors[1])
+    # --- Back to arrays, without the padding ---
     rows = {name: m[0] if name == "light" else m[0, :, :height, :width] for name, m in maps.items()}
     arrays = {name: m.permute(1, 2, 0).float().cpu().numpy() for name, m in rows.items()}
     return {
@@ -194,7 +194,7 @@ def _run(network: BundledNetwork, photo: Array, rays: Array, device: Any) -> dic
 def _scaled(log_depth: Array, surface: Array) -> Array:
     """Depth [h, w] with the median of the settings over the surface, 0 elsewhere."""
     relative = log_depth - np.median(log_depth[surface])
-    limit = np.log(SETTINGS.depth_span)
+    limit = np.log(SETTINGS.max_depth_ratio)
     return np.where(
         surface, SETTINGS.median_depth * np.exp(np.clip(relative, -limit, limit)), 0
     ).astype(np.float32)
@@ -209,7 +209,9 @@ def _surface(logit: Array, photo: Array) -> Array:
     """
     sure = logit < SETTINGS.sure_sky
     labels = np.where(logit < SETTINGS.likely_sky, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[sure], labels[logit > SETTINGS.sure_surface] = cv2.GC_FGD, cv2.GC_BGD
+    labels[sure] = cv2.GC_FGD
+    labels[logit > SETTINGS.sure_surface] = cv2.GC_BGD
+    # Sky grows from what is sure: blue or white patches elsewhere in the picture stay surface.
     return ~binary_propagation(sure, mask=grabcut(photo, labels)) if sure.any() else ~sure
 
 
@@ -223,5 +225,6 @@ def _unsure_sky(logit: Array, surface: Array) -> float:
 
 def _without_specks(surface: Array) -> Array:
     """The surface [h, w] bool without tiny islands of either kind."""
-    most = max(4, int(SETTINGS.least_island * surface.size)) - 1
-    return remove_small_holes(remove_small_objects(surface, max_size=most), max_size=most)
+    max_size = max(4, int(SETTINGS.min_island * surface.size)) - 1
+    islands_filled = remove_small_objects(surface, max_size=max_size)
+    return remove_small_holes(islands_filled, max_size=max_size)

@@ -3,7 +3,7 @@
 It stands where the paper has MatNet (section "Material Prediction Network") and gives the same maps. Plain 3x3
 convolutions on few, wide levels: on a CPU these run several times closer to the peak than depthwise ones, and they
 learn from scratch with far fewer pictures than a transformer. Two attention blocks on the coarsest level see the
-whole picture. Everything is relative to the camera rays, so that any field of view and any crop can be told.
+whole picture. Everything is relative to the camera rays: the network takes any field of view and any crop.
 """
 
 from dataclasses import dataclass
@@ -67,13 +67,17 @@ class BundledNetwork(StoredNetwork):
         super().__init__(architecture or BundledArchitecture())
         a = self.architecture
         w = self.architecture.widths
+        # Encoder: a quarter of the resolution by pixel unshuffling, then one level for
+        # each halving.
         self.stem = nn.Sequential(_conv(6 * 16 + 2, w[0]), group_norm(w[0]), nn.SiLU())
         self.levels = nn.ModuleList(
             nn.Sequential(*(ResidualBlock(w[k]) for _ in range(a.blocks[k]))) for k in range(4)
         )
         self.downs = nn.ModuleList(nn.Conv2d(w[k] * 4, w[k + 1], 1) for k in range(3))
+        # --- Context: attention over the coarsest level ---
         self.place = nn.Conv2d(4, w[3], 1)
         self.attention = nn.ModuleList(_AttentionBlock(w[3]) for _ in range(a.attention))
+        # --- Decoder: back to a quarter, with a skip connection from each level, then to half ---
         self.ups = nn.ModuleList(nn.Conv2d(w[k + 1], w[k], 1) for k in range(3))
         self.skips = nn.ModuleList(nn.Conv2d(w[k], w[k], 1) for k in range(3))
         self.decoders = nn.ModuleList(
@@ -82,14 +86,18 @@ class BundledNetwork(StoredNetwork):
         )
         self.fine = nn.Conv2d(w[0], 4 * a.fine, 1)
         self.refine = nn.Sequential(_conv(a.fine + 24, a.fine), group_norm(a.fine), nn.SiLU())
+        # Heads: all maps from half resolution by pixel shuffling; more where the
+        # architecture has them.
         self.head = _conv(a.fine, 4 * sum(CHANNELS.values()), bias=True)
         if a.encoder:
             self.encoder = shipped(a.encoder)
+            # A key of the stored weights, as all names of modules: renaming it would make them unreadable.
             self.told = zero_convolutions(self.encoder.channels, w)
         if a.light:
             self.light = LightHead(a.light, w[2])
         if a.spread:
             self.spread = SpreadHead(a.fine)
+        # No checkerboard before the first step of training.
         _same_subpixels(self.fine)
         _same_subpixels(self.head)
 
@@ -103,38 +111,47 @@ class BundledNetwork(StoredNetwork):
         [B, 1, H, W] the logit of there being a surface; metallic_logit, the metallic before its sigmoid; where the
         architecture has it, light [B, 4, h, 2h], see `LightHead`, and spread [B, 5, H, W], see `SpreadHead`.
         """
-        picture = encode(image)
-        more = self._told(image)
+        picture = encoded_input(image)
+        added = self._encoder_terms(image)
+
+        # --- Encoder: 1/4, 1/8, 1/16 and 1/32 of the resolution ---
         x = self.stem(torch.cat([F.pixel_unshuffle(picture, 4), F.avg_pool2d(rays, 4)], 1))
-        x, skips, told = self.levels[0](x + more[0]), [], x
+        x = self.levels[0](x + added[0])
+        skips = []
         for k in range(3):
             skips.append(x)
-            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + more[k + 1])
+            x = self.levels[k + 1](self.downs[k](F.pixel_unshuffle(x, 2)) + added[k + 1])
         x = self._context(x, F.avg_pool2d(rays, STRIDE))
+
+        # --- Decoder: back to 1/4; the light reads its features at 1/16 ---
+        light_features = x
         for k in (2, 1, 0):
             x = F.interpolate(self.ups[k](x), scale_factor=2, mode="nearest")
             x = self.decoders[k](x + self.skips[k](skips[k]))
             if k == 2:
-                told = x
+                light_features = x
+
+        # --- Half resolution, with the photo's own detail, and the maps ---
         x = F.pixel_shuffle(self.fine(x), 2)
         x = self.refine(torch.cat([x, F.pixel_unshuffle(picture, 2)], 1))
+        # float32: half precision in training would lose small differences of the outputs.
         maps = _maps(F.pixel_shuffle(self.head(x).float(), 2), picture[:, :3])
         if self.architecture.light:
-            maps["light"] = self.light(told, picture, rays, maps)
+            maps["light"] = self.light(light_features, picture, rays, maps)
         if self.architecture.spread:
             maps["spread"] = self.spread(x)
         return maps
 
-    def _told(self, image: Tensor) -> list[Tensor | float]:
+    def _encoder_terms(self, image: Tensor) -> list[Tensor | float]:
         """What the classifier's features add at each level; nothing where there is no encoder."""
         if not self.architecture.encoder:
             return [0.0] * 4
         with torch.no_grad():
-            features = [unit_power(found) for found in self.encoder(srgb(image))]
-        return [part(found) for part, found in zip(self.told, features, strict=True)]
+            features = [unit_power(level) for level in self.encoder(srgb(image))]
+        return [convolution(level) for convolution, level in zip(self.told, features, strict=True)]
 
     def _context(self, x: Tensor, rays: Tensor) -> Tensor:
-        """Attention over the coarsest level [B, C, h, w], told where each cell looks."""
+        """Attention over the coarsest level [B, C, h, w]; each cell knows its place by its ray."""
         batch, channels, height, width = x.shape
         x = x + self.place(torch.cat([rays, rays.square()], 1))
         tokens = x.flatten(2).transpose(1, 2)  # [B, h w, C]
@@ -151,7 +168,7 @@ def srgb(image: Tensor) -> Tensor:
     )
 
 
-def encode(image: Tensor) -> Tensor:
+def encoded_input(image: Tensor) -> Tensor:
     """[B, 6, H, W] what the network sees of linear radiance [B, 3, H, W]: a photo-like curve, and a logarithm.
 
     The curve separates mid-tones, the logarithm makes a change of light the same difference everywhere.
@@ -163,7 +180,7 @@ def encode(image: Tensor) -> Tensor:
 
 
 def _maps(raw: Tensor, curve: Tensor) -> dict[str, Tensor]:
-    """The heads [B, 10, H, W] float32 as maps; albedo is told as what differs from the photo, curve [B, 3, H, W].
+    """The heads [B, 10, H, W] float32 as maps; albedo is the photo's `curve` [B, 3, H, W] plus a correction.
 
     The photo's own detail is then there from the start, and the network learns to take light out of it.
     """
@@ -174,9 +191,8 @@ def _maps(raw: Tensor, curve: Tensor) -> dict[str, Tensor]:
         "roughness": maps["roughness"].sigmoid(),
         "metallic": maps["metallic"].sigmoid(),
         "metallic_logit": maps["metallic"],
-        "normal": F.normalize(
-            maps["normal"] + ahead, dim=1, eps=1e-4
-        ),  # raw zero looks at the viewer
+        # A raw 0 faces the viewer.
+        "normal": F.normalize(maps["normal"] + ahead, dim=1, eps=1e-4),
         "depth": maps["depth"],
         "mask": maps["mask"],
     }
@@ -189,6 +205,7 @@ def _conv(inputs: int, outputs: int, *, bias: bool = False) -> nn.Conv2d:
 @torch.no_grad()
 def _same_subpixels(conv: nn.Conv2d) -> None:
     """Start the four pixels that pixel_shuffle makes of one as equals: no checkerboard (Aitken et al. 2017)."""
+    # pixel_shuffle takes each group of four channels as one pixel's 2 x 2 block.
     conv.weight.copy_(conv.weight[::4].repeat_interleave(4, 0))
     if conv.bias is not None:
         conv.bias.zero_()
@@ -210,8 +227,8 @@ class _AttentionBlock(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         batch, cells, channels = x.shape
         qkv = self.qkv(self.norm1(x)).view(batch, cells, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
-        seen = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2])
-        x = x + self.out(seen.transpose(1, 2).reshape(batch, cells, channels))
+        attended = F.scaled_dot_product_attention(qkv[0], qkv[1], qkv[2])
+        x = x + self.out(attended.transpose(1, 2).reshape(batch, cells, channels))
         return x + self.down(F.gelu(self.up(self.norm2(x))))
 
 
@@ -225,6 +242,7 @@ class SpreadHead(nn.Module):
         super().__init__()
         self.hidden = nn.Sequential(_conv(features, features, bias=True), nn.SiLU())
         self.out = _conv(features, 4 * len(SPREADS), bias=True)
+        # An untrained network expects the same error everywhere.
         nn.init.zeros_(self.out.weight)
         assert self.out.bias is not None
         nn.init.constant_(self.out.bias, FIRST_SPREAD)
@@ -235,6 +253,7 @@ class SpreadHead(nn.Module):
         Of the encoded albedo (mean over RGB), roughness, metallic, the normal's angle in radians, and the logarithm
         of relative depth: the scales of Laplace distributions.
         """
+        # Clamped: an error of e^-7 or of e is as good as none or all.
         raw = self.out(self.hidden(features.detach()))
         return F.pixel_shuffle(raw.float(), 2).clamp(-7, 1)
 
@@ -242,19 +261,19 @@ class SpreadHead(nn.Module):
 class LightHead(nn.Module):
     """The light around a scene from a photo of it: every direction of a map attends to the cells of the photo.
 
-    A cell is told by its features, its colour, and the normal, albedo, depth and ray that belong to it, so that
+    A cell holds its features, its colour, and the normal, albedo, depth and ray that belong to it, so that
     brightness against normal, the classical evidence for the light, is there to be read.
     """
 
     STRIDE = 16
     """Pixels on a side of a cell."""
-    TOLD = 17
+    CELL_CHANNELS = 17
     """Channels of a cell beside its features."""
 
     def __init__(self, rows: int, features: int, channels: int = 128, blocks: int = 3):
         super().__init__()
         self.rows = rows
-        self.cells = nn.Linear(features + self.TOLD, channels)
+        self.cells = nn.Linear(features + self.CELL_CHANNELS, channels)
         self.directions = nn.Sequential(
             nn.Linear(_HARMONICS, channels), nn.GELU(), nn.Linear(channels, channels)
         )
@@ -274,18 +293,29 @@ class LightHead(nn.Module):
         Natural logarithm of radiance in the photo's units (white 1), camera frame, equirectangular; last the logarithm
         of its scale of error (of a Laplace distribution).
         """
+        # Cells: means of everything that is known of a block of pixels; no gradient
+        # passes to the maps.
         depth = maps["depth"] - maps["depth"].flatten(1).mean(1).view(-1, 1, 1, 1)
         slant = rays.square().sum(1, True)
-        told = [picture, rays, maps["albedo"], maps["normal"], maps["mask"].sigmoid(), depth, slant]
+        cell_maps = [
+            picture,
+            rays,
+            maps["albedo"],
+            maps["normal"],
+            maps["mask"].sigmoid(),
+            depth,
+            slant,
+        ]
         cells = F.avg_pool2d(
-            torch.cat([t.detach().to(features.dtype) for t in told], 1), self.STRIDE
+            torch.cat([t.detach().to(features.dtype) for t in cell_maps], 1), self.STRIDE
         )
+        # --- Every direction asks the cells ---
         x = self.cells(torch.cat([features, cells], 1).flatten(2).transpose(1, 2))
-        asked = self.directions(self.harmonics.to(x.dtype)).expand(len(x), -1, -1)
+        queries = self.directions(self.harmonics.to(x.dtype)).expand(len(x), -1, -1)
         for block in self.blocks:
-            asked = block(asked, x)
-        found = self.out(self.norm(asked)).float().transpose(1, 2)
-        return found.view(-1, 4, self.rows, 2 * self.rows)
+            queries = block(queries, x)
+        light = self.out(self.norm(queries)).float().transpose(1, 2)
+        return light.view(-1, 4, self.rows, 2 * self.rows)
 
 
 class _LightBlock(nn.Module):
@@ -301,17 +331,19 @@ class _LightBlock(nn.Module):
         self.out = nn.Linear(channels, channels)
         self.among = _AttentionBlock(channels, head_size)
 
-    def forward(self, asked: Tensor, cells: Tensor) -> Tensor:
-        batch, count, channels = asked.shape
+    def forward(self, queries: Tensor, cells: Tensor) -> Tensor:
+        batch, count, channels = queries.shape
 
         def split(t):
             return t.view(batch, t.shape[1], self.heads, -1).transpose(1, 2)
 
         key, value = self.keys(self.cell_norm(cells)).chunk(2, -1)
-        seen = F.scaled_dot_product_attention(
-            split(self.query(self.norm(asked))), split(key), split(value)
+        attended = F.scaled_dot_product_attention(
+            split(self.query(self.norm(queries))), split(key), split(value)
         )
-        return self.among(asked + self.out(seen.transpose(1, 2).reshape(batch, count, channels)))
+        return self.among(
+            queries + self.out(attended.transpose(1, 2).reshape(batch, count, channels))
+        )
 
 
 _FREQUENCIES = (1, 2, 4)

@@ -8,7 +8,7 @@ import torch
 
 from materialist.camera import pixel_rays
 from materialist.errors import WeightsError
-from materialist.predict.bundled.inference import infer
+from materialist.predict.bundled.inference import infer_bundled
 from materialist.predict.bundled.network import BundledNetwork
 from materialist.predict.protocol import MAPS, MapSet, Predictor, on_gpu
 from materialist.predict.weights import sha256
@@ -29,32 +29,38 @@ class BundledPredictor(Predictor):
         self.device = torch.device("cuda" if on_gpu(device) else "cpu")
         network, self.facts = BundledNetwork.load(path)
         self.network = network.to(self.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-        own = "" if path == WEIGHTS else f" {path.name}"
-        self.name = f"bundled{own} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"
+        file_name = "" if path == WEIGHTS else f" {path.name}"
+        self.name = (
+            f"bundled{file_name} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"
+        )
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted of the network's maps at the photo's size; deterministic, `seed` changes nothing.
 
         Any size and aspect. Albedo is linear; depth is up to scale, with median 3; depth is 0 where the network sees
         sky. Raises WeightsError when the weights give values that are not finite.
         """
-        found = infer(
+        prediction = infer_bundled(
             self.network, photo.linear, pixel_rays(photo.camera)[..., :2].copy(), device=self.device
         )
-        maps = {**vars(found.materials), "normal": found.normal, "depth": found.depth}
+        maps = {
+            **vars(prediction.materials),
+            "normal": prediction.normal,
+            "depth": prediction.depth,
+        }
         if not all(np.isfinite(maps[name]).all() for name in MAPS):
             raise WeightsError(
                 f"The network gave values that are not finite; check its weights ({self.name})."
             )
-        warnings = found.warnings
-        if "depth" not in wanted:  # there may be a surface in the depth of another source
-            maps["normal"] = np.where(found.depth[..., None] > 0, found.normal, 0).astype(
+        warnings = prediction.warnings
+        if "depth" not in names:  # there may be a surface in the depth of another source
+            maps["normal"] = np.where(prediction.depth[..., None] > 0, prediction.normal, 0).astype(
                 np.float32
             )
             warnings = ()
-        light = found.light if "albedo" in wanted else None
-        spread = {name: values for name, values in found.spread.items() if name in wanted}
-        chosen = {name: maps[name] for name in wanted}
-        return MapSet(chosen, dict.fromkeys(wanted, self.name), warnings, light, spread)
+        light = prediction.light if "albedo" in names else None
+        spread = {name: values for name, values in prediction.spread.items() if name in names}
+        chosen = {name: maps[name] for name in names}
+        return MapSet(chosen, dict.fromkeys(names, self.name), warnings, light, spread)

@@ -15,13 +15,13 @@ SPOT = 12
 """The channel that is high at the clicks."""
 BOX = 14
 """The channel that is 1 in a box."""
-NEAR = 3.0
-"""Pixels within which a click is told sharply."""
-DEEP = 2.0
-"""Largest difference of logarithms of depth that is told from larger ones."""
+SPOT_PIXELS = 3.0
+"""Standard deviation of the spot at a click, pixels."""
+MAX_LOG_DEPTH = 2.0
+"""Difference of logarithms of depth at which the input is clipped."""
 
 
-def features(
+def click_features(
     rgb: Array,
     normal: Array,
     depth: Array,
@@ -39,11 +39,13 @@ def features(
     surface = depth > 0
     log = np.log(np.where(surface, depth, 1.0))
     rows, columns = np.indices(depth.shape)
+    # --- Smallest differences so far: of several clicks the most alike counts ---
     level = np.full(depth.shape, np.inf)
     colour = np.full(rgb.shape, np.inf)
     cosine = np.full(depth.shape, -1.0)
     away = np.full(depth.shape, np.inf)
     inside = np.zeros(depth.shape)
+    # --- Where the object is sampled: 3 x 3 pixels at each click, or the inner half of the box ---
     places = [(x, y, np.s_[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2]) for x, y in clicks]
     if box is not None:
         x0, y0, x1, y1 = box
@@ -53,20 +55,25 @@ def features(
         places = [
             ((x0 + x1) // 2, (y0 + y1) // 2, np.s_[y0 + down : y1 - down, x0 + right : x1 - right])
         ]
-    for x, y, near in places:
-        here = np.median(log[near][surface[near]]) if surface[near].any() else 0.0
-        other = np.clip(log - here, -DEEP, DEEP)
-        level = np.where(np.abs(other) < np.abs(level), other, level)
-        off = np.abs(rgb - np.median(rgb[near].reshape(-1, 3), 0))
+    for x, y, sample in places:
+        # Depth: medians resist a sample that reaches over an edge.
+        sample_log = np.median(log[sample][surface[sample]]) if surface[sample].any() else 0.0
+        difference = np.clip(log - sample_log, -MAX_LOG_DEPTH, MAX_LOG_DEPTH)
+        level = np.where(np.abs(difference) < np.abs(level), difference, level)
+        # Colour.
+        off = np.abs(rgb - np.median(rgb[sample].reshape(-1, 3), 0))
         colour = np.where((off.sum(-1) < colour.sum(-1))[..., None], off, colour)
-        facing = normal[near].reshape(-1, 3).mean(0)
+        # Normal.
+        facing = normal[sample].reshape(-1, 3).mean(0)
         cosine = np.maximum(cosine, normal @ (facing / max(float(np.linalg.norm(facing)), 1e-6)))
+        # Distance in the picture.
         away = np.minimum(away, np.hypot(rows - y, columns - x))
-    spot = np.exp(-((away / NEAR) ** 2) / 2) if box is None else np.zeros(depth.shape)
+    spot = np.exp(-((away / SPOT_PIXELS) ** 2) / 2) if box is None else np.zeros(depth.shape)
+    # --- All channels, in the order of the constants above ---
     parts = [
         rgb - 0.5,
         normal,
-        np.where(surface, level, DEEP)[..., None],
+        np.where(surface, level, MAX_LOG_DEPTH)[..., None],
         surface[..., None],
         colour,
         cosine[..., None],

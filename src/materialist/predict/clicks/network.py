@@ -1,7 +1,7 @@
 """ClickNet: a small U-Net from the photo, its maps and clicks or a box to the object that is meant.
 
-Clicks are told as Xu et al. 2016 do it, by maps of the distance to them, and by how every pixel differs from them: in
-colour, in geometry, and in the features of an image classifier, which know parts of one thing by their kind.
+Clicks are encoded as Xu et al. 2016 do it, by maps of the distance to them, and by how every pixel differs from them:
+in colour, in geometry, and in the features of an image classifier, which know parts of one thing by their kind.
 """
 
 import torch
@@ -26,6 +26,7 @@ class ClickNet(UNet):
         super().__init__(CHANNELS, 1, a)
         if a.encoder:
             self.encoder = shipped(a.encoder)
+            # A key of the stored weights, as in `BundledNetwork`.
             self.told = zero_convolutions([2 * c + 1 for c in self.encoder.channels], a.widths[1:])
 
     def forward(self, maps: Tensor) -> Tensor:
@@ -35,10 +36,9 @@ class ClickNet(UNet):
         with torch.no_grad():
             features = self.encoder((maps[:, :3] + 0.5).clamp(0, 1))
             meant = maps[:, SPOT : SPOT + 1] + maps[:, BOX : BOX + 1]
-            seen = [related(unit_power(found), meant) for found in features]
-        return self.raw(maps, [part(found) for part, found in zip(self.told, seen, strict=True)])[
-            :, 0
-        ]
+            levels = [related(unit_power(level), meant) for level in features]
+        added = [convolution(level) for convolution, level in zip(self.told, levels, strict=True)]
+        return self.raw(maps, added)[:, 0]
 
 
 def related(features: Tensor, meant: Tensor) -> Tensor:

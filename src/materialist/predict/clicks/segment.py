@@ -9,7 +9,7 @@ import numpy as np
 from materialist.camera import unit
 from materialist.errors import InputError
 from materialist.predict import resample
-from materialist.predict.clicks.features import NORMAL_X, Box, features
+from materialist.predict.clicks.features import NORMAL_X, Box, click_features
 from materialist.types import Array
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
@@ -18,7 +18,7 @@ SIDE = 224
 """Longer side at which the network sees the photo, pixels."""
 
 
-def object_at(
+def object_likelihood(
     rgb: Array,
     normal: Array,
     depth: Array,
@@ -50,23 +50,26 @@ def object_at(
         raise InputError(
             f"The box is {box}; give (x0, y0, x1, y1) inside {width} x {height} pixels."
         )
+    # --- The photo and its maps at the network's size; clicks and box with them ---
     network = loaded(ClickNet, Path(weights) if str(weights) else WEIGHTS)
     scale = SIDE / max(height, width)
     rows, columns = size = resample.with_longer_side(depth.shape, SIDE)
     whole = [np.ascontiguousarray(v, np.float32) for v in (rgb, normal, depth)]
+    # Depth by the nearest pixel: a mean across an edge is a depth that nothing has.
     nearest = np.asarray(cv2.resize(whole[2], (columns, rows), interpolation=cv2.INTER_NEAREST))
     places = [
         (min(int((x + 0.5) * scale), columns - 1), min(int((y + 0.5) * scale), rows - 1))
         for x, y in clicks
     ]
     frame = None if box is None else _scaled(box, scale, (columns, rows))
-    maps = features(
+    maps = click_features(
         resample.values(whole[0], size),
         unit(resample.values(whole[1], size)),
         nearest,
         places,
         frame,
     )
+    # --- The network on the picture and its mirror image, padded to whole strides ---
     below = -maps.shape[1] % STRIDE
     beside = -maps.shape[2] % STRIDE
     padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
@@ -74,6 +77,7 @@ def object_at(
     mirrored[:, NORMAL_X] *= -1
     with torch.inference_mode():
         both = (network(padded) + network(mirrored).flip(-1)) / 2
+    # --- Back to the photo's size ---
     share = both[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
     return np.asarray(cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR))
 

@@ -68,6 +68,8 @@ class MatNet(StoredNetwork):
         albedo [B, 3, H, W], roughness, metallic, depth [B, 1, H, W]: >= 0, not bounded above; normal [B, 3, H, W]:
         unit, camera frame. What `depth` means depends on the weights: in the published ones it falls with distance.
         """
+        # Five channels of materials (A, R, M) and three of normals come from one head, depth
+        # from the other.
         features = self.pretrained(image, self.architecture.layers)
         materials = self.material_head(features)
         positive = F.relu(materials[:, :5])
@@ -104,24 +106,26 @@ class Encoder(nn.Module):
         """
         rows = image.shape[-2] // PATCH
         columns = image.shape[-1] // PATCH
-        patches = (
-            self.patch_embed["proj"](image).flatten(2).transpose(1, 2)
-        )  # [B, rows * columns, width]
+        # --- Tokens: one a patch [B, rows * columns, width], and the class token before them ---
+        patches = self.patch_embed["proj"](image).flatten(2).transpose(1, 2)
         tokens = torch.cat([self.cls_token.expand(len(patches), -1, -1), patches], 1)
         tokens = tokens + self._positions(rows, columns)
-        found = []
+        layer_features = []
+        # --- Features after the chosen blocks, as pictures again, without the class token ---
         for k, block in enumerate(self.blocks[: max(layers) + 1]):
             tokens = block(tokens)
             if k in layers:
                 features = self.norm(tokens)[:, 1:]
-                found.append(features.transpose(1, 2).unflatten(-1, (rows, columns)))
-        return found
+                layer_features.append(features.transpose(1, 2).unflatten(-1, (rows, columns)))
+        return layer_features
 
     def _positions(self, rows: int, columns: int) -> Tensor:
         """[1, 1 + rows * columns, width]: the position embedding of a picture of that many patches."""
         grid = round((self.pos_embed.shape[1] - 1) ** 0.5)
         if (rows, columns) == (grid, grid):
             return self.pos_embed
+        # The embedding was learned on a square grid: it is resized as a picture, the class
+        # token's stays.
         learned = self.pos_embed[:, 1:].unflatten(1, (grid, grid)).permute(0, 3, 1, 2)
         scale = ((rows + OFFSET) / grid, (columns + OFFSET) / grid)
         resized = F.interpolate(learned, scale_factor=scale, mode="bicubic")
@@ -174,12 +178,14 @@ class Head(nn.Module):
     def __init__(self, width: int, pyramid: Sequence[int], fused: int, outputs: int):
         super().__init__()
         self.projects = nn.ModuleList(nn.Conv2d(width, channels, 1) for channels in pyramid)
+        # --- Each layer at its scale: 4, 2, 1 and 1/2 times the patch grid ---
         enlarge = [
             nn.ConvTranspose2d(channels, channels, n, stride=n)
             for channels, n in zip(pyramid, (4, 2))
         ]
         shrink = nn.Conv2d(pyramid[3], pyramid[3], 3, stride=2, padding=1)
         self.resize_layers = nn.ModuleList([*enlarge, nn.Identity(), shrink])
+        # --- Fusion from coarse to fine, and the output ---
         self.scratch = nn.ModuleDict()  # the name is the checkpoints'
         for k, channels in enumerate(pyramid, 1):
             self.scratch[f"layer{k}_rn"] = nn.Conv2d(channels, fused, 3, padding=1, bias=False)
@@ -191,6 +197,7 @@ class Head(nn.Module):
     def forward(self, features: Sequence[Tensor]) -> Tensor:
         """[B, outputs, 14 h, 14 w] without a last activation, from four tensors [B, width, h, w]."""
         rows, columns = features[0].shape[-2:]
+        # --- Each layer projected to its channels and brought to its scale ---
         steps = zip(features, self.projects, self.resize_layers, strict=True)
         layers = [resize(project(x)) for x, project, resize in steps]
         # From the coarsest scale to the finest, then two convolutions.

@@ -33,15 +33,13 @@ class MatNetPredictor(Predictor):
         path = weights_file(locate(str(where), "matnet"))
         digest = verify_file(path)
         state = read_state(path)
-        self.trained_here = (
-            metadata(path).get("format") == MatNet.FORMAT
-        )  # its depth output is depth
+        # The published network answers with something that falls with distance; ours with depth.
+        self.trained_here = metadata(path).get("format") == MatNet.FORMAT
         width = state["pretrained.cls_token"].shape[-1] if "pretrained.cls_token" in state else None
         # An unknown width is compared with the published size, so that the message says what was expected.
         size = next((name for name, s in SIZES.items() if s.width == width), "vitb")
-        with torch.random.fork_rng(
-            devices=[]
-        ):  # the start values are replaced; nobody's random numbers change
+        # The start values are replaced at once: the caller's random numbers must not move on.
+        with torch.random.fork_rng(devices=[]):
             network = MatNet(size)
         load_weights(network, state, path)
         self.network = network.to("cuda" if on_gpu(device) else "cpu").eval()
@@ -49,30 +47,34 @@ class MatNetPredictor(Predictor):
         self.name = f"matnet {size} {path.name} sha256:{digest[:16]}"
 
     def parts(
-        self, photo: Photo, wanted: Collection[str], *, seed: int = 0, normal: Array | None = None
+        self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
         """The wanted of the network's maps, as docs/predictors.md has them; `seed` changes nothing.
 
         It sees linear values, as in training. For depth see `planar_depth`; weights of `train matnet --config paper`
         answer with depth itself, as their loss asks.
         """
-        maps = infer(self.network, photo.linear, input_size=self.input_size)
+        maps = infer_matnet(self.network, photo.linear, input_size=self.input_size)
         if not all(np.isfinite(values).all() for values in maps.values()):
             raise WeightsError(
                 f"MatNet gave values that are not finite; check the weights ({self.name})."
             )
+        # Resizing shortens normals between two directions; where hardly anything is left they
+        # are unknown.
         length = np.linalg.norm(maps["normal"], axis=-1, keepdims=True)
-        found = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
-        found["normal"] = np.where(
+        result = {name: np.clip(maps[name], 0, 1) for name in ("albedo", "roughness", "metallic")}
+        result["normal"] = np.where(
             length > 1e-3, maps["normal"] / np.maximum(length, 1e-3), 0
         ).astype(np.float32)
-        found["depth"] = (
+        result["depth"] = (
             np.maximum(maps["depth"], 1e-3) if self.trained_here else planar_depth(maps["depth"])
         )
-        return MapSet({name: found[name] for name in wanted}, dict.fromkeys(wanted, self.name))
+        return MapSet({name: result[name] for name in names}, dict.fromkeys(names, self.name))
 
 
-def infer(network: MatNet, linear: Array, *, input_size: int = INPUT_SIZE) -> dict[str, Array]:
+def infer_matnet(
+    network: MatNet, linear: Array, *, input_size: int = INPUT_SIZE
+) -> dict[str, Array]:
     """The network's raw outputs for a picture [H, W, 3] float32 linear, about [0, 1], as the published inference has
     them: albedo, normal [H, W, 3] and roughness, metallic, depth [H, W], float32; see `MatNet.forward` for ranges, and
     `at_network_size`. The normals are not normalised again.
@@ -112,6 +114,7 @@ def network_size(height: int, width: int, input_size: int = INPUT_SIZE) -> tuple
     scale = max(input_size / height, input_size / width)
 
     def fitted(side: int) -> int:
+        # Rounded to whole patches, but never below the size that was asked for.
         near = round(scale * side / PATCH) * PATCH
         return near if near >= input_size else int(np.ceil(scale * side / PATCH)) * PATCH
 

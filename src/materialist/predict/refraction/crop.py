@@ -10,7 +10,7 @@ import numpy as np
 from materialist.camera import turn_upright, unit
 from materialist.color import linear_to_srgb
 from materialist.geometry.silhouette import border_distance, object_size, spacing, window
-from materialist.solids.symmetry import mirrored
+from materialist.solids.symmetry import mirrored_thickness
 from materialist.types import Array
 
 SIDE = 64
@@ -53,9 +53,13 @@ class Window:
     @classmethod
     def around(cls, inside: Array) -> Window:
         """The window around a mask [H, W] bool, which it frames to the fraction of a pixel as the training views do."""
-        (top, bottom), (left, right) = ((k.start, k.stop) for k in window(inside))
-        side = max(bottom - top, right - left) * (1 + 2 * MARGIN)
-        return cls((left + right - side) / 2, (top + bottom - side) / 2, side)
+        rows, columns = window(inside)
+        height = rows.stop - rows.start
+        width = columns.stop - columns.start
+        side = max(height, width) * (1 + 2 * MARGIN)
+        return cls(
+            (columns.start + columns.stop - side) / 2, (rows.start + rows.stop - side) / 2, side
+        )
 
     def moved(self, larger: float, right: float, down: float) -> Window:
         """The window `larger` times as large about its middle, and that many of its sides aside."""
@@ -71,6 +75,8 @@ class Window:
         weight = inside.astype(np.float32)
         share = self._cut(weight)
 
+        # The background must not leak in: values are weighted by the mask before they are
+        # averaged.
         def mean(x):
             return self._cut(x * _like(weight, x)) / _like(np.maximum(share, 1e-6), x)
 
@@ -86,17 +92,17 @@ class Window:
         spread = self._spread(
             np.where(seen, values, 0).astype(np.float32), inside.shape
         ) / np.maximum(known, 1e-6)
+        # Pixels of the mask that no known value reaches take the median of the object.
         filled = np.where(known > 1e-3, spread, float(np.median(values[seen])))
         return np.where(inside, filled, 0).astype(np.float32)
 
     def _cut(self, values: Array) -> Array:
         """[SIDE, SIDE, ...] of values [H, W, ...], 0 beyond the border: means down, bilinear up."""
-        fine = SIDE * max(
-            1, int(np.ceil(self.side / SIDE))
-        )  # a whole number of places in every pixel
-        places = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
+        # First at a whole multiple of SIDE, so that the area mean then has equal weights.
+        fine = SIDE * max(1, int(np.ceil(self.side / SIDE)))
+        flags = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
         large = cv2.warpAffine(
-            np.ascontiguousarray(values, np.float32), self._map(fine), (fine, fine), flags=places
+            np.ascontiguousarray(values, np.float32), self._map(fine), (fine, fine), flags=flags
         )
         return cv2.resize(large, (SIDE, SIDE), interpolation=cv2.INTER_AREA)
 
@@ -122,35 +128,34 @@ class Window:
         return result
 
 
-def features(view: View) -> Array:
+def refraction_features(view: View) -> Array:
     """[CHANNELS, S, S] float32, 0 outside the object: what the network is given of it.
 
     Lengths are in units of the object's size, directions in the frame of the ray through the window's centre, so that
     neither the place in the picture nor the scene's scale matters.
     """
+    # --- Directions in the frame of the window's central ray ---
     length = np.linalg.norm(view.rays, axis=-1)
     normal = view.normal @ to_window(view.rays).T
     facing = -np.sum(view.normal * view.rays, -1) / length
+    # --- Lengths in units of the object's size ---
     size = view.size
     distance = view.depth * length
     relief = (distance - np.median(distance[view.inside])) / size
     border = border_distance(view.inside) / np.sqrt(view.inside.sum())
-    mirror = mirrored(view.depth, view.normal, view.inside, view.rays) / size
+    mirror = mirrored_thickness(view.depth, view.normal, view.inside, view.rays) / size
     flat = [view.inside.astype(np.float32), facing, np.clip(relief, -3, 3), mirror, border]
-    stacked = np.concatenate(
-        [linear_to_srgb(view.photo) - 0.5, normal, np.stack(flat, -1)], -1
-    )  # [S, S, CHANNELS]
-    return np.ascontiguousarray(
-        np.moveaxis(np.where(view.inside[..., None], stacked, 0), -1, 0), np.float32
-    )
+    stacked = np.concatenate([linear_to_srgb(view.photo) - 0.5, normal, np.stack(flat, -1)], -1)
+    masked = np.where(view.inside[..., None], stacked, 0)  # [S, S, CHANNELS]
+    return np.ascontiguousarray(np.moveaxis(masked, -1, 0), np.float32)
 
 
 MIRROR = 9
-"""The channel of `features` that holds the mirrored thickness."""
+"""The channel of `refraction_features` that holds the mirrored thickness."""
 MASK = 6
-"""The channel of `features` that holds the mask."""
+"""The channel of `refraction_features` that holds the mask."""
 NORMAL_X = 3
-"""The channel of `features` that changes its sign in a mirror; the other two of the normal follow it."""
+"""The channel of `refraction_features` that changes its sign in a mirror; the other two of the normal follow it."""
 BACK_X = 2
 """The channel of the network's answer that does, with the other two of the back's normal after it."""
 ANSWERS = 5

@@ -9,7 +9,7 @@ import numpy as np
 from materialist.camera import pixel_rays, unit
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.silhouette import surface_in
-from materialist.predict.refraction.crop import BACK_X, Window, features, to_window
+from materialist.predict.refraction.crop import BACK_X, Window, refraction_features, to_window
 from materialist.solids.outline import surface_of_revolution
 from materialist.solids.revolution import Revolution
 from materialist.types import Array, Camera
@@ -65,15 +65,17 @@ def thickness(
             )
     network = loaded(RefractionNet, Path(weights) if str(weights) else WEIGHTS)
     maps = (photo_linear, inside, normal, depth, pixel_rays(camera))
+    # The mean over several framings: the network's answer depends a little on where the window
+    # lies.
     answers = [_answer(network, Window.around(inside).moved(*frame), *maps) for frame in FRAMES]
-    found = np.mean(answers, axis=0)  # [H, W, 5]
-    if not np.isfinite(found).all():
+    mean = np.mean(answers, axis=0)  # [H, W, 5]
+    if not np.isfinite(mean).all():
         raise WeightsError(
             f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS})."
         )
-    solid = found[..., 0]
-    hollow = found[..., 1]
-    back = unit(found[..., BACK_X:])
+    solid = mean[..., 0]
+    hollow = mean[..., 1]
+    back = unit(mean[..., BACK_X:])
     return Thickness(solid, np.minimum(hollow, solid), back)
 
 
@@ -93,13 +95,14 @@ def best_thickness(
     the camera's frame, where a support tells it. `behind`: [H, W] planar depth of the surface behind the object, 0 =
     nothing.
     """
+    # The network still gives the wall of the hollow object, which an outline does not show.
     guess = thickness(photo_linear, mask, normal, depth, camera)
-    found = surface_of_revolution(
+    fitted = surface_of_revolution(
         depth, normal, surface_in(mask, depth, camera), camera, up=up, behind=behind
     )
-    if found is None:
+    if fitted is None:
         return guess
-    body, solid = found
+    body, solid = fitted
     return Thickness(solid, np.minimum(guess.hollow, solid), revolution=body, method="revolution")
 
 
@@ -117,9 +120,8 @@ def _answer(
 
     view = window.cut(photo, inside, normal, depth, rays)
     with torch.inference_mode():  # [5, S, S], lengths in units of the object's size
-        found = network(torch.from_numpy(features(view))[None])[0].numpy()
-    turned = np.moveaxis(found[BACK_X:], 0, -1) @ to_window(
-        view.rays
-    )  # [S, S, 3] in the camera's frame
-    channels = [*(found[:BACK_X] * view.size), *np.moveaxis(turned, -1, 0)]
+        answer = network(torch.from_numpy(refraction_features(view))[None])[0].numpy()
+    # Normals [S, S, 3] back in the camera frame: a product from the right with R is R^T n.
+    turned = np.moveaxis(answer[BACK_X:], 0, -1) @ to_window(view.rays)
+    channels = [*(answer[:BACK_X] * view.size), *np.moveaxis(turned, -1, 0)]
     return np.stack([window.put_back(channel, view.inside, inside) for channel in channels], -1)

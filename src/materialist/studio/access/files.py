@@ -42,6 +42,7 @@ class HandedFiles:
         """The file of a name that came from this person's page. Raises InputError for all others alike."""
         with self._lock:
             owner, path = self._files.get(name, ("", None)) if isinstance(name, str) else ("", None)
+        # One message for all: whether a file exists is nobody else's business.
         if path is None or owner != person or not path.is_file():
             raise InputError(_GONE)
         return path
@@ -49,7 +50,7 @@ class HandedFiles:
     def forget_missing(self) -> None:
         """Forget the files that were cleared away."""
         with self._lock:
-            self._files = {name: one for name, one in self._files.items() if one[1].is_file()}
+            self._files = {name: entry for name, entry in self._files.items() if entry[1].is_file()}
 
 
 def with_known_files(body: bytes, person: str, files: HandedFiles) -> bytes:
@@ -71,11 +72,13 @@ def with_known_files(body: bytes, person: str, files: HandedFiles) -> bytes:
 
 def _located(value: Any, person: str, files: HandedFiles) -> Any:
     if isinstance(value, list):
-        return [_located(one, person, files) for one in value]
+        return [_located(item, person, files) for item in value]
     if not isinstance(value, dict):
         return value
+    # Any such key makes Gradio treat the object as a file.
     if not _FILE_KEYS & value.keys():
-        return {key: _located(one, person, files) for key, one in value.items()}
+        return {key: _located(item, person, files) for key, item in value.items()}
+    # Only what is known of the file itself; nothing of what the request says of it.
     path = files.path(person, value.get("path"))
     shown = str(value.get("orig_name") or path.name)
     kind = {"_type": "gradio.FileData"}
@@ -84,9 +87,9 @@ def _located(value: Any, person: str, files: HandedFiles) -> Any:
 
 def _without_files(value: Any) -> Any:
     if isinstance(value, list):
-        return [_without_files(one) for one in value]
+        return [_without_files(item) for item in value]
     if not isinstance(value, dict):
         return value
     if _FILE_KEYS & value.keys():
         return None
-    return {key: _without_files(one) for key, one in value.items()}
+    return {key: _without_files(item) for key, item in value.items()}

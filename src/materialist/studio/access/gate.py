@@ -83,8 +83,8 @@ class Gate:
         """host: what a studio for this machine only is bound to. proxy: HOST[:PORT] of the proxy before the studio."""
         self.app = app
         self.studio = studio
-        own = None if host is None else {*LOCAL, host.lower().strip("[]")}
-        self.names = own if proxy is None else {_place(f"http://{proxy}")[0]}
+        host_names = None if host is None else {*LOCAL, host.lower().strip("[]")}
+        self.names = host_names if proxy is None else {_place(f"http://{proxy}")[0]}
         """Host names that may be asked for; None for all."""
         self.proxy = proxy
         self.password = password
@@ -101,10 +101,10 @@ class Gate:
             return await send({"type": "websocket.close", "code": 1008})
         address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
-        most = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
+        max_bytes = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
         if scope["path"] == _UPLOAD:
-            most = _largest_upload()
-        request = Request(scope, _limited(receive, most))
+            max_bytes = _largest_upload()
+        request = Request(scope, _limited(receive, max_bytes))
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies, address)
 
@@ -130,40 +130,44 @@ class Gate:
     def _address(self, scope: Any) -> str:
         """The IP address that a request comes from: behind a proxy what the proxy says, its last word."""
         if self.proxy:
+            # The last entry is the proxy's own; those before it are what the client claims.
             forwarded = dict(scope["headers"]).get(b"x-forwarded-for", b"").decode("latin-1")
             return forwarded.rpartition(",")[2].strip() or "proxy"
         return scope["client"][0] if scope.get("client") else "unknown"
 
     def allows(self, headers: dict[bytes, bytes]) -> bool:
         """Whether a request with these headers (names in lower case) is one of the studio's own pages."""
-        told = {name.decode(): value.decode("latin-1").lower() for name, value in headers.items()}
+        values = {name.decode(): value.decode("latin-1").lower() for name, value in headers.items()}
+        # --- The place that is asked, and the place that the page is from ---
         asked = (
-            told.get("x-forwarded-host", told.get("host", ""))
+            values.get("x-forwarded-host", values.get("host", ""))
             if self.proxy
-            else told.get("host", "")
+            else values.get("host", "")
         )
-        origin = told.get("origin", "")
+        origin = values.get("origin", "")
         place = _place(f"{origin.partition('://')[0] or 'http'}://{asked}")
+        # DNS rebinding: a foreign name that points to this machine.
         if self.names is not None and place[0] not in self.names:
             return False
         if (
-            told.get("sec-fetch-site") in ("cross-site", "same-site")
-            and told.get("sec-fetch-mode") != "navigate"
+            values.get("sec-fetch-site") in ("cross-site", "same-site")
+            and values.get("sec-fetch-mode") != "navigate"
         ):
             return False
         return not origin or (_place(origin) == place and "" not in place)
 
     def _heard(self, headers: list[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
         """The headers that count: those of a proxy only where there is one, whose name then is the page's own."""
-        told = dict(headers)
-        if self.proxy and b"x-forwarded-host" not in told:
-            told[b"x-forwarded-host"] = told.get(b"host", b"")
+        values = dict(headers)
+        if self.proxy and b"x-forwarded-host" not in values:
+            values[b"x-forwarded-host"] = values.get(b"host", b"")
         dropped = (b"forwarded", PERSON_HEADER.encode())
+        # Only the proxy may say where a request comes from; the person's header is ours alone.
         kept = [(k, v) for k, v in headers if not k.startswith(b"x-forwarded") and k not in dropped]
         if self.proxy:
-            scheme = b"http" if told.get(b"x-forwarded-proto") == b"http" else b"https"
+            scheme = b"http" if values.get(b"x-forwarded-proto") == b"http" else b"https"
             kept += [
-                (b"x-forwarded-host", told[b"x-forwarded-host"]),
+                (b"x-forwarded-host", values[b"x-forwarded-host"]),
                 (b"x-forwarded-proto", scheme),
             ]
         return kept
@@ -172,6 +176,7 @@ class Gate:
         """The application that answers: the page, or a refusal; with cookies to set."""
         if not self.allows(dict(request.scope["headers"])):
             return PlainTextResponse("The studio answers its own pages only.\n", 403)
+        # --- Who asks ---
         login = request.cookies.get(self._cookie, "")
         if self.password and login not in self._logins:
             if (request.method, request.url.path) == ("POST", "/login"):
@@ -180,9 +185,11 @@ class Gate:
         person = self._person(request, cookies, login)
         self.studio.note_sender(person, address)
         request.scope["headers"].append((PERSON_HEADER.encode(), person.encode()))
+        # --- What is asked: only what the page itself uses ---
         path = request.scope["path"]
         if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
             return PlainTextResponse("The studio has no such place.\n", 404)
+        # Files by id, each for its person.
         if path.startswith(_FILE):
             return self._file(request.scope, path.removeprefix(_FILE), person)
         try:
@@ -206,6 +213,7 @@ class Gate:
         try:
             return self.studio.person(token)
         except InputError:  # its browser is new here
+            # A secret that nobody can guess: it alone tells whose photos these are.
             cookies[PERSON] = token = secrets.token_hex(16)
             if self.password:
                 self._logins[login] = token
@@ -214,6 +222,7 @@ class Gate:
     def _file(self, scope: Any, name: str, person: str) -> Any:
         """The application that serves a file: one of the cache, or an upload of this person by its id."""
         with suppress(InputError):
+            # An upload by its id; else only what lies in the cache.
             path = self.studio.files.path(person, name)
             scope["path"] = f"{_FILE}{path}"
             scope["raw_path"] = scope["path"].encode()
@@ -225,12 +234,12 @@ class Gate:
     async def _event(self, request: Request, person: str) -> Any:
         """The application that gets an event of the page, with the files that the person may name."""
         try:
-            given = await request.body()
+            sent_body = await request.body()
         except HTTPException as error:
             return PlainTextResponse(f"{error.detail}\n", error.status_code)
-        body = with_known_files(given, person, self.studio.files)
+        body = with_known_files(sent_body, person, self.studio.files)
         scope = request.scope
-        scope["headers"] = [one for one in scope["headers"] if one[0] not in _LENGTHS]
+        scope["headers"] = [header for header in scope["headers"] if header[0] not in _LENGTHS]
         scope["headers"].append((b"content-length", str(len(body)).encode()))
 
         async def app(scope: Any, receive: Any, send: Any) -> None:
@@ -260,6 +269,7 @@ class Gate:
         wrong = self._wrong_from(sender_of(address), now)
         if len(wrong) >= SETTINGS.wrong_passwords:
             return self._form(429, "Too many wrong passwords; wait a minute.")
+        # Compared in constant time: the time must not tell how much is right.
         word = parse_qs(body.decode("utf-8", "replace")).get("password", [""])[0]
         if not hmac.compare_digest(word.encode(), str(self.password).encode()):
             wrong.append(now)
@@ -271,9 +281,11 @@ class Gate:
     def _wrong_from(self, sender: str, now: float) -> deque[float]:
         """When wrong passwords came from a sender within the last minute; old senders are forgotten."""
         wrong = self._wrong.pop(sender, deque())
+        # Within the last minute.
         while wrong and now - wrong[0] > 60:
             wrong.popleft()
         self._wrong[sender] = wrong
+        # Bounded: addresses cost an attacker little.
         while len(self._wrong) > SETTINGS.addresses:
             self._wrong.pop(next(iter(self._wrong)))
         return wrong
@@ -337,6 +349,7 @@ async def _stored_upload(
 
     try:
         await app(scope, next_part, collect)  # until the files are where it says
+        # --- Its answer, with ids of ours in place of paths of this machine ---
         start = messages[0]
         body = b"".join(message.get("body", b"") for message in messages[1:])
         if start["status"] == 200:
@@ -347,13 +360,13 @@ async def _stored_upload(
         return
     finally:
         studio.quota.settle(claim, stored)
-    headers = [one for one in start["headers"] if one[0] not in _LENGTHS]
+    headers = [header for header in start["headers"] if header[0] not in _LENGTHS]
     length = (b"content-length", str(len(body)).encode())
     await send({**start, "headers": [*headers, length]})
     await send({"type": "http.response.body", "body": body})
 
 
-def _limited(receive: Any, most: int) -> Any:
+def _limited(receive: Any, max_bytes: int) -> Any:
     """`receive` that raises an HTTPException, which Gradio answers with, after so many bytes, promised or not."""
     got = 0
 
@@ -361,8 +374,8 @@ def _limited(receive: Any, most: int) -> Any:
         nonlocal got
         message = await receive()
         got += len(message.get("body", b""))
-        if got > most:
-            raise HTTPException(413, f"More than {most / 1e6:g} MB is not taken here.")
+        if got > max_bytes:
+            raise HTTPException(413, f"More than {max_bytes / 1e6:g} MB is not taken here.")
         return message
 
     return counted

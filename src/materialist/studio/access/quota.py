@@ -15,7 +15,7 @@ from materialist.studio import SETTINGS
 
 HOUR = 3600.0
 """Seconds."""
-SMALLEST = 65_536
+MIN_BYTES = 65_536
 """Bytes that a file counts at least: very many small ones would fill a disk, too."""
 
 
@@ -47,7 +47,7 @@ class Quota:
 
         Raises InputError above what one sender may store within an hour, and where the disk is full.
         """
-        size = max(size, SMALLEST)
+        size = max(size, MIN_BYTES)
         with self._lock:
             if self._stored(sender) + size > SETTINGS.storage_quota:
                 limit = f"{SETTINGS.storage_quota / 1e9:g} GB"
@@ -58,9 +58,9 @@ class Quota:
             return claim
 
     def settle(self, claim: "Claim", stored: int) -> None:
-        """Let a claim count what was stored of it, at least SMALLEST where that is anything."""
+        """Let a claim count what was stored of it, at least MIN_BYTES where that is anything."""
         with self._lock:
-            claim.size = min(claim.size, max(stored, SMALLEST) if stored else 0)
+            claim.size = min(claim.size, max(stored, MIN_BYTES) if stored else 0)
 
     def _stored(self, sender: str) -> int:
         """Bytes of the last hour; senders who stored nothing in it are forgotten."""
@@ -68,6 +68,7 @@ class Quota:
         for who in list(self._claims):
             claims = self._claims[who]
             while claims and claims[0].time < hour_ago:
+                # Claims come in the order of their time.
                 claims.popleft()
             if not claims:
                 del self._claims[who]
@@ -75,6 +76,7 @@ class Quota:
 
     def check_disk(self, size: int = 0) -> None:
         """Raise InputError where so many bytes more would fill a disk."""
+        # Of several disks the fullest decides.
         free = min(shutil.disk_usage(place).free for place in self.places)
         if free - size < SETTINGS.disk_left:
             raise InputError("The disk of the studio is full; it takes no more files.")
@@ -82,12 +84,13 @@ class Quota:
     @contextmanager
     def opening(self, sender: str) -> Iterator[None]:
         """A place among the few files that are opened at a time. Raises InputError where there is none."""
-        own = "Another file of yours is being opened; wait until it is there."
-        with self._place("opening", sender, 1, own):
+        refusal = "Another file of yours is being opened; wait until it is there."
+        with self._place("opening", sender, 1, refusal):
             with self._lock:
                 opening = sum(
-                    count for (what, _), count in self._running.items() if what == "opening"
+                    count for (activity, _), count in self._running.items() if activity == "opening"
                 )
+            # Checked after counting oneself: two at once cannot both pass.
             if opening > SETTINGS.openings:
                 raise InputError(
                     "The studio is opening the files of others; try again in a moment."
@@ -111,9 +114,10 @@ class Quota:
             yield
 
     @contextmanager
-    def _place(self, what: str, sender: str, limit: int, refusal: str) -> Iterator[None]:
+    def _place(self, activity: str, sender: str, limit: int, refusal: str) -> Iterator[None]:
         """One of the `limit` times that something may be done for a sender at once. Raises InputError: refusal."""
-        key = (what, sender)
+        # Counted before the work begins: two requests at once cannot both pass.
+        key = (activity, sender)
         with self._lock:
             if self._running[key] >= limit:
                 raise InputError(refusal)
@@ -173,6 +177,7 @@ def sender_of(address: str) -> str:
         return address
     if ip.version == 4:
         return str(ip)
+    # A provider gives each customer a whole network of 64 bits.
     mapped = ip.ipv4_mapped
     return str(mapped) if mapped else str(ipaddress.ip_network((ip, 64), strict=False))
 

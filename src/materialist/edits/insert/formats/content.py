@@ -84,6 +84,7 @@ def joined_part(parts: list[MeshPart]) -> MeshPart:
     """Parts of one material as one; all of them have normals, or none, and all have colours, or none."""
     if len(parts) == 1:
         return parts[0]
+    # Faces count from the first vertex of their own part.
     sizes = [len(part.vertices) for part in parts]
     first = np.cumsum(sizes) - sizes
     uv = None

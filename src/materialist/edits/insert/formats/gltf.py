@@ -65,8 +65,15 @@ def read_gltf(source: MeshSource) -> MeshContent:
         file = GltfFile(source)
         nodes = GltfNodes(file)
         content = MeshContent()
+        # Counts first, then pictures, then vertices: each step is checked before memory is taken
         drawn = _drawn(file, nodes, content)
-        used = sorted({one.primitive["material"] for one in drawn if "material" in one.primitive})
+        used = sorted(
+            {
+                drawn_mesh.primitive["material"]
+                for drawn_mesh in drawn
+                if "material" in drawn_mesh.primitive
+            }
+        )
     except MALFORMED as error:
         raise source.damaged(_reason(error)) from error
     try:
@@ -77,8 +84,8 @@ def read_gltf(source: MeshSource) -> MeshContent:
     content.left_out += materials.left_out
     content.notes += materials.pictures.notes()
     try:
-        for one in drawn:
-            content.parts += _parts(file, nodes, content, one)
+        for drawn_mesh in drawn:
+            content.parts += _parts(file, nodes, content, drawn_mesh)
     except MALFORMED as error:
         raise source.damaged(_reason(error)) from error
     return content
@@ -102,18 +109,19 @@ def _drawn(file: GltfFile, nodes: GltfNodes, content: MeshContent) -> list[Drawn
         mesh = file.entry("meshes", nodes.nodes[node]["mesh"])
         count = nodes.copies(node)
         for primitive in mesh["primitives"]:
+            # Only triangles have a surface.
             mode = primitive.get("mode", TRIANGLES)
             if mode not in (TRIANGLES, STRIP, FAN):
                 content.left_out.append("its points and lines")
                 continue
             file.source.check("targets", len(primitive.get("targets", [])))
             corners = file.count(primitive.get("indices", primitive["attributes"]["POSITION"]))
-            one = Drawn(
+            drawn_mesh = Drawn(
                 node, mesh, primitive, corners // 3 if mode == TRIANGLES else max(corners - 2, 0)
             )
-            drawn.append(one)
+            drawn.append(drawn_mesh)
             copies += count
-            triangles += count * one.triangles
+            triangles += count * drawn_mesh.triangles
             file.source.check("copies", copies)
     file.source.check("faces", triangles)
     content.left_out += ["its lighting"] * (
@@ -124,21 +132,25 @@ def _drawn(file: GltfFile, nodes: GltfNodes, content: MeshContent) -> list[Drawn
     return drawn
 
 
-def _parts(file: GltfFile, nodes: GltfNodes, content: MeshContent, one: Drawn) -> list[MeshPart]:
+def _parts(
+    file: GltfFile, nodes: GltfNodes, content: MeshContent, drawn_mesh: Drawn
+) -> list[MeshPart]:
     """The copies of a primitive."""
-    faces, rows = _faces(file, one)
+    # --- Once for all copies: faces, points, texture coordinates, colours ---
+    faces, rows = _faces(file, drawn_mesh)
     if not len(faces):
         return []
-    points, normals = _shape(file, nodes, one, rows)
-    places = nodes.places(one.node)
-    if "skin" in nodes.nodes[one.node] and "JOINTS_0" in one.attributes:
-        points, normals = _skinned(file, nodes, one, rows, points, normals)
+    points, normals = _shape(file, nodes, drawn_mesh, rows)
+    places = nodes.places(drawn_mesh.node)
+    if "skin" in nodes.nodes[drawn_mesh.node] and "JOINTS_0" in drawn_mesh.attributes:
+        points, normals = _skinned(file, nodes, drawn_mesh, rows, points, normals)
         places = np.eye(4)[None]  # a skin stands where its joints are, wherever its node is
-    uv = _uv(file, content, one, rows)
-    colours = _colours(file, content, one, rows)
+    uv = _uv(file, content, drawn_mesh, rows)
+    colours = _colours(file, content, drawn_mesh, rows)
     face_colours = None if colours is None else mean_of_corners(colours, faces)
-    key = one.primitive.get("material")
-    name = str(one.mesh.get("name", f"mesh{nodes.nodes[one.node]['mesh']}"))
+    # --- Each copy at its place; a mirrored one is turned inside out again ---
+    key = drawn_mesh.primitive.get("material")
+    name = str(drawn_mesh.mesh.get("name", f"mesh{nodes.nodes[drawn_mesh.node]['mesh']}"))
     parts = []
     for place in places:
         linear = place[:3, :3]
@@ -149,12 +161,12 @@ def _parts(file: GltfFile, nodes: GltfNodes, content: MeshContent, one: Drawn) -
     return parts
 
 
-def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
+def _faces(file: GltfFile, drawn_mesh: Drawn) -> tuple[Array, Array]:
     """(faces [F, 3] as positions in the rows, rows [V] of the accessors that they use)."""
-    mode = one.primitive.get("mode", TRIANGLES)
-    position = one.attributes["POSITION"]
-    if "indices" in one.primitive:
-        corners = file.accessor(one.primitive["indices"], 1)[:, 0]
+    mode = drawn_mesh.primitive.get("mode", TRIANGLES)
+    position = drawn_mesh.attributes["POSITION"]
+    if "indices" in drawn_mesh.primitive:
+        corners = file.accessor(drawn_mesh.primitive["indices"], 1)[:, 0]
         if corners.dtype.kind == "f":
             raise file.source.damaged("its indices are no whole numbers")
         if len(corners) and not 0 <= int(corners.min()) <= int(corners.max()) < file.count(
@@ -174,14 +186,16 @@ def _faces(file: GltfFile, one: Drawn) -> tuple[Array, Array]:
     return places.reshape(-1, 3), rows
 
 
-def _shape(file: GltfFile, nodes: GltfNodes, one: Drawn, rows: Array) -> tuple[Array, Array | None]:
+def _shape(
+    file: GltfFile, nodes: GltfNodes, drawn_mesh: Drawn, rows: Array
+) -> tuple[Array, Array | None]:
     """(positions [V, 3] float64, normals [V, 3] or None), with the morph targets by their weights at rest."""
-    points = file.accessor(one.attributes["POSITION"], 3, rows).astype(np.float64)
+    points = file.accessor(drawn_mesh.attributes["POSITION"], 3, rows).astype(np.float64)
     normals = None
-    if "NORMAL" in one.attributes:
-        normals = file.accessor(one.attributes["NORMAL"], 3, rows).astype(np.float64)
-    weights = nodes.nodes[one.node].get("weights", one.mesh.get("weights", []))
-    for weight, target in zip(weights, one.primitive.get("targets", [])):
+    if "NORMAL" in drawn_mesh.attributes:
+        normals = file.accessor(drawn_mesh.attributes["NORMAL"], 3, rows).astype(np.float64)
+    weights = nodes.nodes[drawn_mesh.node].get("weights", drawn_mesh.mesh.get("weights", []))
+    for weight, target in zip(weights, drawn_mesh.primitive.get("targets", [])):
         if float(weight) != 0 and "POSITION" in target:
             points += float(weight) * file.accessor(target["POSITION"], 3, rows)
         if float(weight) != 0 and "NORMAL" in target and normals is not None:
@@ -190,24 +204,31 @@ def _shape(file: GltfFile, nodes: GltfNodes, one: Drawn, rows: Array) -> tuple[A
 
 
 def _skinned(
-    file: GltfFile, nodes: GltfNodes, one: Drawn, rows: Array, points: Array, normals: Array | None
+    file: GltfFile,
+    nodes: GltfNodes,
+    drawn_mesh: Drawn,
+    rows: Array,
+    points: Array,
+    normals: Array | None,
 ) -> tuple[Array, Array | None]:
     """(positions, normals) in the world: moved by the joints, at rest (glTF 2.0, section 3.7.3)."""
-    skin = file.entry("skins", nodes.nodes[one.node]["skin"])
+    skin = file.entry("skins", nodes.nodes[drawn_mesh.node]["skin"])
     for joint in skin["joints"]:
         file.entry("nodes", joint)
+    # --- Matrix of each joint: where it stands now, times the inverse of where it stood ---
     joints = np.array([nodes.world[joint] for joint in skin["joints"]]).reshape(-1, 4, 4)
     if "inverseBindMatrices" in skin:
         inverse = file.accessor(skin["inverseBindMatrices"], 16).astype(np.float64)
         if len(inverse) < len(joints):
             raise file.source.damaged("a skin has fewer matrices than joints")
         joints = joints @ inverse[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+    # --- Each vertex: the mean of where its joints take it, by their weights ---
     turns = np.linalg.pinv(joints[:, :3, :3])
     moved = np.zeros_like(points)
     facing = None if normals is None else np.zeros_like(normals)
     for start in range(0, len(points), CHUNK):
         chunk = slice(start, start + CHUNK)
-        numbers, weights = _joint_weights(file, one, rows[chunk])
+        numbers, weights = _joint_weights(file, drawn_mesh, rows[chunk])
         if int(numbers.max()) >= len(joints):
             raise file.source.damaged("it names joints that do not exist")
         for joint, weight in zip(numbers.T, weights.T):
@@ -221,15 +242,15 @@ def _skinned(
     return moved, facing
 
 
-def _joint_weights(file: GltfFile, one: Drawn, rows: Array) -> tuple[Array, Array]:
+def _joint_weights(file: GltfFile, drawn_mesh: Drawn, rows: Array) -> tuple[Array, Array]:
     """(joints [V, n], their weights [V, n], which sum to 1)."""
-    sets = [k for k in range(len(one.attributes)) if f"JOINTS_{k}" in one.attributes]
+    sets = [k for k in range(len(drawn_mesh.attributes)) if f"JOINTS_{k}" in drawn_mesh.attributes]
     file.source.check("joint_sets", len(sets))
     numbers = np.concatenate(
-        [file.accessor(one.attributes[f"JOINTS_{k}"], 4, rows) for k in sets], -1
+        [file.accessor(drawn_mesh.attributes[f"JOINTS_{k}"], 4, rows) for k in sets], -1
     )
     weights = np.concatenate(
-        [file.accessor(one.attributes[f"WEIGHTS_{k}"], 4, rows) for k in sets], -1
+        [file.accessor(drawn_mesh.attributes[f"WEIGHTS_{k}"], 4, rows) for k in sets], -1
     )
     total = weights.astype(np.float64).sum(-1, keepdims=True)
     first = np.eye(1, weights.shape[1])
@@ -238,28 +259,28 @@ def _joint_weights(file: GltfFile, one: Drawn, rows: Array) -> tuple[Array, Arra
     )
 
 
-def _uv(file: GltfFile, content: MeshContent, one: Drawn, rows: Array) -> Array | None:
+def _uv(file: GltfFile, content: MeshContent, drawn_mesh: Drawn, rows: Array) -> Array | None:
     """[V, 2] as the material lays its texture."""
-    paint = content.paints.get(one.primitive.get("material"))
+    paint = content.paints.get(drawn_mesh.primitive.get("material"))
     if paint is None:
         return None
     textured = max(paint.surface.albedo.size // 3, paint.surface.roughness.size) > 1
     name = f"TEXCOORD_{paint.layout.uv_set}"
-    if name not in one.attributes:
+    if name not in drawn_mesh.attributes:
         content.left_out += ["a texture, whose coordinates are missing"] * textured
         return None
-    uv = file.accessor(one.attributes[name], 2, rows).astype(np.float64)
+    uv = file.accessor(drawn_mesh.attributes[name], 2, rows).astype(np.float64)
     return paint.layout.placed(uv).astype(np.float32)
 
 
-def _colours(file: GltfFile, content: MeshContent, one: Drawn, rows: Array) -> Array | None:
+def _colours(file: GltfFile, content: MeshContent, drawn_mesh: Drawn, rows: Array) -> Array | None:
     """[V, 3] linear colours of the vertices times the material's; None where a texture is shown instead."""
-    if "COLOR_0" not in one.attributes:
+    if "COLOR_0" not in drawn_mesh.attributes:
         return None
-    colours = file.accessor(one.attributes["COLOR_0"], 3, rows)
+    colours = file.accessor(drawn_mesh.attributes["COLOR_0"], 3, rows)
     if colours.dtype.kind != "f":
         colours = colours.astype(np.float32) / np.float32(np.iinfo(colours.dtype).max)
-    number = one.primitive.get("material")
+    number = drawn_mesh.primitive.get("material")
     if number is None:
         return colours
     if content.paints[number].surface.albedo.size > 3:

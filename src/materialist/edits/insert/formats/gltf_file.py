@@ -80,9 +80,11 @@ class GltfFile:
     def _check_unbacked(self) -> None:
         """Numbers that no bytes stand behind are bounded by nothing else."""
         unbacked = [
-            one for one in self.tree["accessors"] if "bufferView" not in one or "sparse" in one
+            accessor
+            for accessor in self.tree["accessors"]
+            if "bufferView" not in accessor or "sparse" in accessor
         ]
-        self.source.check("vertices", sum(_whole(one["count"]) for one in unbacked))
+        self.source.check("vertices", sum(_whole(accessor["count"]) for accessor in unbacked))
 
     def entry(self, kind: str, number: Any) -> dict[str, Any]:
         """An entry of a list of the document."""

@@ -52,7 +52,7 @@ class GltfMaterials:
             return None
         texture = self._texture(info)
         others = [extension(texture, name).get("source") for name in PICTURES]
-        chosen = next((one for one in others if one is not None), texture.get("source"))
+        chosen = next((source for source in others if source is not None), texture.get("source"))
         if chosen is None:
             self.left_out.append("a texture that is not there, or in a format that is not read")
         return chosen
@@ -91,6 +91,7 @@ class GltfMaterials:
         colour_info, packed_info = _infos(entry)
         colour = self._pixels(colour_info)
         packed = self._pixels(packed_info)
+        # One layout serves both textures: that of the colour, where it has one.
         leads = packed_info if colour is None and packed is not None else colour_info
         layout = self._layout(leads)
         if colour is not None and packed is not None and self._layout(packed_info) != layout:

@@ -50,8 +50,8 @@ class MtlLibrary:
         several = name.split()
         if data is None and len(several) > 1:
             folder.missing[:] = missing
-            for one in several:
-                self._parse(folder.get(one) or b"")
+            for part in several:
+                self._parse(folder.get(part) or b"")
         self._parse(data or b"")
 
     def _parse(self, data: bytes) -> None:

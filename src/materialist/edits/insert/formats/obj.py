@@ -16,7 +16,7 @@ from materialist.edits.insert.formats.content import (
 from materialist.edits.insert.formats.mtl import MtlLibrary
 from materialist.edits.insert.formats.polygons import triangulated
 from materialist.edits.insert.formats.source import MeshSource
-from materialist.edits.insert.formats.text import floats, line_blocks
+from materialist.edits.insert.formats.text import line_blocks, parse_floats
 from materialist.types import Array
 
 NONE = -1
@@ -92,6 +92,7 @@ def _sorted_lines(source: MeshSource, obj: _Obj, lines: Sequence[bytes]) -> _Lin
             words = _uncommented(words)
         if not words:
             continue
+        # Sorted by kind; numbers are read later, all of a kind at once.
         kind = words[0]
         if kind in block.values:
             block.values[kind].append(words[1:])
@@ -103,7 +104,9 @@ def _sorted_lines(source: MeshSource, obj: _Obj, lines: Sequence[bytes]) -> _Lin
         elif kind == b"usemtl":
             _use_material(source, obj, line.split(None, 1)[1:], obj.polygons + len(block.counts))
         elif kind == b"mtllib":
-            obj.libraries += [one.decode("utf-8", "replace") for one in line.split(None, 1)[1:]]
+            obj.libraries += [
+                library.decode("utf-8", "replace") for library in line.split(None, 1)[1:]
+            ]
         elif kind in LEFT_OUT:
             obj.left_out.append(LEFT_OUT[kind])
     return block
@@ -158,23 +161,26 @@ def _table(source: MeshSource, rows: list[list[bytes]], columns: int) -> Array:
         rows = [row[:3] if len(row) < 6 else row for row in rows]  # x y z w
         lengths = set(map(len, rows))
     if len(lengths) == 1 and lengths >= {columns}:
-        return floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
+        return parse_floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
     rows = [[*row, *[b"nan"] * columns][:columns] for row in rows]
-    return floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
+    return parse_floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
 
 
 def _corner_numbers(source: MeshSource, corners: list[bytes]) -> Array:
     """[n, 3] int64 of corners as in `3`, `3/1`, `3//2` or `3/1/2`, as the file counts; 0 for none."""
+    # --- The usual case: all corners alike, so that one pass over the text splits them ---
     slashes = corners[0].count(b"/") if corners else 0
     text = b" ".join(corners)
     if slashes <= 2 and all(corner.count(b"/") == slashes for corner in corners):
         words = text.replace(b"//", b"/0/").replace(b"/", b" ").split()
         if len(words) == len(corners) * (slashes + 1):
-            numbers = floats(source, words).reshape(-1, slashes + 1)
+            numbers = parse_floats(source, words).reshape(-1, slashes + 1)
             return _whole(source, np.pad(numbers, ((0, 0), (0, 2 - slashes))))
+    # --- Mixed corners, one by one ---
     parts = [[*corner.split(b"/"), b"0", b"0"][:3] for corner in corners]
     return _whole(
-        source, floats(source, [word or b"0" for part in parts for word in part]).reshape(-1, 3)
+        source,
+        parse_floats(source, [word or b"0" for part in parts for word in part]).reshape(-1, 3),
     )
 
 

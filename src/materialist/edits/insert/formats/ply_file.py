@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from materialist.edits.insert.formats.source import MeshSource
-from materialist.edits.insert.formats.text import floats, line_blocks
+from materialist.edits.insert.formats.text import line_blocks, parse_floats
 from materialist.types import Array
 
 HEADER_BYTES = 1 << 16
@@ -74,7 +74,9 @@ class PlyElement:
 
     def kind(self, name: str) -> np.dtype:
         """Type of a property as declared."""
-        return np.dtype(next(one.type for one in self.properties if one.name == name))
+        return np.dtype(
+            next(declared.type for declared in self.properties if declared.name == name)
+        )
 
 
 def read_elements(source: MeshSource) -> tuple[dict[str, PlyElement], list[str]]:
@@ -140,7 +142,7 @@ def _text_numbers(source: MeshSource, start: int) -> Array:
     """The numbers of a text as the bytes of float64."""
     blocks = [np.zeros(0)]
     for lines in line_blocks(source, source.data, start):
-        blocks.append(floats(source, b" ".join(lines).split()))
+        blocks.append(parse_floats(source, b" ".join(lines).split()))
     return np.concatenate(blocks).view(np.uint8)
 
 
@@ -150,7 +152,7 @@ def _check_size(source: MeshSource, element: PlyElement, room: int) -> None:
         source.check("vertices", element.count)
     if element.name == "face":
         source.check("faces", element.count)
-    least = element.count * sum(one.least_bytes for one in element.properties)
+    least = element.count * sum(declared.least_bytes for declared in element.properties)
     if least > room:
         raise source.damaged(
             f"damaged: its header counts {element.count} of '{element.name[:40]}', at least {least} bytes, and {room} "
@@ -165,33 +167,40 @@ def _read(source: MeshSource, data: Array, start: int, element: PlyElement) -> i
     table = _uniform(data, start, element)
     if table is None:
         return _ragged(source, data, start, element)
-    for one in element.properties:
-        values = table[one.name]
-        if one.stored_count is None:
-            element.columns[one.name] = values
+    for declared in element.properties:
+        values = table[declared.name]
+        if declared.stored_count is None:
+            element.columns[declared.name] = values
         else:
-            element.lists[one.name] = (table[_length(one)].astype(np.int64), values.ravel())
+            element.lists[declared.name] = (
+                table[_length(declared)].astype(np.int64),
+                values.ravel(),
+            )
     return start + table.nbytes
 
 
-def _length(one: PlyProperty) -> str:
-    return f"length of {one.name}"
+def _length(listed: PlyProperty) -> str:
+    return f"length of {listed.name}"
 
 
 def _uniform(data: Array, start: int, element: PlyElement) -> Array | None:
     """[count] rows where all are as long as the first, as those of triangles are; None where they are not."""
     fields: list[tuple] = []
     offset = start
-    for one in element.properties:
-        if one.stored_count is None:
-            fields.append((one.name, one.stored))
-            offset += one.stored.itemsize
+    for declared in element.properties:
+        if declared.stored_count is None:
+            fields.append((declared.name, declared.stored))
+            offset += declared.stored.itemsize
             continue
-        length = _number(data, offset, one.stored_count)
-        offset += one.stored_count.itemsize + length * one.stored.itemsize
+        # The first row tells the lengths; whether all rows have them is checked at the end.
+        length = _number(data, offset, declared.stored_count)
+        offset += declared.stored_count.itemsize + length * declared.stored.itemsize
         if not 0 <= length <= 255 or offset > len(data):
             return None
-        fields += [(_length(one), one.stored_count), (one.name, one.stored, (length,))]
+        fields += [
+            (_length(declared), declared.stored_count),
+            (declared.name, declared.stored, (length,)),
+        ]
     try:
         rows = np.dtype(fields)
     except ValueError:  # a name twice
@@ -199,7 +208,11 @@ def _uniform(data: Array, start: int, element: PlyElement) -> Array | None:
     if len(data) - start < rows.itemsize * element.count:
         return None
     table = np.frombuffer(data.data, rows, element.count, start)
-    lengths = [table[_length(one)] for one in element.properties if one.stored_count is not None]
+    lengths = [
+        table[_length(declared)]
+        for declared in element.properties
+        if declared.stored_count is not None
+    ]
     return table if all((length == length[0]).all() for length in lengths) else None
 
 
@@ -213,12 +226,14 @@ def _number(data: Array, offset: int, kind: np.dtype) -> int:
 
 def _ragged(source: MeshSource, data: Array, start: int, element: PlyElement) -> int:
     """Fill an element whose lists differ in length, row by row."""
+    # --- Walk the rows: where each value begins, and how many there are ---
     starts = [array("q") for _ in element.properties]
     lengths = [array("q") for _ in element.properties]
     formats = [
-        one.stored_count and struct.Struct(_struct(one.stored_count)) for one in element.properties
+        declared.stored_count and struct.Struct(_struct(declared.stored_count))
+        for declared in element.properties
     ]
-    sizes = [one.stored.itemsize for one in element.properties]
+    sizes = [declared.stored.itemsize for declared in element.properties]
     bytes_ = data.data
     end = start
     try:
@@ -240,14 +255,15 @@ def _ragged(source: MeshSource, data: Array, start: int, element: PlyElement) ->
         raise source.damaged(
             f"damaged: row {row} of '{element.name[:40]}' does not end within the file"
         ) from error
-    for k, one in enumerate(element.properties):
+    # --- Gather each property from all rows ---
+    for k, declared in enumerate(element.properties):
         begin = np.frombuffer(starts[k], np.int64)
         size = np.frombuffer(lengths[k], np.int64)
-        values = _gathered(data, begin, size, one.stored)
-        if one.stored_count is None:
-            element.columns[one.name] = values
+        values = _gathered(data, begin, size, declared.stored)
+        if declared.stored_count is None:
+            element.columns[declared.name] = values
         else:
-            element.lists[one.name] = (size, values)
+            element.lists[declared.name] = (size, values)
     return end
 
 
@@ -260,6 +276,7 @@ def _gathered(data: Array, begin: Array, lengths: Array, kind: np.dtype) -> Arra
     """The numbers of lists that begin at these bytes, one list after the other."""
     values = np.empty(int(lengths.sum()), kind)
     place = np.cumsum(lengths) - lengths
+    # Lists of one length are gathered together, as rows of a table.
     for length in np.unique(lengths[lengths > 0]):
         rows = np.flatnonzero(lengths == length)
         width = int(length) * kind.itemsize

@@ -46,6 +46,7 @@ def _cut(
     if size == 3:
         yield index, np.arange(len(index))
         return
+    # --- Which corners point inwards? ---
     outline = points[corners[index]].astype(np.float64)
     outline = outline - outline[:, :1]
     normal = np.cross(outline, np.roll(outline, -1, 1)).sum(1)  # Newell: twice the area
@@ -53,9 +54,11 @@ def _cut(
     if size == 4:  # a diagonal from the corner that points inwards lies within
         index = np.take_along_axis(index, (reflex.argmax(1)[:, None] + np.arange(4)) % 4, 1)
         reflex = np.zeros_like(reflex)
+    # --- Convex: a fan about the first corner ---
     simple = ~reflex.any(1)
     fans = np.stack([np.repeat(index[:, :1], size - 2, 1), index[:, 1:-1], index[:, 2:]], -1)
     yield fans[simple].reshape(-1, 3), np.repeat(np.flatnonzero(simple), size - 2)
+    # --- Not convex: ears are cut off one by one ---
     hollow = np.flatnonzero(~simple)
     if len(hollow):
         source.check("polygon", int(size))
@@ -79,15 +82,15 @@ def _ears(outline: Array, normal: Array) -> tuple[Array, Array]:
     right = np.cross(across, normal)
     plane = np.stack([right, np.cross(normal, right)], -1)
     plane = plane / np.maximum(np.linalg.norm(plane, axis=1, keepdims=True), 1e-300)
-    flat = np.nan_to_num(
-        outline @ plane, posinf=0, neginf=0
-    )  # [P, n, 2]; such vertices are refused later
+    # Outlines in their planes [P, n, 2]; vertices that are not finite are refused later.
+    flat = np.nan_to_num(outline @ plane, posinf=0, neginf=0)
     ring = np.array([outline.shape[1]], np.uint32)
     ears = [
         np.asarray(mapbox_earcut.triangulate_float64(corners, ring), np.int64) for corners in flat
     ]
     triangles = np.concatenate(ears).reshape(-1, 3)
     row = np.repeat(np.arange(len(flat)), [len(ear) // 3 for ear in ears])
+    # The library may turn triangles round: those that face away are turned back.
     corner = flat[row[:, None], triangles]
     first = corner[:, 1] - corner[:, 0]
     second = corner[:, 2] - corner[:, 0]

@@ -45,11 +45,13 @@ class MeshFolder:
 
     def _inside(self, name: str) -> Path:
         """The path of a reference; glTF's percent-encoding is decoded. Raises InputError where it leads outside."""
-        spellings = [one.replace("\\", "/") for one in (name, unquote(name))]
+        # The reference as it stands, and decoded: neither may lead outside.
+        spellings = [spelling.replace("\\", "/") for spelling in (name, unquote(name))]
         absolute = any(
-            one.startswith("/") or ":" in one.split("/", 1)[0] or "\0" in one for one in spellings
+            spelling.startswith("/") or ":" in spelling.split("/", 1)[0] or "\0" in spelling
+            for spelling in spellings
         )
-        paths = [] if absolute else [(self.folder / one).resolve() for one in spellings]
+        paths = [] if absolute else [(self.folder / spelling).resolve() for spelling in spellings]
         if absolute or not all(path.is_relative_to(self.folder) for path in paths):
             raise InputError(
                 f"{self.path} refers to {name[:200]}, outside of its folder, which is never followed; "

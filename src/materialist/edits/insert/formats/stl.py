@@ -6,7 +6,7 @@ import numpy as np
 
 from materialist.edits.insert.formats.content import MeshContent, MeshPart
 from materialist.edits.insert.formats.source import MeshSource
-from materialist.edits.insert.formats.text import floats, line_blocks
+from materialist.edits.insert.formats.text import line_blocks, parse_floats
 from materialist.types import Array
 
 HEADER = 84
@@ -20,6 +20,7 @@ def read_stl(source: MeshSource) -> MeshContent:
     count = struct.unpack_from("<I", data, 80)[0] if len(data) >= HEADER else 0
     fits = len(data) >= HEADER + count * FACET.itemsize
     exact = len(data) == HEADER + count * FACET.itemsize
+    # Binary files may begin with "solid", too: the number of bytes decides.
     is_text = (
         data[:512].lstrip(b"\xef\xbb\xbf \t\r\n").lower().startswith(b"solid")
         and b"vertex" in data[:65536].lower()
@@ -56,7 +57,7 @@ def _text_corners(source: MeshSource) -> Array:
             raise source.damaged("a vertex has not three numbers")
         count += len(rows)
         source.check("faces", count // 3)
-        numbers = floats(source, [word for words in rows for word in words[1:]])
+        numbers = parse_floats(source, [word for words in rows for word in words[1:]])
         blocks.append(numbers.reshape(-1, 3))
     if count % 3:
         raise source.damaged(f"it ends within a triangle: {count} vertices")

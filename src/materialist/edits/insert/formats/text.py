@@ -28,7 +28,7 @@ def line_blocks(source: MeshSource, data: bytes, start: int = 0) -> Iterator[lis
     yield [rest]
 
 
-def floats(source: MeshSource, tokens: Sequence[bytes]) -> Array:
+def parse_floats(source: MeshSource, tokens: Sequence[bytes]) -> Array:
     """[n] float64 of words. Raises InputError for a word that is no number."""
     try:
         return np.array(tokens, np.float64) if tokens else np.zeros(0)

@@ -93,9 +93,8 @@ class Textures:
 
     def _decoded(self, image: Any, mode: str) -> Array:
         side = self.side
-        if mode == "RGB" and image.mode.startswith(
-            ("I", "F")
-        ):  # greys of 16 bits or floats: "RGB" would clip them at 255
+        # Greys of 16 bits or floats: Pillow's "RGB" would clip them at 255.
+        if mode == "RGB" and image.mode.startswith(("I", "F")):
             values = np.asarray(image, np.float32) / np.float32(1 if image.mode == "F" else 65535)
             image = _shrunk(Image.fromarray(values), side)
             return np.repeat(np.asarray(image, np.float32)[..., None], 3, -1)

@@ -1,0 +1,1 @@
+"""Sets of labelled pictures: procedural samples in folders, and InteriorVerse."""

@@ -1,0 +1,415 @@
+"""Random physically plausible materials: which tile, which colours, which finish."""
+
+import colorsys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar, cast
+
+import numpy as np
+
+from materialist.types import Array
+from materialist_lab.procedural import tiles
+from materialist_lab.procedural.relief import Relief
+
+Colour = tuple[float, float, float]
+Range = tuple[float, float]
+Shade = tuple[float, Range, Range, Range]
+"""Share, and ranges of hue, saturation and value (sRGB)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ColourPicture:
+    """A photographic texture; two are the same where they are one object."""
+
+    pixels: Array
+    """[h, w, 3] uint8: 255 times the square root of linear albedo, row 0 at the top."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a surface is made of; colours are linear Rec.709 albedo in [0, 1]."""
+
+    tile: int
+    """Number in `tiles.bank()`."""
+    colours: tuple[Colour, Colour, Colour]
+    grain: float = 0.1
+    """Strength of the tile's brightness channel: albedo times exp(grain (g - 0.5))."""
+    roughness: tuple[float, float] = (0.6, 0.6)
+    """At 0 and 1 of the tile's roughness channel."""
+    metallic: tuple[float, float] = (0.0, 0.0)
+    """At 0 and 1 of the tile's first channel."""
+    repeat: tuple[float, float] = (1.0, 1.0)
+    """Metres that one tile covers, along u and v."""
+    turn: float = 0.0
+    """Rotation of the tile, radians."""
+    emission: Colour = (0.0, 0.0, 0.0)
+    """Radiance is emission times albedo, on the front side."""
+    offset: tuple[float, float] | None = None
+    """Shift in tiles; None for a shift of its own for every surface."""
+    picture: ColourPicture | None = None
+    """Covers what the tile covers; the albedo is its colour times the first of `colours`."""
+    emboss: float = 0.0
+    """Height of the tile's relief, metres."""
+    relief: Relief | None = None
+    """Solid noise that bends the normals."""
+
+    def row(self, shift: tuple[float, float], start: int = 0) -> Array:
+        """[36] float32 as the path tracer reads it; `shift` moves the tile where the material leaves that open.
+
+        start: place of the picture's first pixel in the buffer of all pictures, in units of 64 pixels.
+        """
+        c = np.cos(self.turn)
+        s = np.sin(self.turn)
+        (c0, c1, c2), (r0, r1), (m0, m1) = self.colours, self.roughness, self.metallic
+        offset = shift if self.offset is None else self.offset
+        height, width = (0, 0) if self.picture is None else self.picture.pixels.shape[:2]
+        solid = [1.0, 1.0, 1.0, 0.0, 0.0] if self.relief is None else self.relief.row()
+        return np.array(
+            [
+                *c0,
+                r0,
+                *c1,
+                r1,
+                *c2,
+                self.grain,
+                m0,
+                m1,
+                c / self.repeat[0],
+                s / self.repeat[0],
+                -s / self.repeat[1],
+                c / self.repeat[1],
+                offset[0],
+                offset[1],
+                *self.emission,
+                float(self.tile),
+                start,
+                width,
+                height,
+                self.emboss,
+                *solid,
+                0,
+                0,
+                0,
+            ],
+            np.float32,
+        )
+
+
+def hsv(h: float, s: float, v: float) -> Colour:
+    """Linear colour of hue, saturation and value given in sRGB, as people name colours; kept within [0.02, 0.92]."""
+    srgb = np.array(colorsys.hsv_to_rgb(h % 1, min(max(s, 0), 1), min(max(v, 0), 1)))
+    return tuple(np.clip(srgb**2.2, 0.02, 0.92).tolist())
+
+
+def near(rng: np.random.Generator, colour: Colour, low: float, high: float) -> Colour:
+    """That colour, darker or lighter by a factor in [low, high], and a little off its hue."""
+    factor = rng.uniform(low, high) * rng.uniform(0.92, 1.08, 3)
+    return tuple(np.clip(np.array(colour) * factor, 0.015, 0.92).tolist())
+
+
+def uniform(
+    colour: Colour, roughness: float, metallic: float = 0.0, grain: float = 0.0
+) -> Material:
+    return Material(0, (colour,) * 3, grain, (roughness, roughness), (metallic, metallic))
+
+
+ALL: Range = (0, 1)
+ANY_COLOUR: tuple[Shade, ...] = (
+    (0.4, (0.05, 0.15), (0, 0.12), (0.1, 0.95)),
+    (0.3, (0.03, 0.13), (0.12, 0.6), (0.15, 0.9)),
+    (0.2, ALL, (0.05, 0.4), (0.15, 0.9)),
+    (0.1, ALL, (0.4, 0.97), (0.2, 0.95)),
+)
+"""Greys and browns mostly, as in photographs; saturated colours often enough, dark to light."""
+PALE: Shade = (0.8, (0.05, 0.15), (0, 0.15), (0.5, 0.97))
+
+
+T = TypeVar("T")
+
+
+def pick(rng: np.random.Generator, options: Sequence[tuple[float, T]]) -> T:
+    """One of several (share, option)."""
+    shares = np.array([share for share, _ in options])
+    return options[rng.choice(len(options), p=shares / shares.sum())][1]
+
+
+def shade(rng: np.random.Generator, shades: tuple[Shade, ...] = ANY_COLOUR) -> Colour:
+    """A colour from one of the ranges, any by default."""
+    ranges = pick(rng, tuple((share, parts) for share, *parts in shades))
+    return hsv(*(rng.uniform(*r) for r in ranges))
+
+
+@dataclass(frozen=True)
+class Finish:
+    """A family of materials as ranges; a call draws one of them."""
+
+    tiles: str
+    """Kinds of tile, separated by spaces; one named twice is drawn twice as often."""
+    base: tuple[Shade, ...] = ANY_COLOUR
+    second: tuple[float, float, float] = (0, 1, 1)
+    """Probability that the second colour is the first one times a factor, from and to; else it is any colour."""
+    third: tuple[float, float, float] | tuple[Shade, ...] = (0, 1, 1)
+    """The same for the third colour, or its own ranges."""
+    grain: Range = (0, 0.1)
+    roughness: tuple[tuple[float, float, float], ...] = ((1, 0.6, 0.6),)
+    """(share, from, to) at 0 of the tile's roughness channel."""
+    rougher: Range = (0, 0)
+    """How much larger it is at 1 of that channel."""
+    repeat: Range = (0.3, 1)
+    """Metres that a tile covers, log-uniform."""
+    stretch: Range = (1, 1)
+    """Factor on that along u."""
+    quarter: bool = False
+    """Whether the tile is turned by 90 degrees half of the time."""
+
+    def __call__(self, rng: np.random.Generator) -> Material:
+        first = shade(rng, self.base)
+        rough = rng.uniform(
+            *pick(rng, tuple((share, (low, high)) for share, low, high in self.roughness))
+        )
+        size = float(np.exp(rng.uniform(*np.log(self.repeat))))
+        return Material(
+            tile(rng, str(rng.choice(self.tiles.split()))),
+            (first, self._other(rng, first, self.second), self._other(rng, first, self.third)),
+            rng.uniform(*self.grain),
+            (rough, float(np.clip(rough + rng.uniform(*self.rougher), 0.06, 1))),
+            repeat=(size * rng.uniform(*self.stretch), size),
+            turn=rng.choice([0, np.pi / 2]) if self.quarter else 0.0,
+        )
+
+    def _other(self, rng: np.random.Generator, first: Colour, how: tuple) -> Colour:
+        if isinstance(how[0], tuple):
+            return shade(rng, how)
+        return near(rng, first, how[1], how[2]) if rng.random() < how[0] else shade(rng)
+
+
+def tile(rng: np.random.Generator, kind: str) -> int:
+    """The number of a tile of that kind."""
+    where = tiles.bank()[1][kind]
+    return int(rng.integers(where.start, where.stop))
+
+
+SHINY_OR_MATT = ((0.5, 0.08, 0.35), (0.5, 0.35, 0.7))
+TIMBER: tuple[Shade, ...] = ((1, (0.045, 0.105), (0.25, 0.7), (0.2, 0.88)),)
+EARTH: tuple[Shade, ...] = ((1, (0.03, 0.14), (0, 0.4), (0.2, 0.8)),)
+MORTAR: tuple[Shade, ...] = ((1, (0.1, 0.1), (0, 0.15), (0.25, 0.85)),)
+
+wall_paint = Finish(
+    "plain plain plain cloudy",
+    (
+        (0.5, (0.05, 0.17), (0, 0.18), (0.6, 0.97)),
+        (0.35, ALL, (0, 0.18), (0.6, 0.97)),
+        (0.15, ALL, (0.1, 0.5), (0.25, 0.85)),
+    ),
+    (1, 0.85, 1.05),
+    (1, 0.6, 0.95),
+    (0, 0.12),
+    ((1, 0.45, 0.95),),
+    (0.1, 0.1),
+    (0.8, 3),
+)
+wallpaper = Finish(
+    "ornament ornament ornament stripes stripes spots plaid",
+    ((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))),
+    (0.7, 0.5, 0.95),
+    rougher=(0.2, 0.2),
+    repeat=(0.4, 1.5),
+)
+lacquer = Finish(
+    "plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),)
+)
+"""Of any colour, dull or shiny."""
+skin = replace(
+    lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),)
+)
+white_paint = replace(
+    lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),)
+)
+plastic = replace(
+    lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT
+)
+raw_wood = Finish(
+    "wood",
+    TIMBER,
+    (1, 0.35, 0.75),
+    (1, 0.15, 0.4),
+    (0.1, 0.5),
+    ((1, 0.4, 0.8),),
+    (0.2, 0.2),
+    (0.5, 1.4),
+    (1, 2),
+)
+wood = replace(raw_wood, roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)))
+"""Pale, brown, red or nearly black timber, raw or varnished."""
+floor_boards = replace(wood, tiles="planks", repeat=(0.9, 2.2))
+tiled = Finish(
+    "tiling tiling tiling checker",
+    (*ANY_COLOUR, PALE),
+    (0.75, 0.75, 1.0),
+    MORTAR,
+    (0, 0.2),
+    ((1, 0.06, 0.5),),
+    (0.2, 0.8),
+    (0.6, 3),
+)
+stone = Finish(
+    "marble speckle cloudy",
+    ((1, (0.03, 0.16), (0, 0.25), (0.2, 0.92)),),
+    (0.7, 0.3, 0.8),
+    (0.7, 0.3, 0.8),
+    (0.1, 0.6),
+    ((0.5, 0.08, 0.4), (0.5, 0.5, 0.95)),
+    (0.15, 0.15),
+    (0.4, 2),
+)
+"""Marble, granite, terrazzo, concrete."""
+brick = Finish(
+    "bricks",
+    ((0.8, (0.0, 0.09), (0.15, 0.7), (0.3, 0.85)), (0.2, (0.1, 0.1), (0.03, 0.03), (0.7, 0.92))),
+    (1, 0.5, 1.0),
+    MORTAR,
+    (0.3, 0.9),
+    ((1, 0.75, 0.75),),
+    (0.2, 0.2),
+    (0.6, 1.2),
+)
+woven = Finish(
+    "weave",
+    second=(0.5, 0.4, 0.9),
+    grain=(0.1, 0.7),
+    roughness=((1, 0.6, 1.0),),
+    repeat=(0.08, 0.3),
+)
+printed_cloth = replace(
+    woven, tiles="plain plain stripes plaid ornament spots cloudy", repeat=(0.2, 0.9)
+)
+ceramic = Finish(
+    "plain plain plain stripes ornament spots cloudy",
+    (*ANY_COLOUR, PALE),
+    grain=(0, 0.15),
+    roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)),
+    repeat=(0.1, 0.5),
+    quarter=True,
+)
+"""Glazed pottery: white, coloured, decorated; matt clay now and then."""
+foliage = Finish(
+    "cloudy",
+    ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))),
+    (1, 0.5, 1.3),
+    (1, 1.0, 1.6),
+    (0.2, 0.6),
+    ((1, 0.35, 0.7),),
+    repeat=(0.1, 0.3),
+)
+"""Leaves, fresh or autumnal."""
+paved = Finish(
+    "speckle speckle bricks bricks cloudy tiling tiling",
+    EARTH,
+    (1, 0.55, 1.1),
+    (0.8, 0.35, 0.8),
+    (0.3, 1.1),
+    ((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)),
+    (0.1, 0.1),
+    (1, 4),
+)
+grass = replace(
+    paved,
+    tiles="grass",
+    base=((1, (0.14, 0.34), (0.3, 0.7), (0.25, 0.6)),),
+    roughness=((1, 0.7, 1.0),),
+)
+facade = Finish(
+    "facade",
+    ((0.85, (0.02, 0.16), (0, 0.5), (0.35, 0.95)), (0.15, ALL, (0, 0.9), (0.2, 0.9))),
+    (0.5, 0.5, 1.5),
+    ((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),),
+    (0.1, 0.5),
+    ((1, 0.7, 0.95),),
+    (-0.8, -0.5),
+    (5, 12),
+)
+"""House front with rows of dark or mirroring windows, which are smoother than the wall."""
+
+METALS = (
+    (0.91, 0.90, 0.88),
+    (0.62, 0.61, 0.60),
+    (0.95, 0.78, 0.36),
+    (0.93, 0.65, 0.52),
+    (0.78, 0.68, 0.46),
+    (0.45, 0.44, 0.43),
+)
+"""Silver and aluminium, steel, gold, copper, brass, iron: linear reflectance at normal incidence."""
+
+
+def fabric(rng: np.random.Generator) -> Material:
+    return (woven if rng.random() < 0.3 else printed_cloth)(rng)
+
+
+def ground(rng: np.random.Generator) -> Material:
+    """Outdoor ground: asphalt, paving, grass, earth, gravel, sand, concrete."""
+    return (grass if rng.random() < 0.2 else paved)(rng)
+
+
+def metal(rng: np.random.Generator) -> Material:
+    """Steel, aluminium, brass, copper, gold, iron: polished, brushed, or worn."""
+    colour = cast(
+        Colour,
+        tuple((np.array(METALS[rng.integers(len(METALS))]) * rng.uniform(0.85, 1, 3)).tolist()),
+    )
+    kind = str(rng.choice(["plain", "brushed", "rust"], p=[0.5, 0.35, 0.15]))
+    made = Finish(
+        kind,
+        grain=(0, 0.3),
+        roughness=((0.5, 0.05, 0.25), (0.5, 0.25, 0.6)),
+        rougher=(0.1, 0.2),
+        repeat=(0.1, 0.5),
+        quarter=True,
+    )(rng)
+    if kind == "rust":  # corroded or painted over where the tile's first channel is 1
+        return replace(made, colours=(colour, *made.colours[1:]), metallic=(1.0, 0.0))
+    return replace(made, colours=(colour,) * 3, metallic=(1.0, 1.0))
+
+
+def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
+    """A carpet of that size in metres, its tile fitted once."""
+    made = Finish("carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),))(
+        rng
+    )
+    return replace(made, repeat=(width, depth), offset=(0.5, 0.5))
+
+
+def printed(rng: np.random.Generator, width: float, height: float) -> Material:
+    """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
+    kinds = "picture picture picture print ornament cloudy spots"
+    made = Finish(kinds, (*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),))(rng)
+    return replace(made, repeat=(width, -height), offset=(0.5, 0.5))
+
+
+def light(rng: np.random.Generator, radiance: Colour) -> Material:
+    """A luminous white surface of that radiance."""
+    emission = cast(Colour, tuple((np.array(radiance) / 0.8).tolist()))
+    return Material(tile(rng, "plain"), ((0.8, 0.8, 0.8),) * 3, 0.0, emission=emission)
+
+
+Maker = Callable[[np.random.Generator], Material]
+OBJECTS: tuple[tuple[float, Maker], ...] = (
+    (0.2, ceramic),
+    (0.2, plastic),
+    (0.26, metal),
+    (0.11, wood),
+    (0.07, fabric),
+    (0.07, stone),
+    (0.09, wall_paint),
+)
+
+
+def any_object(rng: np.random.Generator) -> Material:
+    """What a movable thing may be made of, at a scale that suits 10 to 40 centimetres."""
+    material = pick(rng, OBJECTS)(rng)
+    shrink = rng.uniform(0.15, 0.5) if max(material.repeat) > 0.5 else 1.0
+    return replace(material, repeat=(material.repeat[0] * shrink, material.repeat[1] * shrink))
+
+
+def one_of(rng: np.random.Generator, *makers: Callable[[np.random.Generator], T]) -> T:
+    """What one of the makers makes, each as likely."""
+    return makers[rng.integers(len(makers))](rng)

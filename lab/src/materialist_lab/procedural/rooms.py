@@ -1,0 +1,249 @@
+"""Rooms: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from materialist.types import Array
+from materialist_lab.procedural import lights, walls, world
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural.objects import furniture as f
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects.things import Meshes
+from materialist_lab.procedural.walls import RoomWall
+from materialist_lab.procedural.world import Parts, ScenePart, block, moved, placed, rod
+
+Size = Array
+"""[3] width, depth and height of a room, metres; its floor is centred on the origin."""
+
+
+def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
+    """A furnished room seen by somebody who stands or sits in it."""
+    size = rng.uniform([2.6, 3.2, 2.3], [6.5, 8.0, 3.3])
+    standing = Furniture(size)
+    standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 3, 9, meshes))
+    standing.in_the_middle(rng, _some(rng, f.IN_THE_MIDDLE, 1, 6, meshes))
+    return _world(rng, size, captures, standing.parts, view_of(rng, size, standing), "room")
+
+
+def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
+    """Things on a table, a sideboard or a kitchen top, seen from close by, with the room behind them."""
+    maker = m.pick(rng, f.TO_LOOK_ON)
+    piece = maker(rng, meshes)
+    (low, high), top = world.bounds(piece), world.bounds(piece[:1])[1][1]
+    size = rng.uniform([2.6, 3.0, 2.3], [5.0, 5.0, 3.0])
+    size[:2] = np.maximum(size[:2], (high - low)[[0, 2]] + 0.7)
+    at_wall = maker is not f.set_table or rng.random() < 0.5
+    x = rng.uniform(-0.3, 0.3)
+    z = -size[1] / 2 - low[2] + 0.03 if at_wall else rng.uniform(-0.3, 0.3)
+    standing = Furniture(size)
+    standing.add(placed(piece, (x, 0, z)))
+    standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 2, 4, meshes))
+    target = np.array([x + rng.uniform(-0.4, 0.4) * high[0], top + rng.uniform(0.0, 0.15), z])
+    distance, up, turn, fov = rng.uniform(
+        [0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60]
+    )
+    w, d, h = size
+    inside = np.array([[-w / 2 + 0.1, 0.2, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
+    eye = np.clip(world.orbit(target, distance, turn, up, fov).position, *inside)
+    view = world.look(eye, target, fov, rng.normal() * 0.03)
+    return _world(rng, size, captures, standing.parts, view, "table")
+
+
+def _some(rng, kinds, low: int, high: int, meshes) -> list[Parts]:
+    """At least `low` and fewer than `high` pieces of these kinds."""
+    return [m.pick(rng, kinds)(rng, meshes) for _ in range(int(rng.integers(low, high)))]
+
+
+def _world(
+    rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, kind: str
+) -> world.World:
+    w, d, _ = size
+    parts, portals, envmap = shell(rng, size, captures)
+    parts += furniture
+    if rng.random() < 0.5:
+        a = w * rng.uniform(0.3, 0.7)
+        b = d * rng.uniform(0.25, 0.6)
+        rug = m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)
+        parts.append(block((a, 0.012, b), (rng.normal() * 0.3, 0, rng.normal() * 0.4), rug, 0.004))
+    parts += lamps(rng, size, portals, envmap)
+    return world.World(parts, envmap, view, portals, kind)
+
+
+def sides(size: Size) -> list[tuple[Array, float, float]]:
+    """(lower left corner, turn about Y, length) of the back, right, front and left wall, as seen from inside."""
+    w, d, _ = size
+    corners = np.array([(-w, 0, -d), (w, 0, -d), (w, 0, d), (-w, 0, d)]) / 2
+    return list(zip(corners, (0.0, -np.pi / 2, np.pi, np.pi / 2), (w, d, w, d)))
+
+
+Hangings = Callable[[np.random.Generator, RoomWall, int], Parts]
+"""(random numbers, wall, how many) -> what hangs on the wall where there is room."""
+
+
+def shell(
+    rng: np.random.Generator, size: Size, captures: Meshes, hangings: Hangings = walls.hangings
+) -> tuple[Parts, list[world.Portal], Array]:
+    """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
+    w, d, h = size
+    is_open = rng.random() < 0.25
+    parts: Parts = []
+    portals: list[world.Portal] = []
+    count = (
+        int(rng.choice([0, 1, 2], p=[0.1, 0.6, 0.3])) if not is_open else int(rng.random() < 0.3)
+    )
+    with_windows = rng.permutation(2 if is_open else 4)[:count]
+    paint = m.wall_paint(rng)
+    accent = rng.integers(4) if rng.random() < 0.3 else -1
+    lower = m.one_of(rng, m.wall_paint, m.tiled, m.wood) if rng.random() < 0.15 else None
+    wood = m.white_paint(rng) if rng.random() < 0.7 else m.wood(rng)
+    x = np.array([1.0, 0, 0])
+    z = np.array([0, 0, 1.0])
+    for k, (corner, turn, length) in enumerate(sides(size)):
+        holes = [walls.Opening(0, length, 0, h)]
+        if not (is_open and k == 2):
+            wall = RoomWall(length, h)
+            most = 4 if count == 1 else 3
+            own = walls.windows(rng, wall, int(rng.integers(1, most))) if k in with_windows else []
+            own += walls.door(rng, wall) if rng.random() < 0.35 else []
+            makers = (m.wall_paint, m.wallpaper, m.brick, m.tiled, m.wood, m.stone)
+            own += walls.surface(
+                wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2)
+            )
+            own.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
+            own += hangings(rng, wall, int(rng.integers(0, 5)))
+            parts = parts + moved(own, corner, turn)
+            holes = wall.holes
+        for hole in holes:
+            up = (0, hole.top - hole.bottom, 0)
+            sheet = s.sheet((hole.left, hole.bottom, -0.01), (hole.right - hole.left) * x, up)
+            low, up, right, _ = s.moved(sheet, corner, turn).vertices
+            portals.append(world.Portal(low, right - low, up - low))
+    floor = m.one_of(rng, m.floor_boards, m.floor_boards, m.tiled, m.stone, m.fabric)
+    ceiling = m.floor_boards(rng) if rng.random() < 0.08 else m.white_paint(rng)
+    parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), floor))
+    parts.append(ScenePart(s.sheet((-w / 2, h, -d / 2), w * x, d * z), ceiling))
+    if rng.random() < 0.12:
+        beams = np.arange(-w / 2 + 0.4, w / 2, 0.9)
+        look = m.wood(rng)
+        parts += [block((0.14, 0.2, d), (at, h - 0.2, 0), look) for at in beams]
+    if not portals:
+        return parts, portals, np.zeros((8, 16, 3), np.float32)
+    return parts, portals, (lights.around if is_open else lights.outdoors)(rng, captures)
+
+
+class Furniture:
+    """What stands in a room, with the boxes around it."""
+
+    def __init__(self, size: Size):
+        self.size = size
+        self.parts: Parts = []
+        self.boxes: list[tuple[Array, Array]] = []
+
+    def add(self, piece: Parts) -> None:
+        """Take the piece in, unless it reaches through a wall or into another piece."""
+        low, high = world.bounds(piece)
+        inside = (np.maximum(-low, high)[[0, 2]] <= self.size[:2] / 2).all()
+        if inside and not any((low < b).all() and (high > a).all() for a, b in self.boxes):
+            self.parts += piece
+            self.boxes.append((low, high))
+
+    def along_walls(self, rng: np.random.Generator, pieces: list[Parts]) -> None:
+        """Stand pieces with their backs to a wall, most at the back and the sides."""
+        for piece in pieces:
+            corner, turn, length = sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
+            low, high = world.bounds(piece)
+            at = rng.uniform(0.04, max(0.05, length - (high - low)[0] - 0.04))
+            self.add(moved(placed(piece, (at - low[0], 0, 0.04 - low[2])), corner, turn))
+
+    def in_the_middle(self, rng: np.random.Generator, pieces: list[Parts]) -> None:
+        """Stand pieces anywhere, turned anyhow."""
+        for piece in pieces:
+            x, z = rng.uniform(-0.35, [0.35, 0.25]) * self.size[:2]
+            self.add(placed(piece, (x, 0, z), rng.uniform(0, 2 * np.pi)))
+
+
+def _glow(rng, power: float, area: float) -> m.Material:
+    """A lamp of that power and area, its colour between candle and daylight."""
+    t = rng.choice([rng.uniform(0, 0.35), rng.uniform(0.35, 1.0)])
+    colour = (1 - t) * np.array([1.0, 0.62, 0.3]) + t * np.array([1.0, 0.97, 1.0])
+    return m.light(rng, tuple(power / area * colour / colour.mean()))
+
+
+def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
+    """Ceiling panels, globes and shades; their power against the windows varies by a factor of a hundred.
+
+    At times it is evening: `envmap` is made darker in place.
+    """
+    if portals and rng.random() < 0.4:
+        return []
+    through = sum(np.linalg.norm(np.cross(p.right, p.up)) for p in portals) / 2 if portals else 2.0
+    power = through * float(np.exp(rng.uniform(np.log(0.08), np.log(8.0))))
+    if portals and rng.random() < 0.12:
+        envmap *= rng.uniform(0.005, 0.1)
+    chosen = rng.permutation(3)[: int(rng.integers(1, 3))]
+    return [
+        p for k in chosen for p in (_panels, _globes, _shade)[k](rng, size, power / len(chosen))
+    ]
+
+
+def _panels(rng, size, power) -> Parts:
+    """A few long panels or several small spots on the ceiling."""
+    w, d, h = size
+    spots = rng.random() < 0.5
+    n, a, b = (
+        (rng.integers(2, 7), 0.1, 0.1)
+        if spots
+        else (rng.integers(1, 4), *rng.uniform(0.12, [0.6, 1.2]))
+    )
+    glow = _glow(rng, power, n * a * b)
+    edge = m.metal(rng)
+    parts = []
+    for x, z in rng.uniform(-0.4, 0.4, (n, 2)) * [w, d]:
+        parts.append(block((a + 0.03, 0.03, b + 0.03), (x, h - 0.03, z), edge))
+        parts.append(
+            ScenePart(s.sheet((x - a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b)), glow)
+        )
+    return parts
+
+
+def _globes(rng, size, power) -> Parts:
+    w, d, h = size
+    n = int(rng.integers(1, 4))
+    r = rng.uniform(0.06, 0.2)
+    drop = rng.uniform(0.3, 0.9)
+    glow = _glow(rng, power, n * 4 * np.pi * r * r)
+    cord = m.metal(rng)
+    x = rng.uniform(-0.2, 0.2) * w
+    z = rng.uniform(-0.3, 0.2) * d
+    row = [x + (k - n / 2) * 4 * r for k in range(n)]
+    balls = [world.orb((at, h - drop, z), r, glow) for at in row]
+    return balls + [rod([(at, h - drop + r, z), (at, h, z)], 0.006, cord, 5) for at in row]
+
+
+def _shade(rng, size, power) -> Parts:
+    w, d, _ = size
+    r, tall, height = rng.uniform([0.12, 1.1, 0.18], [0.25, 1.7, 0.35])
+    at = np.array([rng.choice([-1, 1]) * (w / 2 - r - 0.1), 0, rng.uniform(-0.45, 0.2) * d])
+    glow = _glow(rng, power, 2 * np.pi * r * height)
+    stand = m.metal(rng)
+    shade = s.lathe(np.array([(r, tall), (r * rng.uniform(0.5, 1), tall + height)]), 32)
+    pole = rod([(0, 0, 0), (0, tall + height / 2, 0)], 0.012, stand)
+    foot = block((0.28, 0.03, 0.28), (0, 0, 0), stand)
+    return placed([ScenePart(shade, glow), pole, foot], at)
+
+
+def view_of(rng: np.random.Generator, size: Size, standing: Furniture) -> world.Viewpoint:
+    """Somebody in the front half of the room who looks towards its back."""
+    w, d, h = size
+    for _ in range(30):
+        eye = rng.uniform([-0.44, 0, 0.05], [0.44, 0, 0.48]) * [w, 0, d]
+        if not any(
+            (eye > low - 0.25).all() and (eye < high + 0.25).all() for low, high in standing.boxes
+        ):
+            break
+    eye[1] = min(rng.uniform(1.2, 1.75) if rng.random() < 0.7 else rng.uniform(0.5, 2.0), h - 0.3)
+    target = np.array(
+        [rng.uniform(-0.5, 0.5) * w, rng.uniform(0.3, 1.5), -d / 2 * rng.uniform(0.2, 1.0)]
+    )
+    return world.look(eye, target, rng.uniform(35, 75), rng.normal() * 0.025)

@@ -1,0 +1,228 @@
+"""Rough sculptural shapes: lumps with limbs, weathered stones, carved plates and fluted vessels, with fine meshes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+from scipy.ndimage import gaussian_filter
+from skimage.measure import marching_cubes
+
+from materialist.types import Array
+from materialist_lab.procedural import materials as m
+from materialist_lab.procedural import relief
+from materialist_lab.procedural.catalog.reading import from_the_sides
+from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects.shapes import Solid
+from materialist_lab.procedural.staged.finishes import covered, relief_of
+from materialist_lab.procedural.staged.stock import Stock
+from materialist_lab.procedural.world import Parts, ScenePart, one_thing
+
+Maker = Callable[[np.random.Generator, Stock], Solid]
+GRID = 84
+"""Samples on a side of the field of a body with limbs."""
+
+
+def sculpture(rng: np.random.Generator, stock: Stock) -> Parts:
+    """A sculpture about 0.3 m high, standing on y = 0."""
+    makers: tuple[tuple[float, Maker], ...] = (
+        (0.4, _body),
+        (0.2, _stone),
+        (0.16, _plate),
+        (0.14, _vessel),
+        (0.1 if stock.meshes else 0.0, _captured),
+    )
+    solid = m.pick(rng, makers)(rng, stock)
+    family = str(
+        rng.choice(["stone", "stone", "ceramic", "ceramic", "wood", "metal", "paint", "leather"])
+    )
+    solid = from_the_sides(_standing(rng, solid))
+    return one_thing([ScenePart(solid, _material(rng, family, stock))])
+
+
+def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material:
+    draw = rng.random()
+    if draw < 0.3:
+        picture = stock.texture(rng, family) or stock.repeating(rng)
+        if picture is not None:
+            return covered(rng, picture, rng.uniform(0.1, 0.5), family)
+    if draw < 0.4:
+        picture = stock.repeating(rng)
+        if picture is not None:
+            return covered(rng, picture, rng.uniform(0.15, 0.6), family)
+    if draw < 0.55:
+        grey = rng.uniform(0.2, 0.8)
+        made = m.uniform(
+            (grey, grey * rng.uniform(0.9, 1), grey * rng.uniform(0.75, 1)), rng.uniform(0.4, 0.95)
+        )
+    else:
+        makers: dict[str, m.Maker] = {
+            "stone": m.stone,
+            "ceramic": m.ceramic,
+            "wood": m.wood,
+            "metal": m.metal,
+        }
+        made = makers.get(family, m.lacquer)(rng)
+    shrink = rng.uniform(0.2, 0.6)
+    repeat = (made.repeat[0] * shrink, made.repeat[1] * shrink)
+    return replace(
+        made, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001)
+    )
+
+
+def _displaced(rng: np.random.Generator, solid: Solid, amount: float) -> Solid:
+    """The solid moved along its normals by noise of two sizes, `amount` its deviation over the solid's size."""
+    size = float(np.ptp(solid.vertices, axis=0).max())
+    kinds = rng.choice(["rough", "ridges", "hammered", "carved", "folds", "grain", "hair"], 2)
+    blocks = size * np.exp(rng.uniform(np.log(0.5), np.log(2.5), 2))
+    shift = rng.uniform(0, 1, (2, 3))
+    total = sum(
+        relief.height(str(kind), solid.vertices / block + offset) * block * weight
+        for kind, block, offset, weight in zip(kinds, blocks, shift, (1.0, rng.uniform(0, 0.6)))
+    )
+    moved = solid.vertices + solid.normals * (total * amount)[:, None]
+    return replace(solid, vertices=moved, normals=s.smooth_normals(moved, solid.faces))
+
+
+def _depth(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
+    """A boulder, a nut, a head of coral: a ball pressed flat here and there."""
+    ball = trimesh.creation.icosphere(subdivisions=6)
+    vertices = np.asarray(ball.vertices, float)
+    for _ in range(int(rng.integers(0, 8))):
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        over = np.maximum(vertices @ axis - rng.uniform(0.55, 0.95), 0)
+        vertices = vertices - 0.9 * over[:, None] * axis
+    bump = s.lumps(rng, rng.uniform(0, 0.25), 0.35)
+    vertices = vertices * (1 + bump(vertices))[:, None] * rng.uniform(0.55, 1.0, 3)
+    faces = np.asarray(ball.faces, np.int32)
+    solid = Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
+    return _displaced(rng, solid, _depth(rng, 0.004, 0.03))
+
+
+def _body(rng: np.random.Generator, stock: Stock) -> Solid:
+    """Balls and limbs melted into each other: animals, figures, toys, roots."""
+    ends, radii = _skeleton(rng)
+    low = (ends - radii[:, None, None]).min((0, 1)) - 0.1
+    high = (ends + radii[:, None, None]).max((0, 1)) + 0.1
+    step = float((high - low).max()) / GRID
+    counts = np.maximum(((high - low) / step).astype(int) + 2, 8)
+    axes = [low[k] + step * np.arange(counts[k]) for k in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).astype(np.float32)
+    field = np.zeros(points.shape[:3], np.float32)
+    soft = np.float32(rng.uniform(14, 40))
+    for (a, b), radius in zip(ends.astype(np.float32), radii.astype(np.float32)):
+        along = b - a
+        t = np.clip((points - a) @ along / max(float(along @ along), 1e-9), 0, 1)
+        away = points - a
+        distance = np.sqrt(((away - t[..., None] * along) ** 2).sum(-1)) - radius
+        field += np.exp(-soft * np.clip(distance, -0.4, 1))
+    surface, faces, _, _ = marching_cubes(field, 1.0, spacing=(step,) * 3)
+    solid = _of(surface.astype(float) + low, faces[:, ::-1].astype(np.int32))
+    return _displaced(rng, solid, _depth(rng, 0.003, 0.025))
+
+
+def _of(vertices: Array, faces: Array) -> Solid:
+    return Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
+
+
+def _skeleton(rng: np.random.Generator) -> tuple[Array, Array]:
+    """([n, 2, 3] ends, [n] radii) of a trunk with limbs, often the same on both sides."""
+    ends = []
+    radii = []
+    trunk = rng.uniform(0.15, 0.4)
+    along = rng.normal(size=3) * [0.5, 1.0, 0.5]
+    along *= rng.uniform(0.2, 1.0) / np.linalg.norm(along)
+    ends.append((-along / 2, along / 2))
+    radii.append(trunk)
+    mirrored = rng.random() < 0.65
+    for _ in range(int(rng.integers(1, 7))):
+        root = rng.uniform(-0.5, 0.5) * along + rng.normal(size=3) * 0.12
+        way = rng.normal(size=3)
+        tip = root + way / np.linalg.norm(way) * rng.uniform(0.2, 0.85)
+        bend = tip + rng.normal(size=3) * 0.25
+        thick = rng.uniform(0.05, 0.24)
+        for side in (1, -1) if mirrored else (1,):
+            flip = np.array([side, 1, 1])
+            ends += [(root * flip, tip * flip), (tip * flip, bend * flip)]
+            radii += [thick, thick * rng.uniform(0.5, 1.1)]
+    return np.array(ends), np.array(radii)
+
+
+def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
+    """A carved plate, coin or tile: relief of noise, ornament or of a picture's brightness."""
+    n = 190
+    sheet = s.sheet((-0.5, 0, 0), (1, 0, 0), (0, rng.uniform(0.6, 1.4), 0), n)
+    rows = n + 1
+    crop = stock.crop(rng, 1.0, rows, 0.4) if rng.random() < 0.4 else None
+    if crop is not None:
+        grey = np.clip(crop.mean(-1), 0, 255) / 255.0
+        grey = grey[:rows, :rows] if min(grey.shape) >= rows else np.resize(grey, (rows, rows))
+        height = gaussian_filter(grey, 1.5) * rng.uniform(0.05, 0.2)
+    else:
+        block = rng.uniform(0.4, 1.5)
+        places = np.concatenate(
+            [sheet.vertices[:, :2] / block, np.full((rows * rows, 1), rng.random())], -1
+        )
+        kind = str(rng.choice(["carved", "carved", "ridges", "hammered", "folds", "rough"]))
+        height = (
+            relief.height(kind, places + rng.random(3)).reshape(rows, rows)
+            * block
+            * _depth(rng, 0.01, 0.05)
+        )
+    t = np.linspace(-1, 1, rows)
+    edge = np.maximum(np.abs(t)[:, None], np.abs(t)[None])
+    if rng.random() < 0.4:
+        edge = np.hypot(t[:, None], t[None])
+        height = np.where(edge < 1, height, -0.1)
+    rim = np.clip((edge - rng.uniform(0.8, 0.95)) * 20, 0, 1) * (edge < 1)
+    height = height + rim * rng.uniform(-0.04, 0.05)
+    solid = _of(
+        sheet.vertices + np.stack([0 * height, 0 * height, height], -1).reshape(-1, 3), sheet.faces
+    )
+    back = s.slab((1.0, float(np.ptp(sheet.vertices[:, 1])), 0.12))
+    return s.joined([solid, s.moved(back, (0, 0, -0.18))])
+
+
+def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
+    """A vase, column or bell: fluted, twisted or hammered."""
+    rows = 150
+    columns = 260
+    levels = np.linspace(0, 1, int(rng.integers(4, 8)))
+    radius = np.interp(np.linspace(0, 1, rows), levels, rng.uniform(0.12, 0.5, len(levels)))
+    radius = np.convolve(np.pad(radius, 12, mode="edge"), np.ones(25) / 25, "valid")
+    up = np.linspace(0, rng.uniform(0.7, 1.3), rows)
+    phi = np.linspace(0, 2 * np.pi, columns)
+    flutes = rng.choice([0, int(rng.integers(3, 24))])
+    wave = np.cos(flutes * (phi[None] + rng.normal() * up[:, None])) * rng.uniform(0.0, 0.12)
+    r = radius[:, None] * (1 + wave)
+    points = np.stack([r * np.cos(phi), np.broadcast_to(up[:, None], r.shape), r * np.sin(phi)], -1)
+    faces = s.grid_faces(rows, columns)
+    solid = _of(points.reshape(-1, 3), faces)
+    lid = s.moved(s.disc(float(radius[-1]) * 0.95), (0, float(up[-1]) - 0.02, 0))
+    return s.joined([_displaced(rng, solid, _depth(rng, 0.001, 0.012)), lid])
+
+
+def _captured(rng: np.random.Generator, stock: Stock) -> Solid:
+    """A mesh from a file, weathered."""
+    solid = s.load(stock.meshes[rng.integers(len(stock.meshes))])
+    smooth = _of(solid.vertices, solid.faces)
+    return (
+        smooth if len(smooth.faces) < 4000 else _displaced(rng, smooth, _depth(rng, 0.0003, 0.003))
+    )
+
+
+def _standing(rng: np.random.Generator, solid: Solid) -> Solid:
+    """The solid 0.2 to 0.45 m large, turned anyhow, on y = 0."""
+    size = float(np.ptp(solid.vertices, axis=0).max())
+    tip = rng.normal(0, 0.2) if rng.random() < 0.7 else rng.uniform(0, 2 * np.pi)
+    turned = s.moved(
+        solid, turn=rng.uniform(-0.6, 0.6), tip=tip, scale=rng.uniform(0.2, 0.45) / size
+    )
+    low = turned.vertices.min(0)
+    high = turned.vertices.max(0)
+    return s.grounded(replace(turned, vertices=turned.vertices - (low + high) / 2))

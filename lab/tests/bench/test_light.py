@@ -1,0 +1,87 @@
+"""`bench light` on one tiny sample."""
+
+import numpy as np
+import pytest
+
+from materialist import metrics
+from materialist_lab.bench import light
+
+
+@pytest.mark.slow
+def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
+    found, steps, geometry = light.fit(sample, light.METHODS["default"], "auto", device="cpu")
+    assert geometry.plane_label.shape == sample.photo.linear.shape[:2]
+    assert steps > 0 and found.shape == sample.envmap.shape and found.min() >= 0
+    grey = np.full_like(found, sample.envmap.mean())
+    assert metrics.sh_error(found, sample.envmap) < 0.7 * metrics.sh_error(grey, sample.envmap)
+    photo = sample.photo.linear
+    better = metrics.psnr(sample.scene.render(found, spp=64), photo)
+    assert better > 3 + metrics.psnr(sample.scene.render(grey, spp=64), photo)
+
+
+def test_maps_are_given_as_the_method_says(sample):
+    """The paper's "w/ mat" is MatNet's maps, held fixed; "w/o mat": A = R = 0.5 and M = 0.1, whatever the true ones."""
+    names = ("paper", "paper w/o mat", "paper predicted", "paper predicted w/o mat")
+    true, neutral, predicted, shape = (
+        light.given_maps(sample, light.METHODS[name], seed=0, device="cpu") for name in names
+    )
+    assert (
+        true.depth is neutral.depth is sample.truth.depth
+        and true.materials is sample.truth.materials
+    )
+    assert not np.array_equal(predicted.depth, true.depth) and np.array_equal(
+        shape.depth, predicted.depth
+    )
+    for given in (neutral.materials, shape.materials):
+        assert given.albedo.shape == true.materials.albedo.shape and (given.albedo == 0.5).all()
+        assert (given.roughness == 0.5).all() and np.allclose(given.metallic, 0.1)
+
+
+@pytest.mark.slow
+def test_one_colour_of_light_and_the_predicted_one_are_not_fitted(sample):
+    found, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
+    colours = np.unique(found.reshape(-1, 3), axis=0, return_counts=True)[1]
+    prior, none, _ = light.fit(sample, light.METHODS["prior predicted"], "auto", device="cpu")
+    assert none == 0 and prior.shape == found.shape and prior.std() > 0.05 * prior.mean() > 0
+    assert steps == 0 and colours.max() > 0.5 * found.shape[0] * found.shape[1] and found.min() >= 0
+
+
+def test_mirrors_are_photographed_under_the_same_light(sample):
+    polished = light.mirrored(sample)
+    changed = np.abs(polished.photo.linear - sample.photo.linear).max(-1) > 0.05
+    things = np.isin(sample.scene.seen, list(sample.scene.things))
+    assert (polished.truth.materials.metallic == things).all() and np.array_equal(
+        polished.envmap, sample.envmap
+    )
+    assert changed[things].mean() > 0.5 > changed[~things].mean()
+
+
+@pytest.mark.slow
+def test_a_run_writes_a_row_for_every_method(measured):
+    options = {
+        "scenes": 1,
+        "lights": 1,
+        "size": 24,
+        "spp": 16,
+        "methods": "default",
+        "relight": False,
+    }
+    report = measured("light", device="cpu", **options)
+    rows = report.rows
+    assert [r["method"] for r in rows] == ["default"]
+    assert {c.key for c in light.LightBench.columns} - set(rows[0]) == {"relit_psnr", "albedo_l1"}
+    assert rows[0]["mesh_psnr"] > 10 and rows[0]["cpu_seconds"] > 0
+    assert "| default | 1 |" in (report.folder / "report.md").read_text()
+
+
+@pytest.mark.slow
+def test_relit_inversions_and_the_paper_s_engine(measured):
+    report = measured(
+        "light", scenes=1, lights=1, size=48, spp=64, methods="paper path", device="cpu"
+    )
+    rows = {row["method"]: row for row in report.rows}
+    each = [name + end for end in light.COMPLETIONS.values() for name in ("ceiling", "inversion")]
+    assert list(rows) == [*each, "paper path"]
+    assert min(row["mesh_psnr"] for row in rows.values()) > 15
+    assert rows["inversion"]["relit_psnr"] < rows["ceiling"]["relit_psnr"] + 1
+    assert rows["paper path"]["sh_error_relative"] < 1

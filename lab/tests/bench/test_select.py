@@ -1,0 +1,40 @@
+"""The benchmark of clicks: every click has its rows, and they say how much of the object was found."""
+
+import numpy as np
+import pytest
+
+from materialist_lab.bench.select import clickable, drawn, outlines
+
+
+@pytest.mark.slow
+def test_both_maps_are_scored(measured):
+    rows = measured("select", scenes=1, size=96, seed=3).rows
+    assert {row["method"] for row in rows} == {
+        f"{how}, {what}{maps} maps"
+        for how in ("network", "grabcut")
+        for what in ("", "exact box, ", "loose box, ")
+        for maps in ("bundled", "true")
+    } and len(rows) >= 4
+    assert all(0 <= row["iou"] <= 1 and row["good"] == (row["iou"] > 0.8) for row in rows)
+    boxed = [row["iou"] for row in rows if row["method"] == "network, exact box, true maps"]
+    assert np.mean(boxed) > 0.7
+
+
+def test_outlined_objects_are_drawn_where_they_are():
+    whole = {
+        "outline": [[100, 50], [300, 50], [300, 200], [100, 200]],
+        "holes": [[[120, 60], [140, 60], [130, 90]]],
+    }
+    part = {"outline": [[200, 100], [250, 100], [250, 150], [200, 150]], "part": True}
+    (mask, place), (inner, _) = clickable([whole, part], (128, 256))
+    assert abs(int(mask.sum()) - (100 * 75 - 75)) < 20 and int(inner.sum()) == 25 * 25
+    rows, columns = np.nonzero(inner)
+    assert (rows.min(), columns.min()) == (50, 100) and (mask & ~place).sum() == inner.sum()
+
+
+def test_all_outlines_can_be_drawn():
+    for name, objects in outlines().items():
+        for thing in objects:
+            corners = np.concatenate([thing["outline"], *thing.get("holes", [])])
+            assert corners.min() >= -1 and corners.max() <= 513, (name, thing["name"])
+            assert drawn(thing, (512, 512)).sum() >= 400, (name, thing["name"])

@@ -1,0 +1,179 @@
+"""Scenes of real things, made of a tiny catalogue."""
+
+import numpy as np
+import pytest
+from made_catalog import make_archive, make_stock
+
+from materialist.camera import pixel_rays
+from materialist.errors import InputError
+from materialist.types import Camera
+from materialist_lab.procedural import options as o
+from materialist_lab.procedural import packing, sample
+from materialist_lab.procedural.catalog import packages
+from materialist_lab.procedural.catalog.look import CatalogLook
+from materialist_lab.procedural.catalog.support import LevelPlace
+from materialist_lab.procedural.dataset import produce
+from materialist_lab.procedural.staged import finishes, pieces, sculptures, studio_light
+from materialist_lab.procedural.staged import stock as stocks
+from materialist_lab.procedural.world import bounds
+
+
+@pytest.fixture(scope="module")
+def stock(tmp_path_factory):
+    return make_stock(tmp_path_factory.mktemp("stock"))
+
+
+@pytest.fixture(autouse=True)
+def everything_is_trained_on(monkeypatch):
+    monkeypatch.setattr(stocks, "HELD_OUT_EVERY", 10**12)
+
+
+@pytest.mark.parametrize("kind", o.REAL_KINDS)
+def test_worlds_can_be_packed(stock, kind):
+    maker, _ = sample.REAL_MAKERS[kind]
+    for k in range(4):
+        rng = np.random.default_rng([6, k])
+        world = maker(rng, stock)
+        packed = packing.pack(world, rng)
+        for array in (
+            packed.vertices,
+            packed.face,
+            packed.material,
+            packed.env,
+            packed.env_density,
+            packed.portals,
+        ):
+            assert np.isfinite(array).all()
+        assert world.kind == kind and 8 < world.view.fov < 75
+        assert packed.shares.sum() == pytest.approx(1)
+
+
+def test_a_model_is_one_thing_of_its_size(stock):
+    table = stock.listing.model("made-001")
+    parts = pieces.piece(np.random.default_rng(0), table, stock)
+    assert len({part.thing for part in parts}) == 1
+    low, high = bounds(parts)
+    np.testing.assert_allclose(high - low, table.entry.size, rtol=1e-5)
+
+
+def test_a_lamp_shines_when_it_is_lit(stock):
+    lamp = stock.listing.model("made-005")
+    for lit in (False, True):
+        parts = pieces.piece(np.random.default_rng(0), lamp, stock, lit=lit)
+        assert any(max(part.material.emission) > 0 for part in parts) == lit
+
+
+def test_things_are_laid_on_their_place_side_by_side(stock):
+    place = LevelPlace(0.75, -0.6, 0.6, -0.3, 0.3, 10.0)
+    parts = pieces.laid(np.random.default_rng(3), place, 8, stock)
+    things = {}
+    for part in parts:
+        things.setdefault(part.thing, []).append(part)
+    boxes = [bounds(one) for one in things.values()]
+    assert len(boxes) > 2
+    for k, (low, high) in enumerate(boxes):
+        assert low[1] == pytest.approx(0.75, abs=0.03)
+        assert (np.abs((low + high)[[0, 2]] / 2) < [0.6, 0.3]).all()
+        for other_low, other_high in boxes[:k]:
+            middle = (low + high - other_low - other_high)[[0, 2]] / 2
+            assert np.hypot(*middle) > 0.02
+
+
+def test_nothing_is_laid_where_it_does_not_fit(stock):
+    place = LevelPlace(0.2, -0.6, 0.6, -0.3, 0.3, 0.05)
+    for k in range(6):
+        parts = pieces.laid(np.random.default_rng(k), place, 4, stock)
+        assert not parts or bounds(parts)[1][1] < 0.26
+
+
+@pytest.mark.parametrize("family", finishes.ROUGHNESS)
+def test_finishes_are_physical(stock, family):
+    look = CatalogLook(family, (0.4, 0.3, 0.2), 0.5, "", False)
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        made = finishes.finish(
+            rng,
+            type(look)(family, (0.4, 0.3, 0.2), 0.5, "", False),
+            None,
+            finishes.style(rng),
+            stock,
+        )
+        assert all(0 < r <= 1 for r in made.roughness) and all(0 <= v <= 1 for v in made.metallic)
+        assert all(0 < c <= 1 for colour in made.colours for c in colour)
+        assert made.relief is None or 0 < made.relief.slope < 0.6
+
+
+@pytest.mark.parametrize(
+    "make", [sculptures._stone, sculptures._body, sculptures._plate, sculptures._vessel]
+)
+def test_sculptures_are_fine_meshes_with_unit_normals(stock, make):
+    for k in range(2):
+        solid = make(np.random.default_rng([2, k]), stock)
+        assert np.isfinite(solid.vertices).all() and len(solid.faces) > 5000
+        np.testing.assert_allclose(np.linalg.norm(solid.normals, axis=-1), 1, atol=1e-5)
+
+
+def test_hard_lamps_are_small_and_stand_on_the_side_of_the_camera():
+    to_camera = np.array([0.0, 0.3, 1.0]) / np.hypot(1, 0.3)
+    for k in range(6):
+        light = studio_light.hard_lamps(np.random.default_rng(k), to_camera)
+        bright = light.mean(-1) > 0.5 * light.max() / 3
+        assert 0 < bright.mean() < 0.03
+        assert np.median(light) < 0.05 * light.max()
+
+
+def test_what_is_kept_aside_is_never_trained_on(stock, monkeypatch):
+    monkeypatch.setattr(stocks, "HELD_OUT_EVERY", 2)
+    keys = tuple(f"made-{k:03d}" for k in range(40))
+    one, other = (
+        stocks.Stock(stock.listing, held_out=aside)._mine(keys) for aside in (False, True)
+    )
+    assert (
+        set(one) | set(other) == set(keys)
+        and not set(one) & set(other)
+        and min(len(one), len(other)) > 5
+    )
+
+
+def test_options_need_the_models(tmp_path, monkeypatch):
+    monkeypatch.setattr(packages, "FURNITURE", tmp_path)
+    assert o.DataSetOptions().real_share == 0
+    for wrong in ({"real": 0.5}, {"only": "single"}):
+        with pytest.raises(InputError, match="apt-get install"):
+            o.DataSetOptions(**wrong)
+    make_archive(tmp_path / "made.sh3f")
+    assert o.DataSetOptions().real_share == o.REAL_SHARE
+    assert o.DataSetOptions(real=0.25).real_share == 0.25
+    assert (
+        o.DataSetOptions(only="room").real_share == 0
+        and o.DataSetOptions(only="laid").real_share == 1
+    )
+
+
+def test_a_set_of_real_things_keeps_the_contract_and_the_credits(tmp_path, monkeypatch):
+    monkeypatch.setattr(packages, "PHOTOGRAPHS", (tmp_path / "none",))
+    make_archive(tmp_path / "made.sh3f")
+    options = o.DataSetOptions(
+        size=32, spp=1, seed=3, device="cpu", real=1, furniture=tmp_path, cache=tmp_path / "cache"
+    )
+    produce(tmp_path / "set", options, count=3)
+    assert "Somebody" in (tmp_path / "set" / "ATTRIBUTION.txt").read_text()
+    for k in range(3):
+        with np.load(tmp_path / "set" / "samples" / f"{k:07d}.npz") as stored:
+            mask = stored["mask"] > 0
+            assert str(stored["kind"]) in o.REAL_KINDS
+            assert ((stored["depth"] > 0) == mask).all()
+            length = np.linalg.norm(stored["normal"].astype(float) / 127, axis=-1)
+            np.testing.assert_allclose(length[mask], 1, atol=0.02)
+            rays = pixel_rays(Camera(32, 32, float(stored["fov"])))
+            towards = (
+                stored["normal"] / 127 * rays / np.linalg.norm(rays, axis=-1, keepdims=True)
+            ).sum(-1)
+            assert towards.max() < 0.1, "normals face the viewer"
+            assert (
+                np.isfinite(stored["image"].astype(np.float32)).all() and stored["image"].max() > 0
+            )
+            again = sample.make_sample(k, options)
+            assert np.array_equal(again["albedo"], stored["albedo"]) and np.array_equal(
+                again["image"], stored["image"]
+            )

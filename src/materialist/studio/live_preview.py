@@ -1,0 +1,296 @@
+"""Pictures of a scene while a slider moves: `edits.preview.Preview` on its thread, and sketches of what it lacks."""
+
+import ctypes
+import gc
+import sys
+import threading
+from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from materialist.camera import project
+from materialist.color import luminance
+from materialist.edits.core.notes import warned
+from materialist.edits.recipe import Step, apply, options_of, region_of
+from materialist.errors import InputError
+from materialist.jobs.limited import Limits, run_limited
+from materialist.option_kinds import Colour
+from materialist.studio import SETTINGS, glass, tasks
+from materialist.studio.access.quota import Allowance
+from materialist.studio.edit_list import kept, key_of, step_summary
+from materialist.types import Array, Body, Scene
+
+
+def _use_one_thread() -> None:
+    """Arrays of one picture are small: more threads of torch would mostly wait, and wait busily."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+_THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_use_one_thread)
+"""The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
+LIVE = ("edit", "relight")
+"""Kinds of steps that the preview shades; the others are sketched."""
+
+_LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
+
+
+class LivePreview:
+    """A fitted scene, its preview (seconds to build, unless `file` has its tables), and the last edited scenes."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        file: Path | None = None,
+        package: Path | None = None,
+        allowance: Allowance | None = None,
+    ):
+        """package: where the scene lies; things then fall in a process of their own, as the allowance allows."""
+        self._allowance = allowance or Allowance()
+        self.scene = scene
+        self._package = package
+        self._kept: dict[str, Any] = {}
+        """What steps make: scenes, and what a sketch needs of glass."""
+        self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
+        _THREAD.submit(self._prepare, self._preview)
+
+    def _prepare(self, built: Future[Any]) -> None:
+        """Get ready for another light part by part: pictures come between."""
+        more = built is self._preview and built.exception() is None and built.result().prepare()
+        # Only while it is open: the task would hold a closed preview until after `free_memory`.
+        if more and built is self._preview:
+            _THREAD.submit(self._prepare, built)
+
+    @property
+    def ready(self) -> bool:
+        return self._preview.done()
+
+    def wait(self) -> None:
+        """Wait for the preview. Raises the error of its building, if there was one."""
+        self._preview.result()
+
+    def edited(self, steps: tuple[Step, ...]) -> Scene:
+        """The scene after the steps without glass, whose body another process builds.
+
+        Raises InputError, also for glass with values out of range.
+        """
+        for step in steps:
+            if glass.is_traced(step):
+                self._glass(step)
+        return self._after(tuple(step for step in steps if not glass.is_traced(step)))
+
+    def _after(self, steps: tuple[Step, ...]) -> Scene:
+        """The scene after the steps; the last scenes are kept, so moving the last step replays none before it."""
+        # The longest list that starts alike and is kept; from there step by step.
+        counts = range(len(steps), 0, -1)
+        known = next((n for n in counts if key_of(steps[:n]) in self._kept), 1)
+        scene = self.scene
+        for n in range(known, len(steps) + 1):
+            make = partial(self._applied, scene, steps[:n])
+            scene = kept(self._kept, steps[:n], make, SETTINGS.scenes_kept)
+        while len(self._kept) > 1 and _bytes_of_bodies(self._kept.values()) > SETTINGS.kept_bytes:
+            del self._kept[next(iter(self._kept))]
+        return scene
+
+    def _applied(self, before: Scene, steps: tuple[Step, ...]) -> Scene:
+        """The scene `before` with the last of the steps. Raises InputError with the step's summary."""
+        step = steps[-1]
+        try:
+            if step.kind == "drop" and not step.skipped and self._package is not None:
+                return self._fallen(before, steps)
+            return apply(self.scene, [step], onto=before)
+        except InputError as error:
+            reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
+            raise InputError(f"'{step_summary(step)}' cannot be applied. {reason}") from error
+
+    def _fallen(self, before: Scene, steps: tuple[Step, ...]) -> Scene:
+        """The scene `before` after the fall that the last step is; what falls, and for how long, is a stranger's."""
+        limits = Limits(SETTINGS.opening_memory, SETTINGS.fall_seconds)
+        place = str(self._package)
+        with self._allowance.opening():
+            added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
+        # Only what the fall added crosses between the processes.
+        edits = [*before.provenance.get("edits", []), *added["edits"]]
+        after = replace(
+            before,
+            bodies=(*before.bodies, *added["bodies"]),
+            provenance={**before.provenance, "edits": edits},
+        )
+        return warned(after, *added["warnings"])
+
+    def _glass(self, step: Step) -> tuple[Array, Colour]:
+        """Region [H, W] bool and tint of a glass step; builds nothing. Raises InputError where it cannot be."""
+
+        def region_and_tint():
+            return (region_of(self.scene, step), options_of(step).tint)
+
+        return kept(self._kept, (step,), region_and_tint, SETTINGS.scenes_kept)
+
+    def picture(
+        self,
+        steps: tuple[Step, ...],
+        client: glass.GlassClient | None = None,
+        *,
+        coarse: bool = False,
+    ) -> Array:
+        """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
+
+        Glass comes from the client, or is sketched where the client has no pane yet.
+        """
+        if not steps:
+            return self.scene.photo.linear
+        preview = self._preview.result()
+        edited = self.edited(steps)
+        known = [
+            (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
+        ]
+        # --- Shading: the cache knows only the geometry of the fit ---
+        shaded = edited
+        if edited.geometry is not self.scene.geometry:
+            shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
+        picture = _THREAD.submit(preview.picture, shaded, coarse=coarse).result()
+        # --- What was taken away is filled as in the photo ---
+        if edited.photo is not self.scene.photo:
+            filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
+            picture = np.where(filled, edited.photo.linear, picture)
+        # --- Glass: its ground first, then bodies, then the glass before them ---
+        for step, pane in known:
+            if pane is None:
+                picture = sketch_glass(picture, *self._glass(step))
+            else:
+                picture = lay_over(picture, pane.picture, pane.filled)
+        if edited.bodies:
+            picture = draw_bodies(picture, edited)
+        for _, pane in known:
+            if pane is not None:
+                picture = lay_over(picture, pane.picture, pane.share)
+        return picture
+
+    def close(self) -> None:
+        self._preview.cancel()
+        self._preview = Future()
+        # For whoever still waits for it.
+        self._preview.set_exception(InputError("This photo was closed; open it again."))
+        self._kept.clear()
+
+
+def _build(scene: Scene, file: Path | None) -> Any:
+    from materialist.edits.preview import Preview
+
+    return Preview(scene, file)
+
+
+class _Freeing:
+    """Gives memory back on the thread of the previews: once for all who ask before it has begun."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._waiting: Future[None] | None = None
+
+    def submit(self) -> Future[None]:
+        with self._lock:
+            if self._waiting is None:
+                self._waiting = _THREAD.submit(self._free)
+            return self._waiting
+
+    def _free(self) -> None:
+        with self._lock:
+            self._waiting = None
+        # Scenes are in cycles: only the collector frees them.
+        gc.collect()
+        if "drjit" in sys.modules:
+            sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
+            sys.modules["drjit"].flush_malloc_cache()
+        with suppress(OSError, AttributeError):  # glibc has it
+            ctypes.CDLL(None).malloc_trim(0)
+
+
+_FREEING = _Freeing()
+
+
+def free_memory() -> Future[None]:
+    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
+    if "torch" not in sys.modules:  # no scene was open
+        done = Future[None]()
+        done.set_result(None)
+        return done
+    return _FREEING.submit()
+
+
+def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:
+    """Bytes of the meshes of the bodies in edited scenes, each counted once; other values hold none."""
+    scenes = [value for value in kept_values if isinstance(value, Scene)]
+    bodies = {id(body): body for scene in scenes for body in scene.bodies}
+    return sum(
+        array.nbytes
+        for body in bodies.values()
+        for array in vars(body).values()
+        if isinstance(array, np.ndarray)
+    )
+
+
+def draw_bodies(picture: Array, scene: Scene) -> Array:
+    """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
+    # About as bright as the photo.
+    exposure = 2 * float(luminance(scene.photo.linear).mean())
+    # The farthest first: nearer ones are drawn over them.
+    for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):
+        colour, depth = _drawn(body, scene, exposure)
+        behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
+        # Glass is sketched as see-through.
+        share = 1 - 0.7 * body.surface.transmission
+        picture = np.where(
+            ((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture
+        )
+    return picture.astype(np.float32)
+
+
+def sketch_glass(picture: Array, region: Array, tint: Colour) -> Array:
+    """[H, W, 3] with the object under a region [H, W] bool blurred and tinted, until its glass is traced."""
+    spread = 1 + int(1.5 * np.sqrt(region.sum()))  # pixels
+    blurred = cv2.blur(picture, (spread, spread))
+    return np.where(region[..., None], blurred * np.asarray(tint, np.float32), picture)
+
+
+def lay_over(picture: Array, piece: Array, share: Array) -> Array:
+    """[H, W, 3] with another picture laid over it, by its share [H, W]."""
+    return picture + share[..., None] * (piece - picture)
+
+
+def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
+    """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
+    colour = np.zeros((*scene.depth.shape, 3), np.float32)
+    depth = np.zeros(scene.depth.shape, np.float32)
+    # --- Triangles on the screen, at most as many as can be drawn at once ---
+    stride = -(-len(body.faces) * len(scene.bodies) // SETTINGS.triangles)
+    corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
+    pixels, away = project(corners, scene.camera)
+    middle = away.mean(1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    seen = (away > 0).all(1) & (length > 0) & (np.einsum("fi,fi->f", normal, corners.mean(1)) < 0)
+    # --- Shading: a fixed light from above, and some from around ---
+    shade = 0.35 + 0.65 * np.clip(normal @ _LIGHT / np.maximum(length, 1e-20), 0, 1)
+    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(
+        body.surface.tint
+    )
+    points = np.round(np.clip(pixels, -1e5, 1e5) * 16).astype(np.int32)  # sixteenths of a pixel
+    # --- Painter's algorithm ---
+    for face in np.argsort(-middle):
+        if seen[face]:
+            tone = [float(v) for v in np.minimum(albedo * shade[face] * exposure, 1)]
+            cv2.fillConvexPoly(colour, points[face], tone, shift=4)
+            cv2.fillConvexPoly(depth, points[face], float(middle[face]), shift=4)
+    if stride > 1:
+        # Dilation closes the gaps of the triangles that were left out.
+        kernel = np.ones((3, 3), np.uint8)
+        return np.asarray(cv2.dilate(colour, kernel)), np.asarray(cv2.dilate(depth, kernel))
+    return colour, depth
