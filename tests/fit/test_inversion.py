@@ -11,7 +11,7 @@ from materialist import metrics
 from materialist.color import CLIPPED
 from materialist.envmap import paste_visible_sky, texel_directions
 from materialist.fit.engine import TransportEngine
-from materialist.fit.invert import Fit, FitSetup, invert
+from materialist.fit.invert import Fit, FitSetup, invert, stacked
 from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
 from materialist.render.scene import RenderScene
 from materialist.transport.cache import CacheSettings
@@ -123,14 +123,68 @@ def test_white_light_first(room, settings):
 
 
 def test_papers_first_stage_leaves_albedo_alone(room):
-    stage = MaterialStage(("roughness", "metallic"), Schedule(learning_rate=3e-4, max_steps=3))
-    settings = replace(PAPER.at_most(3), materials=replace(PAPER.materials, stages=(stage,)))
+    stage = MaterialStage(("roughness", "metallic"), Schedule(learning_rate=3e-4, max_steps=1))
+    settings = replace(PAPER.at_most(1), materials=replace(PAPER.materials, stages=(stage,)))
     fit = room.fit(settings)
     state = fit.run()
     prior = fit.start().maps
     torch.testing.assert_close(state.maps[:, :3], prior[:, :3])
     expected = 0.7 * prior[:, 3:] + 0.2
     assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
+
+
+def test_paper_fits_the_light_again_after_each_stage_under_its_own_bounces(room):
+    """The maps move; the light of the second fit goes on from that of the first."""
+    fit = room.fit(PAPER.at_most(25))
+    state = fit.run()
+    names = [stage["name"] for stage in state.stages]
+    assert names == [
+        "light",
+        "roughness+metallic",
+        "light 2",
+        "materials",
+        "light 3",
+        "materials 2",
+        "light 4",
+    ]
+    lights = [stage for stage in state.stages if stage["name"].startswith("light")]
+    assert lights[1]["loss_first"] < lights[0]["loss_first"]
+    start = fit.start().maps
+    assert not state.maps[:, :3].equal(start[:, :3])
+    assert float(state.maps.min()) >= 0 and float(state.maps.max()) <= 1
+
+
+def test_bounces_of_the_cache_are_the_path_tracers(room):
+    """Cached shading with the bounces of the same maps is the path-traced picture; with the photo's it is not."""
+    engine = room.fit(PAPER).engine
+    dark = replace(room.truth, albedo=0.4 * room.truth.albedo)
+    maps = torch.from_numpy(stacked(dark))[engine.pixels]
+    traced = room.render(dark, room.light, 256)
+
+    def decibels(sent):
+        picture = np.zeros_like(room.photo.linear)
+        picture.reshape(-1, 3)[engine.pixels] = engine.material_problem(room.light, sent)(maps)
+        return metrics.psnr(picture, traced)
+
+    assert decibels(engine.bounced(maps, room.light)) > max(30, decibels(None) + 1)
+
+
+def test_a_stopped_fit_has_what_was_found(room):
+    """After the first step of the second stage; nothing comes after it."""
+    asked = []
+
+    def stop():
+        asked.append(1)
+        return len(asked) > 7  # 5 steps of the light, before the next stage, one step
+
+    fit = replace(room.fit(PAPER.at_most(5)), stop=stop)
+    state = fit.run()
+    assert [(s["name"], s["steps"]) for s in state.stages] == [
+        ("light", 5),
+        ("roughness+metallic", 2),
+    ]
+    assert float(np.ptp(state.envmap)) > 0
+    assert not state.maps[:, 3:].equal(fit.start().maps[:, 3:])
 
 
 @pytest.mark.parametrize("field", ["mlp-uv", "sh"])
