@@ -26,6 +26,7 @@ NOUNS = {
     "threads",
     "install",
     "records",
+    "stopping",
 }
 NOUNS |= {"option_kinds", "options", "keywords", "plain"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}

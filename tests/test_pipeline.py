@@ -48,7 +48,8 @@ def options(folder, **changes) -> dict:
     """Arguments of a run that takes a second."""
     from materialist.fit.settings import PRESETS
 
-    settings = PRESETS[changes.pop("settings", "default")].at_most(changes.pop("steps", 10))
+    name = changes.pop("settings", "default")
+    settings = name and PRESETS[name].at_most(changes.pop("steps", 10))
     return {
         "photo": folder / "photo.png",
         "predictor": f"maps:{folder}",
@@ -139,15 +140,15 @@ def test_papers_engine_gives_a_scene(folder, monkeypatch):
     assert scene.provenance["engine"] == "path"
     assert scene.provenance["preset"] == "paper"
     stages = {stage["name"]: stage for stage in scene.report.stages}
-    wanted = ["light", "roughness+metallic", "materials"]
-    assert [n for n in stages if n in wanted] == wanted
+    fit = [name for name, stage in stages.items() if "steps" in stage]
+    assert fit[:4] == ["light", "roughness+metallic", "light 2", "materials"]
     assert stages["light"]["loss_last"] < stages["light"]["loss_first"]
     assert scene.envmap.shape == (16, 32, 3)
     assert {"read", "predict", "geometry", "light", "rerender"} <= set(told)
 
 
 def test_the_papers_preset_takes_nothing_that_the_paper_does_not(folder, monkeypatch):
-    """No continued planes, no pasted sky, no photo as indirect light; the light is an MLP at 512 x 256."""
+    """No continued planes, no pasted sky; an MLP at 512 x 256; the photo is indirect light once alone."""
     from materialist.fit import invert as fitting
     from materialist.transport.cache import TransportCache
 
@@ -159,11 +160,23 @@ def test_the_papers_preset_takes_nothing_that_the_paper_does_not(folder, monkeyp
     monkeypatch.setattr(
         TransportCache, "slot_radiance", lambda self, r: sent.append(r) or slots(self, r)
     )
-    given = options(folder, preset="paper", settings="paper", steps=2)
+    given = options(folder, preset="paper", settings=None, steps=2)
     scene = invert(**{name: value for name, value in given.items() if name != "envmap_size"})
     assert scene.envmap.shape == (256, 512, 3) and scene.provenance["completion"] == "none"
     assert (scene.geometry.mesh.face_plane < 0).all()
-    assert len(sent) == 2 and sent == [None, None]
+    assert sent[0] is scene.photo.linear and not any(
+        radiance is scene.photo.linear for radiance in sent[1:]
+    )
+    assert scene.provenance["steps"] == 2
+    assert all(stage["steps"] <= 2 for stage in scene.report.stages if "steps" in stage)
+
+
+def test_a_stopped_inversion_is_a_scene_that_says_so(folder):
+    scene = invert(**options(folder, preset="paper", settings=None, stop=lambda: True))
+    fit = [stage for stage in scene.report.stages if "steps" in stage]
+    assert [(stage["name"], stage["steps"]) for stage in fit] == [("light", 1)]
+    assert any("stopped in its stage 'light', after 1 steps" in note for note in scene.warnings)
+    assert np.isfinite(scene.rerender).all()
 
 
 def test_mask_is_taken_at_working_size(folder):

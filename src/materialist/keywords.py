@@ -101,6 +101,7 @@ class InvertKeywords(TypedDict, total=False):
     depth: str | None
     engine: str
     preset: str
+    steps: int | None
     fov: float | str
     size: int
     layer: str | None
@@ -122,6 +123,7 @@ class ExportKeywords(TypedDict, total=False):
     to: str | None
     max_triangles: int | None
     blender: str | None
+    residual: bool
     shadow_catcher: bool
     fitted_material: bool
 

@@ -308,11 +308,14 @@ class InvertOptions(OperationOptions):
     )
     preset: str = option(
         "default",
-        "Our schedule, or the paper's to the letter.",
+        "Our schedule, or the paper's.",
         kind="word",
         choices=("default", "paper"),
     )
     """The path engine always follows the paper."""
+    steps: int | None = option(
+        None, "At most this many steps in each stage of the fit.", kind="whole", low=1, metavar="N"
+    )
     # How the photo is read.
     fov: float | str = option(
         "auto",
@@ -416,6 +419,13 @@ class ExportOptions(OperationOptions):
         kind="name",
         metavar="PROGRAM",
     )
+    residual: bool = option(
+        True,
+        "Put what the fit leaves of the photo into base colour and metallic, so that renders look like it.",
+        kind="switch",
+        flag="--residual/--no-residual",
+    )
+    """Without it the maps are the fitted ones. The page of HTML has those anyway."""
     shadow_catcher: bool = option(
         False, "blend: show the photo, with the scene to catch shadows on it.", kind="switch"
     )

@@ -44,6 +44,7 @@ def invert(
     encoded: bool | None = None,
     progress: Callable[[str, int, int], Any] | None = None,
     on_stage: Callable[[str, Any], Any] | None = None,
+    stop: Callable[[], bool] | None = None,
     **values: Unpack[InvertKeywords],
 ) -> Scene:
     """Decompose a photograph into geometry, materials and light.
@@ -57,6 +58,7 @@ def invert(
         progress: called as progress(stage, done, total).
         on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
             soon as each is there.
+        stop: asked after each step of the fit; True ends it there, and the scene has what was found until then.
 
     Raises:
         InputError, SetupError: see docs/inputs.md; nothing is written.
@@ -107,9 +109,12 @@ def invert(
     setup(choices.device)
     from materialist.fit import invert as fitting
     from materialist.fit.invert import FitSetup
+    from materialist.fit.optimise import never
     from materialist.fit.settings import preset as named
 
     settings = choices.settings or named(preset, hdr=picture.hdr)
+    if choices.steps is not None:
+        settings = settings.at_most(choices.steps)
     fit_setup = FitSetup(
         picture,
         prior,
@@ -125,7 +130,7 @@ def invert(
         spp=choices.spp,
     )
     lap("setup")
-    best = fitting.invert(fit_setup, progress=progress, found=tell)
+    best = fitting.invert(fit_setup, progress=progress, found=tell, stop=stop or never)
 
     # --- The scene, with where everything came from ---
     report = _report(picture, prior, best, (*stages, *best.stages), start)
@@ -146,6 +151,7 @@ def invert(
             "sources": prior.sources,
             "engine": choices.engine,
             "preset": preset,
+            "steps": choices.steps,
             "completion": fit_setup.completion,
             "completion_asked": choices.completion,
             "tau": choices.tau,
@@ -248,6 +254,11 @@ def _report(
         )
     if is_peaked(result.envmap):
         notes.append("The photo has hard light: its shadows may be baked into the albedo.")
+    if result.stopped:
+        last = [stage for stage in result.stages if "steps" in stage][-1]
+        notes.append(
+            f"The fit was stopped in its stage '{last['name']}', after {last['steps']} steps."
+        )
     poor = float((residual > 0.1).mean())
     return FitReport(
         stages=stages,

@@ -34,7 +34,7 @@ def test_invert_passes_every_option_on_and_writes_the_scene(done, photo, tmp_pat
     calls = install(monkeypatch)
     place = tmp_path / "a.scene"
     options = "--predictor maps:x --engine path --preset paper --fov 50 --size 24 --envmap-size 64x32 --completion none"
-    more = "--tau 8 --mask mask.png --strategy white-light-first --seed 7 --device cpu"
+    more = "--tau 8 --mask mask.png --strategy white-light-first --seed 7 --device cpu --steps 9"
     done("invert", photo, "-o", place, *options.split(), *more.split())
     (call,) = calls
     assert call["options"] == InvertOptions(
@@ -50,6 +50,7 @@ def test_invert_passes_every_option_on_and_writes_the_scene(done, photo, tmp_pat
         strategy="white-light-first",
         seed=7,
         device="cpu",
+        steps=9,
     )
     given = call["photo"]
     assert (
@@ -161,7 +162,8 @@ def test_help_names_a_flag_for_every_option(run, command, kind):
         flag
         for name, (told, _) in declarations(kind).items()
         if told.flag is not None
-        for flag in told.spells(name)
+        for spelled in told.spells(name)
+        for flag in spelled.split("/")
     }
     assert all(flag in out for flag in flags | {"--seed", "--device", "--json", "--force"})
 

@@ -1,9 +1,10 @@
 """The public function and the command."""
 
 import pytest
-from export_scenes import room
+from export_scenes import document, room
 
 import materialist as mt
+from materialist.io.exr import read_exr
 from materialist.io.package import save_scene
 
 
@@ -65,3 +66,35 @@ def test_command(done, refused, package, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["room.glb", "room.light.hdr"]
     html = ("export", package, "--to", "html", "-o", tmp_path / "a.html", "--shadow-catcher")
     assert "options for Blender" in refused(*html) and not (tmp_path / "a.html").exists()
+
+
+def test_light_scale_and_colour_are_said_in_the_file_and_beside_it(tmp_path):
+    notes = " ".join(mt.export(room(), tmp_path / "a.glb", residual=False).notes)
+    assert "-90 degrees about Z" in notes and "no metre" in notes and "Standard" in notes
+    extras = document(room())["extras"]
+    assert "-90 degrees about Z" in extras["light"] and "Standard" in extras["colour"]
+    folder = mt.export(room(), tmp_path / "m", to="mitsuba", residual=False).path.parent
+    for name in ("scene.xml", "scene_materialist.xml"):
+        assert "<!-- A unit is no metre" in (folder / name).read_text()
+
+
+def test_the_residual_is_carried_unless_it_is_not_asked_for(tmp_path):
+    """The photo of the room is darker than its light makes it."""
+    means = {}
+    for carried in (True, False):
+        done = mt.export(room(), tmp_path / f"{carried}", to="mitsuba", residual=carried)
+        means[carried] = read_exr(done.path.with_name("surface_albedo.exr")).mean()
+        assert any("residual=False" in note for note in done.notes) == carried
+    assert abs(means[True] - means[False]) > 0.02
+    assert means[False] == pytest.approx(room().materials.albedo.mean())
+
+
+def test_what_exists_is_refused_before_the_work(tmp_path, monkeypatch):
+    from materialist.exporters import run
+
+    monkeypatch.setattr(run, "with_residual", lambda _: pytest.fail("the work was begun"))
+    (tmp_path / "a.glb").touch()
+    (tmp_path / "m").mkdir()
+    for name, to in (("a.glb", "glb"), ("m", "mitsuba")):
+        with pytest.raises(mt.OutputError):
+            mt.export(room(), tmp_path / name, to=to)

@@ -47,6 +47,8 @@ def test_the_stage_says_what_the_scene_says(written):
     camera = UsdGeom.Camera(stage.GetPrimAtPath("/Scene/Photo")).GetCamera()
     assert camera.GetFieldOfView(camera.FOVHorizontal) == pytest.approx(scene.camera.fov, abs=1e-4)
     assert camera.aspectRatio == pytest.approx(64 / 40)
+    words = stage.GetRootLayer().customLayerData["materialist"]
+    assert "no metre" in words["scale"] and "Rec.709" in stage.GetRootLayer().documentation
     view = np.array(camera.transform)
     np.testing.assert_array_equal(view, np.eye(4))
 

@@ -13,6 +13,7 @@ from materialist.fit.fields import (
     MaterialMaps,
     MaterialMLP,
     MaterialUNet,
+    clamped,
     positional_encoding,
     resize_envmap,
 )
@@ -87,14 +88,48 @@ def test_resizing_keeps_the_mean_and_shrinking_the_light_of_every_texel(height):
 
 def test_material_network_starts_exactly_at_the_prior():
     prior = prior_maps(40)
-    assert MaterialMLP(prior)().equal(prior)
+    pixels = torch.arange(40)
+    assert MaterialMLP(prior, pixels, 4, 10)().equal(prior)
     assert MaterialMaps(prior)().equal(prior)
     # ... and both its weights and zeta have somewhere to go.
-    field = MaterialMLP(prior)
-    torch.nn.init.normal_(field.net[-1].weight, generator=torch.Generator().manual_seed(0))
+    field = MaterialMLP(prior, pixels, 4, 10)
+    torch.nn.init.normal_(field.last.weight, std=0.01, generator=torch.Generator().manual_seed(0))
     change = (field() - prior).abs()
     assert 0 < float(change.detach().max()) <= float(field.zeta.detach()) + 1e-6
     assert field.zeta.requires_grad
+
+
+def test_material_network_tells_equal_priors_apart_by_their_place():
+    """At any size: the places are those of a picture of 512 pixels."""
+    field = MaterialMLP(torch.full((64, 5), 0.5), torch.arange(64), 8, 8)
+    torch.nn.init.normal_(field.last.weight, std=0.01, generator=torch.Generator().manual_seed(0))
+    assert float(field().detach().std(0).min()) > 0.01
+    assert float(field.code[:, :2].max()) == 7 * 64
+
+
+@pytest.mark.parametrize("kind", ["mlp", "maps", "unet"])
+def test_some_rows_of_a_field_are_those_of_all(kind):
+    prior = prior_maps(40)
+    pixels = torch.arange(40)
+    kinds = {
+        "mlp": lambda: MaterialMLP(prior, pixels, 4, 10),
+        "maps": lambda: MaterialMaps(prior),
+        "unet": lambda: MaterialUNet(prior, pixels, 4, 10),
+    }
+    field = kinds[kind]()
+    rows = torch.tensor([7, 3, 30])
+    with torch.no_grad():
+        for parameter in field.parameters():
+            parameter.add_(0.01)
+        torch.testing.assert_close(field(rows), field()[rows])
+
+
+def test_what_has_left_the_range_can_come_back():
+    values = torch.tensor([-0.2, 0.5, 1.3], requires_grad=True)
+    inside = clamped(values)
+    torch.testing.assert_close(inside.detach(), torch.tensor([0.0, 0.5, 1.0]))
+    inside.sum().backward()
+    torch.testing.assert_close(values.grad, torch.ones(3))
 
 
 @pytest.mark.parametrize(("height", "width"), [(8, 8), (7, 10), (5, 13)])

@@ -5,60 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from transport_scenes import furnished_room, windowed_sky
+from made_room import Room
 
 from materialist import metrics
 from materialist.color import CLIPPED
 from materialist.envmap import paste_visible_sky, texel_directions
-from materialist.fit.engine import TransportEngine
-from materialist.fit.invert import Fit, FitSetup, invert
-from materialist.fit.settings import DEFAULT, PAPER, FitSettings, MaterialStage, Schedule
-from materialist.render.scene import RenderScene
-from materialist.transport.cache import CacheSettings
-from materialist.types import Camera, Materials, Photo, Prediction
-
-ENVMAP_HEIGHT = 16
-
-
-class Room:
-    """A photograph of the room, path traced, and a prior that is wrong in every map."""
-
-    def __init__(self, size: int = 32):
-        self.camera, self.geometry, self.truth = furnished_room(size)
-        self.light = windowed_sky(ENVMAP_HEIGHT)
-        self.path = RenderScene(self.geometry, self.camera)
-        linear = np.clip(self.render(self.truth, self.light, 256), 0, 1)
-        self.photo = Photo(linear=linear, camera=self.camera, original=linear)
-        ramp = np.linspace(-0.12, 0.12, self.camera.width, dtype=np.float32)[None, :]
-        self.prior = Materials(
-            np.clip(self.truth.albedo + ramp[..., None], 0.02, 1),
-            np.clip(self.truth.roughness + ramp, 0.05, 1),
-            np.clip(self.truth.metallic * 0.8 + 0.05, 0, 1),
-        )
-        self.start_error = metrics.sh_error_relative(np.full_like(self.light, 0.6), self.light)
-
-    def render(self, materials, envmap, spp, seed=0):
-        self.path.set_materials(materials)
-        self.path.set_envmap(envmap)
-        return self.path.render(spp=spp, seed=seed)
-
-    def fit(self, settings: FitSettings, **options) -> Fit:
-        engine = TransportEngine(
-            self.geometry,
-            self.camera,
-            self.photo.linear,
-            light_height=settings.light_grid,
-            cache=CacheSettings(32, 8),
-        )
-        return Fit(self.setup(settings, **options), self.geometry, self.path, engine)
-
-    def setup(self, settings: FitSettings, prior: Materials | None = None, **options) -> FitSetup:
-        maps = Prediction(
-            prior or self.prior,
-            np.zeros_like(self.photo.linear),
-            np.ones(self.photo.linear.shape[:2]),
-        )
-        return FitSetup(self.photo, maps, settings, envmap_height=ENVMAP_HEIGHT, **options)
+from materialist.fit.invert import invert, stacked
+from materialist.fit.settings import DEFAULT, PAPER, MaterialStage, Schedule
+from materialist.types import Camera
 
 
 @pytest.fixture(scope="module")
@@ -123,14 +77,68 @@ def test_white_light_first(room, settings):
 
 
 def test_papers_first_stage_leaves_albedo_alone(room):
-    stage = MaterialStage(("roughness", "metallic"), Schedule(learning_rate=3e-4, max_steps=3))
-    settings = replace(PAPER.at_most(3), materials=replace(PAPER.materials, stages=(stage,)))
+    stage = MaterialStage(("roughness", "metallic"), Schedule(learning_rate=3e-4, max_steps=1))
+    settings = replace(PAPER.at_most(1), materials=replace(PAPER.materials, stages=(stage,)))
     fit = room.fit(settings)
     state = fit.run()
     prior = fit.start().maps
     torch.testing.assert_close(state.maps[:, :3], prior[:, :3])
     expected = 0.7 * prior[:, 3:] + 0.2
     assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
+
+
+def test_paper_fits_the_light_again_after_each_stage_under_its_own_bounces(room):
+    """The maps move; the light of the second fit goes on from that of the first."""
+    fit = room.fit(PAPER.at_most(25))
+    state = fit.run()
+    names = [stage["name"] for stage in state.stages]
+    assert names == [
+        "light",
+        "roughness+metallic",
+        "light 2",
+        "materials",
+        "light 3",
+        "materials 2",
+        "light 4",
+    ]
+    lights = [stage for stage in state.stages if stage["name"].startswith("light")]
+    assert lights[1]["loss_first"] < lights[0]["loss_first"]
+    start = fit.start().maps
+    assert not state.maps[:, :3].equal(start[:, :3])
+    assert float(state.maps.min()) >= 0 and float(state.maps.max()) <= 1
+
+
+def test_bounces_of_the_cache_are_the_path_tracers(room):
+    """Cached shading with the bounces of the same maps is the path-traced picture; with the photo's it is not."""
+    engine = room.fit(PAPER).engine
+    dark = replace(room.truth, albedo=0.4 * room.truth.albedo)
+    maps = torch.from_numpy(stacked(dark))[engine.pixels]
+    traced = room.render(dark, room.light, 256)
+
+    def decibels(sent):
+        picture = np.zeros_like(room.photo.linear)
+        picture.reshape(-1, 3)[engine.pixels] = engine.material_problem(room.light, sent)(maps)
+        return metrics.psnr(picture, traced)
+
+    assert decibels(engine.bounced(maps, room.light)) > max(30, decibels(None) + 1)
+
+
+def test_a_stopped_fit_has_what_was_found(room):
+    """After the first step of the second stage; nothing comes after it."""
+    asked = []
+
+    def stop():
+        asked.append(1)
+        return len(asked) > 7  # 5 steps of the light, before the next stage, one step
+
+    fit = replace(room.fit(PAPER.at_most(5)), stop=stop)
+    state = fit.run()
+    assert [(s["name"], s["steps"]) for s in state.stages] == [
+        ("light", 5),
+        ("roughness+metallic", 2),
+    ]
+    assert float(np.ptp(state.envmap)) > 0
+    assert not state.maps[:, 3:].equal(fit.start().maps[:, 3:])
 
 
 @pytest.mark.parametrize("field", ["mlp-uv", "sh"])

@@ -45,7 +45,7 @@ def test_consistency_is_a_weighted_sum():
     """Delta times the mean L1 distances of albedo, roughness and metallic, as in the paper; or encoded squares."""
     prior = torch.full((4, 5), 0.4)
     maps = prior + torch.tensor([0.3, 0.3, 0.3, 0.5, 0.2])
-    assert float(consistency(maps, prior, PAPER.materials)) == pytest.approx(0.5 * 1.0)
+    assert float(consistency(maps, prior, PAPER.materials)) == pytest.approx(0.1 * 1.0)
     weighed = replace(PAPER.materials, delta=1.0, weights=(2.0, 0.0, 10.0))
     assert float(consistency(maps, prior, weighed)) == pytest.approx(0.6 + 2.0)
     settings = replace(DEFAULT.materials, delta=1.0, weights=(2.0, 1.0, 10.0))
@@ -61,6 +61,17 @@ def test_losses_of_the_rendering():
         (0.05 + 0.3 + 0.05**2 + 0.3**2) / 2
     )
     assert float(rendering_loss(error, "l2")) == pytest.approx((0.05**2 + 0.3**2) / 2)
+
+
+def test_balanced_loss_gives_the_square_three_times_the_value_of_the_absolute():
+    error = torch.tensor([0.05, -0.3], requires_grad=True)
+    loss = rendering_loss(error, "balanced")
+    absolute = (0.05 + 0.3) / 2
+    assert float(loss.detach()) == pytest.approx(4 * absolute)
+    loss.backward()
+    weight = 3 * absolute / ((0.05**2 + 0.3**2) / 2)  # held
+    expected = [(math.copysign(1, e) + weight * 2 * e) / 2 for e in (0.05, -0.3)]
+    torch.testing.assert_close(error.grad, torch.tensor(expected))
 
 
 def test_log_total_variation_equals_a_loop():

@@ -16,7 +16,7 @@ from materialist.fit.settings import DEFAULT, MaterialStage, Schedule
 WEIGHT = 0.7
 
 
-def fitted(light, photo, prior, white=math.inf):
+def fitted(light, photo, prior, white=math.inf, step_pixels=0):
     """[P, 5] maps where a pixel's radiance is light [P, 3] times albedo."""
     schedule = Schedule(learning_rate=0.02, max_steps=400, decay_every=100, decay=0.3, patience=0)
     settings = replace(
@@ -24,9 +24,10 @@ def fitted(light, photo, prior, white=math.inf):
         weights=(WEIGHT, 1.0, 1.0),
         white=white,
         stages=(MaterialStage(("albedo",), schedule),),
+        step_pixels=step_pixels,
     )
     field = MaterialMaps(prior)
-    fit_materials(lambda maps: maps[:, :3] * light, photo, field, prior, settings)
+    fit_materials(lambda maps, rows: maps[:, :3] * light[rows], photo, field, prior, settings)
     return field().detach()
 
 
@@ -56,3 +57,15 @@ def test_a_clipped_photo_asks_for_nothing_darker():
     prior = torch.full((1, 5), 0.6)
     torch.testing.assert_close(fitted(light, torch.ones(1, 3), prior, white=CLIPPED), prior)
     assert (fitted(light, torch.ones(1, 3), prior)[:, :3] < 0.57).all()
+
+
+def test_few_pixels_a_step_find_what_all_find():
+    rng = np.random.default_rng(1)
+    light, photo = (
+        torch.from_numpy(rng.uniform(0.3, 0.9, (40, 3)).astype(np.float32)) for _ in range(2)
+    )
+    prior = torch.full((40, 5), 0.5)
+    by_all = fitted(light, photo, prior)
+    by_some = fitted(light, photo, prior, step_pixels=20)
+    assert float((by_all - prior).abs().max()) > 0.1
+    torch.testing.assert_close(by_some, by_all, atol=0.03, rtol=0)

@@ -28,10 +28,11 @@ def install(monkeypatch: Any, failure: BaseException | None = None) -> list[dict
     """Put the stand-in in the pipeline's place; returns the list of calls it will see."""
     calls: list[dict[str, Any]] = []
 
-    def invert(photo: Photo, options: Any, *, progress: Any) -> Scene:
+    def invert(photo: Photo, options: Any, *, progress: Any, on_stage: Any, stop: Any) -> Scene:
         calls.append({"photo": photo, "options": options, "progress": progress})
         for step in range(3):
             progress("light", step + 1, 3)
+            assert not stop()
         if failure is not None:
             raise failure
         return scene_of(photo)

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:  # numpy, which it needs, would slow every --help
     from materialist.types import Progress
 
+SPEED_PERIOD = 600.0
+"""Seconds of which the time left is estimated; a path-traced step may take a minute."""
+
 
 @contextmanager
 def stage_progress(quiet: bool = False) -> Iterator[Progress]:
@@ -25,7 +28,12 @@ def stage_progress(quiet: bool = False) -> Iterator[Progress]:
     name = rich.TextColumn("{task.description:<24}")
     left = rich.TimeRemainingColumn(elapsed_when_finished=True)
     columns = name, rich.BarColumn(bar_width=32), rich.MofNCompleteColumn(), left
-    with rich.Progress(*columns, console=console, disable=quiet or not console.is_terminal) as bars:
+    with rich.Progress(
+        *columns,
+        console=console,
+        disable=quiet or not console.is_terminal,
+        speed_estimate_period=SPEED_PERIOD,
+    ) as bars:
 
         def update(stage: str, done: int, total: int) -> None:
             if stage not in tasks:

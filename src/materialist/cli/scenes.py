@@ -10,6 +10,7 @@ import materialist as mt
 from materialist.cli.options import PictureFile, PictureOutput, Run, SceneArgument, output_option
 from materialist.cli.outcome import report_success
 from materialist.cli.progress import stage_progress
+from materialist.cli.stopping import FitStop
 from materialist.errors import InputError
 from materialist.options import ExportOptions, InvertOptions
 
@@ -31,8 +32,11 @@ def invert_command(
     picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
     # Reading is quick, and wrong files show here; the clock is that of the inversion.
     start = time.monotonic()
-    with stage_progress(quiet=run.as_json) as progress:
-        scene = mt.invert(picture, options, progress=progress)
+    slow = options.preset == "paper" or options.engine == "path"
+    with stage_progress(quiet=run.as_json) as progress, FitStop(slow) as stop:
+        scene = mt.invert(
+            picture, options, progress=progress, on_stage=stop.on_stage, stop=stop.requested
+        )
     mt.save_scene(scene, output, force=run.force)
     warnings = scene.warnings
     seconds = time.monotonic() - start

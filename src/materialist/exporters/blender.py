@@ -14,6 +14,7 @@ import numpy as np
 
 from materialist.edits.core.renderer import path_depth
 from materialist.errors import SetupError
+from materialist.exporters.advice import advice
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part, farthest
 from materialist.io.atomic import ensure_writable, whole_file
@@ -95,6 +96,7 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
             *(f"body{k}" for k in range(_in_photo(scene))),
         ],
         "lamps": [asdict(lamp) for lamp in scene.lamps],
+        "advice": advice(scene),
     }
     (folder / "scene.json").write_text(json.dumps(facts, indent=1) + "\n", "utf-8")
     shutil.copyfile(Path(__file__).with_name("blender_build.py"), folder / "build.py")

@@ -36,6 +36,7 @@ def main() -> None:
     add_camera(scene, facts)
     add_light(scene)
     add_lamps(scene, facts)
+    add_text(facts)
     set_rendering(scene, options.samples, facts["bounces"])
     if options.shadow_catcher:
         catch_shadows(scene, facts)
@@ -267,6 +268,12 @@ def add_lamps(scene, facts) -> None:
         placed.location = (x, -z, y)
         placed.visible_camera = True
         scene.collection.objects.link(placed)
+
+
+def add_text(facts) -> None:
+    """The advice on light, scale and colour as a text of the file; light and colour follow it already."""
+    text = bpy.data.texts.new("Read me")
+    text.write("\n".join(f"{key}: {words}" for key, words in facts["advice"].items()) + "\n")
 
 
 def set_rendering(scene, samples, bounces) -> None:

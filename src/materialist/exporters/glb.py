@@ -21,6 +21,7 @@ from trimesh.visual.material import PBRMaterial
 from materialist import __version__
 from materialist.color import srgb_levels
 from materialist.edits.core.surfaces import edge_faults
+from materialist.exporters.advice import advice
 from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import to_bytes
 from materialist.types import Array, Camera, Lamp, Materials, Scene
@@ -100,7 +101,8 @@ def _complete(tree: dict[str, Any], scene: Scene, parts: list[Part]) -> None:
     if used:
         tree["extensionsUsed"] = sorted(used)
     size = {"width": scene.camera.width, "height": scene.camera.height}
-    tree["extras"] = {"photo": {**size, "horizontal_fov_degrees": scene.camera.fov}}
+    photo = {**size, "horizontal_fov_degrees": scene.camera.fov}
+    tree["extras"] = {"photo": photo, **advice(scene)}
 
 
 def _light(lamp: Lamp) -> dict:

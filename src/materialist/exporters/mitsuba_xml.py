@@ -11,6 +11,7 @@ import numpy as np
 from materialist.bsdf.disney_plugin import PLUGIN
 from materialist.bsdf.rough_dielectric import PLUGIN as FROSTED
 from materialist.edits.core.renderer import path_depth
+from materialist.exporters.advice import advice
 from materialist.exporters.parts import Part
 from materialist.io.exr import write_exr
 from materialist.render.bodies import OUTSIDE, at_least_2x2, body_bsdf, body_emitter
@@ -40,8 +41,10 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
                     folder / f"{part.name}_{key}.exr", at_least_2x2(getattr(part.materials, key))
                 )
     for name, own in FILES.items():
+        text = _xml(mi, _description(mi, scene, parts, own), path_depth(scene))
+        words = advice(scene)
         (folder / name).write_text(
-            _xml(mi, _description(mi, scene, parts, own), path_depth(scene)), "utf-8"
+            f"{text}\n<!-- {words['scale']} {words['colour']} -->\n", "utf-8"
         )
 
 

@@ -8,9 +8,11 @@ from typing import Unpack
 
 from materialist.edits.core.notes import PICTURED, is_pictured
 from materialist.errors import InputError, SetupError
-from materialist.exporters.exported import Exported, export_folder
+from materialist.exporters.advice import advice
+from materialist.exporters.exported import EXPORT, Exported, export_folder
 from materialist.exporters.glb import glb_bytes, write_hdr
 from materialist.exporters.parts import Part, body_parts, scene_parts
+from materialist.exporters.residual import with_residual
 from materialist.install import extra_command
 from materialist.io.atomic import ensure_writable, whole_file, write_whole
 from materialist.keywords import ExportKeywords
@@ -22,6 +24,14 @@ SUFFIX = {"glb": ".glb", "blend": ".blend", "usd": ".usdz", "html": ".html"}
 """Format -> suffix of its single file."""
 FOLDERS = ("blend", "usd", "mitsuba")
 """Formats that may also be a folder: PATH without a suffix of its own."""
+ADVICE = {
+    "glb": ("light", "scale", "colour"),
+    "usd": ("scale", "colour"),
+    "mitsuba": ("scale",),
+    "blend": ("scale",),
+}
+"""Format -> the advice that its files do not follow by themselves."""
+CARRIED = "Base colour and metallic carry what the fit leaves of the photo; `residual=False` writes the fitted maps."
 PAGE_TRIANGLES = 60_000
 """Triangles in an HTML page unless the caller says otherwise."""
 
@@ -59,6 +69,10 @@ def export(
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and most is None:
         most = PAGE_TRIANGLES
+    ensure_writable(path, force, EXPORT if path.suffix.lower() not in SUFFIX.values() else None)
+    carries = wanted.residual and to != "html"
+    if carries:
+        scene = replace(scene, materials=with_residual(scene))
     bodies = body_parts(scene)
     parts = [*scene_parts(scene, most), *bodies]
     if to == "blend":
@@ -73,7 +87,11 @@ def export(
             "html": _html,
         }
         made = writers[to](path, scene, parts, force)
-    return replace(made, notes=(*made.notes, *_losses(scene, bodies, to)))
+    words = advice(scene)
+    notes = [words[key] for key in ADVICE.get(to, ())]
+    if carries:
+        notes.append(CARRIED)
+    return replace(made, notes=(*made.notes, *notes, *_losses(scene, bodies, to)))
 
 
 def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:
@@ -125,7 +143,7 @@ def _glb(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     with whole_file(path, force) as mesh_file, whole_file(light, force) as light_file:
         mesh_file.write_bytes(glb_bytes(scene, parts))
         write_hdr(light_file, scene.envmap)
-    note = f"glTF holds no environment light: {light.name} is it, its centre column along the camera's -Z."
+    note = f"glTF holds no environment light: {light.name} is it."
     return Exported(path, (light,), (note,))
 
 

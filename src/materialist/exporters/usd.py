@@ -7,6 +7,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils, Vt
 
 from materialist.color import srgb_levels
+from materialist.exporters.advice import advice
 from materialist.exporters.parts import Part, farthest, one_roughness
 from materialist.io.display import encoded, to_bytes
 from materialist.io.exr import write_exr
@@ -27,7 +28,11 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
     _light(stage, folder, scene)
     for number, lamp in enumerate(scene.lamps):
         _lamp(stage, f"/Scene/lamp{number}", lamp)
-    stage.GetRootLayer().Save()
+    layer = stage.GetRootLayer()
+    words = advice(scene)
+    layer.documentation = f"{words['scale']} {words['colour']}"
+    layer.customLayerData = {"materialist": words}
+    layer.Save()
 
 
 def pack_usdz(folder: Path, file: Path) -> None:

@@ -12,9 +12,10 @@ import torch
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.envmap import texels_around
-from materialist.fit.fields import resize_envmap
+from materialist.fit.fields import ALL, Rows, resize_envmap
+from materialist.render.scene import MAX_DEPTH
 from materialist.transport.cache import CacheSettings, Tables, TransportCache
-from materialist.transport.filter import Guide, filter_tables
+from materialist.transport.filter import filter_tables, surface_guide
 from materialist.transport.light import light_matrix
 from materialist.transport.shading import shade
 from materialist.types import Array, Camera, Geometry, Materials
@@ -36,15 +37,17 @@ class LightProblem:
     """render(envmap [height, 2 height, 3]) -> radiance [Q, 3], differentiable."""
 
 
-MaterialProblem = Callable[[torch.Tensor], torch.Tensor]
-"""Rendering as a function of the materials of P surface pixels, light fixed: [P, 5] albedo, roughness and metallic to
-radiance [P, 3], differentiable."""
+MaterialProblem = Callable[[torch.Tensor, Rows], torch.Tensor]
+"""Rendering as a function of materials, light fixed, differentiable.
+
+From albedo, roughness and metallic [P, 5] of the surface pixels that the second argument names to radiance [P, 3].
+"""
 
 
 class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
-    radiance: [H, W, 3] what the surfaces send to each other: the photograph; None: nothing, as the paper writes L_i.
+    radiance: [H, W, 3] what the surfaces send to each other where a problem has none of its own: the photograph.
     light_height: rows of the environment map inside the light fit. roughness: [H, W], where the fit leaves it alone.
     """
 
@@ -52,7 +55,7 @@ class TransportEngine:
         self,
         geometry: Geometry,
         camera: Camera,
-        radiance: Array | None,
+        radiance: Array,
         *,
         roughness: Array | None = None,
         seed: int = 0,
@@ -69,16 +72,17 @@ class TransportEngine:
         self.radiance = radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
         self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
-        self.guide = _guide(self.cache, camera)
+        self.guide = surface_guide(self.cache)
 
-    def light_problem(self, materials: Materials) -> LightProblem:
+    def light_problem(self, materials: Materials, sent: Array | None = None) -> LightProblem:
         rng = np.random.default_rng(self.seed + 17)
         share = LIGHT_PIXELS / (self.camera.width * self.camera.height)
         count = len(self.cache.pixels)
         rows = _subset(rng, count, min(1.0, max(share, LEAST_PIXELS / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
         matrix = light_matrix(self.cache, materials, rows, self.light_height)
-        indirect = matrix.indirect(placed(self.cache.slot_radiance(self.radiance)))
+        sent = self.radiance if sent is None else sent
+        indirect = matrix.indirect(placed(self.cache.slot_radiance(sent)))
         direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
         index, weight = (placed(v) for v in texels_around(direction, matrix.shape))
@@ -95,11 +99,27 @@ class TransportEngine:
         """Filtered transport tables under `envmap` [h, 2h, 3]."""
         return filter_tables(self.cache, self.cache.gather(envmap, self.radiance), self.guide)
 
-    def material_problem(self, envmap: Array) -> MaterialProblem:
-        gathered = self.cache.gather(envmap, self.radiance)
+    def bounced(self, maps: torch.Tensor, envmap: Array) -> Array:
+        """[H, W, 3] what surfaces with maps [P, 5] send to each other under this light, in the path tracer's bounces.
+
+        The surface that is seen is the last of a path, and the first meets the light alone.
+        """
+        sent = None
+        for _ in range(MAX_DEPTH - 2):
+            radiance = _shaded(self.cache.gather(envmap, sent), maps)
+            sent = self.cache.image(radiance.cpu().numpy())
+        assert sent is not None
+        return sent
+
+    def material_problem(self, envmap: Array, sent: Array | None = None) -> MaterialProblem:
+        gathered = self.cache.gather(envmap, self.radiance if sent is None else sent)
         self.cache.forget()  # a fit asks once, as a rule
         tables = filter_tables(self.cache, gathered, self.guide)
-        return lambda maps: shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])
+
+        def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
+            return _shaded(Tables(tables.diffuse[rows], tables.specular[:, rows]), maps)
+
+        return render
 
 
 class PathEngine:
@@ -134,7 +154,7 @@ class PathEngine:
             max_depth=self.max_depth,
         )
 
-    def light_problem(self, materials: Materials) -> LightProblem:
+    def light_problem(self, materials: Materials, sent: Array | None = None) -> LightProblem:
         maps = [placed(np.ascontiguousarray(values)) for values in vars(materials).values()]
         everything = torch.arange(self.camera.width * self.camera.height)
         return LightProblem(
@@ -143,12 +163,16 @@ class PathEngine:
             lambda envmap: self._render(*maps, envmap).reshape(-1, 3),
         )
 
-    def material_problem(self, envmap: Array) -> MaterialProblem:
+    def bounced(self, maps: torch.Tensor, envmap: Array) -> None:
+        """Nothing: every rendering follows the light from surface to surface."""
+
+    def material_problem(self, envmap: Array, sent: Array | None = None) -> MaterialProblem:
         light = placed(np.ascontiguousarray(envmap, dtype=np.float32))
         h = self.camera.height
         w = self.camera.width
 
-        def render(maps: torch.Tensor) -> torch.Tensor:
+        def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
+            assert rows == ALL, "a path-traced step renders the whole picture"
             full = maps.new_zeros(h * w, 5).index_put((self.pixels,), maps).view(h, w, 5)
             parts = [part.contiguous() for part in (full[..., :3], full[..., 3], full[..., 4])]
             return self._render(*parts, light).reshape(-1, 3)[self.pixels]
@@ -157,7 +181,10 @@ class PathEngine:
 
 
 Engine = TransportEngine | PathEngine
-"""A differentiable renderer of one camera and geometry: `pixels` with a surface, and the two problems."""
+"""A differentiable renderer of one camera and geometry: `pixels` with a surface, and the two problems.
+
+sent: [H, W, 3] what surfaces send to each other, as `bounced` makes it.
+"""
 
 
 def prepared_envmap(envmap: torch.Tensor, height: int) -> Array:
@@ -174,9 +201,6 @@ def _subset(rng, size: int, share: float) -> Array:
     return np.minimum((edges[:-1] + rng.random(count) * np.diff(edges)).astype(np.int64), size - 1)
 
 
-def _guide(cache: TransportCache, camera: Camera) -> Guide:
-    position = np.array(cache.position).T
-    scale = cache.image(-position[:, 2:] / camera.focal)[..., 0]
-    return Guide(
-        cache.image(position), cache.image(np.array(cache.normal).T), np.maximum(scale, 1e-9)
-    )
+def _shaded(tables: Tables, maps: torch.Tensor) -> torch.Tensor:
+    """[P, 3] radiance of maps [P, 5]."""
+    return shade(tables, maps[:, :3], maps[:, 3], maps[:, 4])

@@ -13,6 +13,10 @@ from torch.nn import functional
 
 from materialist.envmap import sh_basis, texel_directions
 
+Rows = torch.Tensor | slice
+"""Which pixels of a material field are meant: their numbers, or a slice."""
+ALL = slice(None)
+
 
 def positional_encoding(x: torch.Tensor, bands: int) -> torch.Tensor:
     """gamma(x): sin and cos of 2^k pi x for k = 0 .. bands-1; [..., C] -> [..., 2 * bands * C]."""
@@ -115,29 +119,54 @@ def _coverage(count: int, of: int) -> torch.Tensor:
 
 
 class MaterialMLP(nn.Module):
-    """m_p + zeta * tanh(MLP_mat(gamma(m_p))) with learnable zeta (paper, Material Properties Optimization)."""
+    """m_p + zeta * tanh(MLP_mat(x, m_p)) with learnable zeta (paper, Material Properties Optimization).
+
+    The network is the published one: it sees the place x of a pixel beside m_p, its activations are sines, and its
+    input is joined once more to the first and the third hidden layer. From m_p alone, equal priors would move alike.
+    """
 
     prior: torch.Tensor
+    code: torch.Tensor
 
     def __init__(
         self,
         prior: torch.Tensor,
+        pixels: torch.Tensor,
+        height: int,
+        width: int,
         *,
-        bands: int = 6,
-        width: int = 128,
-        layers: int = 3,
-        zeta: float = 0.3,
+        bands: int = 2,
+        units: int = 256,
+        zeta: float = 1.3,
     ):
-        """prior: [P, 5] albedo, roughness, metallic."""
+        """prior: [P, 5] albedo, roughness, metallic of the row-major `pixels` [P] of a picture."""
         super().__init__()
+        # In pixels of a picture with 512 on its longer side, which the published code always has.
+        place = torch.stack([pixels // width, pixels % width], 1) * (512 / max(height, width))
+        place = place.to(prior)
+        waves = [wave(2.0**k * place) for k in range(bands) for wave in (torch.sin, torch.cos)]
         self.register_buffer("prior", prior)
-        self.register_buffer("code", positional_encoding(prior, bands))
-        self.net = mlp(10 * bands, 5, width=width, layers=layers)
-        _silence(self.net[-1])
+        self.register_buffer("code", torch.cat([place, *waves, prior], 1))
+        inputs = self.code.shape[1]
+        joined = nn.Linear(inputs, units - inputs), nn.Linear(units, units - inputs)
+        plain = nn.Linear(units, units), nn.Linear(units, units)
+        self.hidden = nn.ModuleList([joined[0], plain[0], joined[1], plain[1]])
+        self.last = nn.Linear(units, 5)
+        _silence(self.last)
         self.zeta = nn.Parameter(torch.tensor(zeta))
 
-    def forward(self) -> torch.Tensor:
-        return (self.prior + self.zeta * torch.tanh(self.net(self.code))).clamp(0, 1)
+    def forward(self, rows: Rows = ALL) -> torch.Tensor:
+        code = self.code[rows]
+        x = code
+        for k, layer in enumerate(self.hidden):
+            before = torch.cat([x, code], 1) if k % 2 else x
+            x = layer(before).sin()
+        return clamped(self.prior[rows] + self.zeta * torch.tanh(self.last(x)))
+
+
+def clamped(values: torch.Tensor) -> torch.Tensor:
+    """Values clamped to [0, 1]. A gradient passes as if they were not, so what left the range can come back."""
+    return values + (values.clamp(0, 1) - values).detach()
 
 
 class MaterialMaps(nn.Module):
@@ -147,8 +176,8 @@ class MaterialMaps(nn.Module):
         super().__init__()
         self.maps = nn.Parameter(prior.clone())
 
-    def forward(self) -> torch.Tensor:
-        return self.maps.clamp(0, 1)
+    def forward(self, rows: Rows = ALL) -> torch.Tensor:
+        return self.maps[rows].clamp(0, 1)
 
 
 class MaterialUNet(nn.Module):
@@ -185,14 +214,14 @@ class MaterialUNet(nn.Module):
         _silence(self.head)
         self.zeta = nn.Parameter(torch.tensor(0.3))
 
-    def forward(self) -> torch.Tensor:
+    def forward(self, rows: Rows = ALL) -> torch.Tensor:
         a = self.down1(self.image)
         b = self.down2(functional.max_pool2d(a, 2))
         m = self.middle(functional.max_pool2d(b, 2))
         u = self.up2(torch.cat([functional.interpolate(m, scale_factor=2.0), b], 1))
         u = self.up1(torch.cat([functional.interpolate(u, scale_factor=2.0), a], 1))
         delta = self.head(u)[0, :, : self.size[0], : self.size[1]].reshape(5, -1).T[self.pixels]
-        return (self.prior + self.zeta * torch.tanh(delta)).clamp(0, 1)
+        return (self.prior + self.zeta * torch.tanh(delta)).clamp(0, 1)[rows]
 
 
 def _silence(layer: nn.Module) -> None:
@@ -219,8 +248,8 @@ class Unified(nn.Module):
         self.field = field
         self.inside = inside
 
-    def forward(self) -> torch.Tensor:
+    def forward(self, rows: Rows = ALL) -> torch.Tensor:
         maps = self.field()
         mean = maps[self.inside, 3:].mean(0)
         unified = torch.where(self.inside[:, None], mean, maps[:, 3:])
-        return torch.cat([maps[:, :3], unified], 1)
+        return torch.cat([maps[:, :3], unified], 1)[rows]

@@ -10,9 +10,16 @@ import torch
 
 from materialist.buffers import placed
 from materialist.envmap import paste_visible_sky
-from materialist.fit.engine import Engine, PathEngine, TransportEngine, prepared_envmap
-from materialist.fit.light import envmap_field, fit_light, start_light
+from materialist.fit.engine import (
+    Engine,
+    MaterialProblem,
+    PathEngine,
+    TransportEngine,
+    prepared_envmap,
+)
+from materialist.fit.light import LightStart, envmap_field, fit_light, start_light
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
+from materialist.fit.optimise import Stop, never
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
@@ -55,6 +62,8 @@ class FitState:
     envmap: Array
     """[h, 2h, 3]."""
     stages: list[dict] = field(default_factory=list)
+    light: tuple[torch.nn.Module, LightStart] | None = None
+    """The field behind `envmap`, which a later fit moves on, and what it began with."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +77,7 @@ class Fit:
     stages: tuple[dict, ...] = ()
     """What it took to make them."""
     progress: Progress | None = None
+    stop: Stop = never
 
     def start(self) -> FitState:
         """The prior's maps under a white light."""
@@ -95,11 +105,25 @@ class Fit:
         setup = self.setup
         photo = self._photo()
         settings = setup.settings.light
-        problem = self.engine.light_problem(materials)
-        begin = start_light(photo, settings, setup.prior.light, problem)
-        light = envmap_field(settings, begin.radiance, seed=setup.seed)
+        known = state.light is not None
+        problem = self.engine.light_problem(materials, self._sent(state) if known else None)
+        if state.light is None:
+            begin = start_light(photo, settings, setup.prior.light, problem)
+            state.light = envmap_field(settings, begin.radiance, seed=setup.seed), begin
+        elif settings.again is not None:
+            settings = replace(settings, schedule=settings.again)
+        light, begin = state.light
+        before = sum(stage["name"].startswith("light") for stage in state.stages)
         result = fit_light(
-            problem, photo, light, settings, begin, seed=setup.seed, progress=self.progress
+            problem,
+            photo,
+            light,
+            settings,
+            begin,
+            name=f"light {before + 1}" if before else "light",
+            seed=setup.seed,
+            progress=self.progress,
+            stop=self.stop,
         )
         state.envmap = self.prepared_light(light(max(settings.height, 16)))
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
@@ -117,27 +141,52 @@ class Fit:
             envmap, setup.photo.linear, surface, setup.photo.camera, white=white
         )
 
+    def material_problem(self, state: FitState) -> MaterialProblem:
+        """Rendering as a function of the materials, under the state's light."""
+        return self.engine.material_problem(state.envmap, self._sent(state))
+
+    def _sent(self, state: FitState) -> Array | None:
+        """[H, W, 3] what surfaces send to each other; None: what the photo shows.
+
+        With `traced` bounces, what the path tracer will find with the state's maps and light.
+        """
+        if self.setup.settings.bounces == "photo":
+            return None
+        return self.engine.bounced(state.maps, state.envmap)
+
     def _fit_materials(self, state: FitState, settings: MaterialSettings) -> None:
         """From the state's maps, which L_cons holds on to."""
-        start = time.perf_counter()
         setup = self.setup
-        problem = self.engine.material_problem(state.envmap)
         pixels = self.engine.pixels
+        photo = self._photo()[pixels]
+        if isinstance(self.engine, PathEngine):  # it renders all pixels anyway
+            settings = replace(settings, step_pixels=0)
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
         model = material_field(
             held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed
         )
-        results = fit_materials(
-            problem, self._photo()[pixels], model, held, settings, progress=self.progress
-        )
-        summaries = [r.summary() for r in results]
-        for first in summaries[:1]:  # the tables are its
-            first["seconds"] += round(
-                time.perf_counter() - start - sum(r.seconds for r in results), 3
+        for stage in settings.stages:
+            if self.stop():
+                break
+            start = time.perf_counter()
+            problem = self.material_problem(state)
+            (result,) = fit_materials(
+                problem,
+                photo,
+                model,
+                held,
+                replace(settings, stages=(stage,)),
+                seed=setup.seed,
+                progress=self.progress,
+                stop=self.stop,
             )
-        state.stages += summaries
-        state.maps = model().detach()
+            state.maps = model().detach()
+            seconds = round(time.perf_counter() - start, 3)  # with those of the tables
+            state.stages.append({**result.summary(), "seconds": seconds})
+            again = setup.settings.light.again is not None and state.light is not None
+            if again and not self.stop():
+                self.fit_light(state, self.materials(state))
 
     def _white_light_first(self, state: FitState) -> FitState:
         """Roughness and metallic start at 0.5, and nothing is remapped on the way."""
@@ -194,6 +243,8 @@ class FitResult:
     spp: int
     """Paths a pixel of both together."""
     stages: tuple[dict, ...]
+    stopped: bool = False
+    """Whether the fit was ended before its end."""
 
     @property
     def rerender(self) -> Array:
@@ -201,7 +252,7 @@ class FitResult:
         return (self.halves[0] + self.halves[1]) / 2
 
 
-def prepare(setup: FitSetup, progress: Progress | None = None) -> Fit:
+def prepare(setup: FitSetup, progress: Progress | None = None, stop: Stop = never) -> Fit:
     """The mesh, and what renders it."""
     tick = progress or (lambda *_: None)
     stages = list[dict]()
@@ -224,7 +275,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None) -> Fit:
         stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device)
     )
     engine = timed(stages, "engine", lambda: _engine(setup, renderer, geometry, progress))
-    return Fit(setup, geometry, renderer, engine, tuple(stages), progress)
+    return Fit(setup, geometry, renderer, engine, tuple(stages), progress, stop)
 
 
 def invert(
@@ -232,17 +283,19 @@ def invert(
     *,
     progress: Progress | None = None,
     found: Callable[[str, Any], Any] = lambda *_: None,
+    stop: Stop = never,
 ) -> FitResult:
     """Geometry, light, materials and the path-traced re-rendering of one photo.
 
     found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
     """
-    fit = prepare(setup, progress)
+    fit = prepare(setup, progress, stop)
     stages = list(fit.stages)
     seed = setup.seed
     if isinstance(fit.engine, TransportEngine):
         timed(stages, "trace", fit.engine.cache.trace)
     state = fit.run()
+    stopped = stop()
     stages += state.stages
     materials = fit.materials(state)
     found("light", state.envmap)
@@ -259,7 +312,7 @@ def invert(
         lambda: [fit.render(materials, state.envmap, each, seed + k) for k in (1, 2)],
     )
     return FitResult(
-        fit.geometry, materials, state.envmap, (first, second), 2 * each, tuple(stages)
+        fit.geometry, materials, state.envmap, (first, second), 2 * each, tuple(stages), stopped
     )
 
 
@@ -271,14 +324,13 @@ def _engine(
     if setup.engine == "path":
         surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
         return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
-    radiance = setup.photo.linear if setup.settings.photo_light else None
     settings = setup.settings.materials
     stays = setup.mask is None and setup.strategy == "default" and not settings.remap
     stays &= all("roughness" not in stage.targets for stage in settings.stages)
     return TransportEngine(
         geometry,
         camera,
-        radiance,
+        setup.photo.linear,
         roughness=setup.prior.materials.roughness if stays else None,
         seed=seed,
         light_height=setup.settings.light_grid,

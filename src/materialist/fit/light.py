@@ -13,7 +13,7 @@ from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
 from materialist.fit.losses import log_chroma, log_total_variation, rendering_loss, residual
-from materialist.fit.optimise import StageResult, optimise
+from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import LightSettings
 from materialist.types import Array, Progress
 
@@ -72,8 +72,10 @@ def fit_light(
     settings: LightSettings,
     start: LightStart,
     *,
+    name: str = "light",
     seed: int = 0,
     progress: Progress | None = None,
+    stop: Stop = never,
 ) -> StageResult:
     """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
 
@@ -100,7 +102,7 @@ def fit_light(
                 value = value + settings.prior * (trust * change.abs()).mean()
         return value
 
-    return optimise("light", field.parameters(), loss, settings.schedule, progress=progress)
+    return optimise(name, field.parameters(), loss, settings.schedule, progress=progress, stop=stop)
 
 
 def _at_height(

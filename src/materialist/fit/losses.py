@@ -26,10 +26,18 @@ def residual(
 
 
 def rendering_loss(error: torch.Tensor, loss: Loss = "l1+l2") -> torch.Tensor:
-    """Mean loss of encoded errors: `l1+l2` is L_re = L_1 + L_2 (paper, Progressive Differentiable Rendering)."""
+    """Mean loss of encoded errors: `l1+l2` is L_re = L_1 + L_2 (paper, Progressive Differentiable Rendering).
+
+    `balanced` weighs L_2 so that it has three times the value of L_1 (published code); the weight has no gradient.
+    """
+    square = error.square().mean()
     if loss == "l2":
-        return error.square().mean()
-    return error.abs().mean() + error.square().mean()
+        return square
+    absolute = error.abs().mean()
+    if loss == "balanced":
+        weight = 3 * absolute / square.clamp_min(1e-12)
+        return absolute + weight.detach() * square
+    return absolute + square
 
 
 def consistency(

@@ -2,14 +2,23 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import torch
 from torch import nn
 
+from materialist.buffers import placed
 from materialist.errors import InputError
 from materialist.fit.engine import MaterialProblem
-from materialist.fit.fields import MaterialMaps, MaterialMLP, MaterialUNet, Unified
+from materialist.fit.fields import (
+    ALL,
+    MaterialMaps,
+    MaterialMLP,
+    MaterialUNet,
+    Rows,
+    Unified,
+)
 from materialist.fit.losses import consistency, rendering_loss, residual
-from materialist.fit.optimise import StageResult, optimise
+from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera, Progress
 
@@ -33,7 +42,7 @@ def material_field(
     """A fresh field around `start` [P, 5]; with `inside` [P] bool, roughness and metallic are one value there."""
     torch.manual_seed(seed)
     fresh: dict[str, Callable[[], nn.Module]] = {
-        "mlp": lambda: MaterialMLP(start),
+        "mlp": lambda: MaterialMLP(start, pixels, camera.height, camera.width),
         "maps": lambda: MaterialMaps(start),
         "unet": lambda: MaterialUNet(start, pixels, camera.height, camera.width),
     }
@@ -50,32 +59,54 @@ def fit_materials(
     prior: torch.Tensor,
     settings: MaterialSettings,
     *,
+    seed: int = 0,
     progress: Progress | None = None,
+    stop: Stop = never,
 ) -> list[StageResult]:
     """Move `field` stage by stage: argmin L_re + delta L_cons.
 
-    photo: [P, 3] linear. prior: [P, 5] maps that L_cons holds on to.
+    photo: [P, 3] linear. prior: [P, 5] maps that L_cons holds on to. seed: of the pixels that a step compares.
     """
     results = []
+    draw = _pixel_draw(len(photo), settings.step_pixels, seed)
     for stage in settings.stages:
         held = {
             name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets
         }
 
         def loss(_: int, held=held) -> torch.Tensor:
-            values = field()
-            values = torch.cat([held.get(name, values[:, c]) for name, c in COLUMNS.items()], 1)
-            error = residual(problem(values), photo, settings.encoding, white=settings.white)
-            return rendering_loss(error, settings.loss) + consistency(values, prior, settings)
+            rows = draw()
+            moved = field(rows)
+            values = torch.cat(
+                [held[name][rows] if name in held else moved[:, c] for name, c in COLUMNS.items()],
+                1,
+            )
+            radiance = problem(values, rows)
+            error = residual(radiance, photo[rows], settings.encoding, white=settings.white)
+            return rendering_loss(error, settings.loss) + consistency(values, prior[rows], settings)
 
         def into_range() -> None:
             base = field.field if isinstance(field, Unified) else field
             if isinstance(base, MaterialMaps):
                 base.maps.clamp_(0, 1)
 
-        name = "+".join(stage.targets) if held else "materials"
+        name = stage.name or ("+".join(stage.targets) if held else "materials")
         run = optimise(
-            name, field.parameters(), loss, stage.schedule, after_step=into_range, progress=progress
+            name,
+            field.parameters(),
+            loss,
+            stage.schedule,
+            after_step=into_range,
+            progress=progress,
+            stop=stop,
         )
         results.append(run)
     return results
+
+
+def _pixel_draw(count: int, most: int, seed: int) -> Callable[[], Rows]:
+    """What names the pixels of a step: all of `count`, or `most` of them at random."""
+    if not most or count <= most:
+        return lambda: ALL
+    rng = np.random.default_rng(seed)
+    return lambda: placed(rng.integers(count, size=most))

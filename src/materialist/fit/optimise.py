@@ -5,10 +5,19 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+import numpy as np
 import torch
 
 from materialist.fit.settings import Schedule
 from materialist.types import Progress
+
+Stop = Callable[[], bool]
+"""Asked after each step; True ends the fit with what it has."""
+
+
+def never() -> bool:
+    """No reason to stop."""
+    return False
 
 
 @dataclass(frozen=True)
@@ -72,11 +81,14 @@ def optimise(
     *,
     after_step: Callable[[], None] | None = None,
     progress: Progress | None = None,
+    stop: Stop = never,
 ) -> StageResult:
     """Minimise `loss(step)` over the tensors `parameters` in place.
 
     It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
     """
+    if progress is not None:
+        progress(name, 0, schedule.max_steps)  # a step may take a minute
     tensors = list(parameters)
     adam = Adam(tensors)
     best = float("inf")
@@ -89,14 +101,14 @@ def optimise(
         if schedule.keep_best and value.item() < best:
             best = value.item()
             kept = [t.detach().clone() for t in tensors]
-        adam.step(schedule.learning_rate * schedule.decay ** (step // schedule.decay_every))
+        adam.step(schedule.rate(step))
         if after_step is not None:
             with torch.no_grad():
                 after_step()
         losses.append(value.item())
         if progress is not None:
             progress(name, step + 1, schedule.max_steps)
-        if _stalled(losses, schedule):
+        if stop() or _stalled(losses, schedule):
             break
     with torch.no_grad():
         for tensor, value in zip(tensors, kept, strict=False):  # kept is empty unless asked for
@@ -106,8 +118,10 @@ def optimise(
 
 def _stalled(losses: list[float], schedule: Schedule) -> bool:
     n = schedule.patience
-    if n == 0 or len(losses) <= n or len(losses) % 10:
+    if n == 0 or len(losses) < n + schedule.averaged or len(losses) % 10:
         return False
-    before = min(losses[:-n])
-    recent = min(losses[-n:])
+    window = np.full(schedule.averaged, 1 / schedule.averaged)
+    means = np.convolve(losses, window, mode="valid")
+    before = means[:-n].min()
+    recent = means[-n:].min()
     return recent > before * (1 - schedule.min_improvement)

@@ -13,7 +13,8 @@ from materialist.errors import InputError
 from materialist.io.photo import HDR_CLIP
 
 Encoding = Literal["linear", "srgb", "log1p"]
-Loss = Literal["l1+l2", "l2"]
+Loss = Literal["l1+l2", "balanced", "l2"]
+Bounces = Literal["photo", "traced"]
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,22 @@ class Schedule:
     max_steps: int = 500  # paper
     decay_every: int = 100  # paper; steps
     decay: float = 0.8  # paper; factor on the learning rate
+    least_rate: float = 0.0  # learning rate below which it does not fall
     # paper; stop when the loss improved too little over this many steps; 0: never
     patience: int = 100
     min_improvement: float = 0.01  # paper; fraction of the loss
+    # steps over whose mean the loss is judged; more where a step sees some pixels alone
+    averaged: int = 1
     keep_best: bool = False  # end with the parameters of the smallest loss, not with the last
+
+    def rate(self, step: int) -> float:
+        """The learning rate of a step."""
+        falling = self.learning_rate * self.decay ** (step // self.decay_every)
+        return max(falling, self.least_rate)
+
+    def at_most(self, steps: int) -> "Schedule":
+        """The same with no more steps."""
+        return replace(self, max_steps=min(steps, self.max_steps))
 
 
 @dataclass(frozen=True)
@@ -41,6 +54,7 @@ class LightSettings:
     white: float = math.inf
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
+    again: Schedule | None = None  # of another fit of the light after each stage of the materials
     # weight of the total variation of log radiance, as it differs from the predicted one
     smooth: float = 0.0
     # weight of the colourfulness of the same; larger: whiter; tuned on 12 scenes
@@ -56,6 +70,7 @@ class MaterialStage:
 
     targets: tuple[str, ...]
     schedule: Schedule
+    name: str = ""  # in progress and report; empty: what it moves
 
 
 @dataclass(frozen=True)
@@ -68,6 +83,7 @@ class MaterialSettings:
     # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
     loss: Loss = "l1+l2"
     white: float = math.inf
+    step_pixels: int = 0  # pixels that a step with cached transport compares, drawn anew; 0: all
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -80,7 +96,8 @@ class FitSettings:
     light: LightSettings
     materials: MaterialSettings
     completion: str = "none"  # what `--completion auto` is; paper
-    photo_light: bool = False  # with cached transport, surfaces light each other as the photo shows them; paper: V L_E
+    bounces: Bounces = "traced"
+    """What surfaces send each other with cached transport: as the photo shows, or, once there is a light, `traced`."""
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
     # pixels of a picture from which they are fewer, in proportion; 8 at the least
@@ -88,30 +105,44 @@ class FitSettings:
 
     def at_most(self, steps: int) -> "FitSettings":
         """The same with no more steps in any stage."""
-
-        def cut(one):
-            return replace(
-                one, schedule=replace(one.schedule, max_steps=min(steps, one.schedule.max_steps))
-            )
-
-        stages = tuple(cut(stage) for stage in self.materials.stages)
-        return replace(
-            self, light=cut(self.light), materials=replace(self.materials, stages=stages)
+        again = self.light.again and self.light.again.at_most(steps)
+        light = replace(self.light, schedule=self.light.schedule.at_most(steps), again=again)
+        stages = tuple(
+            replace(stage, schedule=stage.schedule.at_most(steps))
+            for stage in self.materials.stages
         )
+        return replace(self, light=light, materials=replace(self.materials, stages=stages))
 
 
-_MATERIAL = Schedule(learning_rate=3e-4, max_steps=2000, patience=200, min_improvement=0.005)
+_MATERIAL = Schedule(
+    learning_rate=3e-4,
+    least_rate=1.2e-4,
+    max_steps=2000,
+    patience=200,
+    min_improvement=0.005,
+    averaged=100,
+)
 
 PAPER = FitSettings(
-    light=LightSettings(schedule=Schedule(keep_best=True)),
+    light=LightSettings(
+        encoding="srgb",
+        schedule=Schedule(keep_best=True),
+        again=Schedule(learning_rate=1e-4, decay=1.0, keep_best=True),
+    ),
     materials=MaterialSettings(
+        encoding="srgb",
+        loss="balanced",
+        delta=0.1,
+        step_pixels=1024,
         stages=(
             MaterialStage(("roughness", "metallic"), _MATERIAL),
             MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL),
-        )
+            MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL, "materials 2"),
+        ),
     ),
 )
-"""The paper's settings to the letter (Implementation Details); it gives no cap on material steps, so 2000 a stage."""
+"""The paper's settings (Implementation Details), and the published code's where the paper is silent or where its own
+hardly move the maps: docs/paper_map.md says which. Neither gives a cap on material steps that is ever met: 2000."""
 
 DEFAULT = FitSettings(
     light=LightSettings(
@@ -141,7 +172,7 @@ DEFAULT = FitSettings(
         ),
     ),
     completion="floors",
-    photo_light=True,
+    bounces="photo",
     light_grid=24,
     rerender_spp=32,
     rerender_pixels=2**17,

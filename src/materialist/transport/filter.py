@@ -68,6 +68,14 @@ class Guide:
         return csr_array((weight[kept], column[kept], rows), shape=(h * w, h * w))
 
 
+def surface_guide(cache: TransportCache) -> Guide:
+    """Of the surfaces that the cache's camera sees."""
+    position = np.array(cache.position).T
+    scale = cache.image(-position[:, 2:] / cache.camera.focal)[..., 0]
+    normal = np.array(cache.normal).T
+    return Guide(cache.image(position), cache.image(normal), np.maximum(scale, 1e-9))
+
+
 def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
     """Average `values` [H, W, C] over neighbours that lie on the same surface."""
     flat = values.flatten(0, 1).cpu().numpy()

@@ -24,7 +24,8 @@ from materialist import metrics
 from materialist.buffers import placed
 from materialist.edits.core.renderer import rendered
 from materialist.errors import InputError
-from materialist.fit.invert import FitSetup, prepare, replaced
+from materialist.fit.fields import ALL, Rows
+from materialist.fit.invert import FitSetup, FitState, prepare, replaced
 from materialist.fit.losses import rendering_loss, residual
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
@@ -124,33 +125,33 @@ class _Photo:
         return predictor.predict(self.photo, seed=self.bench.seed)
 
     @cached_property
-    def fitted(self) -> tuple[Any, Array]:
-        """Mesh, path tracer and traced transport of the prior, and the light that the paper's fit finds for it."""
+    def fitted(self) -> tuple[Any, FitState]:
+        """Mesh, path tracer and traced transport of the prior, and it with the light that the paper's fit finds."""
         shared: dict[str, Any] = {"seed": self.bench.seed, "device": self.bench.device}
         fitting: Any = prepare(FitSetup(self.photo, self.prior, PAPER, **shared))
         state = fitting.start()
         fitting.fit_light(state, self.prior.materials)
-        return fitting, state.envmap
+        return fitting, state
 
     def materials(
         self, method: str, settings: MaterialSettings, *, seed: int = 0, blind: bool = False
     ) -> Row:
         """The row of one fit of the materials; `blind` starts from R = M = 0.5 and tells the smallest L_re."""
-        fitting, envmap = self.fitted
+        fitting, state = self.fitted
         engine: Any = fitting.engine
         prior = fitting.start().maps
         if blind:
             prior[:, 3:] = 0.5
         held = prior if blind else remapped(prior)
-        problem = engine.material_problem(envmap)
+        problem = fitting.material_problem(state)
         photo = placed(self.photo.linear.reshape(-1, 3))[engine.pixels]
         seen: list[float] = []
 
-        def render(maps: torch.Tensor) -> torch.Tensor:
-            radiance = problem(maps)
+        def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
+            radiance = problem(maps, rows)
             with torch.no_grad():
-                error = residual(radiance, photo, settings.encoding, white=settings.white)
-                seen.append(float(rendering_loss(error, settings.loss)))
+                error = residual(radiance, photo[rows], settings.encoding, white=settings.white)
+                seen.append(float(rendering_loss(error)))
             return radiance
 
         model = material_field(held, settings, engine.pixels, self.photo.camera, seed=seed)
@@ -159,7 +160,7 @@ class _Photo:
             maps = model()
             render(maps)
         found = replaced(self.prior.materials, engine.pixels, maps)
-        picture = fitting.render(found, envmap, self.bench.spp, self.bench.seed + 1)
+        picture = fitting.render(found, state.envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {
             **self.against_photo(method, picture),

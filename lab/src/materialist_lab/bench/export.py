@@ -2,7 +2,8 @@
 
 A photo is inverted and exported, and the files are rendered from its camera: Mitsuba loads its own folder; GLB and USD
 are read back and rendered by Mitsuba's `principled` under the light beside them; Cycles renders what Blender builds.
-PSNR against the photo and against our re-rendering, which `another seed` is, too; sheet.png has these and each picture.
+PSNR against the photo, as exported and with the fitted maps (`--no-residual`), and of the latter against our
+re-rendering, which `another seed` is, too; sheet.png has photo, re-rendering, and each picture as exported.
 """
 
 import tempfile
@@ -39,6 +40,7 @@ class ExportBench(Benchmark):
 
     columns = (
         Column("photo", "PSNR, photo", "higher", 1),
+        Column("fitted", "... fitted maps", "higher", 1),
         Column("ours", "PSNR, re-rendering", "higher", 1),
     )
     plotted = ("photo", "ours")
@@ -57,39 +59,46 @@ class ExportBench(Benchmark):
             scene = pipeline.invert(case.photo, seed=self.seed, device=self.device, **how)
             ours = pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 1)
             photo = scene.photo.linear
-            for name, picture in self._pictures(scene, Path(temporary)):
+            exported = self._pictures(scene, Path(temporary) / "exported", residual=True)
+            fitted = self._pictures(scene, Path(temporary) / "fitted", residual=False)
+            for (name, picture), (_, plain) in zip(exported, fitted, strict=True):
                 report.sheet.append(strip(photo, ours, picture))
                 yield {
                     "method": name,
                     "sample": "",
                     "photo": psnr(picture, photo),
-                    "ours": psnr(picture, ours),
+                    "fitted": psnr(plain, photo),
+                    "ours": psnr(plain, ours),
                 }
             if find_blender(self.blender or None) is None:
                 yield {"method": "Blender: none found, give --blender PROGRAM", "sample": ""}
 
-    def _pictures(self, scene: Scene, folder: Path) -> Iterator[tuple[str, Array]]:
+    def _pictures(
+        self, scene: Scene, folder: Path, *, residual: bool
+    ) -> Iterator[tuple[str, Array]]:
         """(what renders, [H, W, 3] linear)."""
+        folder.mkdir()
         load = partial(mi.load_file, parallel=False, spp=self.spp)
 
         def rendered(file):
             return np.array(mi.render(load(str(file)), seed=mi.UInt32(self.seed)))
 
         yield "another seed", pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 2)
-        export(scene, folder / "mitsuba", to="mitsuba")
+        export(scene, folder / "mitsuba", to="mitsuba", residual=residual)
         yield "Mitsuba, our material", rendered(folder / "mitsuba" / "scene_materialist.xml")
         yield "Mitsuba, principled", rendered(folder / "mitsuba" / "scene.xml")
         for to, name, light, read in (
             ("glb", "a.glb", "a.light.hdr", _glb),
             ("usd", "a", "a/envmap.exr", _usd),
         ):
-            export(scene, folder / name, to=to)
+            export(scene, folder / name, to=to, residual=residual)
             (folder / to).mkdir()
             lit = replace(scene, envmap=read_envmap(folder / light))
             write_mitsuba(folder / to, lit, [_part(*told) for told in read(folder / name)])
             yield f"{to} in Mitsuba, principled", rendered(folder / to / "scene.xml")
         if program := find_blender(self.blender or None):
-            script = export(scene, folder / "blend", to="blend").path / "build.py"
+            made = export(scene, folder / "blend", to="blend", residual=residual)
+            script = made.path / "build.py"
             for name, flags in (("Principled", []), ("--fitted-material", ["--fitted-material"])):
                 asked = ["--render", str(folder / "cycles.exr"), "--samples", str(self.spp), *flags]
                 run_script(program, script, folder / "scene.blend", asked)

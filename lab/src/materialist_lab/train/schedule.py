@@ -1,11 +1,7 @@
-"""How long a run lasts, the learning rate that follows from it, and requests to stop early."""
+"""How long a run lasts, and the learning rate that follows from it."""
 
 import math
-import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,31 +82,3 @@ class TrainingSchedule:
         steps = warm_up if self.first_step == 0 else min(warm_up, WARM_UP_AGAIN)
         rise = min(1.0, (self.step - self.first_step + 1) / steps) if steps else 1.0
         return rise * (last + (1 - last) * 0.5 * (1 + math.cos(math.pi * self.progress)))
-
-
-@contextmanager
-def stop_requests() -> Iterator[list[int]]:
-    """Notes SIGTERM or Ctrl-C in a list, so that a run can end with a checkpoint; the second signal ends it at once.
-
-    Outside of the main thread nothing is noted.
-    """
-    found = list[int]()
-    before = dict[int, Any]()
-
-    def restore() -> None:
-        while before:
-            number, handler = before.popitem()
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)
-
-    def note(number: int, _: Any) -> None:
-        found.append(number)
-        restore()
-
-    if threading.current_thread() is threading.main_thread():
-        before.update(
-            {number: signal.signal(number, note) for number in (signal.SIGTERM, signal.SIGINT)}
-        )
-    try:
-        yield found
-    finally:
-        restore()

@@ -14,9 +14,10 @@ from torch import Tensor, nn
 
 from materialist.errors import InputError
 from materialist.io.atomic import make_folder, writing
+from materialist.stopping import stop_requests
 from materialist.types import Progress
 from materialist_lab.train import checkpoint, stream
-from materialist_lab.train.schedule import Budget, TrainingSchedule, stop_requests
+from materialist_lab.train.schedule import Budget, TrainingSchedule
 from materialist_lab.train.task import Batch, Task
 
 Note = Callable[[str], None]
