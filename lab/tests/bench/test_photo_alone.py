@@ -20,6 +20,7 @@ from materialist_lab.procedural.options import HELD_OUT
 from materialist_lab.procedural.synthetic import make_sample
 
 
+@pytest.mark.slow
 def test_captures_are_those_that_no_training_set_may_use(monkeypatch, tmp_path):
     """By name: of all files, only the held-out ones are asked for."""
     asked = []
@@ -47,6 +48,7 @@ def test_captures_are_those_that_no_training_set_may_use(monkeypatch, tmp_path):
         arrangements.arrangement(1, seed=SCENE_SEED, data=tmp_path, unseen=True)
 
 
+@pytest.mark.slow
 def test_arrangements_are_those_of_no_other_seed(mitsuba):
     """By seed: benchmarks that settings are tuned with have seed 0; training has scenes of another generator."""
     sample, _ = unseen_sample(0, None, 24)

@@ -67,6 +67,7 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
 
 
+@pytest.mark.slow
 def test_cut_outs_are_things_of_further_views(tmp_path):
     data = tmp_path / "set"
     folder = tmp_path / "cutouts"
