@@ -30,38 +30,38 @@ def truth():
 
 
 def test_the_truth_scores_best(truth):
-    found = score(truth, truth)
-    assert found["albedo_psnr"] == found["roughness_psnr"] == 100
-    assert found["normal_angle"] == found["depth_mae"] == found["depth_si_log_rmse"] == 0
-    assert found["albedo_ssim"] == pytest.approx(1) and found["mask_iou"] == 1
+    figures = score(truth, truth)
+    assert figures["albedo_psnr"] == figures["roughness_psnr"] == 100
+    assert figures["normal_angle"] == figures["depth_mae"] == figures["depth_si_log_rmse"] == 0
+    assert figures["albedo_ssim"] == pytest.approx(1) and figures["mask_iou"] == 1
 
 
 def test_one_factor_is_forgiven_in_albedo_and_depth(truth):
     darker = replace(truth.materials, albedo=truth.materials.albedo / 2)
-    found = score(replace(truth, materials=darker, depth=truth.depth * 3), truth)
+    figures = score(replace(truth, materials=darker, depth=truth.depth * 3), truth)
     assert (
-        found["albedo_psnr"] > 90
-        and found["albedo_psnr_raw"] < 20
-        and found["albedo_scale"] == pytest.approx(2)
+        figures["albedo_psnr"] > 90
+        and figures["albedo_psnr_raw"] < 20
+        and figures["albedo_scale"] == pytest.approx(2)
     )
-    assert found["depth_mae"] < 1e-5 and found["depth_si_log_rmse"] < 1e-6
-    assert found["depth_mae_raw"] == pytest.approx(2 * truth.depth[4:].mean(), rel=1e-5)
+    assert figures["depth_mae"] < 1e-5 and figures["depth_si_log_rmse"] < 1e-6
+    assert figures["depth_mae_raw"] == pytest.approx(2 * truth.depth[4:].mean(), rel=1e-5)
 
 
 def test_known_errors(truth):
     tilt = np.zeros_like(truth.normal)
     tilt[..., 0], tilt[..., 2] = 0.5, 0.75**0.5
     rough = replace(truth.materials, roughness=truth.materials.roughness + 0.1)
-    found = score(replace(truth, materials=rough, normal=tilt), truth)
-    assert found["roughness_psnr"] == pytest.approx(20, abs=1e-3)
-    assert found["normal_angle"] == pytest.approx(30, abs=1e-3)
+    figures = score(replace(truth, materials=rough, normal=tilt), truth)
+    assert figures["roughness_psnr"] == pytest.approx(20, abs=1e-3)
+    assert figures["normal_angle"] == pytest.approx(30, abs=1e-3)
 
 
 def test_only_surface_counts(truth):
     wrong = truth.materials.albedo.copy()
     wrong[:4] = 1
-    found = score(replace(truth, materials=replace(truth.materials, albedo=wrong)), truth)
-    assert found["albedo_psnr"] == 100
+    figures = score(replace(truth, materials=replace(truth.materials, albedo=wrong)), truth)
+    assert figures["albedo_psnr"] == 100
     noise = replace(
         truth.materials,
         roughness=np.random.default_rng(1).uniform(0, 0.8, (24, 32)).astype(np.float32),
@@ -77,8 +77,8 @@ def test_only_surface_counts(truth):
 def test_log_error_of_depth():
     true = np.array([[1.0, 2.0, 4.0, 8.0]])
     factors = np.exp([[0.1, -0.1, 0.1, -0.1]])
-    found = depth_figures(true * factors * 5, true, true > 0)
-    assert found["depth_si_log_rmse"] == pytest.approx(0.1)
+    figures = depth_figures(true * factors * 5, true, true > 0)
+    assert figures["depth_si_log_rmse"] == pytest.approx(0.1)
     holes = depth_figures(np.array([[1.0, 0.0, 0.0, 8.0]]), true, true > 0)
     assert holes["depth_coverage"] == 0.5
 
@@ -98,13 +98,13 @@ def test_depth_order():
 
 
 def test_pooled_psnr_is_of_the_mean_error():
-    found = summary(
+    figures = summary(
         [
             {"metallic_mse": 0.01, "metallic_psnr": 20.0},
             {"metallic_mse": 0.0, "metallic_psnr": 100.0},
         ]
     )
-    assert found["metallic_psnr"] == 60 and found["metallic_psnr_pooled"] == pytest.approx(
+    assert figures["metallic_psnr"] == 60 and figures["metallic_psnr_pooled"] == pytest.approx(
         23.01, abs=0.01
     )
     assert summary([]) == {}

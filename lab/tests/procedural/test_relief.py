@@ -112,10 +112,10 @@ def test_a_picture_lies_upright_on_a_surface():
 
 
 def test_pictures_are_packed_once_each():
-    one, other = (ColourPicture(np.full((7, 5, 3), value, np.uint8)) for value in (10, 20))
+    first, second = (ColourPicture(np.full((7, 5, 3), value, np.uint8)) for value in (10, 20))
     parts = [
         ScenePart(s.slab((1, 1, 1)), replace(plain((1,) * 3), picture=p))
-        for p in (one, other, one, None)
+        for p in (first, second, first, None)
     ]
     world = World(parts, still().envmap, look((0, 1, 3), (0, 0, 0), 40))
     packed = packing.pack(world, np.random.default_rng(0))
@@ -130,10 +130,10 @@ def test_a_backdrop_shows_only_where_no_surface_is():
     image = np.full((8, 8, 3), 0.5, np.float32)
     covered = np.zeros((8, 8), np.float32)
     covered[:4], covered[4] = 1, 0.5
-    made = sample.before(np.full((4, 4, 3), 2.0, np.float32), image, covered)
-    np.testing.assert_allclose(made[:4], 0.5)
-    np.testing.assert_allclose(made[5:], 2.0)
-    assert (made[4] > 0.9).all() and (made[4] < 2).all()
+    shown = sample.before(np.full((4, 4, 3), 2.0, np.float32), image, covered)
+    np.testing.assert_allclose(shown[:4], 0.5)
+    np.testing.assert_allclose(shown[5:], 2.0)
+    assert (shown[4] > 0.9).all() and (shown[4] < 2).all()
 
 
 def test_the_lens_blurs_what_is_not_in_focus():
@@ -141,8 +141,8 @@ def test_the_lens_blurs_what_is_not_in_focus():
     image = rng.uniform(0, 1, (64, 64, 3)).astype(np.float32)
     depth = np.where(np.arange(64) < 32, 1.0, 3.0) + np.zeros((64, 64))
     camera = Camera(64, 64, 40)
-    made = defocused(image, depth, camera, aperture=0.1, focus=1.0)
-    np.testing.assert_allclose(made[:, :24], image[:, :24], atol=1e-5)
-    assert made[:, 40:].std() < 0.5 * image[:, 40:].std()
-    assert made[:, 40:].mean() == pytest.approx(image[:, 40:].mean(), rel=0.03)
+    blurred = defocused(image, depth, camera, aperture=0.1, focus=1.0)
+    np.testing.assert_allclose(blurred[:, :24], image[:, :24], atol=1e-5)
+    assert blurred[:, 40:].std() < 0.5 * image[:, 40:].std()
+    assert blurred[:, 40:].mean() == pytest.approx(image[:, 40:].mean(), rel=0.03)
     np.testing.assert_array_equal(defocused(image, depth, camera, aperture=1e-6, focus=1.0), image)

@@ -90,21 +90,23 @@ def test_the_loss_of_the_light_is_that_of_the_weighted_directions():
     true = torch.ones(1, 4, 8, 16)
     true[:, :3, :4] = 2
     true[:, 3, 4:] = 0
-    found = torch.zeros(1, 4, 8, 16)
-    found[:, :3] = np.log(2)
-    likelihood, irradiance = losses.light(found, true)
+    predicted = torch.zeros(1, 4, 8, 16)
+    predicted[:, :3] = np.log(2)
+    likelihood, irradiance = losses.light(predicted, true)
     assert likelihood.item() == pytest.approx(0, abs=1e-6) and irradiance.item() == pytest.approx(
         0, abs=1e-6
     )
-    found[:, :3] += np.log(1.5)
-    likelihood, irradiance = losses.light(found, true)
+    predicted[:, :3] += np.log(1.5)
+    likelihood, irradiance = losses.light(predicted, true)
     assert likelihood.item() == pytest.approx(np.log(1.5), rel=1e-5)
     assert irradiance.item() == pytest.approx(
         0.5, rel=1e-5
     )  # half as much again in every coefficient
-    found[:, 3] = np.log(np.log(1.5))  # the scale that fits the error best
-    assert losses.light(found, true)[0].item() == pytest.approx(1 + np.log(np.log(1.5)), rel=1e-5)
-    both = losses.light(found.expand(2, -1, -1, -1), torch.cat([true, 0 * true]))
+    predicted[:, 3] = np.log(np.log(1.5))  # the scale that fits the error best
+    assert losses.light(predicted, true)[0].item() == pytest.approx(
+        1 + np.log(np.log(1.5)), rel=1e-5
+    )
+    both = losses.light(predicted.expand(2, -1, -1, -1), torch.cat([true, 0 * true]))
     assert both[1].item() == pytest.approx(0.5, rel=1e-5), (
         "a light that is not known does not count"
     )
@@ -124,10 +126,10 @@ def test_errors_of_maps_are_those_of_their_spread():
     truth = {name: torch.full((1, 1, 2, 2), 0.5) for name in ("roughness", "metallic", "depth")}
     truth["albedo"] = torch.full((1, 3, 2, 2), 0.5)
     truth["normal"] = torch.tensor([0.0, 0.0, 1.0]).view(1, 3, 1, 1).expand(1, 3, 2, 2)
-    found = {**truth, "depth": truth["depth"] + 3}  # its scale is not known
-    found["albedo"] = truth["albedo"] + torch.tensor([0.3, 0.0, 0.0]).view(1, 3, 1, 1)
-    found["roughness"] = truth["roughness"] - 0.2
-    found["normal"] = torch.tensor([1.0, 0.0, 1.0]).view(1, 3, 1, 1).expand(1, 3, 2, 2)
-    errors = losses.map_errors(found, truth, torch.ones(1, 1, 2, 2))
+    predicted = {**truth, "depth": truth["depth"] + 3}  # its scale is not known
+    predicted["albedo"] = truth["albedo"] + torch.tensor([0.3, 0.0, 0.0]).view(1, 3, 1, 1)
+    predicted["roughness"] = truth["roughness"] - 0.2
+    predicted["normal"] = torch.tensor([1.0, 0.0, 1.0]).view(1, 3, 1, 1).expand(1, 3, 2, 2)
+    errors = losses.map_errors(predicted, truth, torch.ones(1, 1, 2, 2))
     expected = torch.tensor([0.1, 0.2, 0.0, math.pi / 4, 0.0])
     torch.testing.assert_close(errors.mean((0, 2, 3)), expected)

@@ -48,11 +48,11 @@ def during(trainer, number, act):
     count = [0]
 
     def counted(batch):
-        found = step(batch)
+        terms = step(batch)
         count[0] += 1
         if count[0] == number:
             act()
-        return found
+        return terms
 
     trainer._step = counted
 
@@ -85,8 +85,8 @@ def test_its_averaged_weights_predict_and_begin_another_run(run, data):
     state = checkpoint.load(folder, "matnet")
     begun = made_runs.bundled(data)
     begun.init = folder / checkpoint.WEIGHTS
-    for found in (predictor.network.state_dict(), begun.network().state_dict()):
-        for name, tensor in found.items():
+    for weights in (predictor.network.state_dict(), begun.network().state_dict()):
+        for name, tensor in weights.items():
             torch.testing.assert_close(tensor, state["averaged"][name], atol=2e-3, rtol=2e-3)
     assert any(not torch.equal(state["averaged"][n], state["network"][n]) for n in state["network"])
     wider = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, spread=True))

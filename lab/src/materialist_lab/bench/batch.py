@@ -90,7 +90,7 @@ class BatchBench(Benchmark):
                 materialist("batch", *listed, *options, environment=SINGLE_THREAD)
                 row = _row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(photos))
                 done = json.loads((runs / "summary.json").read_text("utf-8"))["rows"]
-                if {one["id"]: one["scene_hash"] for one in done} != hashes:
+                if {row["id"]: row["scene_hash"] for row in done} != hashes:
                     raise MaterialistError(
                         f"A batch with {count} workers gave other scenes than single inversions."
                     )
@@ -105,8 +105,10 @@ def chosen(data: Path | None, photos: int, runs: Path) -> list[str]:
     if data is None:
         return list(EXAMPLES[:photos])
     below = data / "photos"
-    found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=runs)]
-    return spread(found, photos)
+    locations = [
+        photo.location for photo in list_photos(below if below.is_dir() else data, runs=runs)
+    ]
+    return spread(locations, photos)
 
 
 def _usage() -> tuple[float, float]:

@@ -77,26 +77,26 @@ class Benchmark(OperationOptions, ABC):
 
 def names(called: str, text: str, known: Collection[str] = ()) -> list[str]:
     """The names of a list with commas, each once. Raises InputError for none, or for one that is not `known`."""
-    found = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
-    if not found:
+    chosen = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    if not chosen:
         raise InputError(f"The {called} is empty; name at least one.")
-    for name in found if known else ():
+    for name in chosen if known else ():
         if name not in known:
             raise InputError(f"The {called} '{name}' is unknown; choose from {', '.join(known)}.")
-    return found
+    return chosen
 
 
 def numbers(called: str, text: str, low: float, high: float, kind: type = int) -> list[Any]:
     """The numbers of a list with commas. Raises InputError for anything but numbers from `low` to `high`."""
     try:
-        found = [kind(part) for part in text.split(",")]
+        values = [kind(part) for part in text.split(",")]
     except ValueError:
-        found = []
-    if not all(low <= number <= high for number in found) or not found:
+        values = []
+    if not all(low <= number <= high for number in values) or not values:
         raise InputError(
             f"The {called} is {text!r}; give numbers from {low} to {high} with commas."
         )
-    return found
+    return values
 
 
 def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -> None:
@@ -115,7 +115,7 @@ def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -
         )
 
 
-def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dict[str, float]]:
+def timed(work: Callable[..., Any], *args: Any, **kwargs: Any) -> tuple[Any, dict[str, float]]:
     """What `work` returns, its wall seconds, and processor seconds with those of processes that it started and ended.
 
     Other programs hardly change the latter.
@@ -125,7 +125,7 @@ def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dic
         return time.perf_counter(), time.process_time() + sum(os.times()[2:4])
 
     begun = spent()
-    value = work(*given, **named)
+    value = work(*args, **kwargs)
     wall, cpu = (end - start for start, end in zip(begun, spent(), strict=True))
     return value, {"seconds": wall, "cpu_seconds": cpu}
 

@@ -142,8 +142,8 @@ class EditBench(Benchmark):
         turns = [relight(scene, rotate=40.0 * k) for k in range(1, 4)]
         for name, edited in (("preview: material", changes), ("preview: light", turns)):
             preview.render(edited[0])  # the first one compiles
-            for one in edited[1:]:
-                yield {"method": name, "sample": sample, **timed(preview.render, one)[1]}
+            for edited_scene in edited[1:]:
+                yield {"method": name, "sample": sample, **timed(preview.render, edited_scene)[1]}
         yield from self._finals(
             scene, mask, {"material": lambda: changes[0], "light": lambda: turns[0]}, sample
         )
@@ -162,15 +162,15 @@ class EditBench(Benchmark):
         }
 
     def _finals(
-        self, scene: Scene, mask: Array, given: dict[str, Callable[[], Scene]], sample: str
+        self, scene: Scene, mask: Array, changes: dict[str, Callable[[], Scene]], sample: str
     ) -> Iterator[Row]:
         """Seconds of edits from their options to their pictures, and of a film."""
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        made = cup()[1]
+        vessel = cup()[1]
         floor = (scene.normal[..., 1] > 0.9) & (scene.depth > 0)
         place = free_place(floor) or (self.latency / 2, self.latency / 2)
-        kinds = given | {
-            "insertion": lambda: insert(scene, made, place),
+        kinds = changes | {
+            "insertion": lambda: insert(scene, vessel, place),
             "removal": lambda: remove(scene, mask),
             "glass": lambda: glass(scene, mask),
         }
@@ -180,7 +180,9 @@ class EditBench(Benchmark):
         if self.frames:
 
             def film():
-                return list(pictures(scene, drop(scene, made, place, frames=self.frames), **shared))
+                return list(
+                    pictures(scene, drop(scene, vessel, place, frames=self.frames), **shared)
+                )
 
             yield {"method": f"drop: {self.frames} frames", "sample": sample, **timed(film)[1]}
 

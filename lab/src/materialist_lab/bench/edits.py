@@ -185,10 +185,10 @@ def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]
 
 
 def sample_and_light(
-    scene: int, view: int, light: int, **how: Any
+    scene: int, view: int, light: int, **options: Any
 ) -> tuple[SyntheticSample, Array]:
-    """The sample of these numbers, and the next light [h, 2h, 3] of its view; `how` as of `make_sample`."""
-    sample, other = (make_sample(scene, view, k, **how) for k in (light, light + 1))
+    """The sample of these numbers, and the next light [h, 2h, 3] of its view; `options` as of `make_sample`."""
+    sample, other = (make_sample(scene, view, k, **options) for k in (light, light + 1))
     return sample, other.envmap
 
 

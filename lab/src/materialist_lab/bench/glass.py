@@ -129,9 +129,9 @@ class GlassBench(Benchmark):
         true = behind["true"]
         d = models.thicknesses(case.scene, stage, true)
 
-        def row(method: str, picture: Array, found: Thickness | None = None) -> Row:
+        def row(method: str, picture: Array, thickness: Thickness | None = None) -> Row:
             shown[method] = picture
-            return {"method": method, "sample": case.name, **figures(case, picture, found)}
+            return {"method": method, "sample": case.name, **figures(case, picture, thickness)}
 
         for kind, background in behind.items():
             yield row(f"background alone, {kind}", background.picture)
@@ -140,8 +140,8 @@ class GlassBench(Benchmark):
         yield row(f"{CEILING}, truth again", again)
         for model in (models.two_interface, models.closed):
             name = model.__name__
-            for source, found in d.items():
-                yield row(f"{name}, {source} d", model(case, found, true), found)
+            for source, thickness in d.items():
+                yield row(f"{name}, {source} d", model(case, thickness, true), thickness)
             inpainted = model(case, d["predicted"], behind["inpainted"])
             yield row(f"{name}, predicted d, inpainted", inpainted, d["predicted"])
         for source in ("true", "network"):
@@ -194,15 +194,15 @@ def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str
     truth = case.truth
     # Outside the mask both are the truth, so that windows that reach over its border compare equals.
     inside = np.where(mask[..., None], picture, truth)
-    found = {
+    values = {
         "psnr": metrics.psnr(inside, truth, mask=mask),
         "ssim": metrics.ssim(inside, truth, mask=mask),
     }
-    found["frame"] = float(found["psnr"] - 10 * np.log10(mask.mean()))
+    values["frame"] = float(values["psnr"] - 10 * np.log10(mask.mean()))
     box = window(mask)
     if (distance := lpips(inside[box], truth[box])) is not None:
-        found["lpips"] = distance
+        values["lpips"] = distance
     if thickness is not None:
         true = case.stage.front.thickness
-        found["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
-    return {f"{name}_{group}": value for name, value in found.items()}
+        values["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
+    return {f"{name}_{group}": value for name, value in values.items()}

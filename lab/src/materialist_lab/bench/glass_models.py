@@ -53,9 +53,9 @@ class Background:
         """The mesh of its depth, and its planes, which go on with their mean albedo."""
         depth = self.maps.depth
         albedo = self.maps.materials.albedo
-        found = list[Item]()
+        items = list[Item]()
         if not depth.any():
-            return found
+            return items
         geometry = build_geometry(depth, self.maps.normal, camera)
         for k in np.unique(geometry.mesh.face_plane):
             mean = (
@@ -64,8 +64,8 @@ class Background:
                 else albedo
             )
             mesh: Any = part(geometry.mesh, int(k))
-            found.append(Item(mesh, mean, 1.0, 0.0))
-        return found
+            items.append(Item(mesh, mean, 1.0, 0.0))
+        return items
 
     def fitted(self, envmap: Array, room: TrueScene) -> "Background":
         """With the albedo under which its surfaces, path-traced under the light, look like its picture."""
@@ -100,7 +100,7 @@ def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
 
 
 def two_interface(
-    case: Case, found: Thickness, behind: Background, *, papers_back: bool = False
+    case: Case, thickness: Thickness, behind: Background, *, papers_back: bool = False
 ) -> Array:
     """[H, W, 3] linear, inside the object's mask: the two-interface model.
 
@@ -111,22 +111,29 @@ def two_interface(
     beyond = interfaces.Backdrop(behind.picture, behind.maps.depth, scene.envmap)
     material = Glass(ior=case.ior, model="two-interface", back="same" if papers_back else "found")
     return interfaces.two_interface(
-        scene.camera, scene.normal, scene.depth, mask, found.solid, beyond, material, found.back
+        scene.camera,
+        scene.normal,
+        scene.depth,
+        mask,
+        thickness.solid,
+        beyond,
+        material,
+        thickness.back,
     )
 
 
-def closed(case: Case, found: Thickness, behind: Background) -> Array:
+def closed(case: Case, thickness: Thickness, behind: Background) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
     scene = case.scene
     mask = case.stage.mask
-    whole = found.revolution
+    whole = thickness.revolution
     if whole is not None:
         return before(case, whole.body(scene.camera), behind)
     depth = scene.depth
     normal = scene.normal
     beyond = behind.maps.depth
     body = closed_proxy(
-        depth, normal, mask, found.solid, scene.camera, behind=beyond, back=found.back
+        depth, normal, mask, thickness.solid, scene.camera, behind=beyond, back=thickness.back
     )
     return before(case, body, behind)
 
@@ -157,6 +164,6 @@ def thicknesses(scene: Scene, stage: GlassScene, behind: Background) -> dict[str
     methods |= {name: name for name in ("network", "symmetry")}
     depth = behind.maps.depth
     return {
-        name: object_thickness(scene, stage.mask, how, behind=depth)
-        for name, how in methods.items()
+        name: object_thickness(scene, stage.mask, method, behind=depth)
+        for name, method in methods.items()
     }

@@ -193,7 +193,7 @@ def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *o
         *options,
     )
     seconds = timed(lambda: materialist(*command))[1]["seconds"]
-    told = json.loads((scene / "report.json").read_text())
+    report = json.loads((scene / "report.json").read_text())
     camera = json.loads((scene / "scene.json").read_text())["camera"]
     names = {f"{name}_l1": f"prior_l1_{name}" for name in ("albedo", "roughness", "metallic")}
     names |= {"psnr": "rerender_psnr_path", "ssim": "rerender_ssim_path", "peak_mb": "peak_rss_mb"}
@@ -202,8 +202,10 @@ def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *o
         "sample": case.name,
         "seconds": seconds,
         "seconds_per_mpixel": seconds / (camera["width"] * camera["height"]) * 1e6,
-        **{ours: told[theirs] for ours, theirs in names.items() if told.get(theirs) is not None},
-        **stages(told["stages"], seconds),
+        **{
+            ours: report[theirs] for ours, theirs in names.items() if report.get(theirs) is not None
+        },
+        **stages(report["stages"], seconds),
     }
 
 
@@ -220,10 +222,10 @@ def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
     return path
 
 
-def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
+def stages(timings: list[dict[str, Any]], seconds: float) -> dict[str, float]:
     """Seconds by stage, repeated stages added up; `other` is what no stage claims, start and writing among it."""
     spent: Counter[str] = Counter()
-    for stage in told:
+    for stage in timings:
         # Stages named by what they move, as albedo, count as materials.
         name = {"trace": "engine"}.get(stage["name"], stage["name"])
         spent[name if name in STAGES else "materials"] += stage["seconds"]

@@ -129,13 +129,13 @@ class LightBench(Benchmark):
         for scene, view, light in product(
             range(self.scenes), range(self.views), range(self.lights)
         ):
-            how: dict[str, Any] = {
+            options: dict[str, Any] = {
                 "size": self.size,
                 "data": data,
                 "seed": self.seed,
                 "unseen": self.unseen,
             }
-            sample, other = sample_and_light(scene, view, scene + view + light, **how)
+            sample, other = sample_and_light(scene, view, scene + view + light, **options)
             sample = mirrored(sample) if self.mirrors else sample
             stage = _Stage(self, sample, other)
             for row in chain(stage.relit() if self.relight else (), stage.fitted(methods)):
@@ -174,9 +174,9 @@ class _Stage:
                 "seed": self.bench.seed,
                 "device": device,
             }
-            found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
-            off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
-            figures = self._of_light(found.envmap) | on(found)
+            inverted, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
+            off = np.abs(inverted.materials.albedo - truth.materials.albedo)[truth.depth > 0]
+            figures = self._of_light(inverted.envmap) | on(inverted)
             yield {
                 "method": "inversion" + suffix,
                 **figures,
@@ -191,9 +191,9 @@ class _Stage:
         for name in methods:
             method = METHODS[name]
             completion = bench.completion
-            given = given_maps(self.sample, method, seed=bench.seed, device=bench.device)
+            maps = given_maps(self.sample, method, seed=bench.seed, device=bench.device)
             (envmap, steps, geometry), cost = timed(
-                fit, self.sample, method, given, completion, seed=bench.seed, device=bench.device
+                fit, self.sample, method, maps, completion, seed=bench.seed, device=bench.device
             )
             figures = self._of_light(envmap) | self._on(
                 replace(perfect, geometry=geometry, envmap=envmap)
@@ -222,13 +222,13 @@ class _Stage:
 def fit(
     sample: SyntheticSample,
     method: Method,
-    given: Prediction,
+    maps: Prediction,
     completion: str,
     *,
     seed: int = 0,
     device: str = "auto",
 ) -> tuple[Array, int, Geometry]:
-    """(envmap [256, 512, 3], steps, mesh): what the method finds for the photo with the maps `given`."""
+    """(envmap [256, 512, 3], steps, mesh): what the method finds for the photo with these `maps`."""
     photo = sample.photo
     named = preset(method.preset)
     height = sample.envmap.shape[0]
@@ -239,7 +239,7 @@ def fit(
         )
     setup = FitSetup(
         photo,
-        given,
+        maps,
         replace(named, light=light),
         completion,
         method.engine,
@@ -250,15 +250,15 @@ def fit(
     fit = prepare(setup)
     state = fit.start()
     if method.field in FITLESS:
-        problem = fit.engine.light_problem(given.materials)
+        problem = fit.engine.light_problem(maps.materials)
         target = placed(photo.linear.reshape(-1, 3))
         if method.field == "constant":
-            found = constant_light(problem, target)
+            radiance = constant_light(problem, target)
         else:
-            found = start_light(target, light, given.light, problem).radiance
-        state.envmap = fit.prepared_light(found)
+            radiance = start_light(target, light, maps.light, problem).radiance
+        state.envmap = fit.prepared_light(radiance)
     else:
-        fit.fit_light(state, given.materials)
+        fit.fit_light(state, maps.materials)
     return state.envmap, sum(stage["steps"] for stage in state.stages), fit.geometry
 
 

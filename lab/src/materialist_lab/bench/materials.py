@@ -88,12 +88,12 @@ class MaterialsBench(Benchmark):
             report.settings.update({f"no true {which}": True for which in absent})
             predictions = []
             for spec, source in sources.items():
-                found, cost = timed(source.predict, photo, seed=self.seed)
-                predictions.append(found)
+                predicted, cost = timed(source.predict, photo, seed=self.seed)
+                predictions.append(predicted)
                 yield {
                     "method": spec,
                     "sample": name,
-                    **_scores(found, truth, absent),
+                    **_scores(predicted, truth, absent),
                     "seconds": cost["seconds"],
                 }
             if k < self.pictures:
@@ -136,15 +136,15 @@ def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
     maps = folder / "maps"
     photo = read_photo(str(min(folder.glob("photo.*"))), size=1024)
     truth = MapsPredictor(maps).predict(photo)
-    there = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
-    return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=there)
+    sources = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
+    return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=sources)
 
 
-def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:
+def _scores(predicted: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:
     """The figures of a prediction; none of the maps that the truth lacks, in whose place something else stands."""
-    figures = score(found, truth)
+    figures = score(predicted, truth)
     if (truth.depth > 0).any():
-        figures["depth_order"] = ordinal_accuracy(found.depth, truth.depth)
+        figures["depth_order"] = ordinal_accuracy(predicted.depth, truth.depth)
     return {
         key: value
         for key, value in figures.items()
@@ -155,9 +155,12 @@ def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str
 def _pool(rows: list[Row]) -> None:
     """Give all rows the pooled PSNRs of their method, so that the table of means shows them."""
     for method in {row["method"] for row in rows}:
-        own = [row for row in rows if row["method"] == method]
+        of_method = [row for row in rows if row["method"] == method]
         means = summary(
-            [{key: value for key, value in row.items() if key.endswith("_mse")} for row in own]
+            [
+                {key: value for key, value in row.items() if key.endswith("_mse")}
+                for row in of_method
+            ]
         )
-        for row in own:
+        for row in of_method:
             row.update({key: value for key, value in means.items() if key.endswith("_psnr_pooled")})

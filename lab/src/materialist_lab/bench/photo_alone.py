@@ -122,17 +122,17 @@ class PhotoAloneBench(Benchmark):
             "device": self.device,
         }
 
-        def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
-            found, cost = timed(pipeline.invert, sample.photo, **shared, **how)
+        def inverted(**options: Any) -> tuple[Scene, dict[str, float]]:
+            result, cost = timed(pipeline.invert, sample.photo, **shared, **options)
             left = {
                 f"{key[9:]}_l1": v
-                for key, v in found.report.metrics.items()
+                for key, v in result.report.metrics.items()
                 if key.startswith("prior_l1_")
             }
-            return found, {
+            return result, {
                 **cost,
                 **left,
-                "rerender": metrics.psnr(found.rerender, sample.photo.linear),
+                "rerender": metrics.psnr(result.rerender, sample.photo.linear),
             }
 
         scene, cost = inverted(predictor=self.predictor)
@@ -146,8 +146,8 @@ class PhotoAloneBench(Benchmark):
             )
         if not self.decompose:
             return
-        for given in GIVEN:
-            if given == "light":
+        for known in GIVEN:
+            if known == "light":
                 scale = best_scale(
                     sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0
                 )
@@ -157,7 +157,7 @@ class PhotoAloneBench(Benchmark):
                     {},
                 )
             else:
-                yield f"+ {given}", *inverted(prior=with_truth(scene.prior, sample.truth, given))
+                yield f"+ {known}", *inverted(prior=with_truth(scene.prior, sample.truth, known))
         yield CEILING, true_scene(sample), {}
 
     def _compared(
@@ -201,12 +201,12 @@ class PhotoAloneBench(Benchmark):
         self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array
     ) -> dict[str, float]:
         if edit.kind in SCALED:
-            found = {"inside": aligned_psnr(picture, truth, inside)}
+            figures = {"inside": aligned_psnr(picture, truth, inside)}
         else:
-            found = {"inside": metrics.psnr(picture, truth, mask=inside)}
+            figures = {"inside": metrics.psnr(picture, truth, mask=inside)}
         if edit.kind in TRACED and traces.any():
-            found["shadow"] = metrics.psnr(picture, truth, mask=traces)
-        return found
+            figures["shadow"] = metrics.psnr(picture, truth, mask=traces)
+        return figures
 
 
 def unseen_sample(scene: int, data: Path | None, size: int) -> tuple[SyntheticSample, Array]:
@@ -215,11 +215,11 @@ def unseen_sample(scene: int, data: Path | None, size: int) -> tuple[SyntheticSa
     return sample_and_light(scene, 0, scene, size=size, data=source, seed=SCENE_SEED, unseen=True)
 
 
-def with_truth(prior: Prediction, truth: Prediction, given: str) -> Prediction:
+def with_truth(prior: Prediction, truth: Prediction, known: str) -> Prediction:
     """The prior with the true albedo, the true depth and normals, or both."""
-    if "albedo" in given:
+    if "albedo" in known:
         prior = replace(prior, materials=replace(prior.materials, albedo=truth.materials.albedo))
-    if "geometry" in given:
+    if "geometry" in known:
         prior = replace(prior, depth=truth.depth, normal=truth.normal)
     return prior
 

@@ -62,8 +62,10 @@ class PlateBench(Benchmark):
             cv2.warpAffine(x, ALIGNED, sides, flags=cv2.INTER_LINEAR)
             for x in (plate, np.ones_like(plate))
         ]
-        truth, there = (np.asarray(cv2.resize(x, size, interpolation=cv2.INTER_AREA)) for x in over)
-        shown = there[..., 0] > 0.999
+        truth, coverage = (
+            np.asarray(cv2.resize(x, size, interpolation=cv2.INTER_AREA)) for x in over
+        )
+        shown = coverage[..., 0] > 0.999
         mask = grown(orange(photo.linear), max(1, self.size // 170))
         inside = mask & shown
         around = grown(mask, self.size // 16) & ~mask & shown
@@ -107,6 +109,6 @@ def grown(mask: Array, pixels: int) -> Array:
 def orange(linear: Array) -> Array:
     """[H, W] bool: the largest connected thing of a photo [H, W, 3] in saturated orange."""
     hue, saturation, _ = cv2.split(cv2.cvtColor(linear_to_srgb(linear), cv2.COLOR_RGB2HSV))
-    found = ((hue < 30) & (saturation > 0.75)).astype(np.uint8)
-    _, label, stats, _ = cv2.connectedComponentsWithStats(found)
+    red = ((hue < 30) & (saturation > 0.75)).astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(red)
     return label == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))

@@ -131,7 +131,11 @@ def markdown(report: Report) -> str:
             if c.better and c.key in figures and CEILING not in method:
                 values.setdefault(_part(method), []).append(figures[c.key])
         choose = max if c.better == "higher" else min
-        best |= {(part, c.key): choose(found) for part, found in values.items() if len(found) > 1}
+        best |= {
+            (part, c.key): choose(values_of_part)
+            for part, values_of_part in values.items()
+            if len(values_of_part) > 1
+        }
     for method, figures in table.items():
         cells = [method, str(int(figures["samples"]))]
         for c in report.columns:

@@ -72,12 +72,12 @@ class SelectBench(Benchmark):
                     k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp
                 )
                 name = f"{'captured' if folder else 'procedural'} {sample.name}"
-                for maps, found in (
+                for maps, prediction in (
                     ("bundled", predictor.predict(sample.photo)),
                     ("true", sample.truth),
                 ):
                     things = [(mask, mask) for mask in sample.scene.things.values()]
-                    for row in self._selected(true_scene(sample, found), things, k):
+                    for row in self._selected(true_scene(sample, prediction), things, k):
                         yield {
                             **row,
                             "method": f"{row['method']}, {maps} maps",
@@ -110,11 +110,11 @@ class SelectBench(Benchmark):
             for k, click in enumerate(
                 clicks(place, scene.depth > 0, np.random.default_rng([number, j]))
             ):
-                found = _scores(scene, mask, click=click, method=method)
-                yield {"method": method, "sample": f"object {j} click {k}", **found}
-            for what, box in boxes(mask, self.loose).items():
-                found = _scores(scene, mask, box=box, method=method)
-                yield {"method": f"{method}, {what}", "sample": f"object {j}", **found}
+                scores = _scores(scene, mask, click=click, method=method)
+                yield {"method": method, "sample": f"object {j} click {k}", **scores}
+            for fit, box in boxes(mask, self.loose).items():
+                scores = _scores(scene, mask, box=box, method=method)
+                yield {"method": f"{method}, {fit}", "sample": f"object {j}", **scores}
 
 
 def outlines() -> dict[str, list[dict[str, Any]]]:
@@ -158,12 +158,12 @@ def clicks(
     return [(int(column), int(row)) for row, column in chosen if usable[row, column]]
 
 
-def _scores(scene: Scene, mask: Array, **how: Any) -> dict[str, float]:
+def _scores(scene: Scene, mask: Array, **prompt: Any) -> dict[str, float]:
     try:
-        found = select(scene, **how)
+        selected = select(scene, **prompt)
     except InputError:  # nothing was found there
-        found = np.zeros_like(mask)
-    iou = float((found & mask).sum() / (found | mask).sum())
+        selected = np.zeros_like(mask)
+    iou = float((selected & mask).sum() / (selected | mask).sum())
     return {"iou": iou, "good": float(iou > 0.8), "lost": float(iou < 0.3)}
 
 

@@ -71,10 +71,10 @@ class ThicknessBench(Benchmark):
 def _rows(group: str, name: str, network: Any, views: dict[str, Array]) -> Iterator[Row]:
     """A row a view for the network and for the prior."""
     each = errors(network, views)
-    own = {"solid": "solid", "hollow": "hollow", "back": "back"}
-    prior = {"solid": "symmetry", "back": "back_symmetry"}
+    of_network = {"solid": "solid", "hollow": "hollow", "back": "back"}
+    of_prior = {"solid": "symmetry", "back": "back_symmetry"}
     for k in range(len(each["solid"])):
-        for method, names in (("RefractionNet", own), ("symmetry", prior)):
+        for method, names in (("RefractionNet", of_network), ("symmetry", of_prior)):
             figures = {
                 key: float(each[source][k]) for key, source in names.items() if source in each
             }

@@ -65,8 +65,8 @@ class WhdrBench(Benchmark):
                 albedo = np.ones_like(photo.linear) if spec == "constant" else photo.linear
                 cost: dict[str, float] = {}
                 if source is not None:
-                    found, cost = timed(source.predict, photo, seed=self.seed)
-                    albedo = found.materials.albedo
+                    predicted, cost = timed(source.predict, photo, seed=self.seed)
+                    albedo = predicted.materials.albedo
                 error, count = judged(albedo, file, self.delta)
                 row = {"method": spec, "sample": picture.stem, "whdr": error, "judgements": count}
                 yield row | {"seconds": cost.get("seconds", np.nan)}
@@ -74,24 +74,24 @@ class WhdrBench(Benchmark):
 
 def find(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name; raises InputError when there is none."""
-    found = pairs(folder)
-    if not found:
+    judged = pairs(folder)
+    if not judged:
         raise InputError(
             f"{folder} holds no picture with judgements (NAME.png and NAME.json, as IIW has them)."
         )
-    return found
+    return judged
 
 
 def pairs(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name."""
-    found = []
+    judged = []
     for file in sorted(folder.glob("*.json")):
         picture = next(
             (p for s in ("png", "jpg") if (p := file.with_suffix(f".{s}")).is_file()), None
         )
         if picture is not None:
-            found.append((picture, file))
-    return found
+            judged.append((picture, file))
+    return judged
 
 
 def judged(albedo: Array, file: Path, delta: float = 0.1) -> tuple[float, int]:

@@ -51,7 +51,7 @@ class Views(OperationOptions):
 
 def data(
     output: Annotated[Path, output_option("DIR", "Folder of the data set.")],
-    wanted: DataSetOptions,
+    options: DataSetOptions,
     computing: Computing,
     count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
     workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
@@ -83,20 +83,20 @@ def data(
 
     require_parent(output)
     start = time.monotonic()
-    note = "" if wanted.real == 0 else missing(wanted.furniture)
+    note = "" if options.real == 0 else missing(options.furniture)
     if note and not computing.as_json:
         typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
-        made = produce(
-            output, wanted, count=count, workers=workers, resume=resume, progress=progress
+        rendered = produce(
+            output, options, count=count, workers=workers, resume=resume, progress=progress
         )
     facts = {
         "output": str(output),
-        "rendered": made,
-        "existing": count - made,
+        "rendered": rendered,
+        "existing": count - rendered,
         "seconds": time.monotonic() - start,
     }
-    lines = [f"{count} samples in {output} ({made} new, {facts['seconds']:.0f} s)"]
+    lines = [f"{count} samples in {output} ({rendered} new, {facts['seconds']:.0f} s)"]
     report_success("train data", computing.as_json, lines, **facts)
 
 

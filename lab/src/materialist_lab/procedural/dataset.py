@@ -82,14 +82,14 @@ def _description(options: DataSetOptions) -> dict[str, Any]:
             "share": options.real_share,
             "files": [f"{p.name} {p.stat().st_size}" for p in real],
         }
-    told = {
+    facts = {
         "format": FORMAT,
         "size": options.size,
         "seed": options.seed,
         "split": options.split,
         "content": CONTENT,
     }
-    return told | {
+    return facts | {
         "options": drawn | ({"only": options.only} if options.only else {}),
         "tool_version": __version__,
     }
@@ -101,12 +101,12 @@ def identity(folder: str | Path) -> dict[str, Any]:
     Raises InputError where DIR/dataset.json is none that this version can read.
     """
     file = Path(folder) / DESCRIPTION
-    found = described(file)
-    if found is None or found.get("format") != FORMAT:
+    facts = described(file)
+    if facts is None or facts.get("format") != FORMAT:
         raise InputError(
             f"{file} describes no data set of format {FORMAT}; make one: materialist train data."
         )
-    return {name: found.get(name) for name in _IDENTITY}
+    return {name: facts.get(name) for name in _IDENTITY}
 
 
 def write_data_sheet(

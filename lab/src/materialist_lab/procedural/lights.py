@@ -200,7 +200,7 @@ def _clouds(rng: np.random.Generator) -> Radiance:
     field = (0.75 * tiles.noise(rng, rng.uniform(1.4, 2)) + 0.25 * tiles.noise(rng, 1.2)).astype(
         np.float32
     )
-    least = np.quantile(field, rng.uniform(0, 0.95))
+    threshold = np.quantile(field, rng.uniform(0, 0.95))
     soft = rng.uniform(0.08, 0.4)
     thick = rng.uniform(0.3, 0.8)
     bright = rng.uniform(1, 2)
@@ -215,7 +215,7 @@ def _clouds(rng: np.random.Generator) -> Radiance:
             cv2.remap(field, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)[
                 ..., None
             ]
-            - least
+            - threshold
         )
         density = _step(above, soft) * _step(y - 0.02, 0.12)
         angle = np.arccos(np.clip(d @ sun, -1, 1))[..., None]

@@ -177,10 +177,10 @@ class Finish:
             turn=rng.choice([0, np.pi / 2]) if self.quarter else 0.0,
         )
 
-    def _other(self, rng: np.random.Generator, first: Colour, how: tuple) -> Colour:
-        if isinstance(how[0], tuple):
-            return shade(rng, how)
-        return near(rng, first, how[1], how[2]) if rng.random() < how[0] else shade(rng)
+    def _other(self, rng: np.random.Generator, first: Colour, spread: tuple) -> Colour:
+        if isinstance(spread[0], tuple):
+            return shade(rng, spread)
+        return near(rng, first, spread[1], spread[2]) if rng.random() < spread[0] else shade(rng)
 
 
 def tile(rng: np.random.Generator, kind: str) -> int:
@@ -357,7 +357,7 @@ def metal(rng: np.random.Generator) -> Material:
         tuple((np.array(METALS[rng.integers(len(METALS))]) * rng.uniform(0.85, 1, 3)).tolist()),
     )
     kind = str(rng.choice(["plain", "brushed", "rust"], p=[0.5, 0.35, 0.15]))
-    made = Finish(
+    material = Finish(
         kind,
         grain=(0, 0.3),
         roughness=((0.5, 0.05, 0.25), (0.5, 0.25, 0.6)),
@@ -366,23 +366,25 @@ def metal(rng: np.random.Generator) -> Material:
         quarter=True,
     )(rng)
     if kind == "rust":  # corroded or painted over where the tile's first channel is 1
-        return replace(made, colours=(colour, *made.colours[1:]), metallic=(1.0, 0.0))
-    return replace(made, colours=(colour,) * 3, metallic=(1.0, 1.0))
+        return replace(material, colours=(colour, *material.colours[1:]), metallic=(1.0, 0.0))
+    return replace(material, colours=(colour,) * 3, metallic=(1.0, 1.0))
 
 
 def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
     """A carpet of that size in metres, its tile fitted once."""
-    made = Finish("carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),))(
-        rng
-    )
-    return replace(made, repeat=(width, depth), offset=(0.5, 0.5))
+    material = Finish(
+        "carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),)
+    )(rng)
+    return replace(material, repeat=(width, depth), offset=(0.5, 0.5))
 
 
 def printed(rng: np.random.Generator, width: float, height: float) -> Material:
     """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
     kinds = "picture picture picture print ornament cloudy spots"
-    made = Finish(kinds, (*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),))(rng)
-    return replace(made, repeat=(width, -height), offset=(0.5, 0.5))
+    material = Finish(kinds, (*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),))(
+        rng
+    )
+    return replace(material, repeat=(width, -height), offset=(0.5, 0.5))
 
 
 def light(rng: np.random.Generator, radiance: Colour) -> Material:

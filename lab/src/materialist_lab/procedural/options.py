@@ -42,10 +42,10 @@ def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[P
 
     Raises InputError where there are none.
     """
-    found = sorted(
+    paths = sorted(
         p for p in folder.glob(pattern) if held_out is None or (p.stem in HELD_OUT) == held_out
     )
-    if not found:
+    if not paths:
         which = (
             ""
             if held_out is None
@@ -54,7 +54,7 @@ def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[P
         raise InputError(
             f"{folder} holds no {Path(pattern).suffix} files{which}; give another folder, or none."
         )
-    return found
+    return paths
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,8 +130,8 @@ class DataSetOptions(OperationOptions):
         """Share of pictures of real things."""
         if self.only:
             return float(self.only in REAL_KINDS)
-        usual = REAL_SHARE if self.archives else 0.0
-        return usual if self.real is None else self.real
+        default = REAL_SHARE if self.archives else 0.0
+        return default if self.real is None else self.real
 
     @cached_property
     def mesh_files(self) -> tuple[Path, ...]:
@@ -150,5 +150,5 @@ class DataSetOptions(OperationOptions):
             raise InputError(
                 f"There is no folder {folder} to take {ending} files from; give one that exists."
             )
-        wanted = captures(folder, f"**/*{ending}", self.split == "heldout")
-        return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))
+        paths = captures(folder, f"**/*{ending}", self.split == "heldout")
+        return tuple(sorted(paths, key=lambda p: (p.name, str(p))))

@@ -110,15 +110,15 @@ def _street(rng, meshes) -> Parts:
         for _ in range(int(rng.integers(0, 5))):
             if rng.random() < 0.35:
                 at = (side * (half - 0.95), 0.0, rng.uniform(-22, 1.5))
-                one = street.car(rng)
+                item = street.car(rng)
                 turn = np.pi / 2
             else:
-                one = m.one_of(
+                item = m.one_of(
                     rng, street.post, street.person, lambda r: street.tree(r, r.uniform(3, 7))
                 )
                 at = (side * (half + rng.uniform(0.3, wide - 0.3)), 0.14, rng.uniform(-22, 1.5))
                 turn = rng.uniform(0, 6)
-            parts += placed(one, at, turn + rng.normal() * 0.06)
+            parts += placed(item, at, turn + rng.normal() * 0.06)
     if rng.random() < 0.6:
         white = m.uniform(m.hsv(0.1, 0.05, 0.9), 0.7, grain=0.4)
         lines = [

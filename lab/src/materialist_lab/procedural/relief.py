@@ -35,8 +35,8 @@ class Relief:
 
     def row(self) -> list[float]:
         """[5] as the path tracer reads it: blocks a metre, slope, number of the kind."""
-        least = min(self.size)
-        return [*(1 / s for s in self.size), self.slope * least, float(SOLID.index(self.kind))]
+        smallest = min(self.size)
+        return [*(1 / s for s in self.size), self.slope * smallest, float(SOLID.index(self.kind))]
 
 
 def _frequency(stretch: tuple[float, float, float] = (1, 1, 1)) -> Array:
@@ -119,12 +119,12 @@ SOLID = tuple(_SOLID)
 @lru_cache(maxsize=1)
 def heights() -> dict[str, Array]:
     """Kind -> [SIDE]*3 float32 heights along x, y, z, periodic, deviation 1; the same in every process."""
-    made = {
+    fields = {
         kind: make(np.random.default_rng([43, k])) for k, (kind, make) in enumerate(_SOLID.items())
     }
     return {
         kind: ((field - field.mean()) / field.std()).astype(np.float32)
-        for kind, field in made.items()
+        for kind, field in fields.items()
     }
 
 

@@ -103,16 +103,20 @@ def shell(
         holes = [walls.Opening(0, length, 0, h)]
         if not (is_open and k == 2):
             wall = RoomWall(length, h)
-            most = 4 if count == 1 else 3
-            own = walls.windows(rng, wall, int(rng.integers(1, most))) if k in with_windows else []
-            own += walls.door(rng, wall) if rng.random() < 0.35 else []
+            max_windows = 4 if count == 1 else 3
+            hung = (
+                walls.windows(rng, wall, int(rng.integers(1, max_windows)))
+                if k in with_windows
+                else []
+            )
+            hung += walls.door(rng, wall) if rng.random() < 0.35 else []
             makers = (m.wall_paint, m.wallpaper, m.brick, m.tiled, m.wood, m.stone)
-            own += walls.surface(
+            hung += walls.surface(
                 wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2)
             )
-            own.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
-            own += hangings(rng, wall, int(rng.integers(0, 5)))
-            parts = parts + moved(own, corner, turn)
+            hung.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
+            hung += hangings(rng, wall, int(rng.integers(0, 5)))
+            parts = parts + moved(hung, corner, turn)
             holes = wall.holes
         for hole in holes:
             up = (0, hole.top - hole.bottom, 0)

@@ -167,8 +167,10 @@ def things_of(world: World, probe: dict[str, Array]) -> Array:
     number: dict[object, int] = {}
     of_part = [0]
     for k, part in enumerate(world.parts):
-        own = number.setdefault(("part", k) if part.thing is None else part.thing, len(number) + 1)
-        of_part.append(-own if part.thing is None else own)
+        label = number.setdefault(
+            ("part", k) if part.thing is None else part.thing, len(number) + 1
+        )
+        of_part.append(-label if part.thing is None else label)
     owner = probe["owner"][..., CENTRE].astype(int)
     return np.array(of_part, np.int16)[owner + 1]
 

@@ -84,9 +84,16 @@ class Shading:
         ]
         """Three rows of the rotation from camera to scene directions."""
 
-    def hit(self, found, d, fine=None) -> Hit:
-        """The surface at preliminary intersections `found` of rays with directions d; see `at` for `fine`."""
-        return self.at(found.prim_index, found.prim_uv, d, found.t, found.is_valid(), fine)
+    def hit(self, preliminary, d, fine=None) -> Hit:
+        """The surface at preliminary intersections of rays with directions d; see `at` for `fine`."""
+        return self.at(
+            preliminary.prim_index,
+            preliminary.prim_uv,
+            d,
+            preliminary.t,
+            preliminary.is_valid(),
+            fine,
+        )
 
     def at(self, index, b, d, t, valid, fine=None) -> Hit:
         """The surface at barycentric coordinates b of faces, seen along directions d.
@@ -163,8 +170,10 @@ class Shading:
         )
         layer = place.z - dr.floor(place.z)
         layer = (r[5].x * relief.SLAB + 1 + layer * relief.SIDE) / (relief.SLAB * len(relief.SOLID))
-        found = self.solid.eval(mi.Point3f(place.x, place.y, layer), solid)
-        scene = mi.Vector3f(found[0] * r[4].x, found[1] * r[4].y, found[2] * r[4].z) * r[4].w
+        gradient = self.solid.eval(mi.Point3f(place.x, place.y, layer), solid)
+        scene = (
+            mi.Vector3f(gradient[0] * r[4].x, gradient[1] * r[4].y, gradient[2] * r[4].z) * r[4].w
+        )
         rows = self.turn
         noise = mi.Vector3f(
             *(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3))

@@ -126,7 +126,7 @@ class TrueScene:
     @property
     def things(self) -> dict[int, Array]:
         """Item number -> [H, W] bool mask, of the objects that are seen; ground and walls left out."""
-        flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
+        flat = {k for k, item in enumerate(self.items) if len(item.solid.vertices) <= 4}
         return {
             int(k): self.seen == k for k in np.unique(self.seen[self.seen >= 0]) if k not in flat
         }
@@ -152,8 +152,8 @@ class TrueScene:
 
     def _batches(self, spp: int) -> list[int]:
         """Samples a pixel of each pass: squares, together at least spp, each within WAVEFRONT paths."""
-        most = max(1, int(np.sqrt(WAVEFRONT / (self.camera.width * self.camera.height))) ** 2)
-        count = -(-spp // most)
+        max_spp = max(1, int(np.sqrt(WAVEFRONT / (self.camera.width * self.camera.height))) ** 2)
+        count = -(-spp // max_spp)
         return [int(np.ceil(np.sqrt(spp / count))) ** 2] * count
 
     @cached_property
@@ -182,10 +182,10 @@ class TrueScene:
         """[H, W, 3] albedo of what a probe saw, looked up as Mitsuba does: bilinear, repeated; 0 for sky."""
         albedo = np.zeros((*seen["item"].shape, 3))
         for k, item in enumerate(self.items):
-            here = seen["item"] == k
+            inside = seen["item"] == k
             around = np.pad(item.albedo, ((1, 1), (1, 1), (0, 0)), mode="wrap")
-            place = seen["uv"][here].astype(np.float64) % 1 * item.albedo.shape[1::-1]
-            albedo[here] = bilinear(around, place + 1)
+            place = seen["uv"][inside].astype(np.float64) % 1 * item.albedo.shape[1::-1]
+            albedo[inside] = bilinear(around, place + 1)
         return albedo
 
     @cached_property

@@ -153,8 +153,8 @@ class SampleTracer:
         )
         lane = dr.arange(mi.UInt32, texels * spp)
         hit = self._hit(ray, mi.Bool(True))
-        found = np.stack([np.array(c) for c in hit.p], -1)
-        screen, far = project(found, self.camera)
+        position = np.stack([np.array(c) for c in hit.p], -1)
+        screen, far = project(position, self.camera)
         column, row = (
             np.clip(np.nan_to_num(screen[:, k]), 0, size - 1).astype(int)
             for k, size in ((0, w), (1, h))
@@ -183,8 +183,8 @@ class SampleTracer:
         return mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1)))
 
     def _hit(self, ray, active, fine=None) -> Hit:
-        found = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        return self.shading.hit(found, ray.d, fine)
+        preliminary = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        return self.shading.hit(preliminary, ray.d, fine)
 
     def _paths(self, ray, pixel, sample, rng, seed):
         """Radiance and white diffuse shading along camera rays; each three Floats."""
@@ -228,14 +228,14 @@ class SampleTracer:
             start = hit.p + hit.ng * self.offset
             wo = hit.frame.to_local(to_light)
             above = dr.dot(hit.ng, to_light) > 0
-            wanted = active & above & (wo.z > 0) & (chance > 0)
+            lit = active & above & (wo.z > 0) & (chance > 0)
             shadow = mi.Ray3f(start, to_light)
             shadow.maxt = distance
-            wanted &= ~self.scene.ray_test(shadow, coherent=False, active=wanted)
+            lit &= ~self.scene.ray_test(shadow, coherent=False, active=lit)
             wi = hit.frame.to_local(-ray.d)
             diffuse, specular, density = shading.value(wi, wo, look)
             share = radiance / dr.maximum(chance + density, 1e-20)
-            share = dr.select(wanted, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
+            share = dr.select(lit, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
             first = depth == 0
             full = look.albedo * (1 - look.metallic) * diffuse + specular
             total = total + beta * full * share

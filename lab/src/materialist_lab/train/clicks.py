@@ -85,7 +85,7 @@ def produce_views(
     pasted: list[Array] = []
     if cutouts is not None:
         pasted = [
-            found for path in cutout_files(cutouts) if (found := load_cutout(path)) is not None
+            cutout for path in cutout_files(cutouts) if (cutout := load_cutout(path)) is not None
         ]
         if not pasted:
             raise InputError(
@@ -107,14 +107,14 @@ def produce_views(
             image, thing = paste(image, thing, pasted, rng)
         linear, _ = photographic(image, rng)
         camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
-        found = predictor.predict(
+        predicted = predictor.predict(
             Photo(linear, camera, linear, False, "option", path.name, b"", ())
         )
         return {
             "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8),
             "thing": thing,
-            "normal": np.rint(found.normal * 127).astype(np.int8),
-            "depth": found.depth.astype(np.float16),
+            "normal": np.rint(predicted.normal * 127).astype(np.int8),
+            "depth": predicted.depth.astype(np.float16),
         }
 
     names = [
@@ -255,13 +255,13 @@ class ClickTask(Task):
         architecture: UNetArchitecture | None = None,
     ):
         """Views to learn from and weights to begin from. Raises InputError for a folder without views."""
-        found = load_views(views)
-        if not found:
+        stored = load_views(views)
+        if not stored:
             raise InputError(f"{views} holds no views to learn from.")
-        aside = HELD_OUT if len(found) >= 10 * HELD_OUT else 0
+        aside = HELD_OUT if len(stored) >= 10 * HELD_OUT else 0
         super().__init__(recipe, init)
-        self.views = found[: len(found) - aside]
-        self.held_out = found[len(found) - aside :]
+        self.views = stored[: len(stored) - aside]
+        self.held_out = stored[len(stored) - aside :]
         self.architecture = architecture
 
     def count(self) -> int:
@@ -270,8 +270,8 @@ class ClickTask(Task):
     def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
         """maps [C, side, side] and mask [side, side] of a click in that view, or in another one if it shows nothing."""
         for _ in range(DRAWS):
-            if (found := draw_click(self.views[index], side, rng)) is not None:
-                return {"maps": found[0], "mask": found[1].astype(np.float32)}
+            if (click := draw_click(self.views[index], side, rng)) is not None:
+                return {"maps": click[0], "mask": click[1].astype(np.float32)}
             index = int(rng.integers(len(self.views)))
         raise InputError("The views show nothing to click on; make them of a larger data set.")
 
@@ -291,8 +291,8 @@ class ClickTask(Task):
                 None, (draw_click(view, self.recipe.side, rng) for _ in range(CLICKS))
             ):
                 with torch.inference_mode():
-                    found = network(torch.from_numpy(maps)[None])[0].numpy() > 0
-                overlap.append((found & mask).sum() / (found | mask).sum())
+                    answer = network(torch.from_numpy(maps)[None])[0].numpy() > 0
+                overlap.append((answer & mask).sum() / (answer | mask).sum())
         return (
             {"iou": float(np.mean(overlap)), "iou_median": float(np.median(overlap))}
             if overlap
@@ -300,11 +300,11 @@ class ClickTask(Task):
         )
 
 
-def click_losses(found: Tensor, mask: Tensor) -> dict[str, Tensor]:
+def click_losses(logits: Tensor, mask: Tensor) -> dict[str, Tensor]:
     """Cross-entropy, and one minus the soft overlap (Dice), of logits [B, S, S] with masks [B, S, S]."""
-    share = found.sigmoid()
+    share = logits.sigmoid()
     both = 2 * (share * mask).sum((1, 2)) + 1
     return {
-        "entropy": F.binary_cross_entropy_with_logits(found, mask),
+        "entropy": F.binary_cross_entropy_with_logits(logits, mask),
         "overlap": (1 - both / (share.sum((1, 2)) + mask.sum((1, 2)) + 1)).mean(),
     }

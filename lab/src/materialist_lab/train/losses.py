@@ -62,18 +62,18 @@ def laplace(error: Tensor, log_scale: Tensor, mask: Tensor) -> Tensor:
     return mean(error * (-log_scale).exp() + log_scale, mask)
 
 
-def map_errors(found: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
+def map_errors(predicted: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
     """[B, 5, H, W] absolute errors of maps, as `Prediction.spread` counts them; without gradients.
 
     albedo is sRGB-encoded, depth the natural logarithm of relative depth, each up to a constant of the picture.
     """
     with torch.no_grad():
-        cosine = F.cosine_similarity(found["normal"], true["normal"], dim=1).unsqueeze(1)
-        difference = found["depth"] - true["depth"]
+        cosine = F.cosine_similarity(predicted["normal"], true["normal"], dim=1).unsqueeze(1)
+        difference = predicted["depth"] - true["depth"]
         centre = (difference * mask).flatten(1).sum(1) / mask.flatten(1).sum(1).clamp(min=1)
         depth = (difference - centre.view(-1, 1, 1, 1)).abs().clamp(max=2)
-        albedo = (found["albedo"] - true["albedo"]).abs().mean(1, keepdim=True)
-        flat = [(found[name] - true[name]).abs() for name in ("roughness", "metallic")]
+        albedo = (predicted["albedo"] - true["albedo"]).abs().mean(1, keepdim=True)
+        flat = [(predicted[name] - true[name]).abs() for name in ("roughness", "metallic")]
         return torch.cat([albedo, *flat, cosine.clamp(-1, 1).acos(), depth], 1)
 
 

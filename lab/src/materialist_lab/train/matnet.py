@@ -123,14 +123,14 @@ class PaperTask(MapsTask):
             "depth": losses.silog(out["depth"], batch["depth"], mask),
         }
 
-    def _perceptual(self, found: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    def _perceptual(self, predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
         """LPIPS of sRGB-encoded albedo [B, 3, H, W], the truth where the mask is 0; or gradients in its place."""
-        found = srgb(found)
+        predicted = srgb(predicted)
         true = srgb(true)
         if self.lpips is None:
-            return losses.gradient(found, true, mask)
-        kept = torch.where(mask > 0, found, true)
-        return self.lpips.to(found.device)(2 * kept - 1, 2 * true - 1).mean()
+            return losses.gradient(predicted, true, mask)
+        kept = torch.where(mask > 0, predicted, true)
+        return self.lpips.to(predicted.device)(2 * kept - 1, 2 * true - 1).mean()
 
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
@@ -160,11 +160,11 @@ def enlarged(maps: dict[str, Tensor], size: list[int]) -> dict[str, Tensor]:
 
     mask = maps["mask"]
     share = smooth(maps["mask"]).clamp(min=1e-6)
-    found = {name: nearest(maps[name]) for name in ("normal", "depth", "mask")}
-    found |= {
+    resized = {name: nearest(maps[name]) for name in ("normal", "depth", "mask")}
+    resized |= {
         name: smooth(maps[name] * mask) / share for name in ("albedo", "roughness", "metallic")
     }
-    return found | {"image": smooth(maps["image"])}
+    return resized | {"image": smooth(maps["image"])}
 
 
 def freeze(network: MatNet) -> None:
@@ -181,13 +181,13 @@ def load_start(network: MatNet, path: Path) -> list[str]:
     DINOv2 gives the encoder (its names lack the prefix 'pretrained.'), Depth Anything also the depth decoder, which the
     material decoder starts as well where shapes agree. Raises WeightsError when there is no encoder in the file.
     """
-    found = read_state(path)
-    if "cls_token" in found:
-        found = {f"pretrained.{name}": tensor for name, tensor in found.items()}
+    stored = read_state(path)
+    if "cls_token" in stored:
+        stored = {f"pretrained.{name}": tensor for name, tensor in stored.items()}
     state = network.state_dict()
     start = {
         name: tensor
-        for name, tensor in found.items()
+        for name, tensor in stored.items()
         if name in state and tensor.shape == state[name].shape
     }
     for name in [n for n in start if n.startswith("depth_head.")]:

@@ -60,13 +60,13 @@ def epoch(
     )
     batches = iter(loader)
     try:
-        for k, found in enumerate(batches, skip):
-            if isinstance(found, str):
-                raise InputError(found)
+        for k, loaded in enumerate(batches, skip):
+            if isinstance(loaded, str):
+                raise InputError(loaded)
             random.manual_seed(int(np.random.SeedSequence((seed, number, k)).generate_state(1)[0]))
             with torch.no_grad():
                 varied = task.vary(
-                    {n: t.to(device, non_blocking=True) for n, t in found.items()}, side, random
+                    {n: t.to(device, non_blocking=True) for n, t in loaded.items()}, side, random
                 )
             yield varied
     finally:

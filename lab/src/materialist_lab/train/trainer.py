@@ -160,20 +160,20 @@ class Trainer:
 
     def score(self) -> dict[str, Any]:
         """Score the averaged weights; writes a line of scores.jsonl."""
-        found = self.task.scores(self.averaged, self.folder)
-        self.last_scores = {name: _rounded(value) for name, value in found.items()}
+        scores = self.task.scores(self.averaged, self.folder)
+        self.last_scores = {name: _rounded(value) for name, value in scores.items()}
         line = {
             "step": self.schedule.step,
             "seconds": round(self.schedule.seconds, 1),
             **self.last_scores,
         }
-        if found:
+        if scores:
             checkpoint.append_line(self.folder / checkpoint.SCORES, line)
         self.note(
             f"step {self.schedule.step}  "
             + "  ".join(f"{k} {v}" for k, v in self.last_scores.items())
         )
-        return found
+        return scores
 
     def _batches(self) -> Iterator[Batch]:
         """Epoch after epoch, without end; within one, pictures become larger when the recipe says so."""

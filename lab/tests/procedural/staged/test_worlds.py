@@ -69,7 +69,7 @@ def test_things_are_laid_on_their_place_side_by_side(stock):
     things = {}
     for part in parts:
         things.setdefault(part.thing, []).append(part)
-    boxes = [bounds(one) for one in things.values()]
+    boxes = [bounds(parts_of_thing) for parts_of_thing in things.values()]
     assert len(boxes) > 2
     for k, (low, high) in enumerate(boxes):
         assert low[1] == pytest.approx(0.75, abs=0.03)
@@ -91,16 +91,18 @@ def test_finishes_are_physical(stock, family):
     look = CatalogLook(family, (0.4, 0.3, 0.2), 0.5, "", False)
     rng = np.random.default_rng(1)
     for _ in range(20):
-        made = finishes.finish(
+        material = finishes.finish(
             rng,
             type(look)(family, (0.4, 0.3, 0.2), 0.5, "", False),
             None,
             finishes.style(rng),
             stock,
         )
-        assert all(0 < r <= 1 for r in made.roughness) and all(0 <= v <= 1 for v in made.metallic)
-        assert all(0 < c <= 1 for colour in made.colours for c in colour)
-        assert made.relief is None or 0 < made.relief.slope < 0.6
+        assert all(0 < r <= 1 for r in material.roughness) and all(
+            0 <= v <= 1 for v in material.metallic
+        )
+        assert all(0 < c <= 1 for colour in material.colours for c in colour)
+        assert material.relief is None or 0 < material.relief.slope < 0.6
 
 
 @pytest.mark.parametrize(
@@ -125,13 +127,13 @@ def test_hard_lamps_are_small_and_stand_on_the_side_of_the_camera():
 def test_what_is_kept_aside_is_never_trained_on(stock, monkeypatch):
     monkeypatch.setattr(stocks, "HELD_OUT_EVERY", 2)
     keys = tuple(f"made-{k:03d}" for k in range(40))
-    one, other = (
+    train, held_out = (
         stocks.Stock(stock.listing, held_out=aside)._mine(keys) for aside in (False, True)
     )
     assert (
-        set(one) | set(other) == set(keys)
-        and not set(one) & set(other)
-        and min(len(one), len(other)) > 5
+        set(train) | set(held_out) == set(keys)
+        and not set(train) & set(held_out)
+        and min(len(train), len(held_out)) > 5
     )
 
 

@@ -24,20 +24,20 @@ from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
 
 @pytest.mark.parametrize("index", range(20))
 def test_every_kind_of_shape_is_usable(index):
-    made = make_shape(index)
-    vertices = made.solid.vertices
+    shape = make_shape(index)
+    vertices = shape.solid.vertices
     assert np.isfinite(vertices).all() and np.ptp(vertices, axis=0).max() == pytest.approx(1)
     np.testing.assert_allclose(vertices.min(0) + vertices.max(0), 0, atol=1e-9)
-    assert made.solid.faces.max() < len(vertices)
+    assert shape.solid.faces.max() < len(vertices)
     # Level rays from the front meet it from outside, whatever it is, and run through material behind that.
     origin = np.stack(
         np.meshgrid(np.linspace(-0.4, 0.4, 24), np.linspace(-0.4, 0.4, 24), [2.0]), -1
     ).reshape(-1, 3)
-    found = ShapeTracer(made.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
-    hit = np.isfinite(found.first)
-    assert hit.any() and (found.material <= found.solid + 1e-3).all()
-    assert (found.material[hit] > 0).mean() > 0.95
-    assert not made.hollow or found.material[hit].sum() < 0.95 * found.solid[hit].sum()
+    paths = ShapeTracer(shape.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
+    hit = np.isfinite(paths.first)
+    assert hit.any() and (paths.material <= paths.solid + 1e-3).all()
+    assert (paths.material[hit] > 0).mean() > 0.95
+    assert not shape.hollow or paths.material[hit].sum() < 0.95 * paths.solid[hit].sum()
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +90,8 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
     np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)
     np.testing.assert_allclose(a.solid[both], b.solid[both], atol=6e-3)
     inner = both & (a.solid > 0.3)
-    for one, two in ((normal_a, normal_b), (back_a, back_b)):
-        agreement = np.sum(one.reshape(-1, 3)[inner] * two.reshape(-1, 3)[inner], -1)
+    for first, second in ((normal_a, normal_b), (back_a, back_b)):
+        agreement = np.sum(first.reshape(-1, 3)[inner] * second.reshape(-1, 3)[inner], -1)
         assert np.median(agreement) > 0.999
 
 

@@ -92,21 +92,21 @@ def listing(
     """
     folder = folder or cache_folder()
     made_of = [[path.name, path.stat().st_size] for path in (*archives, *photographs)]
-    found = described(folder / LIST)
-    if found is None or found.get("version") != VERSION or found.get("made_of") != made_of:
-        found = _build(archives, folder, progress) | {"photographs": _shrink(photographs, folder)}
+    facts = described(folder / LIST)
+    if facts is None or facts.get("version") != VERSION or facts.get("made_of") != made_of:
+        facts = _build(archives, folder, progress) | {"photographs": _shrink(photographs, folder)}
         write_whole(
             folder / LIST,
-            json.dumps({"version": VERSION, "made_of": made_of, **found}, indent=1) + "\n",
+            json.dumps({"version": VERSION, "made_of": made_of, **facts}, indent=1) + "\n",
         )
     by_role: dict[str, list[str]] = {}
-    for key, role in found["roles"].items():
+    for key, role in facts["roles"].items():
         by_role.setdefault(role, []).append(key)
     textures = {
-        family: tuple((key, k) for key, k in places) for family, places in found["textures"].items()
+        family: tuple((key, k) for key, k in places) for family, places in facts["textures"].items()
     }
     roles = {role: tuple(sorted(keys)) for role, keys in by_role.items()}
-    return Listing(folder, roles, textures, tuple(found["photographs"]))
+    return Listing(folder, roles, textures, tuple(facts["photographs"]))
 
 
 def _build(archives: Sequence[Path], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -155,12 +155,12 @@ def _shrink(photographs: Sequence[Path], folder: Path) -> list[str]:
 
 @lru_cache(maxsize=64)
 def _photograph(path: Path) -> Array:
-    found = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if found is None:
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if picture is None:
         raise InputError(
             f"The photograph {path} cannot be read; delete the folder, and it will be made again."
         )
-    return np.ascontiguousarray(found[..., ::-1])
+    return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _credits(used: Sequence[CatalogEntry]) -> str:
@@ -169,7 +169,9 @@ def _credits(used: Sequence[CatalogEntry]) -> str:
         "BlendSwap-CC-0: CC0 1.0. KatorLegaz, Reallusion: CC-BY 3.0 United States. BlendSwap-CC-BY, Scopia: CC-BY 3.0\n"
         "(http://creativecommons.org/licenses/by/3.0/).\n\n"
     )
-    return head + "".join(f"{one.key}: {one.name}, by {one.creator or 'unknown'}\n" for one in used)
+    return head + "".join(
+        f"{entry.key}: {entry.name}, by {entry.creator or 'unknown'}\n" for entry in used
+    )
 
 
 def _store(folder: Path, entry: CatalogEntry, role: str, parts: ModelParts) -> None:
@@ -212,7 +214,9 @@ def _load(folder: Path, key: str) -> CatalogModel:
     entry = facts["entry"]
     lights = tuple(tuple(place) for place in entry.pop("lights"))
     entry |= {name: tuple(entry[name]) for name in ("size", "turn")}
-    looks = tuple(CatalogLook(**{**one, "colour": tuple(one["colour"])}) for one in facts["looks"])
+    looks = tuple(
+        CatalogLook(**{**look, "colour": tuple(look["colour"])}) for look in facts["looks"]
+    )
     pictures = {
         name.removeprefix("picture "): ColourPicture(as_roots(_decoded(packed)))
         for name, packed in arrays.items()
@@ -233,7 +237,7 @@ def _load(folder: Path, key: str) -> CatalogModel:
         solids,
         looks,
         tuple(pictures.get(look.picture) for look in looks),
-        tuple(LevelPlace(*one) for one in facts["places"]),
+        tuple(LevelPlace(*place) for place in facts["places"]),
     )
 
 

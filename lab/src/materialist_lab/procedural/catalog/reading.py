@@ -61,8 +61,8 @@ def read_catalog_model(
     for piece in pieces:
         area = float(piece.area)
         whole += area
-        found, painted = _material(piece, entry, pictures, s)
-        if found.clear:
+        look, painted = _material(piece, entry, pictures, s)
+        if look.clear:
             clear += area
             continue
         solid = _solid(piece, s)
@@ -71,7 +71,7 @@ def read_catalog_model(
             holed += mixed
         if len(solid.faces):
             solids.append(solid)
-            looks.append(found)
+            looks.append(look)
     if clear > s.glass * whole:
         raise InputError("it is of glass")
     if not solids or whole <= 0:
@@ -81,7 +81,12 @@ def read_catalog_model(
     solids = _fitted(_lighter(solids, s), entry)
     textured = [bool(look.picture) for look in looks]
     return ModelParts(
-        [one if t else from_the_sides(one) for one, t in zip(solids, textured)], looks, pictures
+        [
+            solid if has_picture else from_the_sides(solid)
+            for solid, has_picture in zip(solids, textured)
+        ],
+        looks,
+        pictures,
     )
 
 
@@ -141,8 +146,8 @@ def _solid(piece: trimesh.Trimesh, s: ReadingSettings) -> Solid:
     faces = np.asarray(piece.faces, np.int32)
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
     faces = faces[area > 1e-14 * max(float(np.ptp(vertices, axis=0).max()), 1e-9) ** 2]
-    found = getattr(piece.visual, "uv", None)
-    uv = None if found is None else np.nan_to_num(np.asarray(found, float))
+    stored_uv = getattr(piece.visual, "uv", None)
+    uv = None if stored_uv is None else np.nan_to_num(np.asarray(stored_uv, float))
     if "vertex_normals" in piece._cache.cache:
         normals = unit(np.nan_to_num(np.asarray(piece.vertex_normals, float)))
     else:
@@ -191,7 +196,8 @@ def _fitted(solids: list[Solid], entry: CatalogEntry) -> list[Solid]:
     """The solids turned and stretched to the size of the entry."""
     turn = np.array(entry.turn).reshape(3, 3) if len(entry.turn) == 9 else np.eye(3)
     solids = [
-        replace(one, vertices=one.vertices @ turn.T, normals=one.normals @ turn.T) for one in solids
+        replace(solid, vertices=solid.vertices @ turn.T, normals=solid.normals @ turn.T)
+        for solid in solids
     ]
     used = joined(solids)
     corners = used.vertices[used.faces.ravel()]
@@ -201,6 +207,8 @@ def _fitted(solids: list[Solid], entry: CatalogEntry) -> list[Solid]:
     scale = np.where(high - low < 1e-6 * (high - low).max(), np.median(scale), scale)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     return [
-        replace(one, vertices=(one.vertices - base) * scale, normals=unit(one.normals / scale))
-        for one in solids
+        replace(
+            solid, vertices=(solid.vertices - base) * scale, normals=unit(solid.normals / scale)
+        )
+        for solid in solids
     ]

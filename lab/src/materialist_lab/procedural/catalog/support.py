@@ -44,8 +44,8 @@ def level_places(solids: list[Solid]) -> list[LevelPlace]:
     everything = np.concatenate([solid.vertices[solid.faces] for solid in solids])
     low = everything.min(1)
     high = everything.max(1)
-    found = [_place(corners[g], areas[g]) for g in groups]
-    return [_with_clearance(place, low, high) for place in found if place is not None]
+    places = [_place(corners[g], areas[g]) for g in groups]
+    return [_with_clearance(place, low, high) for place in places if place is not None]
 
 
 def _level_faces(solids: list[Solid]) -> tuple[Array, Array, Array]:

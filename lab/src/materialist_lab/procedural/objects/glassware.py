@@ -157,9 +157,9 @@ def _frustum(rng: np.random.Generator) -> Solid:
     vertices = solid.vertices * [1, 1, deep]
     corners = vertices[solid.faces]
     flat = unit(shapes.face_normals(vertices, solid.faces))
-    own = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
+    corner_faces = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
     return Solid(
-        corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2))
+        corners.reshape(-1, 3), corner_faces, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2))
     )
 
 

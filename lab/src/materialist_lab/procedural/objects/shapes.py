@@ -125,8 +125,8 @@ def load(path: Path) -> Solid:
     u = np.arctan2(corners[..., 2], corners[..., 0]) / (2 * np.pi) + 0.5
     u = np.where((np.ptp(u, axis=1, keepdims=True) > 0.5) & (u < 0.5), u + 1, u)
     uv = np.stack([u, corners[..., 1]], -1).reshape(-1, 2)
-    own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-    return Solid(corners.reshape(-1, 3), own, normals[faces].reshape(-1, 3), uv)
+    corner_faces = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
+    return Solid(corners.reshape(-1, 3), corner_faces, normals[faces].reshape(-1, 3), uv)
 
 
 def placed(
@@ -360,8 +360,8 @@ def leaves(
             spine + side * width / 2 * w * size / length,
         ]
     vertices = np.stack(rows, 1)  # [N, 8, 3]
-    one = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
-    faces = (one[None] + 8 * np.arange(n)[:, None, None]).reshape(-1, 3).astype(np.int32)
+    leaf_faces = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
+    faces = (leaf_faces[None] + 8 * np.arange(n)[:, None, None]).reshape(-1, 3).astype(np.int32)
     flat = vertices.reshape(-1, 3)
     uv = np.tile(
         np.stack([np.tile([0, width], 4), np.repeat([0, 0.35, 0.7, 1], 2) * length], -1), (n, 1)

@@ -91,8 +91,8 @@ def tree(rng, size: float) -> Parts:
     elif kind < 0.9:
         masses = [s.blob(rng, size * rng.uniform(0.25, 0.5, 3), 0.25, 32) for _ in tips[:8]]
         parts += [
-            ScenePart(s.moved(one, tip - [0, 0.12 * size, 0]), leaf)
-            for one, tip in zip(masses, tips)
+            ScenePart(s.moved(crown, tip - [0, 0.12 * size, 0]), leaf)
+            for crown, tip in zip(masses, tips)
         ]
     return parts
 

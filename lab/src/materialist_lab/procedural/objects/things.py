@@ -262,14 +262,14 @@ def scattered(
     taken: list[tuple[float, float, float]] = []
     parts: Parts = []
     for _ in range(count):
-        one = thing(rng, float(np.exp(rng.uniform(*np.log(sizes)))), meshes, share)
+        item = thing(rng, float(np.exp(rng.uniform(*np.log(sizes)))), meshes, share)
         radius = max(
-            float(np.hypot(p.solid.vertices[:, 0], p.solid.vertices[:, 2]).max()) for p in one
+            float(np.hypot(p.solid.vertices[:, 0], p.solid.vertices[:, 2]).max()) for p in item
         )
         for _ in range(12):
             x, z = rng.uniform(-1, 1, 2) * np.maximum(np.array(half) - 0.6 * radius, 0.01)
             if all(np.hypot(x - a, z - b) > 0.85 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
-                parts += placed(one, (x, 0, z), rng.uniform(0, 2 * np.pi))
+                parts += placed(item, (x, 0, z), rng.uniform(0, 2 * np.pi))
                 break
     return parts

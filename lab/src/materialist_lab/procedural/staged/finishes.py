@@ -76,12 +76,14 @@ RELIEFS: dict[str, tuple[ReliefRange, ...]] = {
 
 def relief_of(rng: np.random.Generator, family: str, scale: float = 1.0) -> Relief | None:
     """Relief that suits a family, its size times `scale`; often none."""
-    for one in RELIEFS.get(family, ()):
-        if rng.random() < one.share:
-            size = scale * float(np.exp(rng.uniform(*np.log(one.size))))
+    for choice in RELIEFS.get(family, ()):
+        if rng.random() < choice.share:
+            size = scale * float(np.exp(rng.uniform(*np.log(choice.size))))
             stretch = np.exp(rng.normal(0, 0.25, 3)) if rng.random() < 0.5 else np.ones(3)
             x, y, z = (size * stretch).tolist()
-            return Relief(str(rng.choice(one.kinds.split())), (x, y, z), rng.uniform(*one.slope))
+            return Relief(
+                str(rng.choice(choice.kinds.split())), (x, y, z), rng.uniform(*choice.slope)
+            )
     return None
 
 
@@ -93,7 +95,7 @@ class Style:
     """[3] on colours."""
     gloss: float
     """Added to roughness."""
-    own: bool
+    has_own_finish: bool
     """Whether plain surfaces get finishes of our own."""
     bumpy: float
     """Probability of relief."""
@@ -111,7 +113,7 @@ def finish(
     rng: np.random.Generator,
     look: CatalogLook,
     picture: ColourPicture | None,
-    one: Style,
+    variant: Style,
     stock: Stock,
 ) -> Material:
     """The material of one surface of a model."""
@@ -119,22 +121,22 @@ def finish(
     if family == "mirror":
         return m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
     low, high = ROUGHNESS[family]
-    rough = 0.75 * rng.uniform(low, high) + 0.25 * np.clip(look.shine, low, high) + one.gloss
+    rough = 0.75 * rng.uniform(low, high) + 0.25 * np.clip(look.shine, low, high) + variant.gloss
     rough = float(np.clip(rough, 0.06, 1.0))
-    relief = relief_of(rng, family) if rng.random() < one.bumpy else None
+    relief = relief_of(rng, family) if rng.random() < variant.bumpy else None
     if picture is not None:
-        return replace(pictured(picture, one.gain, rough), relief=relief)
-    if one.own and rng.random() < 0.7:
-        made = _own(rng, family, stock)
-        if made is not None:
-            return replace(made, relief=relief)
+        return replace(pictured(picture, variant.gain, rough), relief=relief)
+    if variant.has_own_finish and rng.random() < 0.7:
+        material = _own_finish(rng, family, stock)
+        if material is not None:
+            return replace(material, relief=relief)
     metallic = 0.0
-    colour = np.clip(np.array(look.colour) * one.gain, 0.015, 0.85)
+    colour = np.clip(np.array(look.colour) * variant.gain, 0.015, 0.85)
     if family == "metal":
         metallic, colour = _metal(rng, colour)
-    made = m.uniform(_triple(colour), rough, metallic, grain=rng.uniform(0, 0.15))
+    material = m.uniform(_triple(colour), rough, metallic, grain=rng.uniform(0, 0.15))
     second = float(np.clip(rough + rng.uniform(0, 0.15), 0.06, 1))
-    return replace(made, roughness=(rough, second), repeat=(0.6, 0.6), relief=relief)
+    return replace(material, roughness=(rough, second), repeat=(0.6, 0.6), relief=relief)
 
 
 def pictured(picture: ColourPicture, gain: Array, rough: float, metallic: float = 0.0) -> Material:
@@ -156,13 +158,13 @@ def covered(rng: np.random.Generator, picture: ColourPicture, size: float, famil
     """A material whose picture repeats every `size` metres, on surfaces with texture coordinates in metres."""
     h, w = picture.pixels.shape[:2]
     rough = rng.uniform(*ROUGHNESS[family])
-    made = pictured(picture, np.exp(rng.normal(0, 0.2)) * np.ones(3), rough)
+    material = pictured(picture, np.exp(rng.normal(0, 0.2)) * np.ones(3), rough)
     turn = rng.choice([0, np.pi / 2]) if rng.random() < 0.3 else 0.0
     relief = relief_of(rng, family)
-    return replace(made, repeat=(size, -size * h / w), turn=turn, offset=None, relief=relief)
+    return replace(material, repeat=(size, -size * h / w), turn=turn, offset=None, relief=relief)
 
 
-def _own(rng: np.random.Generator, family: str, stock: Stock) -> Material | None:
+def _own_finish(rng: np.random.Generator, family: str, stock: Stock) -> Material | None:
     """A finish of ours, or a picture from another model; None for families that stay as they are."""
     if family not in OUR_FINISHES or (family == "other" and rng.random() < 0.6):
         return None
@@ -171,8 +173,8 @@ def _own(rng: np.random.Generator, family: str, stock: Stock) -> Material | None
         if picture is not None:
             return covered(rng, picture, rng.uniform(0.3, 1.2), family)
     makers = OUR_FINISHES[family]
-    made = makers[rng.integers(len(makers))](rng)
-    return replace(made, emboss=rng.uniform(0, EMBOSS.get(family, 0.0)))
+    material = makers[rng.integers(len(makers))](rng)
+    return replace(material, emboss=rng.uniform(0, EMBOSS.get(family, 0.0)))
 
 
 def _metal(rng: np.random.Generator, colour: Array) -> tuple[float, Array]:

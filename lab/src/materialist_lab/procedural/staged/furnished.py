@@ -99,18 +99,18 @@ def _group(rng: np.random.Generator, stock: Stock) -> Parts:
     chair = stock.model(rng, "chair" if height > 0.6 else "sofa", high=2.4)
     if chair is None:
         return parts
-    one = piece(rng, chair, stock)
+    seat = piece(rng, chair, stock)
     wide = chair.entry.size[0]
     deep = chair.entry.size[2]
     if height <= 0.6:
-        return parts + placed(one, (0, 0, -depth / 2 - deep / 2 - 0.35))
+        return parts + placed(seat, (0, 0, -depth / 2 - deep / 2 - 0.35))
     for side in (-1, 1):
         count = int(min(max(width // (wide + 0.1), 0), 3))
         for x in (np.arange(count) + 0.5) * width / max(count, 1) - width / 2:
             if rng.random() < 0.85:
                 out = depth / 2 + deep * rng.uniform(0.05, 0.6)
                 turn = (0.0 if side < 0 else np.pi) + rng.normal(0, 0.15)
-                parts = parts + placed(_copy(one), (x, 0, side * out), turn)
+                parts = parts + placed(_copy(seat), (x, 0, side * out), turn)
     return parts
 
 
@@ -137,10 +137,9 @@ def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
     hanging = wall or paper
     on_wall = covered(rng, hanging, rng.uniform(0.5, 1.6), "paint") if hanging else None
     if on_wall:
-        on_wall = replace(
-            on_wall, offset=tuple(rng.random(2).tolist())
-        )  # one for all pieces of the walls
-    made = []
+        # One offset for all pieces of the walls: the pattern runs on across them.
+        on_wall = replace(on_wall, offset=tuple(rng.random(2).tolist()))
+    recovered = []
     for part in parts:
         flat = part.thing is None and len(part.solid.vertices) == 4
         level = flat and abs(float(part.solid.normals[0, 1])) > 0.9
@@ -150,8 +149,8 @@ def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
             material = on_floor or replace(material, emboss=rng.uniform(0, 0.004))
         elif flat and not level:
             material = on_wall or replace(material, relief=plaster, emboss=rng.uniform(0, 0.004))
-        made.append(ScenePart(part.solid, material, part.thing))
-    return made
+        recovered.append(ScenePart(part.solid, material, part.thing))
+    return recovered
 
 
 def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
@@ -198,8 +197,8 @@ def _hung_model(rng: np.random.Generator, stock: Stock, wall: walls.RoomWall) ->
     at = wall.free(rng, model.entry.size[0] + 0.05)
     if at is None:
         return []
-    one = piece(rng, model, stock, lit=rng.random() < 0.5)
-    return moved(one, (at, model.entry.elevation, 0.002 - bounds(one)[0][2]))
+    hung = piece(rng, model, stock, lit=rng.random() < 0.5)
+    return moved(hung, (at, model.entry.elevation, 0.002 - bounds(hung)[0][2]))
 
 
 def _from_ceiling(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:

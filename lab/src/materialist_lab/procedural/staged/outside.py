@@ -65,14 +65,14 @@ def _standing(rng: np.random.Generator, stock: Stock, count: int, back: float) -
         model = stock.model(rng, str(rng.choice(THINGS)))
         if model is None:
             continue
-        one = piece(rng, model, stock)
-        low, high = bounds(one)
+        item = piece(rng, model, stock)
+        low, high = bounds(item)
         radius = float(np.hypot(*(high - low)[[0, 2]]) / 2)
         for _ in range(10):
             x = rng.uniform(-4.5, 4.5)
             z = rng.uniform(back + radius, max(3.0 - radius, back + radius))
             if all(np.hypot(x - a, z - b) > 0.8 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
-                parts += placed(one, (x, 0, z), rng.uniform(0, 2 * np.pi))
+                parts += placed(item, (x, 0, z), rng.uniform(0, 2 * np.pi))
                 break
     return parts

@@ -23,7 +23,7 @@ def piece(
     rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: bool = False
 ) -> Parts:
     """A model as one thing at the origin, in materials of its own. lit: its lamps shine."""
-    one = style(rng)
+    variant = style(rng)
     finished: dict[tuple[object, ...], m.Material] = {}
     parts: Parts = []
     glow = np.exp(rng.uniform(*np.log(GLOW))) * np.array(
@@ -37,7 +37,7 @@ def piece(
         if key not in finished:
             shines = lit and look.family == "bulb"
             finished[key] = (
-                m.light(rng, tuple(glow)) if shines else finish(rng, look, picture, one, stock)
+                m.light(rng, tuple(glow)) if shines else finish(rng, look, picture, variant, stock)
             )
         parts.append(ScenePart(solid, finished[key]))
     if lit and not any(look.family == "bulb" for look in model.looks):
@@ -88,17 +88,17 @@ def laid(
     taken: list[tuple[float, float, float]] = []
     parts: Parts = []
     for _ in range(count):
-        one = small_thing(rng, stock, min(0.62, 1.8 * float(half.min())), place.clearance * 0.95)
-        if not one:
+        item = small_thing(rng, stock, min(0.62, 1.8 * float(half.min())), place.clearance * 0.95)
+        if not item:
             continue
-        low, high = bounds(one)
+        low, high = bounds(item)
         radius = float(np.hypot(*(high - low)[[0, 2]]) / 2)
         room = np.maximum(half - 0.72 * radius, 0.0) * (1 - crowd * 0.6)
         for _ in range(14):
             x, z = middle + rng.uniform(-1, 1, 2) * room
             if all(np.hypot(x - a, z - b) > 0.74 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
-                centred = placed(one, -(low + high) / 2 * [1, 0, 1])
+                centred = placed(item, -(low + high) / 2 * [1, 0, 1])
                 parts += placed(centred, (x, place.height, z), _turn(rng))
                 break
     return parts
@@ -122,11 +122,13 @@ def furnished_piece(
 
 
 def backdrop_of(
-    rng: np.random.Generator, stock: Stock, level: float, least: float, blur: float = 0.0
+    rng: np.random.Generator, stock: Stock, level: float, min_share: float, blur: float = 0.0
 ) -> Array | None:
-    """[h, w, 3] linear radiance about `level` of a part of a photograph, at least `least` of its shorter side, blurred
-    by `blur` pixels of 256; None where there is none."""
-    part = stock.crop(rng, 1.0, 256, least)
+    """[h, w, 3] linear radiance of a part of a photograph, about `level`; None where there is no photograph.
+
+    The part is at least `min_share` of the shorter side. It is blurred by `blur` pixels of 256.
+    """
+    part = stock.crop(rng, 1.0, 256, min_share)
     if part is None:
         return None
     linear = (as_roots(part) / 255.0).astype(np.float32) ** 2

@@ -52,7 +52,7 @@ def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material
             return covered(rng, picture, rng.uniform(0.15, 0.6), family)
     if draw < 0.55:
         grey = rng.uniform(0.2, 0.8)
-        made = m.uniform(
+        material = m.uniform(
             (grey, grey * rng.uniform(0.9, 1), grey * rng.uniform(0.75, 1)), rng.uniform(0.4, 0.95)
         )
     else:
@@ -62,11 +62,11 @@ def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material
             "wood": m.wood,
             "metal": m.metal,
         }
-        made = makers.get(family, m.lacquer)(rng)
+        material = makers.get(family, m.lacquer)(rng)
     shrink = rng.uniform(0.2, 0.6)
-    repeat = (made.repeat[0] * shrink, made.repeat[1] * shrink)
+    repeat = (material.repeat[0] * shrink, material.repeat[1] * shrink)
     return replace(
-        made, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001)
+        material, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001)
     )
 
 

@@ -64,15 +64,15 @@ class Stock:
         return self.listing.photograph(names[rng.integers(len(names))]) if names else None
 
     def crop(
-        self, rng: np.random.Generator, aspect: float, side: int, least: float = SMALLEST_CROP
+        self, rng: np.random.Generator, aspect: float, side: int, min_share: float = SMALLEST_CROP
     ) -> Array | None:
         """[h, w, 3] uint8 sRGB, its longer side `side` pixels: a part of a photograph of that width over height."""
         whole = self.photograph(rng)
         if whole is None:
             return None
         h, w = whole.shape[:2]
-        most = min(h, w / aspect)
-        height = most * rng.uniform(least, 1.0)
+        max_height = min(h, w / aspect)
+        height = max_height * rng.uniform(min_share, 1.0)
         width = height * aspect
         top = rng.uniform(0, h - height)
         left = rng.uniform(0, w - width)

@@ -29,12 +29,12 @@ def hard_lamps(rng: np.random.Generator, to_camera: Array) -> Array:
     return (total / max(float(luminance(total).max()), 1e-9) * 300).astype(np.float32)
 
 
-def _around(rng: np.random.Generator, axis: Array, most: float) -> Array:
+def _around(rng: np.random.Generator, axis: Array, max_degrees: float) -> Array:
     """[3] unit: a direction at most that many degrees from an axis, evenly spread over the cap, not from far below."""
     for _ in range(40):
         d = rng.normal(size=3)
         d /= np.linalg.norm(d)
-        if d @ axis > np.cos(np.radians(most)) and d[1] > -0.3:
+        if d @ axis > np.cos(np.radians(max_degrees)) and d[1] > -0.3:
             return d
     return axis
 

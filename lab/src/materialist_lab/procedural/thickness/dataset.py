@@ -129,17 +129,17 @@ def draw_view(
         if view.inside.mean() >= LEAST_PIXELS:
             break
     paths, _, back = look(tracer, pose, view.rays)
-    there = np.isfinite(paths.first).reshape(SIDE, SIDE)
+    hit = np.isfinite(paths.first).reshape(SIDE, SIDE)
 
     def picture(x):
-        return np.where(there, x.reshape(SIDE, SIDE), 0).astype(np.float32)
+        return np.where(hit, x.reshape(SIDE, SIDE), 0).astype(np.float32)
 
     target = (
         np.stack([picture(paths.solid), picture(paths.material)])
         * np.linalg.norm(view.rays, axis=-1)
         / view.size
     )
-    back = np.moveaxis(np.where(there[..., None], back @ to_window(view.rays).T, 0), -1, 0)
+    back = np.moveaxis(np.where(hit[..., None], back @ to_window(view.rays).T, 0), -1, 0)
     target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
     return refraction_features(view).astype(np.float16), target
 
