@@ -102,6 +102,7 @@ class DataSetOptions(OperationOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        # The tracer ends 16 lanes together: see `tracer.VECTOR`.
         if self.size % 4:
             raise InputError(f"The size is {self.size}; give a multiple of 4.")
         if self.only and self.only not in KINDS:

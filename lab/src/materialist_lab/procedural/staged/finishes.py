@@ -81,9 +81,8 @@ def relief_of(rng: np.random.Generator, family: str, scale: float = 1.0) -> Reli
             size = scale * float(np.exp(rng.uniform(*np.log(choice.size))))
             stretch = np.exp(rng.normal(0, 0.25, 3)) if rng.random() < 0.5 else np.ones(3)
             x, y, z = (size * stretch).tolist()
-            return Relief(
-                str(rng.choice(choice.kinds.split())), (x, y, z), rng.uniform(*choice.slope)
-            )
+            kind = str(rng.choice(choice.kinds.split()))
+            return Relief(kind, (x, y, z), rng.uniform(*choice.slope))
     return None
 
 
@@ -102,11 +101,12 @@ class Style:
 
 
 def style(rng: np.random.Generator) -> Style:
+    """A random variant; all surfaces of one instance share it."""
     even = np.exp(rng.normal(0, 0.3)) if rng.random() < 0.6 else 1.0
     tint = np.exp(rng.normal(0, 0.25, 3)) if rng.random() < 0.3 else np.ones(3)
-    return Style(
-        even * tint, rng.normal(0, 0.08), rng.random() < 0.6, rng.choice([0.0, 1.0], p=[0.3, 0.7])
-    )
+    gloss = rng.normal(0, 0.08)
+    has_own_finish = rng.random() < 0.6
+    return Style(even * tint, gloss, has_own_finish, rng.choice([0.0, 1.0], p=[0.3, 0.7]))
 
 
 def finish(
@@ -120,10 +120,12 @@ def finish(
     family = look.family
     if family == "mirror":
         return m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
+    # The catalogue's shine is a hint only: most comes from the family's range.
     low, high = ROUGHNESS[family]
     rough = 0.75 * rng.uniform(low, high) + 0.25 * np.clip(look.shine, low, high) + variant.gloss
     rough = float(np.clip(rough, 0.06, 1.0))
     relief = relief_of(rng, family) if rng.random() < variant.bumpy else None
+    # --- A picture of the model's own, a finish of ours, or one colour ---
     if picture is not None:
         return replace(pictured(picture, variant.gain, rough), relief=relief)
     if variant.has_own_finish and rng.random() < 0.7:

@@ -31,6 +31,7 @@ THINGS = (
 def outside(rng: np.random.Generator, stock: Stock) -> World:
     """Things on open ground, at times before houses or a photograph, under a sky."""
     parts = [_ground(rng, stock)]
+    # --- Behind: houses, a wall, or open land, perhaps with a photograph as the backdrop ---
     behind = rng.random()
     at = -rng.uniform(6, 16)
     if behind < 0.45:
@@ -39,6 +40,7 @@ def outside(rng: np.random.Generator, stock: Stock) -> World:
     elif behind < 0.6:
         parts += placed(street.wall(rng, 40.0), (0, 0, at))
     parts += _standing(rng, stock, int(rng.integers(3, 13)), at + 0.5 if behind < 0.6 else -9.0)
+    # --- The camera: crouching now and then, else standing ---
     height = rng.uniform(0.5, 1.0) if rng.random() < 0.25 else rng.uniform(1.3, 2.2)
     eye = np.array([rng.normal() * 0.8, height, rng.uniform(4, 8)])
     target = np.array([rng.normal() * 1.2, rng.uniform(0.2, 1.6), -rng.uniform(1, 5)])

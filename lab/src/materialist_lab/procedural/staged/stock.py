@@ -32,6 +32,7 @@ class Stock:
     captures: tuple[Path, ...] = ()
 
     def _is_mine(self, name: str) -> bool:
+        # A checksum of the name: the same on every machine, whatever else is installed.
         return (crc32(name.encode()) % HELD_OUT_EVERY == 0) == self.held_out
 
     def _mine(self, names: tuple[str, ...]) -> list[str]:
@@ -42,6 +43,7 @@ class Stock:
     ) -> CatalogModel | None:
         """A model of one of the roles whose longest side is between two lengths, metres; None where there is none."""
         keys = [key for role in roles for key in self._mine(self.listing.models.get(role, ()))]
+        # A dozen tries: the sizes of all models are not known before they are loaded.
         for _ in range(12 if keys else 0):
             model = self.listing.model(keys[rng.integers(len(keys))])
             if low <= max(model.entry.size) <= high:
@@ -71,6 +73,7 @@ class Stock:
         if whole is None:
             return None
         h, w = whole.shape[:2]
+        # --- A random part of that shape, mirrored in half of the cases ---
         max_height = min(h, w / aspect)
         height = max_height * rng.uniform(min_share, 1.0)
         width = height * aspect
@@ -79,11 +82,11 @@ class Stock:
         part = whole[int(top) : int(top + height) + 1, int(left) : int(left + width) + 1]
         if rng.random() < 0.5:
             part = part[:, ::-1]
+        # --- Its size; averaged where it shrinks ---
         scale = side / max(part.shape[:2])
         size = max(4, round(part.shape[1] * scale)), max(4, round(part.shape[0] * scale))
-        return cv2.resize(
-            part, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-        )
+        interpolation = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+        return cv2.resize(part, size, interpolation=interpolation)
 
     def printed(self, rng: np.random.Generator, aspect: float) -> ColourPicture | None:
         """A part of a photograph as a picture of that width over height."""
