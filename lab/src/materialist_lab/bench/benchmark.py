@@ -53,12 +53,14 @@ class Benchmark(OperationOptions, ABC):
         Raises InputError where there are no rows.
         """
         setup(self.device)
+        # --- The empty report: its text is the module's docstring ---
         title, _, note = inspect.cleandoc(
             sys.modules[type(self).__module__].__doc__ or ""
         ).partition("\n\n")
         settings = {name: None if value == "" else value for name, value in asdict(self).items()}
         settings["data"] = None if data is None else data.name
         report = Report(title, note, settings, self.columns, self.plotted)
+        # --- Rows as they come in; written at once, then every few seconds ---
         written = -self.write_every
         try:
             for row in track(
@@ -68,6 +70,7 @@ class Benchmark(OperationOptions, ABC):
                 if time.monotonic() > written + self.write_every:
                     write(report, output)
                     written = time.monotonic()
+        # A stopped run keeps what it measured.
         finally:
             if report.rows:
                 write(report, output)
@@ -77,6 +80,7 @@ class Benchmark(OperationOptions, ABC):
 
 def names(called: str, text: str, known: Collection[str] = ()) -> list[str]:
     """The names of a list with commas, each once. Raises InputError for none, or for one that is not `known`."""
+    # A dict keeps the order and drops repetitions.
     chosen = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
     if not chosen:
         raise InputError(f"The {called} is empty; name at least one.")
@@ -106,6 +110,7 @@ def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -
         command, capture_output=True, text=True, env={**os.environ, **(environment or {})}
     )
     if done.returncode:
+        # A process that the kernel kills for memory says nothing.
         said = (
             f"{done.stdout[-300:]}{done.stderr[-300:]}".strip()
             or "nothing; it may have run out of memory"
@@ -121,6 +126,7 @@ def timed(work: Callable[..., Any], *args: Any, **kwargs: Any) -> tuple[Any, dic
     Other programs hardly change the latter.
     """
 
+    # Children count once they ended, which is what `os.times` has.
     def spent() -> tuple[float, float]:
         return time.perf_counter(), time.process_time() + sum(os.times()[2:4])
 

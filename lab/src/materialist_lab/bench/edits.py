@@ -188,7 +188,8 @@ def sample_and_light(
     scene: int, view: int, light: int, **options: Any
 ) -> tuple[SyntheticSample, Array]:
     """The sample of these numbers, and the next light [h, 2h, 3] of its view; `options` as of `make_sample`."""
-    sample, other = (make_sample(scene, view, k, **options) for k in (light, light + 1))
+    sample = make_sample(scene, view, light, **options)
+    other = make_sample(scene, view, light + 1, **options)
     return sample, other.envmap
 
 

@@ -79,11 +79,13 @@ class MaterialsBench(Benchmark):
             raise InputError(
                 "There is nothing to score; give --data DIR: materialist train data --split heldout -o DIR."
             )
+        # Predictors are loaded once for all samples.
         sources = {
             spec: get_predictor(spec, device=self.device)
             for spec in names("predictor", self.predictor)
         }
         for k, (name, photo, truth) in enumerate(self.samples(data, report)):
+            # Maps that the data set lacks are filled with something: no figures of them.
             absent = [name for name in MAPS if truth.sources and name not in truth.sources]
             report.settings.update({f"no true {which}": True for which in absent})
             predictions = []
@@ -102,6 +104,7 @@ class MaterialsBench(Benchmark):
 
     def samples(self, data: Path, report: Report) -> Iterator[tuple[str, Photo, Prediction]]:
         """(name, photo, truth) of the samples; see the module for what `data` may be. Raises InputError."""
+        # --- Photographs with maps beside them, or a data set ---
         folders = photo_folders(data)
         if folders:
             for folder in spread(folders, self.limit):
@@ -112,6 +115,7 @@ class MaterialsBench(Benchmark):
             report.settings["left out"] = " ".join(source.notes) or None
         for index in spread(list(range(len(source))), self.limit):
             sample = source.read(index)
+            # Procedural pictures are clean; InteriorVerse's are left as they are.
             spoilt = self.photographic and isinstance(source, SampleFolder)
             seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
             yield f"{index:07d}", photo_of(seen), sample.truth()
@@ -121,6 +125,7 @@ def photo_of(sample: Sample) -> Photo:
     """The picture of a sample as an ordinary photograph, clipped to [0, 1], with its true field of view."""
     linear = np.clip(sample.image, 0, 1).astype(np.float32)
     height, width = linear.shape[:2]
+    # Rays go through pixel centres: the half width lies half a pixel further out.
     fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
     return Photo(linear, Camera(width, height, float(fov)), original=linear, fov_source="option")
 
@@ -156,6 +161,7 @@ def _pool(rows: list[Row]) -> None:
     """Give all rows the pooled PSNRs of their method, so that the table of means shows them."""
     for method in {row["method"] for row in rows}:
         of_method = [row for row in rows if row["method"] == method]
+        # Pooled: the mean of squared errors over all samples, then one PSNR of it.
         means = summary(
             [
                 {key: value for key, value in row.items() if key.endswith("_mse")}

@@ -122,6 +122,7 @@ class PhotoAloneBench(Benchmark):
             "device": self.device,
         }
 
+        # Every inversion with its cost and how far its maps are from the prior's.
         def inverted(**options: Any) -> tuple[Scene, dict[str, float]]:
             result, cost = timed(pipeline.invert, sample.photo, **shared, **options)
             left = {

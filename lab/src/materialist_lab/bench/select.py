@@ -61,11 +61,13 @@ class SelectBench(Benchmark):
     spp: int = option(100, "Samples a pixel of the pictures.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        # A missing folder ends the bench before anything slow.
         if data is not None:
             arrangement(0, seed=self.seed, data=data)  # that there are meshes
         predictor = BundledPredictor()
         if data is not None:
             yield from self._outlined(data / "photos", predictor)
+        # --- Synthetic pictures, procedural and of captured meshes, with both kinds of maps ---
         for folder in (None,) if data is None else (None, data):
             for k in range(self.scenes):
                 sample = make_sample(
@@ -91,6 +93,7 @@ class SelectBench(Benchmark):
                 continue
             photo = read_photo(str(folder / name), size=self.photo_size)
             maps = predictor.predict(photo)
+            # Selection uses the maps alone: any light will do.
             scene = scene_of(photo, maps, np.ones((16, 32, 3), np.float32))
             things = clickable(objects, maps.depth.shape)
             for row in self._selected(scene, things, k):
@@ -105,6 +108,7 @@ class SelectBench(Benchmark):
     ) -> Iterator[Row]:
         """A row a click, and a box, by every method; `things` are masks and where in them clicks may lie."""
         for method, (j, (mask, place)) in product(METHODS, enumerate(things)):
+            # What is hardly seen cannot be meant.
             if mask.sum() < self.smallest:
                 continue
             for k, click in enumerate(
@@ -129,6 +133,7 @@ def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
     scale = max(shape) / 512
     for inside, polygons in ((True, [thing["outline"]]), (False, thing.get("holes", []))):
         for corners in polygons:
+            # Outlines are in pixels of 512, whose centres are halves.
             columns, rows = np.array(corners, float).T * scale - 0.5
             mask[polygon(rows, columns, shape)] = inside
     return mask
@@ -138,6 +143,7 @@ def clickable(
     objects: Sequence[dict[str, Any]], shape: tuple[int, ...]
 ) -> list[tuple[Array, Array]]:
     """Masks of objects, and where in them a click means them: not on a `part`, which is an object of its own."""
+    # A click on a part means the part, not the whole that it belongs to.
     masks = [drawn(thing, shape) for thing in objects]
     parts = [mask for thing, mask in zip(objects, masks, strict=True) if thing.get("part")]
     other = np.logical_or.reduce([np.zeros(shape, bool), *parts])
@@ -152,6 +158,7 @@ def clicks(
 ) -> list[tuple[int, int]]:
     """Two (column, row) in a mask [H, W] bool: its middle, and any place `inside` pixels from its border or more; both
     `usable` [H, W] bool."""
+    # Padded: the border of the picture is a border of the object.
     away = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
     places = [np.argwhere(away == away.max()), np.argwhere((away > inside) & usable)]
     chosen = [places[0][0], *([places[1][rng.integers(len(places[1]))]] if len(places[1]) else [])]

@@ -51,9 +51,11 @@ class WhdrBench(Benchmark):
             raise InputError(
                 "This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json."
             )
+        # --- Pictures with judgements ---
         pairs = find(data)[:: self.every]
         pairs = pairs[: self.limit] if self.limit else pairs
         report.settings["pictures"] = len(pairs)
+        # --- Baselines and predictors ---
         sources: dict[str, Any] = dict.fromkeys(BASELINES)
         sources |= {
             spec: get_predictor(spec, device=self.device)
@@ -108,6 +110,7 @@ def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple
     Judgements count when both points are opaque, the answer is '1', '2' or 'E', and its score is positive.
     """
     height, width = albedo.shape[:2]
+    # --- Weighted disagreement over all judgements that count ---
     points = {p["id"]: p for p in judgements["intrinsic_points"]}
     wrong = total = 0.0
     count = 0
@@ -122,11 +125,13 @@ def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple
             or not all(p["opaque"] for p in pair)
         ):
             continue
+        # Points are shares of width and height.
         places = [
             (min(int(p["y"] * height), height - 1), min(int(p["x"] * width), width - 1))
             for p in pair
         ]
         first, second = (max(1e-10, float(albedo[place].mean())) for place in places)
+        # '1' says that the first point is darker.
         said = "1" if second / first > 1 + delta else "2" if first / second > 1 + delta else "E"
         wrong += weight * (said != answer)
         total += weight

@@ -197,7 +197,7 @@ def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
     # About what comes in through the windows: their area times a radiance of 1, halved.
     through = 2.0
     if portals:
-        through = sum(np.linalg.norm(np.cross(p.right, p.up)) for p in portals) / 2
+        through = float(sum(np.linalg.norm(np.cross(p.right, p.up)) for p in portals)) / 2
     power = through * float(np.exp(rng.uniform(np.log(0.08), np.log(8.0))))
     # Evening.
     if portals and rng.random() < 0.12:

@@ -64,6 +64,7 @@ class MapsTask(Task):
 
         Of a set that is too small to hold any out, samples that it learns from are scored, and `of` says so.
         """
+        # The same samples and the same camera noise at every scoring.
         origin, samples = held_out(self.source, self.score_samples)
         rows = []
         strips = []
@@ -80,6 +81,7 @@ class MapsTask(Task):
         shown = {
             name: value
             for name, value in figures.items()
+            # Those are for pooling over a set; a log needs the rest.
             if not name.endswith(("_mse", "_raw", "_scale"))
         }
         return {"of": origin, **shown}
@@ -87,6 +89,7 @@ class MapsTask(Task):
 
 def trained_on(source: Source) -> list[int]:
     """Places of the samples to train on. Their own numbers say which are held out; none of a set that is too small."""
+    # By the sample's own number, so that a growing set keeps its held-out samples.
     count = len(source)
     return [
         k for k in range(count) if count < HELD_OUT_EVERY or (source.number(k) + 1) % HELD_OUT_EVERY
@@ -100,6 +103,7 @@ def held_out(source: Source, max_samples: int) -> tuple[str, list[Sample]]:
     are the first ones that it learns from. Those that cannot be read are left out.
     """
     origin = HELD_OUT
+    # --- Which ones ---
     validation = source.validation()
     if validation is not None:
         source = validation
@@ -107,6 +111,7 @@ def held_out(source: Source, max_samples: int) -> tuple[str, list[Sample]]:
     elif not (chosen := sorted(set(range(len(source))) - set(trained_on(source)))):
         origin = TRAINED_ON
         chosen = list(range(min(len(source), max_samples)))
+    # --- Read them, evenly spread ---
     samples = []
     for k in np.unique(np.linspace(0, len(chosen) - 1, max_samples).astype(int)):
         with suppress(InputError):

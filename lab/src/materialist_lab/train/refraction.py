@@ -99,10 +99,12 @@ class RefractionTask(Task):
         predicted = network(batch["maps"]).float()
         target = batch["target"]
         weight = ThicknessLoss()
+        # Where the predicted mask and the truth agree that there is the object.
         inside = batch["maps"][:, MASK] * (target[:, 0] > 0)
         count = inside.sum((1, 2)).clamp(min=1)
         terms = {}
         for k, (name, share) in enumerate((("solid", 1.0), ("hollow", weight.hollow))):
+            # Absolute errors relative to the mean, and errors of logarithms, which thin parts need.
             a = predicted[:, k]
             b = target[:, k]
             soft = weight.soft[k]

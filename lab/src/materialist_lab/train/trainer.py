@@ -60,6 +60,7 @@ class Trainer:
 
         Raises OutputError when FOLDER holds a run and `resume` is off, InputError when that run is of another network.
         """
+        # --- The run in the folder, if it is resumed ---
         self.task = task
         self.recipe = task.recipe
         self.folder = folder
@@ -69,11 +70,13 @@ class Trainer:
         state = checkpoint.load(folder, task.kind, resume=resume, device=self.device)
         torch.manual_seed(self.options.seed)
         torch.backends.cudnn.benchmark = self.device.type == "cuda"
+        # --- The network, and the average of its weights ---
         self.network = task.network().to(self.device)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False).eval()
         self._learnt = [p for p in self.network.parameters() if p.requires_grad]
         pairs = zip(self.averaged.parameters(), self.network.parameters(), strict=True)
         self._averages = [mine for mine, theirs in pairs if theirs.requires_grad]
+        # --- The optimiser: biases and scales of normalisation are not decayed ---
         decayed = [p for p in self._learnt if p.ndim > 1]
         others = [p for p in self._learnt if p.ndim <= 1]
         self.optimizer = torch.optim.AdamW(
@@ -85,6 +88,7 @@ class Trainer:
             betas=self.recipe.betas,
             fused=True,
         )
+        # --- Where the run stands ---
         self.schedule = TrainingSchedule(budget, state and state["schedule"])
         self.epoch = 1
         self.batch = 0
@@ -101,6 +105,7 @@ class Trainer:
 
         Always leaves a checkpoint and the averaged weights.
         """
+        # The checkpoint is written whatever ends the run.
         with stop_requests() as stop:
             try:
                 self._train(stop, progress)
@@ -119,6 +124,7 @@ class Trainer:
                 losses[name] = losses.get(name, 0.0) + value
             count += 1
             done = self.schedule.done or bool(stop)
+            # --- A point of the curve ---
             if self.schedule.step % self.options.report_steps == 0 or done:
                 self._report(losses, count, time.monotonic() - since, progress)
                 losses = {}
@@ -126,6 +132,7 @@ class Trainer:
                 since = time.monotonic()
             if done:
                 break
+            # --- Scores and a checkpoint now and then ---
             if time.monotonic() - saved > self.options.checkpoint_seconds:
                 start = time.monotonic()
                 self.score()
@@ -134,6 +141,7 @@ class Trainer:
                 since += saved - start  # the curve tells the speed of training alone
 
     def save(self) -> None:
+        # --- Weights to predict with, and how they came about ---
         schedule = self.schedule.as_dict()
         facts = {
             "step": schedule["step"],
@@ -144,6 +152,7 @@ class Trainer:
             "scores": self.last_scores,
         }
         self.averaged.save(self.folder / checkpoint.WEIGHTS, facts)
+        # --- Everything that going on needs ---
         state = {
             "kind": self.task.kind,
             "architecture": self.network.architecture.as_dict(),
@@ -192,6 +201,7 @@ class Trainer:
             for batch in batches:
                 self.batch += 1
                 yield batch
+                # The side grows within a pass: go on with the rest of it at the new side.
                 if self.recipe.side_at(self.schedule.progress) != side:
                     break
             else:
@@ -201,12 +211,14 @@ class Trainer:
 
     def _step(self, batch: Batch) -> dict[str, float]:
         """One step of the optimiser; returns the terms of the loss."""
+        # --- Forward ---
         rate = self.recipe.rate * self.schedule.rate(self.recipe.warm_up, self.recipe.last_rate)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.recipe.bfloat16):
             terms = self.task.losses(self.network, batch)
         total: Tensor = sum(terms.values(), torch.zeros((), device=self.device))
+        # --- Backward; a gradient that is not finite changes nothing ---
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
         norm = nn.utils.clip_grad_norm_(self._learnt, self.recipe.clip)
@@ -226,6 +238,7 @@ class Trainer:
             else 0.0
         )
         torch._foreach_lerp_(self._averages, self._learnt, 1 - decay)  # type: ignore[arg-type]
+        # Statistics of normalisation are averages already.
         for mine, theirs in zip(self.averaged.buffers(), self.network.buffers(), strict=True):
             mine.copy_(theirs)
 
@@ -246,6 +259,7 @@ class Trainer:
         progress("train", round(1000 * self.schedule.progress), 1000)
 
     def _restore(self, state: dict[str, Any]) -> None:
+        # Loading would fail in the middle, with a message about tensors.
         if state["architecture"] != self.network.architecture.as_dict():
             raise InputError(
                 f"{self.folder} holds a run of another network; resume it with the options it began with."
