@@ -7,7 +7,7 @@ import pytest
 
 from materialist import metrics
 from materialist.camera import project
-from materialist_lab.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
+from materialist_lab.bench.edits import KINDS, MIN_SHIFT, SHIFTS, edits, true_scene
 from materialist_lab.procedural.synthetic import make_sample
 
 
@@ -67,7 +67,7 @@ def test_a_material_edit_of_the_scene_is_the_true_one(cases):
         if kind in SHIFTS:
             name, by = SHIFTS[kind]
             moved = getattr(truth, name)[inside] - getattr(sample.truth.materials, name)[inside]
-            assert (moved * np.sign(by) >= ROOM - 1e-6).all() and (
+            assert (moved * np.sign(by) >= MIN_SHIFT - 1e-6).all() and (
                 np.abs(moved) <= abs(by) + 1e-6
             ).all()
 

@@ -58,6 +58,7 @@ class Background:
             return items
         geometry = build_geometry(depth, self.maps.normal, camera)
         for k in np.unique(geometry.mesh.face_plane):
+            # Planes reach beyond what is seen: there they have their mean albedo.
             mean = (
                 np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3))
                 if k >= 0
@@ -73,6 +74,7 @@ class Background:
         items = self.surfaces(room.camera)
         if not items:
             return self
+        # --- One multiplicative step: albedo times picture over rendering ---
         seen = denoised(
             staged(room, items).render(envmap, PROTOCOL.albedo_spp), old.albedo, self.maps.normal
         )
@@ -88,12 +90,14 @@ def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
 
     Before nothing but the light, where it refuses, the same patches.
     """
+    # --- A room: the object is removed from it ---
     if stage.room.items:
         photo = Background(scene.photo.linear, scene.prior).fitted(scene.envmap, stage.room)
         removed = remove(replace(scene, materials=photo.maps.materials), stage.mask)
         return Background(
             removed.photo.linear, Prediction(removed.materials, removed.normal, removed.depth)
         )
+    # --- The light alone: patches of what is around the object ---
     hole = grown(stage.mask, 1)
     maps = stage.room.truth
     return Background(patched(scene.photo.linear, hole, ~hole, np.zeros(hole.shape, int)), maps)
@@ -108,6 +112,7 @@ def two_interface(
     """
     scene = case.scene
     mask = case.stage.mask
+    # "found" takes the normals that are given, "same" those of the front.
     beyond = interfaces.Backdrop(behind.picture, behind.maps.depth, scene.envmap)
     material = Glass(ior=case.ior, model="two-interface", back="same" if papers_back else "found")
     return interfaces.two_interface(
@@ -126,6 +131,7 @@ def closed(case: Case, thickness: Thickness, behind: Background) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
     scene = case.scene
     mask = case.stage.mask
+    # A solid of revolution is whole already; else front and back are closed at the outline.
     whole = thickness.revolution
     if whole is not None:
         return before(case, whole.body(scene.camera), behind)
@@ -145,8 +151,10 @@ def before(case: Case, body: Any, behind: Background) -> Array:
     """
     scene = case.scene
     mask = case.stage.mask
+    # The true renderer, so that only the shape differs from the truth.
     things = [*behind.surfaces(scene.camera), replace(case.stage.item, solid=body, ior=case.ior)]
     picture = staged(case.stage.room, things).render(scene.envmap, case.spp)
+    # Only the object is denoised: its background is that of the photo.
     box = window(mask)
     seen = np.ascontiguousarray(picture[box])
     normal = np.ascontiguousarray(scene.normal[box])

@@ -40,6 +40,7 @@ class GpuBench(Benchmark):
     runs: int = option(50, "Forward passes; a tenth of it more do not count.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        # Both libraries must see it: an inversion uses both.
         usable = usable_gpus() and torch.cuda.is_available()
         report.settings["card"] = (
             torch.cuda.get_device_name() if usable else "none that Mitsuba and PyTorch can use"
@@ -50,6 +51,7 @@ class GpuBench(Benchmark):
                 for k, s in self._measured(report)
             )
             return
+        # --- Each device in a process of its own ---
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as folder:
             for device in ("cpu", "cuda")[: 1 + usable]:  # a process keeps its device
                 options = asdict(replace(self, device=device))

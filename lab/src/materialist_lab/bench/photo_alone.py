@@ -88,6 +88,7 @@ class PhotoAloneBench(Benchmark):
         for scene in range(self.scenes):
             sample, light = unseen_sample(scene, data, self.size)
             scenes = {}
+            # --- Inversions, and how far their maps are from the truth ---
             for name, fitted, cost in self._fitted(sample):
                 scenes[name] = fitted
                 if name == "fitted":
@@ -109,6 +110,7 @@ class PhotoAloneBench(Benchmark):
                     "light": light_error(fitted.envmap, sample.envmap),
                     **cost,
                 }
+            # --- Edits of each of them against the edited truth ---
             before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=5)
             for edit in edits(sample, light, kinds):
                 for row in self._compared(edit, sample, before, scenes, report):
@@ -136,6 +138,7 @@ class PhotoAloneBench(Benchmark):
                 "rerender": metrics.psnr(result.rerender, sample.photo.linear),
             }
 
+        # --- From the photo alone, and by the paper's algorithm ---
         scene, cost = inverted(predictor=self.predictor)
         yield "fitted", scene, cost
         if self.paper:
@@ -147,8 +150,11 @@ class PhotoAloneBench(Benchmark):
             )
         if not self.decompose:
             return
+        # --- With a part of the truth given: what that part costs ---
         for known in GIVEN:
             if known == "light":
+                # Light times albedo is what the photo fixes: the true light fits the albedo's
+                # scale.
                 scale = best_scale(
                     sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0
                 )
@@ -171,6 +177,7 @@ class PhotoAloneBench(Benchmark):
     ) -> Iterator[Row]:
         """Rows of one edit, and its strip of the sheet; `before` is the true picture of the photo."""
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
+        # The true picture tells where an edit shows.
         region = edit.region(before, after), edit.traces(before, after)
         shown = [sample.photo.linear, after]
         yield {
@@ -181,10 +188,12 @@ class PhotoAloneBench(Benchmark):
             try:
                 edited = edit.change(scene)
                 picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
+            # An edit that refuses counts as the photo left alone.
             except InputError:
                 edited = scene
                 picture = sample.photo.linear
             if (edit.kind, name) == ("insert", "fitted"):
+                # The baseline: shadows in screen space, without a mesh.
                 photo = sample.photo.linear
                 flat = (
                     photo
@@ -201,6 +210,7 @@ class PhotoAloneBench(Benchmark):
     def _scores(
         self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array
     ) -> dict[str, float]:
+        # Albedo and light share a factor that the photo does not tell.
         if edit.kind in SCALED:
             figures = {"inside": aligned_psnr(picture, truth, inside)}
         else:
@@ -239,6 +249,7 @@ def map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:
 
 def light_error(estimate: Array, truth: Array) -> float:
     """Relative error of the spherical harmonics of a light [h, 2h, 3], after the factor that makes it least."""
+    # argmin_s |s a - b|^2 = a . b / a . a.
     a = metrics.sh_coefficients(estimate)
     b = metrics.sh_coefficients(truth)
     return metrics.sh_error_relative(estimate * (np.sum(a * b) / max(np.sum(a * a), 1e-12)), truth)

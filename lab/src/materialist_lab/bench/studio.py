@@ -196,9 +196,9 @@ def slider_moves(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tup
     rng = np.random.default_rng(seed)
     last = dict(stand)
     for k in range(moves):
-        # A smaller move may leave the picture as it was, and the wait for another would not end.
         name = list(_RANGES)[k % len(_RANGES)]
         low, high = _RANGES[name]
+        # A smaller move may leave the picture as it was, and the wait for another would not end.
         while abs((value := round(float(rng.uniform(low, high)), 2)) - last[name]) < 0.05 * (
             high - low
         ):

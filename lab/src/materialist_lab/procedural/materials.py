@@ -158,18 +158,18 @@ class Finish:
     """Kinds of tile, separated by spaces; one named twice is drawn twice as often."""
     base: tuple[Shade, ...] = ANY_COLOUR
     second: tuple[float, float, float] = (0, 1, 1)
-    """Probability that the second colour is the first one times a factor, from and to; else it is any colour."""
+    """(probability, from, to): with it the second colour is the first one times a factor; otherwise any colour."""
     third: tuple[float, float, float] | tuple[Shade, ...] = (0, 1, 1)
-    """The same for the third colour, or its own ranges."""
+    """The same for the third colour, or ranges that it is drawn from."""
     grain: Range = (0, 0.1)
     roughness: tuple[tuple[float, float, float], ...] = ((1, 0.6, 0.6),)
     """(share, from, to) at 0 of the tile's roughness channel."""
     rougher: Range = (0, 0)
-    """How much larger it is at 1 of that channel."""
+    """What is added to the roughness at 1 of that channel, from and to."""
     repeat: Range = (0.3, 1)
     """Metres that a tile covers, log-uniform."""
     stretch: Range = (1, 1)
-    """Factor on that along u."""
+    """Factor on the size along u, from and to."""
     quarter: bool = False
     """Whether the tile is turned by 90 degrees half of the time."""
 

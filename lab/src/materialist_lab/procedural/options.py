@@ -14,9 +14,9 @@ REAL_KINDS = ("furnished", "laid", "single", "outside")
 """Kinds of scenes of real things."""
 KINDS = (*TOY_KINDS, *REAL_KINDS)
 REAL_SHARE = 0.75
-"""Share of the latter where nothing else is said and their packages are installed."""
+"""Default share of scenes of real things, where their packages are installed."""
 SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
-"""What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
+"""Split -> the numbers it adds to the random seed of a sample: no two splits show the same scenes."""
 HELD_OUT = frozenset(
     (
         "binoculars",
@@ -34,7 +34,7 @@ HELD_OUT = frozenset(
         "venice_sunset",
     )
 )
-"""Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
+"""Stems of meshes and HDR captures. No training set may use them; the split 'heldout' uses nothing else."""
 
 
 def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[Path]:
@@ -129,6 +129,7 @@ class DataSetOptions(OperationOptions):
     @property
     def real_share(self) -> float:
         """Share of pictures of real things."""
+        # One kind alone is wholly of the one or of the other.
         if self.only:
             return float(self.only in REAL_KINDS)
         default = REAL_SHARE if self.archives else 0.0

@@ -24,11 +24,11 @@ from materialist_lab.procedural.world import World
 DENOISING = "balanced"
 """Quality of the filter: less than half of the time of 'high'."""
 LIGHT_SPP = 128
-"""Rays of each of its texels."""
+"""Rays per texel of the stored light."""
 LIGHT_HIDDEN = 0.1
-"""Weight, in it, of the sky behind visible surfaces, where there is a sky."""
+"""Weight of the sky behind visible surfaces in the stored light, for kinds of worlds under an open sky."""
 ATTEMPTS = 6
-"""Cameras that see too little are thrown away at most that often."""
+"""Largest number of worlds that are drawn until a camera sees enough; the last one is taken as it is."""
 MAKERS: dict[str, tuple[Callable[..., World], float]] = {
     "room": (rooms.room, 0.38),
     "table": (rooms.table_top, 0.22),
@@ -42,11 +42,11 @@ REAL_MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], floa
     "single": (single, 0.35),
     "outside": (outside, 0.1),
 }
-"""The same of the pictures of real things."""
+"""Kind of scene -> its maker, and its share of the pictures of real things."""
 OPEN_KINDS = ("outdoor", "still life", "single", "outside")
 """Kinds of worlds under an open sky."""
 SINGLE_COVERS = (0.08, 0.92)
-"""Least and most of a picture that a single thing may cover."""
+"""Smallest and largest share of a picture that a single thing may cover."""
 
 
 def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:

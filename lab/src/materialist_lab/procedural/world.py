@@ -69,6 +69,7 @@ class World:
 
 def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewpoint:
     """The camera at `position` [3] that looks at `target` [3], rolled by `roll` radians."""
+    # A camera looks along its -Z.
     back = np.asarray(position, float) - target
     upright = turn_upright(back / np.linalg.norm(back))
     # About the axis of the view.

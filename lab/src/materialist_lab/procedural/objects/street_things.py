@@ -13,6 +13,7 @@ def house(rng) -> Parts:
     trim = m.one_of(rng, m.stone, m.wall_paint)
     x = rng.uniform(-0.35, 0.35) * w
     front = m.facade(rng) if rng.random() < 0.8 else m.brick(rng)
+    # --- The block, its plinth, ledges at the storeys and a door ---
     parts = [block((w, h, d), (0, 0, -d / 2), front)]
     if rng.random() < 0.7:
         parts.append(block((w + 0.1, rng.uniform(0.4, 1.0), 0.12), (0, 0, 0.03), trim))
@@ -22,6 +23,7 @@ def house(rng) -> Parts:
         block((1.3, 2.4, 0.16), (x, 0, 0.03), trim),
         block((1.0, 2.2, 0.2), (x, 0, 0.03), m.wood(rng)),
     ]
+    # --- A flat roof, or two slopes ---
     if rng.random() < 0.4:
         return [*parts, block((w + 0.6, 0.3, d + 0.6), (0, h, -d / 2), trim)]
     rise = rng.uniform(1.5, 3.5)
@@ -67,6 +69,7 @@ def car(rng) -> Parts:
 
 def tree(rng, size: float) -> Parts:
     """A tree: trunk, boughs, and a crown of leaves or of soft masses; bare in winter."""
+    # --- Trunk and boughs ---
     trunk = m.raw_wood(rng)
     leaf = m.foliage(rng)
     kind = rng.random()
@@ -82,6 +85,7 @@ def tree(rng, size: float) -> Parts:
         middle = (start + end) / 2 + [0, 0.06 * size, 0]
         parts.append(rod([start, middle, end], size * np.array([0.016, 0.01, 0.004]), trunk, 6))
         tips += [middle, end]
+    # --- The crown: leaves around the tips, soft masses, or nothing ---
     if kind < 0.55:
         n = int(rng.integers(400, 1500))
         length = size * rng.uniform(0.04, 0.09)
@@ -104,6 +108,7 @@ def bush(rng, size: float) -> Parts:
     leaf = m.foliage(rng)
     n = int(rng.integers(150, 500))
     length = size * rng.uniform(0.12, 0.25)
+    # A dark core behind the leaves: a bush is not transparent.
     core = s.blob(rng, size * np.array([1.0, 0.8, 1.0]), 0.2, 32)
     roots = core.vertices[rng.integers(len(core.vertices), size=n)] * 0.95
     leaves = s.leaves(rng, roots, rng.normal((0, 0.4, 0), 1, (n, 3)), length, 0.4 * length)
@@ -119,6 +124,7 @@ def person(rng) -> Parts:
     parts = []
     hip = 0.5 * tall
     neck = 0.84 * tall
+    # A leg and an arm on each side.
     for x in (-0.09, 0.09):
         foot, reach = rng.normal(size=2) * 0.12
         leg = [(x, 0.03, foot), (x, hip / 2, foot * 0.3), (x, hip, 0)]

@@ -117,6 +117,7 @@ def finish(
     stock: Stock,
 ) -> Material:
     """The material of one surface of a model."""
+    # --- Roughness and relief ---
     family = look.family
     if family == "mirror":
         return m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
@@ -143,6 +144,7 @@ def finish(
 
 def pictured(picture: ColourPicture, gain: Array, rough: float, metallic: float = 0.0) -> Material:
     """A material whose picture lies by the texture coordinates of a model: v points up."""
+    # The picture is the albedo; the colour is a factor on it.
     colour = _triple(np.clip(gain, 0.3, 1.4))
     return Material(
         0,
@@ -170,6 +172,7 @@ def _own_finish(rng: np.random.Generator, family: str, stock: Stock) -> Material
     """A finish of ours, or a picture from another model; None for families that stay as they are."""
     if family not in OUR_FINISHES or (family == "other" and rng.random() < 0.6):
         return None
+    # A picture of the same family, of another model.
     if rng.random() < 0.5 and family != "ceramic":
         picture = stock.texture(rng, family)
         if picture is not None:
@@ -181,10 +184,12 @@ def _own_finish(rng: np.random.Generator, family: str, stock: Stock) -> Material
 
 def _metal(rng: np.random.Generator, colour: Array) -> tuple[float, Array]:
     """(metallic, colour) of what the catalogue calls a metal: painted where its colour is none of a metal."""
+    # No metal is green or blue: that is paint.
     saturation = float(np.ptp(colour) / max(colour.max(), 1e-6))
     warm = colour[0] >= colour[1] >= colour[2]
     if (saturation > 0.35 and not warm) or rng.random() < 0.12:
         return 0.0, colour
+    # Grey says metal, not which: silver, steel or iron.
     if saturation < 0.2:
         colour = np.array(m.METALS[rng.choice([0, 1, 1, 5])]) * rng.uniform(0.8, 1.0)
     return 1.0, np.clip(colour / colour.max() * rng.uniform(0.5, 0.95), 0.02, 0.95)

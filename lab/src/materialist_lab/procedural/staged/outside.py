@@ -51,6 +51,7 @@ def outside(rng: np.random.Generator, stock: Stock) -> World:
 
 
 def _ground(rng: np.random.Generator, stock: Stock) -> ScenePart:
+    # A photographed ground at times, else one of ours.
     sheet = s.sheet((-GROUND, 0, GROUND), (2 * GROUND, 0, 0), (0, 0, -2 * GROUND), 12)
     picture = stock.texture(rng, "stone") if rng.random() < 0.3 else None
     if picture is not None:

@@ -14,11 +14,11 @@ from materialist_lab.procedural.materials import ColourPicture
 from materialist_lab.procedural.objects.things import Meshes
 
 SMALLEST_CROP = 0.2
-"""Of a photograph's shorter side."""
+"""Smallest height of a crop as a share of the largest one that fits into the photograph."""
 HELD_OUT_EVERY = 10
 """One model and photograph in so many is never trained on."""
-FEWEST_TEXTURES = 4
-"""Of a family, or all its things would look alike."""
+MIN_TEXTURES = 4
+"""Pictures that a family must have: with fewer, all its things would look alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,10 +52,11 @@ class Stock:
 
     def texture(self, rng: np.random.Generator, family: str) -> ColourPicture | None:
         """A picture that repeats, of a surface of that family of materials; None where there is none."""
+        # Only of models that this stock may use.
         places = [
             place for place in self.listing.textures.get(family, ()) if self._is_mine(place[0])
         ]
-        if len(places) < FEWEST_TEXTURES:
+        if len(places) < MIN_TEXTURES:
             return None
         key, solid = places[rng.integers(len(places))]
         return self.listing.model(key).pictures[solid]
