@@ -76,6 +76,7 @@ def test_a_sample_depends_on_seed_and_number_alone(data_set, options, tmp_path):
 
 
 def test_resume_makes_what_is_missing_and_nothing_else(data_set, options):
+    # One sample is missing, and a run that was killed left half of another.
     gone = sample_path(data_set, 2)
     kept = sample_path(data_set, 3)
     before = arrays(data_set, 2)
@@ -93,6 +94,7 @@ def test_other_sets_are_not_gone_on_with(data_set, options, tmp_path):
         produce(data_set, options, count=6)
     with pytest.raises(InputError, match="seed 11, not 12"):
         produce(data_set, replace(options, seed=12), count=6, resume=True)
+    # A set of an earlier version of the program.
     (tmp_path / "set").mkdir()
     facts = identity(data_set)
     assert (facts["format"], facts["size"], facts["seed"], facts["options"]["spp"]) == (
@@ -151,6 +153,7 @@ FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 )
 def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
     (tmp_path / "meshes").mkdir()
+    # A whole mesh is read, so that the refusal is about the other one.
     (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
     assert len(shapes.load(tmp_path / "meshes" / "chair.ply").faces) == 1
     (tmp_path / "meshes" / "vase.ply").write_text(text)
@@ -194,6 +197,7 @@ def test_a_killed_run_leaves_whole_samples_only(tmp_path):
         "0",
     ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    # Killed once there are two samples, without a chance to clean up.
     deadline = time.monotonic() + 120
     while (
         len(list((tmp_path / "d" / "samples").glob("[0-9]*.npz"))) < 2
@@ -231,6 +235,7 @@ def test_the_command_makes_resumes_and_draws(done, refused, tmp_path):
         0,
         "--count",
     )
+    # The second call makes the one sample that is missing.
     for count, resume in ((1, ()), (2, ("--resume",))):
         report = done(*make, count, *resume)
         assert (report["rendered"], report["existing"]) == (1, count - 1)
