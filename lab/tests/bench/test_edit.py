@@ -29,6 +29,7 @@ def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
         np.testing.assert_array_equal(inside, edit.mask)
         assert change[inside].mean() > 3 * change[~inside].mean()
         if kind in ("hue", "metal"):
+            # Inside the change is at least four times as large in squared error.
             assert metrics.psnr(before, after, mask=inside) + 6 < metrics.psnr(
                 before, after, mask=~inside
             )
@@ -39,6 +40,7 @@ def test_the_true_cup_stands_where_the_scene_has_it(cases):
     edit = edits["insert"]
     scene = true_scene(sample)
     (body,) = edit.change(scene).bodies
+    # The mask lies within the box of the projected vertices, to a pixel.
     place, _ = project(body.vertices.astype(np.float64), scene.camera)
     rows, columns = np.nonzero(edit.mask)
     assert columns.min() >= np.floor(place[:, 0].min()) and columns.max() <= np.ceil(
@@ -66,6 +68,7 @@ def test_a_material_edit_of_the_scene_is_the_true_one(cases):
         np.testing.assert_array_equal(edited.albedo[~inside], scene.materials.albedo[~inside])
         if kind in SHIFTS:
             name, by = SHIFTS[kind]
+            # A shift moves as far as it can within [0, 1], and always visibly.
             moved = getattr(truth, name)[inside] - getattr(sample.truth.materials, name)[inside]
             assert (moved * np.sign(by) >= MIN_SHIFT - 1e-6).all() and (
                 np.abs(moved) <= abs(by) + 1e-6
@@ -77,6 +80,7 @@ def test_a_cup_of_glass_is_where_the_blue_one_is(cases):
     blue = edits["insert"]
     clear = edits["glass cup"]
     assert (blue.mask & clear.mask).sum() > 0.9 * (blue.mask | clear.mask).sum()
+    # Both are the same glass.
     (body,) = clear.change(true_scene(sample)).bodies
     assert body.surface.ior == clear.truth.items[-1].ior == 1.5
 

@@ -108,7 +108,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
     description["sensor"] = sensor(Camera(size, size, world.view.fov), look_along(mi))
     scene = mi.load_dict(description)
     params = mi.traverse(scene)
-    # Set afterwards: the plugin would resample a bitmap.
+    # Set afterwards, on the grid that Mitsuba itself uses.
     params["sky.data"] = mi.TensorXf(grid)
     params.update()
     return np.array(mi.render(scene, spp=spp, seed=3))[..., :3]

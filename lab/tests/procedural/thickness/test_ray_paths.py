@@ -29,6 +29,7 @@ def straight(x, y=0.0):
 def test_chords_of_a_ball():
     x = np.array([0.003, 0.1, 0.3, 0.45, 0.6])
     paths = ShapeTracer(ball()).trace(*straight(x))
+    # Pythagoras: half a chord is sqrt(r^2 - x^2).
     chord = 2 * np.sqrt(np.maximum(RADIUS**2 - x**2, 0))
     np.testing.assert_allclose(paths.solid, chord, atol=5e-3)
     np.testing.assert_allclose(paths.material, chord, atol=5e-3)
@@ -36,6 +37,7 @@ def test_chords_of_a_ball():
     np.testing.assert_allclose(paths.first[:4], 3 - chord[:4] / 2, atol=3e-3)
     normal = paths.normal[:4] / np.linalg.norm(paths.normal[:4], axis=-1, keepdims=True)
     np.testing.assert_allclose(normal[:, 0], x[:4] / RADIUS, atol=5e-3)
+    # The ray leaves at the mirror image of where it enters.
     leaving = paths.exit_normal[:4] / np.linalg.norm(paths.exit_normal[:4], axis=-1, keepdims=True)
     np.testing.assert_allclose(leaving, normal * [1, 1, -1], atol=1e-2)
 
@@ -66,4 +68,5 @@ def test_slanting_rays_through_a_box():
     angle = 0.4
     direction = np.array([[np.sin(angle), 0, -np.cos(angle)]])
     paths = ShapeTracer(box).trace(np.array([[0.0, 1.0, 0.0]]) - 3 * direction, direction)
+    # A slab of thickness d is d / cos long along a slanting ray.
     assert paths.solid[0] == pytest.approx(0.5 / np.cos(angle), rel=1e-4)

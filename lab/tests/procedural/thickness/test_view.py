@@ -71,6 +71,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
         maps, _ = dataset.draw_view(ball, ShapeTracer(ball.solid), np.random.default_rng(seed))
         inside = maps[MASK] > 0.5
         sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
+    # The exact frame leaves MARGIN on every side.
     framed = SIDE / (1 + 2 * MARGIN)
     assert np.mean(sides) == pytest.approx(framed, abs=2) and 0.6 < np.std(sides) < 5
 
@@ -78,6 +79,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
 def test_stretching_the_rays_is_stretching_the_shape(ball):
     rng = np.random.default_rng(4)
     pose = dataset.draw_pose(rng, upright=True)
+    # The stretched shape itself, its normals turned outwards where the stretch mirrors.
     stretched = replace(ball.solid, vertices=ball.solid.vertices @ pose.stretch.T)
     normals = solids.smooth_normals(stretched.vertices, stretched.faces)
     stretched = replace(stretched, normals=normals * np.sign(np.linalg.det(pose.stretch)))
@@ -89,6 +91,7 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
     assert both.mean() > 0.3 and (np.isfinite(a.first) == np.isfinite(b.first)).mean() > 0.99
     np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)
     np.testing.assert_allclose(a.solid[both], b.solid[both], atol=6e-3)
+    # Thin borders have steep normals, which the mesh's faces round off.
     inner = both & (a.solid > 0.3)
     for first, second in ((normal_a, normal_b), (back_a, back_b)):
         agreement = np.sum(first.reshape(-1, 3)[inner] * second.reshape(-1, 3)[inner], -1)
@@ -101,6 +104,7 @@ def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
     first = dataset.load(tmp_path / "set")
     assert first["maps"].shape == (4, CHANNELS, SIDE, SIDE) and np.isfinite(first["maps"]).all()
     before = (tmp_path / "set" / "00001.npz").stat().st_mtime_ns
+    # One more shape: the others stay as they are.
     dataset.produce(tmp_path / "set", replace(plan, shapes=3))
     assert (tmp_path / "set" / "00001.npz").stat().st_mtime_ns == before
     assert len(dataset.load(tmp_path / "set")["maps"]) == 6
