@@ -62,7 +62,13 @@ def test_every_module_that_starts_processes_is_known():
     [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)],
     ids=["SIGKILL", "SIGTERM"],
 )
-@pytest.mark.parametrize("module", POOLS)
+@pytest.mark.parametrize(
+    "module",
+    [
+        pytest.param(module, marks=[] if module.startswith("materialist/") else pytest.mark.slow)
+        for module in POOLS
+    ],
+)
 def test_workers_end_with_their_parent(module, how_it_ends, tmp_path):
     (tmp_path / "samples").mkdir()
     program = [sys.executable, "-c", POOLS[module], str(tmp_path)]

@@ -34,6 +34,7 @@ sys.stdout.write(digest.hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_threads_do_not_change_the_bits():
     digests = set()
     for threads, environment in (

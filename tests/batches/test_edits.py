@@ -48,6 +48,7 @@ def test_the_key_knows_the_materials_and_textures_of_a_mesh(tmp_path, changed):
     assert edits_key(tmp_path / "edits.yaml", "a", 8) != key
 
 
+@pytest.mark.slow
 def test_masks_that_are_missing_are_told_before_the_first_inversion(recipe):
     recipe.write_text("- edit: {mask: 'm/{name}.png', hue: 20}\n")
     source = photos(recipe.parent / "photos", "one", "two")

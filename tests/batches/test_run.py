@@ -137,6 +137,7 @@ def masks(folder, *names):
     return folder / "edits.yaml"
 
 
+@pytest.mark.slow
 def test_edits_are_applied_with_masks_by_name_and_redone_without_the_inversion(tmp_path):
     pytest.importorskip("mitsuba")
     source = photos(tmp_path / "in", "a", "b")

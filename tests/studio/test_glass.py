@@ -57,6 +57,7 @@ def test_the_last_value_wins_and_the_picture_is_kept(tracer, log):
     )  # one process for all
 
 
+@pytest.mark.slow
 def test_failures_are_told_and_the_next_value_is_tried(tracer):
     tracer.ask((), glass(1.7))
     until(lambda: not tracer.state.waiting)

@@ -61,7 +61,14 @@ def many_edits(path):
     return path
 
 
-@pytest.mark.parametrize("option", ["texture", "envmap", "mask"])
+@pytest.mark.parametrize(
+    "option",
+    [
+        "texture",
+        pytest.param("envmap", marks=pytest.mark.slow),
+        pytest.param("mask", marks=pytest.mark.slow),
+    ],
+)
 def test_a_small_file_of_a_large_picture(tmp_path, limited, option):
     file = large_png(tmp_path / "a.png", 7000)
     assert file.stat().st_size < 500_000
@@ -74,6 +81,7 @@ def test_a_small_file_of_a_large_picture(tmp_path, limited, option):
     assert [one.name for one in tmp_path.iterdir()] == ["a.png"]
 
 
+@pytest.mark.slow
 def test_a_small_file_of_a_large_mesh(tmp_path, limited):
     file = sparse_glb(tmp_path / "a.glb", 400_000_000)
     before = psutil.Process().memory_info().rss
@@ -102,12 +110,14 @@ def test_a_scene_is_unpacked_and_loaded_elsewhere(tmp_path):
     assert not (tmp_path / "other").exists()
 
 
+@pytest.mark.slow
 def test_a_list_of_thousands_of_edits_is_a_sentence(session, tmp_path):
     with pytest.raises(InputError, match="1000 edits; a photo takes up to 200"):
         session.read_edits(many_edits(tmp_path / "edits.yaml"))
     assert session.edits.steps == ()
 
 
+@pytest.mark.slow
 def test_as_many_edits_as_are_allowed_can_be_applied(session, tmp_path):
     mask = write_mask(session.workspace, block())
     step = f"- edit: {{mask: {mask}, hue: 3}}\n"

@@ -7,7 +7,7 @@ import pytest
 
 from materialist import metrics
 from materialist.camera import project
-from materialist_lab.bench.edits import KINDS, ROOM, SHIFTS, edits, true_scene
+from materialist_lab.bench.edits import KINDS, MIN_SHIFT, SHIFTS, edits, true_scene
 from materialist_lab.procedural.synthetic import make_sample
 
 
@@ -19,26 +19,28 @@ def cases(mitsuba):
 
 @pytest.mark.slow
 def test_the_truth_of_an_edit_differs_in_its_object_alone(cases):
-    sample, found = cases
+    sample, edits = cases
     before = sample.scene.render(sample.envmap, spp=64, seed=3)
     for kind in ("hue", "metal", "glass", "remove"):
-        edit = found[kind]
+        edit = edits[kind]
         after = edit.truth.render(edit.envmap, spp=64, seed=3)
         inside = edit.region(before, after)
         change = np.abs(after - before)
         np.testing.assert_array_equal(inside, edit.mask)
         assert change[inside].mean() > 3 * change[~inside].mean()
         if kind in ("hue", "metal"):
+            # Inside the change is at least four times as large in squared error.
             assert metrics.psnr(before, after, mask=inside) + 6 < metrics.psnr(
                 before, after, mask=~inside
             )
 
 
 def test_the_true_cup_stands_where_the_scene_has_it(cases):
-    sample, found = cases
-    edit = found["insert"]
+    sample, edits = cases
+    edit = edits["insert"]
     scene = true_scene(sample)
     (body,) = edit.change(scene).bodies
+    # The mask lies within the box of the projected vertices, to a pixel.
     place, _ = project(body.vertices.astype(np.float64), scene.camera)
     rows, columns = np.nonzero(edit.mask)
     assert columns.min() >= np.floor(place[:, 0].min()) and columns.max() <= np.ceil(
@@ -52,13 +54,13 @@ def test_the_true_cup_stands_where_the_scene_has_it(cases):
 
 def test_a_material_edit_of_the_scene_is_the_true_one(cases):
     """The maps of the edit are the true ones after it; the paper's "high" and "low" move one value that has room."""
-    sample, found = cases
+    sample, edits = cases
     scene = true_scene(sample)
-    assert {"roughness+", "roughness-", "metallic+"} <= set(found)
-    for kind in {"metal", *SHIFTS} & set(found):
-        inside = found[kind].mask
-        truth = found[kind].truth.truth.materials
-        edited = found[kind].change(scene).materials
+    assert {"roughness+", "roughness-", "metallic+"} <= set(edits)
+    for kind in {"metal", *SHIFTS} & set(edits):
+        inside = edits[kind].mask
+        truth = edits[kind].truth.truth.materials
+        edited = edits[kind].change(scene).materials
         for name in ("albedo", "roughness", "metallic"):
             np.testing.assert_allclose(
                 getattr(edited, name)[inside], getattr(truth, name)[inside], atol=1e-5
@@ -66,17 +68,19 @@ def test_a_material_edit_of_the_scene_is_the_true_one(cases):
         np.testing.assert_array_equal(edited.albedo[~inside], scene.materials.albedo[~inside])
         if kind in SHIFTS:
             name, by = SHIFTS[kind]
+            # A shift moves as far as it can within [0, 1], and always visibly.
             moved = getattr(truth, name)[inside] - getattr(sample.truth.materials, name)[inside]
-            assert (moved * np.sign(by) >= ROOM - 1e-6).all() and (
+            assert (moved * np.sign(by) >= MIN_SHIFT - 1e-6).all() and (
                 np.abs(moved) <= abs(by) + 1e-6
             ).all()
 
 
 def test_a_cup_of_glass_is_where_the_blue_one_is(cases):
-    sample, found = cases
-    blue = found["insert"]
-    clear = found["glass cup"]
+    sample, edits = cases
+    blue = edits["insert"]
+    clear = edits["glass cup"]
     assert (blue.mask & clear.mask).sum() > 0.9 * (blue.mask | clear.mask).sum()
+    # Both are the same glass.
     (body,) = clear.change(true_scene(sample)).bodies
     assert body.surface.ior == clear.truth.items[-1].ior == 1.5
 

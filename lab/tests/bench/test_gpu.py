@@ -7,13 +7,13 @@ from materialist_lab.bench import gpu
 
 
 def test_each_device_is_a_column(tmp_path, monkeypatch):
-    def measured(*given):
+    def measured(*arguments):
         device = next(
-            text.removeprefix("--device=") for text in given if text.startswith("--device=")
+            text.removeprefix("--device=") for text in arguments if text.startswith("--device=")
         )
-        Path(given[3]).mkdir()
+        Path(arguments[3]).mkdir()
         rows = [{"method": "edit", "sample": "cup", device: len(device)}]
-        Path(given[3], "report.json").write_text(json.dumps({"rows": rows}))
+        Path(arguments[3], "report.json").write_text(json.dumps({"rows": rows}))
 
     monkeypatch.setattr(
         gpu.torch,

@@ -9,13 +9,13 @@ from materialist_lab.bench import light
 
 @pytest.mark.slow
 def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
-    found, steps, geometry = light.fit(sample, light.METHODS["default"], "auto", device="cpu")
+    fitted, steps, geometry = light.fit(sample, light.METHODS["default"], "auto", device="cpu")
     assert geometry.plane_label.shape == sample.photo.linear.shape[:2]
-    assert steps > 0 and found.shape == sample.envmap.shape and found.min() >= 0
-    grey = np.full_like(found, sample.envmap.mean())
-    assert metrics.sh_error(found, sample.envmap) < 0.7 * metrics.sh_error(grey, sample.envmap)
+    assert steps > 0 and fitted.shape == sample.envmap.shape and fitted.min() >= 0
+    grey = np.full_like(fitted, sample.envmap.mean())
+    assert metrics.sh_error(fitted, sample.envmap) < 0.7 * metrics.sh_error(grey, sample.envmap)
     photo = sample.photo.linear
-    better = metrics.psnr(sample.scene.render(found, spp=64), photo)
+    better = metrics.psnr(sample.scene.render(fitted, spp=64), photo)
     assert better > 3 + metrics.psnr(sample.scene.render(grey, spp=64), photo)
 
 
@@ -32,18 +32,23 @@ def test_maps_are_given_as_the_method_says(sample):
     assert not np.array_equal(predicted.depth, true.depth) and np.array_equal(
         shape.depth, predicted.depth
     )
-    for given in (neutral.materials, shape.materials):
-        assert given.albedo.shape == true.materials.albedo.shape and (given.albedo == 0.5).all()
-        assert (given.roughness == 0.5).all() and np.allclose(given.metallic, 0.1)
+    for materials in (neutral.materials, shape.materials):
+        assert (
+            materials.albedo.shape == true.materials.albedo.shape
+            and (materials.albedo == 0.5).all()
+        )
+        assert (materials.roughness == 0.5).all() and np.allclose(materials.metallic, 0.1)
 
 
 @pytest.mark.slow
 def test_one_colour_of_light_and_the_predicted_one_are_not_fitted(sample):
-    found, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
-    colours = np.unique(found.reshape(-1, 3), axis=0, return_counts=True)[1]
+    fitted, steps, _ = light.fit(sample, light.METHODS["constant predicted"], "auto", device="cpu")
+    colours = np.unique(fitted.reshape(-1, 3), axis=0, return_counts=True)[1]
     prior, none, _ = light.fit(sample, light.METHODS["prior predicted"], "auto", device="cpu")
-    assert none == 0 and prior.shape == found.shape and prior.std() > 0.05 * prior.mean() > 0
-    assert steps == 0 and colours.max() > 0.5 * found.shape[0] * found.shape[1] and found.min() >= 0
+    assert none == 0 and prior.shape == fitted.shape and prior.std() > 0.05 * prior.mean() > 0
+    assert (
+        steps == 0 and colours.max() > 0.5 * fitted.shape[0] * fitted.shape[1] and fitted.min() >= 0
+    )
 
 
 def test_mirrors_are_photographed_under_the_same_light(sample):

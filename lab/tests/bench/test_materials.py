@@ -61,9 +61,9 @@ def test_maps_that_are_not_there_are_no_truth(folder, measured):
 def test_samples_are_seen_by_their_own_camera(tmp_path):
     made_samples.write_set(tmp_path, 5, fov=48.0)
     report = Report("", "", {}, ())
-    found = list(materials.MaterialsBench(limit=2, photographic=False).samples(tmp_path, report))
-    assert [name for name, _, _ in found] == ["0000000", "0000004"]
-    assert found[0][1].camera.fov == pytest.approx(48.0, rel=1e-5)
+    samples = list(materials.MaterialsBench(limit=2, photographic=False).samples(tmp_path, report))
+    assert [name for name, _, _ in samples] == ["0000000", "0000004"]
+    assert samples[0][1].camera.fov == pytest.approx(48.0, rel=1e-5)
 
 
 def test_the_benchmark_of_time(measured):

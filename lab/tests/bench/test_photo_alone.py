@@ -20,6 +20,7 @@ from materialist_lab.procedural.options import HELD_OUT
 from materialist_lab.procedural.synthetic import make_sample
 
 
+@pytest.mark.slow
 def test_captures_are_those_that_no_training_set_may_use(monkeypatch, tmp_path):
     """By name: of all files, only the held-out ones are asked for."""
     asked = []
@@ -47,6 +48,7 @@ def test_captures_are_those_that_no_training_set_may_use(monkeypatch, tmp_path):
         arrangements.arrangement(1, seed=SCENE_SEED, data=tmp_path, unseen=True)
 
 
+@pytest.mark.slow
 def test_arrangements_are_those_of_no_other_seed(mitsuba):
     """By seed: benchmarks that settings are tuned with have seed 0; training has scenes of another generator."""
     sample, _ = unseen_sample(0, None, 24)
@@ -63,7 +65,7 @@ def test_a_part_of_the_truth_replaces_that_part_alone(mitsuba):
         depth=truth.depth * 2,
         materials=replace(truth.materials, albedo=truth.materials.albedo / 2),
     )
-    albedo, geometry = (with_truth(prior, truth, given) for given in ("albedo", "geometry"))
+    albedo, geometry = (with_truth(prior, truth, known) for known in ("albedo", "geometry"))
     assert albedo.depth is prior.depth and albedo.materials.albedo is truth.materials.albedo
     assert geometry.depth is truth.depth and geometry.materials is prior.materials
 
@@ -90,7 +92,7 @@ def test_a_run_has_maps_and_edits(measured, monkeypatch):
     assert rows["relight: fitted"]["inside"] > rows["relight: untouched"]["inside"] + 3
     inverted = []
     monkeypatch.setattr(
-        pipeline, "invert", lambda *_, **how: inverted.append(how) or true_scene(sample)
+        pipeline, "invert", lambda *_, **options: inverted.append(options) or true_scene(sample)
     )
     measured("photo-alone", kinds="relight", paper=3, **small)
     assert inverted[1]["engine"] == "path" and inverted[1]["settings"] == PAPER.at_most(3)

@@ -137,8 +137,8 @@ def test_what_cannot_be_is_told_before_anything_is_written(
 
 def test_options_are_brought_to_the_kind_that_is_taken():
     """A whole number may be written with a point, and a name may read as a number."""
-    found = SelectBench.given(scenes="3", size="64.0", loose="0.5", device="cpu")
-    assert (found.scenes, found.size, found.loose) == (3, 64, 0.5) and isinstance(found.size, int)
+    bench = SelectBench.given(scenes="3", size="64.0", loose="0.5", device="cpu")
+    assert (bench.scenes, bench.size, bench.loose) == (3, 64, 0.5) and isinstance(bench.size, int)
     assert GlassBench.given(iors=1.5, shapes="3") == GlassBench(iors="1.5", shapes=3)
 
 

@@ -10,9 +10,9 @@ from materialist_lab.bench.select import clickable, drawn, outlines
 def test_both_maps_are_scored(measured):
     rows = measured("select", scenes=1, size=96, seed=3).rows
     assert {row["method"] for row in rows} == {
-        f"{how}, {what}{maps} maps"
-        for how in ("network", "grabcut")
-        for what in ("", "exact box, ", "loose box, ")
+        f"{method}, {prompt}{maps} maps"
+        for method in ("network", "grabcut")
+        for prompt in ("", "exact box, ", "loose box, ")
         for maps in ("bundled", "true")
     } and len(rows) >= 4
     assert all(0 <= row["iou"] <= 1 and row["good"] == (row["iou"] > 0.8) for row in rows)

@@ -86,5 +86,5 @@ def test_every_benchmark_takes_its_options_and_those_of_all_commands():
     options = options_of(typer.main.get_group(app))
     assert set(options) == set(BENCHMARKS)
     for name, flags in options.items():
-        own = {f"--{field.replace('_', '-')}" for field in declarations(benchmark_class(name))}
-        assert own | {"--output", "--data", "--force", "--seed", "--device", "--json"} <= flags
+        declared = {f"--{field.replace('_', '-')}" for field in declarations(benchmark_class(name))}
+        assert declared | {"--output", "--data", "--force", "--seed", "--device", "--json"} <= flags

@@ -24,6 +24,7 @@ def room(*, window: bool, lamp: bool, sky: float = 1.0) -> World:
     """A closed box of 2 m with a metal and a painted block, lit by a window in its right side and by a lamp."""
     grey = plain((0.6, 0.6, 0.55))
     red = plain((0.7, 0.2, 0.15), 0.4)
+    # Floor, ceiling, back, left and right walls, two blocks.
     parts = [
         ScenePart(s.sheet((-1, 0, 1), 2 * X, -2 * Z), grey),
         ScenePart(s.sheet((-1, 2, -1), 2 * X, 2 * Z), grey),
@@ -39,6 +40,7 @@ def room(*, window: bool, lamp: bool, sky: float = 1.0) -> World:
         glow = plain((0.8, 0.8, 0.8), emission=(8.0, 6.0, 4.0))
         parts.append(ScenePart(s.sheet((-0.3, 1.95, -0.3), 0.6 * X, 0.6 * Z), glow))
     envmap = np.full((32, 64, 3), sky, np.float32)
+    # A blue sky with a small sun.
     envmap[:12] *= np.array([1.0, 1.5, 3.0], np.float32)
     envmap[10, 40] *= 60
     portals = [Portal(np.array([1, 0.6, -0.4]), 0.8 * Z, 0.9 * Y)] if window else []
@@ -76,6 +78,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
                 "data": mi.TensorXf(np.tile(np.float32(v), (2, 2, 1))),
             }
 
+        # Mitsuba's BSDF takes bitmaps.
         colour, roughness, metallic = map(
             flat, (material.colours[0], material.roughness[0], material.metallic[0])
         )
@@ -89,6 +92,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
         if max(material.emission) > 0:
             radiance = (np.array(material.emission) * material.colours[0]).tolist()
             light = {"type": "area", "radiance": {"type": "rgb", "value": radiance}}
+        # The scene in the camera frame, as the tracer has it.
         place = (part.solid.vertices - origin) @ rotation
         normals = part.solid.normals @ rotation
         solid = replace(part.solid, vertices=place, normals=normals)
@@ -104,6 +108,7 @@ def reference(world: World, size: int, spp: int, depth: int) -> np.ndarray:
     description["sensor"] = sensor(Camera(size, size, world.view.fov), look_along(mi))
     scene = mi.load_dict(description)
     params = mi.traverse(scene)
+    # Set afterwards, on the grid that Mitsuba itself uses.
     params["sky.data"] = mi.TensorXf(grid)
     params.update()
     return np.array(mi.render(scene, spp=spp, seed=3))[..., :3]

@@ -24,44 +24,47 @@ def truth():
     normal = np.zeros((24, 32, 3), np.float32)
     normal[..., 2] = 1
     depth = rng.uniform(1, 3, (24, 32)).astype(np.float32)
+    # Sky in the upper rows.
     depth[:4] = 0
     maps = rng.uniform(0.1, 0.5, (24, 32, 3)), rng.uniform(0, 0.8, (24, 32)), np.zeros((24, 32))
     return Prediction(Materials(*(m.astype(np.float32) for m in maps)), normal, depth)
 
 
 def test_the_truth_scores_best(truth):
-    found = score(truth, truth)
-    assert found["albedo_psnr"] == found["roughness_psnr"] == 100
-    assert found["normal_angle"] == found["depth_mae"] == found["depth_si_log_rmse"] == 0
-    assert found["albedo_ssim"] == pytest.approx(1) and found["mask_iou"] == 1
+    figures = score(truth, truth)
+    assert figures["albedo_psnr"] == figures["roughness_psnr"] == 100
+    assert figures["normal_angle"] == figures["depth_mae"] == figures["depth_si_log_rmse"] == 0
+    assert figures["albedo_ssim"] == pytest.approx(1) and figures["mask_iou"] == 1
 
 
 def test_one_factor_is_forgiven_in_albedo_and_depth(truth):
     darker = replace(truth.materials, albedo=truth.materials.albedo / 2)
-    found = score(replace(truth, materials=darker, depth=truth.depth * 3), truth)
+    figures = score(replace(truth, materials=darker, depth=truth.depth * 3), truth)
     assert (
-        found["albedo_psnr"] > 90
-        and found["albedo_psnr_raw"] < 20
-        and found["albedo_scale"] == pytest.approx(2)
+        figures["albedo_psnr"] > 90
+        and figures["albedo_psnr_raw"] < 20
+        and figures["albedo_scale"] == pytest.approx(2)
     )
-    assert found["depth_mae"] < 1e-5 and found["depth_si_log_rmse"] < 1e-6
-    assert found["depth_mae_raw"] == pytest.approx(2 * truth.depth[4:].mean(), rel=1e-5)
+    assert figures["depth_mae"] < 1e-5 and figures["depth_si_log_rmse"] < 1e-6
+    assert figures["depth_mae_raw"] == pytest.approx(2 * truth.depth[4:].mean(), rel=1e-5)
 
 
 def test_known_errors(truth):
+    # Thirty degrees: sin = 1/2.
     tilt = np.zeros_like(truth.normal)
     tilt[..., 0], tilt[..., 2] = 0.5, 0.75**0.5
     rough = replace(truth.materials, roughness=truth.materials.roughness + 0.1)
-    found = score(replace(truth, materials=rough, normal=tilt), truth)
-    assert found["roughness_psnr"] == pytest.approx(20, abs=1e-3)
-    assert found["normal_angle"] == pytest.approx(30, abs=1e-3)
+    figures = score(replace(truth, materials=rough, normal=tilt), truth)
+    assert figures["roughness_psnr"] == pytest.approx(20, abs=1e-3)
+    assert figures["normal_angle"] == pytest.approx(30, abs=1e-3)
 
 
 def test_only_surface_counts(truth):
     wrong = truth.materials.albedo.copy()
+    # Errors in the sky do not count.
     wrong[:4] = 1
-    found = score(replace(truth, materials=replace(truth.materials, albedo=wrong)), truth)
-    assert found["albedo_psnr"] == 100
+    figures = score(replace(truth, materials=replace(truth.materials, albedo=wrong)), truth)
+    assert figures["albedo_psnr"] == 100
     noise = replace(
         truth.materials,
         roughness=np.random.default_rng(1).uniform(0, 0.8, (24, 32)).astype(np.float32),
@@ -77,14 +80,16 @@ def test_only_surface_counts(truth):
 def test_log_error_of_depth():
     true = np.array([[1.0, 2.0, 4.0, 8.0]])
     factors = np.exp([[0.1, -0.1, 0.1, -0.1]])
-    found = depth_figures(true * factors * 5, true, true > 0)
-    assert found["depth_si_log_rmse"] == pytest.approx(0.1)
+    figures = depth_figures(true * factors * 5, true, true > 0)
+    assert figures["depth_si_log_rmse"] == pytest.approx(0.1)
+    # What is predicted as sky has no logarithm: it counts as not covered.
     holes = depth_figures(np.array([[1.0, 0.0, 0.0, 8.0]]), true, true > 0)
     assert holes["depth_coverage"] == 0.5
 
 
 def test_depth_order():
     true = np.random.default_rng(1).uniform(1, 9, (40, 40))
+    # Any rising function keeps the order, a falling one turns it around.
     assert ordinal_accuracy(true**2, true) == 1
     assert ordinal_accuracy(1 / true, true) == 0
     assert ordinal_accuracy(np.ones_like(true), true) == 0.5
@@ -98,13 +103,14 @@ def test_depth_order():
 
 
 def test_pooled_psnr_is_of_the_mean_error():
-    found = summary(
+    # PSNR of the mean squared error 0.005, and the mean of 20 and 100.
+    figures = summary(
         [
             {"metallic_mse": 0.01, "metallic_psnr": 20.0},
             {"metallic_mse": 0.0, "metallic_psnr": 100.0},
         ]
     )
-    assert found["metallic_psnr"] == 60 and found["metallic_psnr_pooled"] == pytest.approx(
+    assert figures["metallic_psnr"] == 60 and figures["metallic_psnr_pooled"] == pytest.approx(
         23.01, abs=0.01
     )
     assert summary([]) == {}
@@ -125,6 +131,7 @@ def test_mean_angle_of_a_part():
     up = np.zeros((2, 2, 3), np.float32)
     out = np.zeros((2, 2, 3), np.float32)
     up[..., 1], out[..., 2] = 1, 1
+    # Right in the upper half, 90 degrees off in the lower one.
     out[0] = up[0]
     everywhere = np.ones((2, 2), bool)
     assert mean_angle(up, out, everywhere) == pytest.approx(45)
@@ -147,6 +154,7 @@ def test_pictures_after_one_factor():
 def test_half_of_the_errors_are_within_a_calibrated_spread(truth):
     rng = np.random.default_rng(1)
     scale = rng.uniform(0.01, 0.05, truth.depth.shape)
+    # The spread is the scale of a Laplace distribution; here it is the true one.
     errors = rng.laplace(0, scale)
     rough = replace(truth.materials, roughness=truth.materials.roughness + errors)
     depth = np.where(truth.depth > 0, truth.depth * np.exp(errors), 0) * 3

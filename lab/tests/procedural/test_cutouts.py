@@ -13,10 +13,10 @@ from materialist_lab.procedural import cutouts
 
 def test_a_cut_out_has_no_margin_and_linear_colours(tmp_path):
     made_cutouts.write_disc(tmp_path / "disc.png")
-    found = cutouts.load_cutout(tmp_path / "disc.png")
-    assert found.shape == (60, 60, 4)
-    np.testing.assert_allclose(found[30, 30], [0.7157, 0.01298, 0.00700, 1], rtol=0.01)
-    assert found[0, 0, 3] == 0
+    cutout = cutouts.load_cutout(tmp_path / "disc.png")
+    assert cutout.shape == (60, 60, 4)
+    np.testing.assert_allclose(cutout[30, 30], [0.7157, 0.01298, 0.00700, 1], rtol=0.01)
+    assert cutout[0, 0, 3] == 0
 
 
 def test_files_without_a_thing_are_passed_over(tmp_path):
@@ -41,12 +41,13 @@ def test_the_picture_changes_where_the_thing_is(tmp_path, monkeypatch):
     thing = np.full((96, 128), -3, np.int16)
     sizes = []
     for seed in range(20):
-        after, found = cutouts.paste(before, thing, [disc], np.random.default_rng(seed))
-        new = found > 0
+        after, labels = cutouts.paste(before, thing, [disc], np.random.default_rng(seed))
+        new = labels > 0
         assert (
-            set(np.unique(found)) - {-3} <= set(range(1, cutouts.SETTINGS.most + 1)) and new.any()
+            set(np.unique(labels)) - {-3} <= set(range(1, cutouts.SETTINGS.max_cutouts + 1))
+            and new.any()
         )
-        np.testing.assert_array_equal(found[~new], -3)
+        np.testing.assert_array_equal(labels[~new], -3)
         changed = np.abs(after - before).max(-1) > 1e-3
         assert (new & ~changed).sum() == 0 and (changed & ~new).sum() < 0.4 * new.sum() + 40
         sizes.append(new.mean())

@@ -38,7 +38,7 @@ def options():
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, options):
+def data_set(tmp_path_factory, options):
     folder = tmp_path_factory.mktemp("set") / "data"
     assert produce(folder, options, count=6) == 6
     return folder
@@ -49,9 +49,9 @@ def arrays(folder, index):
         return dict(file)
 
 
-def test_every_sample_keeps_the_contract(made):
+def test_every_sample_keeps_the_contract(data_set):
     for k in range(6):
-        sample = arrays(made, k)
+        sample = arrays(data_set, k)
         for name, (kind, channels) in CONTRACT.items():
             assert sample[name].dtype == kind, name
             assert sample[name].shape == (SIZE, SIZE, *([channels] if channels else [])), name
@@ -66,43 +66,50 @@ def test_every_sample_keeps_the_contract(made):
         assert not sample["normal"][~mask].any()
 
 
-def test_a_sample_depends_on_seed_and_number_alone(made, options, tmp_path):
+def test_a_sample_depends_on_seed_and_number_alone(data_set, options, tmp_path):
     again = make_sample(4, options)
-    stored = arrays(made, 4)
+    stored = arrays(data_set, 4)
     for name in CONTRACT:
         assert np.array_equal(again[name], stored[name]), name
     other = make_sample(4, DataSetOptions(size=SIZE, seed=12, spp=4, device="cpu", real=0))
     assert not np.array_equal(other["albedo"], stored["albedo"])
 
 
-def test_resume_makes_what_is_missing_and_nothing_else(made, options):
-    gone = sample_path(made, 2)
-    kept = sample_path(made, 3)
-    before = arrays(made, 2)
+def test_resume_makes_what_is_missing_and_nothing_else(data_set, options):
+    # One sample is missing, and a run that was killed left half of another.
+    gone = sample_path(data_set, 2)
+    kept = sample_path(data_set, 3)
+    before = arrays(data_set, 2)
     stamp = kept.stat().st_mtime_ns
     gone.unlink()
-    (made / "samples" / ".0000005.npz.0.partial-99-0.npz").write_bytes(b"half a sample")
-    assert produce(made, options, count=6, resume=True) == 1
-    assert all(np.array_equal(v, arrays(made, 2)[k]) for k, v in before.items())
+    (data_set / "samples" / ".0000005.npz.0.partial-99-0.npz").write_bytes(b"half a sample")
+    assert produce(data_set, options, count=6, resume=True) == 1
+    assert all(np.array_equal(v, arrays(data_set, 2)[k]) for k, v in before.items())
     assert kept.stat().st_mtime_ns == stamp
-    assert not list((made / "samples").glob(".*"))
+    assert not list((data_set / "samples").glob(".*"))
 
 
-def test_other_sets_are_not_gone_on_with(made, options, tmp_path):
+def test_other_sets_are_not_gone_on_with(data_set, options, tmp_path):
     with pytest.raises(InputError, match="--resume"):
-        produce(made, options, count=6)
+        produce(data_set, options, count=6)
     with pytest.raises(InputError, match="seed 11, not 12"):
-        produce(made, replace(options, seed=12), count=6, resume=True)
+        produce(data_set, replace(options, seed=12), count=6, resume=True)
+    # A set of an earlier version of the program.
     (tmp_path / "set").mkdir()
-    told = identity(made)
-    assert (told["format"], told["size"], told["seed"], told["options"]["spp"]) == (1, SIZE, 11, 4)
+    facts = identity(data_set)
+    assert (facts["format"], facts["size"], facts["seed"], facts["options"]["spp"]) == (
+        1,
+        SIZE,
+        11,
+        4,
+    )
     (tmp_path / "set" / "dataset.json").write_text(
-        json.dumps({**told, "content": told["content"] - 1})
+        json.dumps({**facts, "content": facts["content"] - 1})
     )
     with pytest.raises(InputError, match="begun with content"):
         produce(tmp_path / "set", options, count=2, resume=True)
     with pytest.raises(InputError, match=r"dataset\.json"):
-        identity(made / "samples")
+        identity(data_set / "samples")
 
 
 def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
@@ -146,6 +153,7 @@ FACES = "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
 )
 def test_a_damaged_mesh_is_named_before_anything_is_made(tmp_path, text):
     (tmp_path / "meshes").mkdir()
+    # A whole mesh is read, so that the refusal is about the other one.
     (tmp_path / "meshes" / "chair.ply").write_text(HEADER + FACES + CORNERS + "3 0 1 2\n")
     assert len(shapes.load(tmp_path / "meshes" / "chair.ply").faces) == 1
     (tmp_path / "meshes" / "vase.ply").write_text(text)
@@ -189,6 +197,7 @@ def test_a_killed_run_leaves_whole_samples_only(tmp_path):
         "0",
     ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    # Killed once there are two samples, without a chance to clean up.
     deadline = time.monotonic() + 120
     while (
         len(list((tmp_path / "d" / "samples").glob("[0-9]*.npz"))) < 2
@@ -226,9 +235,10 @@ def test_the_command_makes_resumes_and_draws(done, refused, tmp_path):
         0,
         "--count",
     )
+    # The second call makes the one sample that is missing.
     for count, resume in ((1, ()), (2, ("--resume",))):
-        told = done(*make, count, *resume)
-        assert (told["rendered"], told["existing"]) == (1, count - 1)
+        report = done(*make, count, *resume)
+        assert (report["rendered"], report["existing"]) == (1, count - 1)
     draw = ("train", "data", "-o", folder, "--sheet", sheet)
     done(*draw)
     drawn = sheet.read_bytes()

@@ -22,8 +22,8 @@ def test_a_tilted_camera_sees_the_sky_tilted():
     up_in_camera = looking_down.T @ [0, 1, 0]
     assert (looking_down @ [0, 0, -1])[1] < 0
     _, first, second, third = sh_coefficients(lights.envmap(radiance, looking_down))[:4, 0]
-    found = np.array([first, second, third]) / np.linalg.norm([first, second, third])
-    assert np.allclose(found, [-up_in_camera[0], up_in_camera[1], -up_in_camera[2]], atol=1e-3)
+    light_axis = np.array([first, second, third]) / np.linalg.norm([first, second, third])
+    assert np.allclose(light_axis, [-up_in_camera[0], up_in_camera[1], -up_in_camera[2]], atol=1e-3)
 
 
 def test_skies_have_a_mean_of_one_and_are_lighter_above():

@@ -67,6 +67,7 @@ def test_joints_of_bricks_slope_down():
     seen = labels(bricks, 96)["normal"]
     field = tiles.bank()[0][tile].astype(float) / 255
     height = 0.01 * (0.3 * field[..., 2] - field[..., 1])
+    # Matt and of one colour: only the relief changes the normals.
     # The ground's texture coordinates are metres from its corner (-1, 1), v towards -Z: (x, y) of the picture.
     camera = Camera(96, 96, 20)
     x = (np.arange(96) + 0.5 - 48) / camera.focal * 2
@@ -77,9 +78,11 @@ def test_joints_of_bricks_slope_down():
     def at(u, v):
         return height[(v / step % tiles.SIZE).astype(int), (u / step % tiles.SIZE).astype(int)]
 
+    # The gradient of the stored height by central differences, in metres a metre.
     slope = np.stack([at(u + step, v) - at(u - step, v), at(u, v + step) - at(u, v - step)], -1) / (
         2 * step
     )
+    # A normal (x, y, z) belongs to the slopes -x / z and -y / z.
     bent = -seen[..., :2] / seen[..., 2:]
     steep = np.abs(slope) > 0.3
     assert steep.sum() > 100
@@ -100,7 +103,9 @@ def test_a_picture_lies_upright_on_a_surface():
         offset=(0.0, 0.0),
         picture=ColourPicture(pixels),
     )
+    # The picture fills the view exactly.
     albedo = labels(material, 64, fov=2 * np.degrees(np.arctan(0.5)))["albedo"]
+    # Pixels are square roots; blue is halved by the material's colour.
     expected = (pixels / 255.0) ** 2 * [1, 1, 0.5]
     for row in range(3):
         for column in range(5):
@@ -112,13 +117,14 @@ def test_a_picture_lies_upright_on_a_surface():
 
 
 def test_pictures_are_packed_once_each():
-    one, other = (ColourPicture(np.full((7, 5, 3), value, np.uint8)) for value in (10, 20))
+    first, second = (ColourPicture(np.full((7, 5, 3), value, np.uint8)) for value in (10, 20))
     parts = [
         ScenePart(s.slab((1, 1, 1)), replace(plain((1,) * 3), picture=p))
-        for p in (one, other, one, None)
+        for p in (first, second, first, None)
     ]
     world = World(parts, still().envmap, look((0, 1, 3), (0, 0, 0), 40))
     packed = packing.pack(world, np.random.default_rng(0))
+    # Column 24 is the picture's place, 25 its width.
     starts = packed.material[:, 24].astype(int)
     assert starts[0] == starts[2] != starts[1] and packed.material[3, 25] == 0
     assert len(packed.pictures) == 3 * packing.PICTURE_START
@@ -129,11 +135,12 @@ def test_pictures_are_packed_once_each():
 def test_a_backdrop_shows_only_where_no_surface_is():
     image = np.full((8, 8, 3), 0.5, np.float32)
     covered = np.zeros((8, 8), np.float32)
+    # Covered above, half covered in one row, open below.
     covered[:4], covered[4] = 1, 0.5
-    made = sample.before(np.full((4, 4, 3), 2.0, np.float32), image, covered)
-    np.testing.assert_allclose(made[:4], 0.5)
-    np.testing.assert_allclose(made[5:], 2.0)
-    assert (made[4] > 0.9).all() and (made[4] < 2).all()
+    shown = sample.before(np.full((4, 4, 3), 2.0, np.float32), image, covered)
+    np.testing.assert_allclose(shown[:4], 0.5)
+    np.testing.assert_allclose(shown[5:], 2.0)
+    assert (shown[4] > 0.9).all() and (shown[4] < 2).all()
 
 
 def test_the_lens_blurs_what_is_not_in_focus():
@@ -141,8 +148,9 @@ def test_the_lens_blurs_what_is_not_in_focus():
     image = rng.uniform(0, 1, (64, 64, 3)).astype(np.float32)
     depth = np.where(np.arange(64) < 32, 1.0, 3.0) + np.zeros((64, 64))
     camera = Camera(64, 64, 40)
-    made = defocused(image, depth, camera, aperture=0.1, focus=1.0)
-    np.testing.assert_allclose(made[:, :24], image[:, :24], atol=1e-5)
-    assert made[:, 40:].std() < 0.5 * image[:, 40:].std()
-    assert made[:, 40:].mean() == pytest.approx(image[:, 40:].mean(), rel=0.03)
+    # The left half is in focus, the right one three times as far.
+    blurred = defocused(image, depth, camera, aperture=0.1, focus=1.0)
+    np.testing.assert_allclose(blurred[:, :24], image[:, :24], atol=1e-5)
+    assert blurred[:, 40:].std() < 0.5 * image[:, 40:].std()
+    assert blurred[:, 40:].mean() == pytest.approx(image[:, 40:].mean(), rel=0.03)
     np.testing.assert_array_equal(defocused(image, depth, camera, aperture=1e-6, focus=1.0), image)

@@ -19,12 +19,12 @@ def test_materials_are_physical():
     assert len(families) > 15
     for name, make in makers.items():
         for _ in range(30):
-            one = make(rng)
-            assert all(0 < c <= 0.95 for colour in one.colours for c in colour), name
-            assert all(0 < r <= 1 for r in one.roughness) and all(
-                0 <= v <= 1 for v in one.metallic
+            material = make(rng)
+            assert all(0 < c <= 0.95 for colour in material.colours for c in colour), name
+            assert all(0 < r <= 1 for r in material.roughness) and all(
+                0 <= v <= 1 for v in material.metallic
             ), name
-            assert one.row((0, 0)).shape == (packing.MATERIAL,)
+            assert material.row((0, 0)).shape == (packing.MATERIAL,)
 
 
 @pytest.mark.parametrize("maker", [maker for _, maker in things.KINDS])

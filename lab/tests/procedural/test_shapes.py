@@ -45,8 +45,8 @@ def test_a_level_set_has_the_volume_the_radius_and_the_normals_of_a_ball():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_creatures_are_whole_and_stand(seed):
-    made = creature(np.random.default_rng(seed))
-    assert np.isfinite(made.vertices).all() and is_closed(made)
-    assert 0.01 < volume(made) < 4
-    low = made.vertices[:, 1].min()
-    assert (made.vertices[:, 1] < low + 0.01 * np.ptp(made.vertices[:, 1])).sum() >= 3
+    body = creature(np.random.default_rng(seed))
+    assert np.isfinite(body.vertices).all() and is_closed(body)
+    assert 0.01 < volume(body) < 4
+    low = body.vertices[:, 1].min()
+    assert (body.vertices[:, 1] < low + 0.01 * np.ptp(body.vertices[:, 1])).sum() >= 3

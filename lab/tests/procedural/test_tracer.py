@@ -42,6 +42,7 @@ def test_equals_mitsubas_integrator(world, tolerance):
     ours, _ = traced(world)
     theirs = reference(world, SIZE, 576, tracer.MAX_DEPTH + 1)
 
+    # Means over blocks: single pixels are too noisy to compare.
     def blocks(a):
         return a.reshape(4, 8, 4, 8, 3).mean((1, 3))
 
@@ -60,9 +61,11 @@ def test_a_rough_ground_under_an_even_sky_has_the_shading_of_the_closed_form():
     image, shading = traced(world, spp=100)
     wi = hemisphere(200)
     up = np.array([0.0, 0.0, 1.0])
+    # The diffuse lobe is a polynomial of the roughness: 1, 0.8, 0.8 squared.
     c = diffuse_coefficients(up, wi, np.broadcast_to(up, wi.shape)) @ np.array([1, 0.8, 0.64])
     expected = 2.0 * (c * wi[..., 2]).mean() * 2 * np.pi / np.pi
     np.testing.assert_allclose(shading.mean((0, 1)), expected, rtol=0.01)
+    # The specular lobe for a reflectance at normal incidence of 0.04.
     s0, s1 = specular_split(0.8, up, wi, np.broadcast_to(up, wi.shape))
     specular = 2.0 * ((0.04 * s0 + s1) * wi[..., 2]).mean() * 2 * np.pi
     np.testing.assert_allclose(image.mean((0, 1)), 0.5 * expected + specular, rtol=0.01)
@@ -89,6 +92,7 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
     up = world.view.to_scene.T @ np.array([0, 1, 0])
     assert labels["mask"].all()
     np.testing.assert_allclose(labels["normal"], np.broadcast_to(up, (SIZE, SIZE, 3)), atol=1e-5)
+    # The camera is 2 m above the plane: t = -2 / (ray . up), and depth is t along -Z.
     rays = pixel_rays(Camera(SIZE, SIZE, 40))
     np.testing.assert_allclose(labels["depth"], -2.0 / (rays @ up), rtol=1e-4)
     np.testing.assert_allclose(
@@ -108,6 +112,7 @@ def test_labels_of_a_ground_seen_from_a_known_camera():
 def test_a_second_world_compiles_nothing():
     import drjit as dr
 
+    # Two scenes of other shapes, materials and lamps compile what there is to compile.
     traced(still(), spp=4)
     traced(room(window=True, lamp=True), spp=4)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
@@ -115,6 +120,7 @@ def test_a_second_world_compiles_nothing():
         traced(room(window=True, lamp=False), spp=4)
         traced(replace(still(), view=look((1, 1, 2), (0, 0, 0), 60)), spp=4)
         history = dr.kernel_history()
+    # The small kernels copy buffers; the two large ones trace.
     large = [k for k in history if k.get("operation_count", 0) > 500]
     assert len(large) == 2
     assert all(k["cache_hit"] for k in large)
@@ -134,6 +140,7 @@ def test_texture_is_not_printed_into_the_shading():
     world = World([ground], np.ones((16, 32, 3), np.float32), look((0, 2, 1e-3), (0, 0, 0), 50))
     seen = tracer_of(world, 64)
     probe = seen.probe()
+    # Denoised, where texture could leak in.
     arrays = sample._developed(
         world, probe, seen, np.random.default_rng(0), DataSetOptions(size=64, device="cpu")
     )
@@ -148,10 +155,12 @@ def test_the_light_around_a_ground_under_the_sky_is_the_sky():
     """Every point of the ground sees the upper half, and none the lower one, which the ground itself hides."""
     ground = ScenePart(s.sheet((-50, 0, 50), 100 * X, -100 * Z), plain((0.5, 0.5, 0.5), 0.8))
     sky = np.full((16, 32, 3), 2.0, np.float32)
+    # The zenith has a colour of its own.
     sky[:4] = [4, 3, 1]
     world = World([ground], sky, look((0, 1, 1), (0, 0, 0), 40))
     traced = tracer_of(world)
     light = traced.light(traced.probe(), rows=8, spp=64, seed=0)
+    # Directions of the light are in the camera frame.
     up = texel_directions(8, 16) @ (world.view.to_scene.T @ [0, 1, 0])
     np.testing.assert_allclose(light[up > 0.25, 3], 1)
     np.testing.assert_allclose(light[up < -0.25, 3], 0)
@@ -160,6 +169,7 @@ def test_the_light_around_a_ground_under_the_sky_is_the_sky():
     )
     low = (up > 0.25) & (up < 0.5)
     np.testing.assert_allclose(light[low, :3], 2, rtol=0.05)
+    # With a weight for what is hidden, the sky fills in below.
     behind = traced.light(traced.probe(), rows=8, spp=64, seed=0, hidden=0.1)
     np.testing.assert_allclose(behind[up < -0.25, 3], 0.1, rtol=1e-5)
     np.testing.assert_allclose(behind[up < -0.25, :3], 2, rtol=1e-3)

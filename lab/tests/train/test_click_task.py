@@ -37,9 +37,9 @@ def test_clicks_lie_on_what_they_ask_for():
 def test_the_loss_has_a_closed_form():
     mask = torch.zeros(1, 4, 4)
     mask[0, :2] = 1
-    found = click_losses(torch.zeros(1, 4, 4), mask)
-    assert found["entropy"].item() == pytest.approx(np.log(2), rel=1e-6)
-    assert found["overlap"].item() == pytest.approx(1 - (2 * 4 + 1) / (8 + 8 + 1), rel=1e-6)
+    terms = click_losses(torch.zeros(1, 4, 4), mask)
+    assert terms["entropy"].item() == pytest.approx(np.log(2), rel=1e-6)
+    assert terms["overlap"].item() == pytest.approx(1 - (2 * 4 + 1) / (8 + 8 + 1), rel=1e-6)
     sure = click_losses(40 * (2 * mask - 1), mask)
     assert sure["entropy"].item() < 1e-6 and sure["overlap"].item() < 1e-6
 
@@ -54,11 +54,11 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
         )
     views = tmp_path / "run" / "views"
     produce_views(sets[0], views)
-    (made,) = load_views(views)
-    assert made["rgb"].shape == (64, 64, 3) and made["rgb"].dtype == np.uint8
-    length = np.linalg.norm(made["normal"].astype(float) / 127, axis=-1)
-    assert np.abs(length[made["depth"] > 0] - 1).max() < 0.03
-    assert 1 in np.sign(made["thing"])
+    (view,) = load_views(views)
+    assert view["rgb"].shape == (64, 64, 3) and view["rgb"].dtype == np.uint8
+    length = np.linalg.norm(view["normal"].astype(float) / 127, axis=-1)
+    assert np.abs(length[view["depth"] > 0] - 1).max() < 0.03
+    assert 1 in np.sign(view["thing"])
     before = (views / "0000000.npz").stat().st_mtime_ns
     shutil.move(sets[0], tmp_path / "elsewhere")
     produce_views(tmp_path / "elsewhere", views)  # a set may move
@@ -67,6 +67,7 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     assert (views / "0000000.npz").stat().st_mtime_ns == before, "what is there is kept"
 
 
+@pytest.mark.slow
 def test_cut_outs_are_things_of_further_views(tmp_path):
     data = tmp_path / "set"
     folder = tmp_path / "cutouts"

@@ -9,7 +9,7 @@ from materialist.predict.bundled.network import BundledNetwork
 def test_one_step_and_its_weights(done, data, tmp_path):
     small = ("--size", 32, "--batch", 1, "--workers", 0, "--score-samples", 0, "--device", "cpu")
     more = made_samples.write_set(tmp_path / "more", 3)
-    made = done(
+    report = done(
         "train",
         "matnet",
         "--data",
@@ -22,7 +22,7 @@ def test_one_step_and_its_weights(done, data, tmp_path):
         1,
         *small,
     )
-    assert made["step"] == 1
+    assert report["step"] == 1
     weights = tmp_path / "run" / "weights.safetensors"
     assert weights.stat().st_size < 40e6, "what the package can hold"
     assert BundledNetwork.load(weights)[1]["data"] == {"samples": 7, "seed": [5, 5]}

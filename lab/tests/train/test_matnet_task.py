@@ -79,10 +79,10 @@ def test_colours_at_the_sky_are_those_of_the_surface():
         for name in MAPS
     }
     large = enlarged(small | {"mask": mask}, [80, 96])
-    here = large["mask"][0] > 0
-    assert 0.2 < here.float().mean() < 0.95 and large["image"][0][here].min() < 0.5
+    inside = large["mask"][0] > 0
+    assert 0.2 < inside.float().mean() < 0.95 and large["image"][0][inside].min() < 0.5
     for name in ("albedo", "roughness", "metallic"):
-        np.testing.assert_allclose(large[name][:, here], 0.6, atol=1e-5)
+        np.testing.assert_allclose(large[name][:, inside], 0.6, atol=1e-5)
 
 
 def test_starting_from_other_checkpoints(network, tmp_path):

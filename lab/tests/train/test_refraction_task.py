@@ -44,11 +44,11 @@ def test_it_leaves_weights_that_score_as_it_said_and_begin_another_run(views, tm
         figures["solid"], rel=1e-2
     )
     again = made_runs.trainer(made_runs.refraction(views, init=file), tmp_path / "second", steps=1)
-    for found, wanted in zip(
+    for result, expected in zip(
         again.network.parameters(), trainer.averaged.parameters(), strict=True
     ):
         torch.testing.assert_close(
-            found.detach(), wanted.detach(), atol=1e-6, rtol=1e-3
+            result.detach(), expected.detach(), atol=1e-6, rtol=1e-3
         )  # stored as float16
 
 

@@ -50,11 +50,11 @@ def during(trainer, number, act):
     count = [0]
 
     def counted(batch):
-        found = step(batch)
+        terms = step(batch)
         count[0] += 1
         if count[0] == number:
             act()
-        return found
+        return terms
 
     trainer._step = counted
 
@@ -72,6 +72,7 @@ def test_a_run_learns_and_tells(run):
         for name in (checkpoint.CURVE, checkpoint.SCORES)
     )
     assert [line["step"] for line in curve] == [6, 12, 18, 24, 30]
+    # It learns, and the rate falls.
     assert curve[-1]["loss"] < 0.8 * curve[0]["loss"]
     assert curve[-1]["rate"] < curve[0]["rate"] and curve[-1]["per_second"] > 0
     assert "no LPIPS" in notes[0]
@@ -84,18 +85,21 @@ def test_its_averaged_weights_predict_and_begin_another_run(run, data):
     folder, _ = run
     predictor = BundledPredictor(folder / checkpoint.WEIGHTS)
     assert predictor.facts["step"] == 30 and predictor.facts["data"]["seed"] == [5]
+    # Weights are stored in half precision.
     state = checkpoint.load(folder, "matnet")
     begun = made_runs.bundled(data)
     begun.init = folder / checkpoint.WEIGHTS
-    for found in (predictor.network.state_dict(), begun.network().state_dict()):
-        for name, tensor in found.items():
+    for weights in (predictor.network.state_dict(), begun.network().state_dict()):
+        for name, tensor in weights.items():
             torch.testing.assert_close(tensor, state["averaged"][name], atol=2e-3, rtol=2e-3)
     assert any(not torch.equal(state["averaged"][n], state["network"][n]) for n in state["network"])
+    # A network with one more head begins with what there is.
     wider = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, spread=True))
     wider.init = folder / checkpoint.WEIGHTS
     grown = wider.network().state_dict()  # with an untrained head of its own
     torch.testing.assert_close(grown["head.weight"], begun.network().state_dict()["head.weight"])
     assert float(grown["spread.out.weight"].abs().sum()) == 0
+    # Another width is another network.
     other = made_runs.bundled(data, architecture=replace(made_runs.NETWORK, fine=16))
     other.init = folder / checkpoint.WEIGHTS
     with pytest.raises(WeightsError, match="is not a checkpoint of BundledNetwork"):
@@ -104,9 +108,11 @@ def test_its_averaged_weights_predict_and_begin_another_run(run, data):
 
 @pytest.mark.parametrize("kind", ["matnet", "clicks", "refraction"])
 def test_a_run_that_was_killed_ends_as_one_that_was_not(kind, tasks, tmp_path):
+    # Bit for bit: order, variants, moments and averages go on where they stopped.
     whole = made_runs.trainer(tasks[kind](), tmp_path / "whole", steps=6)
     whole.fit()
     cut = made_runs.trainer(tasks[kind](), tmp_path / "cut", steps=6)
+    # As a terminal or a scheduler stops a job: workers and trainer together.
     during(cut, 3, lambda: os.kill(os.getpid(), signal.SIGTERM))
     assert cut.fit() == {} and cut.schedule.step == 3
     rest = made_runs.trainer(tasks[kind](), tmp_path / "cut", steps=6, resume=True)
@@ -157,10 +163,12 @@ def test_a_run_is_not_overwritten_nor_mixed_up(run, data, tasks, tmp_path):
 
 def test_checkpoints_are_whole_or_refused(tmp_path):
     checkpoint.save(tmp_path, {"kind": "matnet", "step": 1})
+    # What cannot be stored must not spoil what is there.
     with pytest.raises(AttributeError):
         checkpoint.save(tmp_path, {"kind": "matnet", "step": 2, "bad": lambda: None})
     assert checkpoint.load(tmp_path, "matnet")["step"] == 1
     path = tmp_path / checkpoint.NAME
+    # A disk that was full.
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(WeightsError, match="is damaged"):
         checkpoint.load(tmp_path, "matnet")
@@ -176,6 +184,7 @@ def test_pictures_grow_with_the_run(data, tmp_path):
         256,
     ]
     assert RECIPE.changed(side=96).side_at(0) == 96
+    # Three of six steps at half of the side.
     task = made_runs.bundled(data, side=64, growth=((0.5, 32),))
     trainer = made_runs.trainer(task, tmp_path / "run", steps=6)
     losses = task.losses
@@ -191,6 +200,7 @@ def test_pictures_grow_with_the_run(data, tmp_path):
 def test_the_rate_rises_falls_and_is_restarted():
     schedule = TrainingSchedule(Budget(steps=100))
     assert schedule.rate(10, 0.1) == pytest.approx(0.1)
+    # Half a cosine: the mean of 1 and 0.1 in the middle.
     schedule.step = 50
     assert schedule.rate(10, 0.1) == pytest.approx(0.55)
     unfinished = schedule.as_dict()
@@ -198,6 +208,7 @@ def test_the_rate_rises_falls_and_is_restarted():
     assert schedule.rate(10, 0.1) == pytest.approx(0.1) and schedule.done
     same = TrainingSchedule(Budget(steps=100), unfinished)
     assert same.rate(10, 0.1) == pytest.approx(0.55), "the same budget goes on"
+    # 100 of 1000 steps are done.
     longer = TrainingSchedule(Budget(steps=900), schedule.as_dict())
     assert longer.progress == pytest.approx(0.1) and not longer.done
     longer.step = 150

@@ -68,6 +68,7 @@ def test_glass_that_bends_nothing_shows_the_sky_behind_it():
     assert picture[INNER][:, 0].mean() < picture[INNER][:, 2].mean()
 
 
+@pytest.mark.slow
 def test_under_another_light_the_sky_is_that_light():
     edited = relight(glass(SCENE, MASK, ior=1.0, thickness="symmetry"), ambient=0.5)
     picture = composite(SCENE, edited, spp=16, denoise=False)

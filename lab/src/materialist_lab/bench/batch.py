@@ -66,6 +66,7 @@ class BatchBench(Benchmark):
             self.device,
             "--json",
         )
+        # --- Single inversions, a process each ---
         with tempfile.TemporaryDirectory() as folder:
             place = Path(folder)
             photos = chosen(data, self.photos, place)
@@ -83,6 +84,7 @@ class BatchBench(Benchmark):
             single = _row("single inversions, one after the other", begin, len(photos))
             yield single
             hashes = {photo: package_hash(place / f"{k}.scene") for k, photo in enumerate(photos)}
+            # --- The same photos as a batch ---
             for count in counts:
                 begin = _usage()
                 runs = place / f"runs-{count}"
@@ -90,7 +92,8 @@ class BatchBench(Benchmark):
                 materialist("batch", *listed, *options, environment=SINGLE_THREAD)
                 row = _row(f"batch, {count} worker{'s' if count > 1 else ''}", begin, len(photos))
                 done = json.loads((runs / "summary.json").read_text("utf-8"))["rows"]
-                if {one["id"]: one["scene_hash"] for one in done} != hashes:
+                # The same scenes bit for bit, or times cannot be compared.
+                if {row["id"]: row["scene_hash"] for row in done} != hashes:
                     raise MaterialistError(
                         f"A batch with {count} workers gave other scenes than single inversions."
                     )
@@ -105,8 +108,10 @@ def chosen(data: Path | None, photos: int, runs: Path) -> list[str]:
     if data is None:
         return list(EXAMPLES[:photos])
     below = data / "photos"
-    found = [photo.location for photo in list_photos(below if below.is_dir() else data, runs=runs)]
-    return spread(found, photos)
+    locations = [
+        photo.location for photo in list_photos(below if below.is_dir() else data, runs=runs)
+    ]
+    return spread(locations, photos)
 
 
 def _usage() -> tuple[float, float]:

@@ -53,12 +53,14 @@ class Benchmark(OperationOptions, ABC):
         Raises InputError where there are no rows.
         """
         setup(self.device)
+        # --- The empty report: its text is the module's docstring ---
         title, _, note = inspect.cleandoc(
             sys.modules[type(self).__module__].__doc__ or ""
         ).partition("\n\n")
         settings = {name: None if value == "" else value for name, value in asdict(self).items()}
         settings["data"] = None if data is None else data.name
         report = Report(title, note, settings, self.columns, self.plotted)
+        # --- Rows as they come in; written at once, then every few seconds ---
         written = -self.write_every
         try:
             for row in track(
@@ -68,6 +70,7 @@ class Benchmark(OperationOptions, ABC):
                 if time.monotonic() > written + self.write_every:
                     write(report, output)
                     written = time.monotonic()
+        # A stopped run keeps what it measured.
         finally:
             if report.rows:
                 write(report, output)
@@ -77,26 +80,27 @@ class Benchmark(OperationOptions, ABC):
 
 def names(called: str, text: str, known: Collection[str] = ()) -> list[str]:
     """The names of a list with commas, each once. Raises InputError for none, or for one that is not `known`."""
-    found = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
-    if not found:
+    # A dict keeps the order and drops repetitions.
+    chosen = list(dict.fromkeys(part.strip() for part in text.split(",") if part.strip()))
+    if not chosen:
         raise InputError(f"The {called} is empty; name at least one.")
-    for name in found if known else ():
+    for name in chosen if known else ():
         if name not in known:
             raise InputError(f"The {called} '{name}' is unknown; choose from {', '.join(known)}.")
-    return found
+    return chosen
 
 
 def numbers(called: str, text: str, low: float, high: float, kind: type = int) -> list[Any]:
     """The numbers of a list with commas. Raises InputError for anything but numbers from `low` to `high`."""
     try:
-        found = [kind(part) for part in text.split(",")]
+        values = [kind(part) for part in text.split(",")]
     except ValueError:
-        found = []
-    if not all(low <= number <= high for number in found) or not found:
+        values = []
+    if not all(low <= number <= high for number in values) or not values:
         raise InputError(
             f"The {called} is {text!r}; give numbers from {low} to {high} with commas."
         )
-    return found
+    return values
 
 
 def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -> None:
@@ -106,6 +110,7 @@ def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -
         command, capture_output=True, text=True, env={**os.environ, **(environment or {})}
     )
     if done.returncode:
+        # A process that the kernel kills for memory says nothing.
         said = (
             f"{done.stdout[-300:]}{done.stderr[-300:]}".strip()
             or "nothing; it may have run out of memory"
@@ -115,17 +120,18 @@ def materialist(*arguments: str, environment: Mapping[str, str] | None = None) -
         )
 
 
-def timed(work: Callable[..., Any], *given: Any, **named: Any) -> tuple[Any, dict[str, float]]:
+def timed(work: Callable[..., Any], *args: Any, **kwargs: Any) -> tuple[Any, dict[str, float]]:
     """What `work` returns, its wall seconds, and processor seconds with those of processes that it started and ended.
 
     Other programs hardly change the latter.
     """
 
+    # Children count once they ended, which is what `os.times` has.
     def spent() -> tuple[float, float]:
         return time.perf_counter(), time.process_time() + sum(os.times()[2:4])
 
     begun = spent()
-    value = work(*given, **named)
+    value = work(*args, **kwargs)
     wall, cpu = (end - start for start, end in zip(begun, spent(), strict=True))
     return value, {"seconds": wall, "cpu_seconds": cpu}
 

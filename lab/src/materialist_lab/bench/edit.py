@@ -88,6 +88,7 @@ class EditBench(Benchmark):
                 seed=self.seed,
                 device=self.device,
             )
+            # The ceiling: the edit of the true scene.
             perfect = true_scene(sample)
             before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=self.seed + 5)
             for edit in edits(sample, other, kinds):
@@ -111,17 +112,20 @@ class EditBench(Benchmark):
 
         before: the true picture of the photo.
         """
+        # Light through glass onto the floor is noisy: more paths.
         caustics = self.caustics if edit.kind == "glass cup" else 1
         after = edit.truth.render(edit.envmap, spp=caustics * self.truth_spp, seed=self.seed + 5)
         inside = edit.region(before, after)
         shared: dict[str, Any] = {"spp": self.spp, "seed": self.seed, "device": self.device}
         photo = sample.photo.linear
+        # --- Ceilings: the whole edited picture, and its difference brought into the photo ---
         truly = edit.change(perfect)
         yield {"method": f"{edit.kind}: untouched", **scores(photo, after, inside)}
         best = composite(perfect, truly, full_render=True, **shared)
         yield {"method": f"{CEILING} {edit.kind}", **scores(best, after, inside)}
         brought = composite(perfect, truly, **shared)
         yield {"method": f"{CEILING} {edit.kind}, composite", **scores(brought, after, inside)}
+        # --- The edit of the fitted scene ---
         scene, seconds = fitted
         picture, cost = timed(composite, scene, edit.change(scene), **shared)
         yield {
@@ -133,6 +137,7 @@ class EditBench(Benchmark):
         report.sheet.append(strip(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
+        # --- The live preview, once everything is prepared ---
         scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(Preview, scene)
         yield {"method": "preview: built once", "sample": sample, **cost}
@@ -142,14 +147,16 @@ class EditBench(Benchmark):
         turns = [relight(scene, rotate=40.0 * k) for k in range(1, 4)]
         for name, edited in (("preview: material", changes), ("preview: light", turns)):
             preview.render(edited[0])  # the first one compiles
-            for one in edited[1:]:
-                yield {"method": name, "sample": sample, **timed(preview.render, one)[1]}
+            for edited_scene in edited[1:]:
+                yield {"method": name, "sample": sample, **timed(preview.render, edited_scene)[1]}
+        # --- Final pictures ---
         yield from self._finals(
             scene, mask, {"material": lambda: changes[0], "light": lambda: turns[0]}, sample
         )
         layers = render_layers(
             EditRenderer(scene, device=self.device), changes[0], spp=16, seed=self.seed
         )
+        # --- Into a large photo, with grain as cameras have it ---
         side = (self.large, self.large)
         large = np.asarray(cv2.resize(scene.photo.original, side, interpolation=cv2.INTER_CUBIC))
         grain = 0.03 * np.random.default_rng(0).standard_normal((*side, 1), np.float32)
@@ -162,15 +169,16 @@ class EditBench(Benchmark):
         }
 
     def _finals(
-        self, scene: Scene, mask: Array, given: dict[str, Callable[[], Scene]], sample: str
+        self, scene: Scene, mask: Array, changes: dict[str, Callable[[], Scene]], sample: str
     ) -> Iterator[Row]:
         """Seconds of edits from their options to their pictures, and of a film."""
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
-        made = cup()[1]
+        vessel = cup()[1]
+        # Something to stand on; the middle where there is no floor.
         floor = (scene.normal[..., 1] > 0.9) & (scene.depth > 0)
         place = free_place(floor) or (self.latency / 2, self.latency / 2)
-        kinds = given | {
-            "insertion": lambda: insert(scene, made, place),
+        kinds = changes | {
+            "insertion": lambda: insert(scene, vessel, place),
             "removal": lambda: remove(scene, mask),
             "glass": lambda: glass(scene, mask),
         }
@@ -180,7 +188,9 @@ class EditBench(Benchmark):
         if self.frames:
 
             def film():
-                return list(pictures(scene, drop(scene, made, place, frames=self.frames), **shared))
+                return list(
+                    pictures(scene, drop(scene, vessel, place, frames=self.frames), **shared)
+                )
 
             yield {"method": f"drop: {self.frames} frames", "sample": sample, **timed(film)[1]}
 

@@ -31,8 +31,8 @@ SHIFTS = {
     for sign in "+-"
 }
 """The paper's "high" and "low" (Material Editing): what is shifted, and by how much."""
-ROOM = 0.25
-"""What is left of a shift in [0, 1], at the least."""
+MIN_SHIFT = 0.25
+"""Smallest shift within [0, 1] for which an object is edited: the limits may leave less than the whole."""
 KINDS = ("hue", "metal", "relight", "insert", "glass", "remove", "glass cup", *SHIFTS)
 INSERTIONS = ("insert", "glass cup")
 SHADOW = 0.02
@@ -73,9 +73,12 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
     things = stage.things
     for kind in kinds:
         # Objects are neither floor nor wall.
-        able = [k for k in things if kind not in SHIFTS or _shift(stage.items[k], kind) >= ROOM]
+        able = [
+            k for k in things if kind not in SHIFTS or _shift(stage.items[k], kind) >= MIN_SHIFT
+        ]
         largest = max(able, key=lambda k: things[k].sum(), default=None)
         if kind == "relight":
+            # Another light changes the whole picture.
             everything = np.ones(stage.seen.shape, bool)
             yield Edit(kind, partial(relight, envmap=light), stage, light, everything)
         elif kind in INSERTIONS:
@@ -90,6 +93,7 @@ def edits(sample: SyntheticSample, light: Array, kinds: list[str]) -> Iterator[E
                 others = []
             elif kind == "glass":
                 change = partial(glass, mask=mask)
+                # Removed, of glass, or of another material: only this object of the truth changes.
                 others = [_of_glass(item, stage)]
             else:
                 values, other = _material(kind, item)
@@ -109,6 +113,7 @@ def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
         name, by = SHIFTS[kind]
         shifted: dict[str, Any] = {name: getattr(item, name) + np.sign(by) * _shift(item, kind)}
         return {name: f"{by:+g}"}, replace(item, **shifted)
+    # Copper.
     colour = np.broadcast_to(np.array(COPPER, np.float32), item.albedo.shape).copy()
     values = {"albedo": COPPER, "metallic": 1.0, "roughness": 0.3}
     return values, replace(item, albedo=colour, metallic=1.0, roughness=0.3)
@@ -118,6 +123,7 @@ def _shift(item: Item, kind: str) -> float:
     """How much of one of the SHIFTS the limits 0 and 1 leave."""
     name, by = SHIFTS[kind]
     old = getattr(item, name)
+    # Towards the limit that the sign points to.
     return min(abs(by), 1 - old if by > 0 else old)
 
 
@@ -134,6 +140,7 @@ def staged(stage: TrueScene, items: list[Item]) -> TrueScene:
 
 def free_place(floor: Array) -> tuple[float, float] | None:
     """Column and row farthest from what is no floor [H, W] bool; None where there is hardly any."""
+    # Padded: the border of the picture is no floor.
     free = cv2.distanceTransform(np.pad(floor.astype(np.uint8), 1), cv2.DIST_L2, 5)[1:-1, 1:-1]
     row, column = np.unravel_index(int(np.argmax(free)), free.shape)
     return (float(column) + 0.5, float(row) + 0.5) if free[row, column] >= 2 else None
@@ -158,6 +165,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator
         return
     solid, model = cup()
     material = "as-is" if kind == "insert" else "glass"
+    # The product's placing, so that both cups stand at the same place.
     (body,) = insert(true_scene(sample), model, at, material=material).bodies
     placed = replace(
         solid, vertices=body.vertices.astype(np.float64), normals=body.normals.astype(np.float64)
@@ -168,6 +176,7 @@ def _insertion(sample: SyntheticSample, stage: TrueScene, kind: str) -> Iterator
     truth = staged(
         stage, [*stage.items, Item(placed, np.tile(albedo, (2, 2, 1)), roughness, 0.0, ior)]
     )
+    # The last object of the true scene.
     mask = truth.seen == len(stage.items)
     yield Edit(
         kind, lambda scene: insert(scene, model, at, material=material), truth, sample.envmap, mask
@@ -178,6 +187,7 @@ def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]
     """A scene with true maps, which cost the same as fitted ones, a region [H, W] bool of it, and what to call both."""
     scene = true_scene(make_sample(0, 0, 0, size=size, data=data, seed=seed, spp=16))
     mask = np.zeros(scene.depth.shape, bool)
+    # The middle of the picture, as large as a typical object.
     third = np.s_[size // 3 : 2 * size // 3]
     mask[third, third] = True
     mask &= scene.depth > 0
@@ -185,10 +195,11 @@ def awaited(size: int, data: Path | None, seed: int) -> tuple[Scene, Array, str]
 
 
 def sample_and_light(
-    scene: int, view: int, light: int, **how: Any
+    scene: int, view: int, light: int, **options: Any
 ) -> tuple[SyntheticSample, Array]:
-    """The sample of these numbers, and the next light [h, 2h, 3] of its view; `how` as of `make_sample`."""
-    sample, other = (make_sample(scene, view, k, **how) for k in (light, light + 1))
+    """The sample of these numbers, and the next light [h, 2h, 3] of its view; `options` as of `make_sample`."""
+    sample = make_sample(scene, view, light, **options)
+    other = make_sample(scene, view, light + 1, **options)
     return sample, other.envmap
 
 

@@ -86,6 +86,7 @@ class GlassBench(Benchmark):
         for case, behind in self._cases(data, iors) if self.shapes else ():
             shown: dict[str, Array] = {}
             yield from self._compared(case, behind, shown)
+            # --- The pictures: truth and predictions inside the mask, the room around them ---
             if len(report.sheet) < self.pictures:
                 inside = case.stage.mask[..., None]
                 room = behind["true"].picture
@@ -106,6 +107,7 @@ class GlassBench(Benchmark):
                 light = scenes.environment(
                     next(lights[thing.group]), stage, data=data, seed=self.seed
                 )
+                # One exposure for room, grey object and glass.
                 room = stage.room.render(light, self.reference, seed=1)
                 gain = scenes.exposure(room)
                 grey = stage.grey.render(light * gain, self.reference, seed=2)
@@ -127,23 +129,27 @@ class GlassBench(Benchmark):
         """The rows of all methods for one case; their pictures go into `shown`."""
         stage = case.stage
         true = behind["true"]
+        # --- Thickness by every way of finding it ---
         d = models.thicknesses(case.scene, stage, true)
 
-        def row(method: str, picture: Array, found: Thickness | None = None) -> Row:
+        def row(method: str, picture: Array, thickness: Thickness | None = None) -> Row:
             shown[method] = picture
-            return {"method": method, "sample": case.name, **figures(case, picture, found)}
+            return {"method": method, "sample": case.name, **figures(case, picture, thickness)}
 
+        # --- What bounds the figures: no glass at all, and the true mesh ---
         for kind, background in behind.items():
             yield row(f"background alone, {kind}", background.picture)
         yield row(f"{CEILING}, true mesh", models.before(case, stage.item.solid, true))
         again = stage.glass(case.ior).render(case.scene.envmap, self.spp, seed=4)
         yield row(f"{CEILING}, truth again", again)
+        # --- Both models with every thickness ---
         for model in (models.two_interface, models.closed):
             name = model.__name__
-            for source, found in d.items():
-                yield row(f"{name}, {source} d", model(case, found, true), found)
+            for source, thickness in d.items():
+                yield row(f"{name}, {source} d", model(case, thickness, true), thickness)
             inpainted = model(case, d["predicted"], behind["inpainted"])
             yield row(f"{name}, predicted d, inpainted", inpainted, d["predicted"])
+        # --- How much the normal of the back is worth ---
         for source in ("true", "network"):
             leaning = replace(d[source], back=stage.front.back)
             yield row(f"closed, {source} d, true back", models.closed(case, leaning, true), leaning)
@@ -153,6 +159,7 @@ class GlassBench(Benchmark):
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
         """Rows of the preview: built, its first picture, and one picture after another, as a person changes sliders."""
+        # The preview as the studio has it.
         scene, mask, sample = awaited(self.latency, data, self.seed)
         preview, cost = timed(lambda: GlassPreview(scene, mask, device=self.device, seed=self.seed))
         yield {"method": "preview: built once", "sample": sample, **cost}
@@ -178,6 +185,7 @@ def sensitivity(
 
     As there, the back's normal is the front's: the row to compare with is that of the same assumption.
     """
+    # The name seeds the noise: a case has the same in any selection of cases.
     rng = np.random.default_rng([seed, 10, *case.name.encode()])
     largest = scenes.PROTOCOL.noise
     for k in range(draws):
@@ -194,15 +202,16 @@ def figures(case: Case, picture: Array, thickness: Thickness | None) -> dict[str
     truth = case.truth
     # Outside the mask both are the truth, so that windows that reach over its border compare equals.
     inside = np.where(mask[..., None], picture, truth)
-    found = {
+    values = {
         "psnr": metrics.psnr(inside, truth, mask=mask),
         "ssim": metrics.ssim(inside, truth, mask=mask),
     }
-    found["frame"] = float(found["psnr"] - 10 * np.log10(mask.mean()))
+    # The squared error over all pixels is the mask's share of that inside it.
+    values["frame"] = float(values["psnr"] - 10 * np.log10(mask.mean()))
     box = window(mask)
     if (distance := lpips(inside[box], truth[box])) is not None:
-        found["lpips"] = distance
+        values["lpips"] = distance
     if thickness is not None:
         true = case.stage.front.thickness
-        found["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
-    return {f"{name}_{group}": value for name, value in found.items()}
+        values["thickness"] = float(np.abs(thickness.solid - true)[mask].sum() / true[mask].sum())
+    return {f"{name}_{group}": value for name, value in values.items()}

@@ -53,19 +53,20 @@ class Background:
         """The mesh of its depth, and its planes, which go on with their mean albedo."""
         depth = self.maps.depth
         albedo = self.maps.materials.albedo
-        found = list[Item]()
+        items = list[Item]()
         if not depth.any():
-            return found
+            return items
         geometry = build_geometry(depth, self.maps.normal, camera)
         for k in np.unique(geometry.mesh.face_plane):
+            # Planes reach beyond what is seen: there they have their mean albedo.
             mean = (
                 np.broadcast_to(albedo[geometry.plane_label == k].mean(0), (2, 2, 3))
                 if k >= 0
                 else albedo
             )
             mesh: Any = part(geometry.mesh, int(k))
-            found.append(Item(mesh, mean, 1.0, 0.0))
-        return found
+            items.append(Item(mesh, mean, 1.0, 0.0))
+        return items
 
     def fitted(self, envmap: Array, room: TrueScene) -> "Background":
         """With the albedo under which its surfaces, path-traced under the light, look like its picture."""
@@ -73,6 +74,7 @@ class Background:
         items = self.surfaces(room.camera)
         if not items:
             return self
+        # --- One multiplicative step: albedo times picture over rendering ---
         seen = denoised(
             staged(room, items).render(envmap, PROTOCOL.albedo_spp), old.albedo, self.maps.normal
         )
@@ -88,19 +90,21 @@ def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
 
     Before nothing but the light, where it refuses, the same patches.
     """
+    # --- A room: the object is removed from it ---
     if stage.room.items:
         photo = Background(scene.photo.linear, scene.prior).fitted(scene.envmap, stage.room)
         removed = remove(replace(scene, materials=photo.maps.materials), stage.mask)
         return Background(
             removed.photo.linear, Prediction(removed.materials, removed.normal, removed.depth)
         )
+    # --- The light alone: patches of what is around the object ---
     hole = grown(stage.mask, 1)
     maps = stage.room.truth
     return Background(patched(scene.photo.linear, hole, ~hole, np.zeros(hole.shape, int)), maps)
 
 
 def two_interface(
-    case: Case, found: Thickness, behind: Background, *, papers_back: bool = False
+    case: Case, thickness: Thickness, behind: Background, *, papers_back: bool = False
 ) -> Array:
     """[H, W, 3] linear, inside the object's mask: the two-interface model.
 
@@ -108,25 +112,34 @@ def two_interface(
     """
     scene = case.scene
     mask = case.stage.mask
+    # "found" takes the normals that are given, "same" those of the front.
     beyond = interfaces.Backdrop(behind.picture, behind.maps.depth, scene.envmap)
     material = Glass(ior=case.ior, model="two-interface", back="same" if papers_back else "found")
     return interfaces.two_interface(
-        scene.camera, scene.normal, scene.depth, mask, found.solid, beyond, material, found.back
+        scene.camera,
+        scene.normal,
+        scene.depth,
+        mask,
+        thickness.solid,
+        beyond,
+        material,
+        thickness.back,
     )
 
 
-def closed(case: Case, found: Thickness, behind: Background) -> Array:
+def closed(case: Case, thickness: Thickness, behind: Background) -> Array:
     """[H, W, 3] linear, inside the object's mask: a closed object before the background, path-traced."""
     scene = case.scene
     mask = case.stage.mask
-    whole = found.revolution
+    # A solid of revolution is whole already; else front and back are closed at the outline.
+    whole = thickness.revolution
     if whole is not None:
         return before(case, whole.body(scene.camera), behind)
     depth = scene.depth
     normal = scene.normal
     beyond = behind.maps.depth
     body = closed_proxy(
-        depth, normal, mask, found.solid, scene.camera, behind=beyond, back=found.back
+        depth, normal, mask, thickness.solid, scene.camera, behind=beyond, back=thickness.back
     )
     return before(case, body, behind)
 
@@ -138,8 +151,10 @@ def before(case: Case, body: Any, behind: Background) -> Array:
     """
     scene = case.scene
     mask = case.stage.mask
+    # The true renderer, so that only the shape differs from the truth.
     things = [*behind.surfaces(scene.camera), replace(case.stage.item, solid=body, ior=case.ior)]
     picture = staged(case.stage.room, things).render(scene.envmap, case.spp)
+    # Only the object is denoised: its background is that of the photo.
     box = window(mask)
     seen = np.ascontiguousarray(picture[box])
     normal = np.ascontiguousarray(scene.normal[box])
@@ -157,6 +172,6 @@ def thicknesses(scene: Scene, stage: GlassScene, behind: Background) -> dict[str
     methods |= {name: name for name in ("network", "symmetry")}
     depth = behind.maps.depth
     return {
-        name: object_thickness(scene, stage.mask, how, behind=depth)
-        for name, how in methods.items()
+        name: object_thickness(scene, stage.mask, method, behind=depth)
+        for name, method in methods.items()
     }

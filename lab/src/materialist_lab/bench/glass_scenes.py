@@ -76,8 +76,8 @@ class SeenSide:
 def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:
     """The first `count` symmetric and `count` asymmetric objects: procedural, or watertight meshes of DATA/meshes."""
     if data is None:
-        return [_made(group, k, seed) for k in range(count) for group in GROUPS]
-    found: list[list[GlassObject]] = []
+        return [_revolved(group, k, seed) for k in range(count) for group in GROUPS]
+    groups: list[list[GlassObject]] = []
     for group in GROUPS:
         files = sorted((data / "meshes" / group).glob("*.ply"))
         files = [f for f in files if f.stem not in VESSELS]
@@ -91,11 +91,11 @@ def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:
             raise InputError(
                 f"{data / 'meshes' / group} holds no closed .ply mesh; give another --data, or none."
             )
-        found.append(closed)
-    return [thing for pair in zip_longest(*found) for thing in pair if thing]
+        groups.append(closed)
+    return [thing for pair in zip_longest(*groups) for thing in pair if thing]
 
 
-def _made(group: str, k: int, seed: int) -> GlassObject:
+def _revolved(group: str, k: int, seed: int) -> GlassObject:
     """Solid number k of a group, of the shapes that RefractionNet never saw."""
     kinds = SOLIDS[group]
     index = KINDS * (k // len(kinds)) + kinds[k % len(kinds)]

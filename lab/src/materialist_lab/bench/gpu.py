@@ -40,9 +40,10 @@ class GpuBench(Benchmark):
     runs: int = option(50, "Forward passes; a tenth of it more do not count.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        there = usable_gpus() and torch.cuda.is_available()
+        # Both libraries must see it: an inversion uses both.
+        usable = usable_gpus() and torch.cuda.is_available()
         report.settings["card"] = (
-            torch.cuda.get_device_name() if there else "none that Mitsuba and PyTorch can use"
+            torch.cuda.get_device_name() if usable else "none that Mitsuba and PyTorch can use"
         )
         if self.device != "auto":
             yield from (
@@ -50,11 +51,14 @@ class GpuBench(Benchmark):
                 for k, s in self._measured(report)
             )
             return
+        # --- Each device in a process of its own ---
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as folder:
-            for device in ("cpu", "cuda")[: 1 + there]:  # a process keeps its device
+            for device in ("cpu", "cuda")[: 1 + usable]:  # a process keeps its device
                 options = asdict(replace(self, device=device))
-                given = [f"--{name.replace('_', '-')}={value}" for name, value in options.items()]
-                materialist("bench", "gpu", "-o", f"{folder}/{device}", *given)
+                arguments = [
+                    f"--{name.replace('_', '-')}={value}" for name, value in options.items()
+                ]
+                materialist("bench", "gpu", "-o", f"{folder}/{device}", *arguments)
                 yield from json.loads(Path(folder, device, "report.json").read_text())["rows"]
 
     def _measured(self, report: Report) -> Iterator[tuple[str, float]]:

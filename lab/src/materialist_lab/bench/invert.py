@@ -106,16 +106,19 @@ class InvertBench(Benchmark):
     at_once: int = option(1, "With 2 or more, so many inversions at the same time, too.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        # A synthetic photo is made once, as large as the largest size needs it.
         sizes = numbers("sizes", self.sizes, 16, 8192)
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as temporary:
             folder = Path(temporary)
             case = photo_case(self, data, self.photo, folder, min(NATIVE, max(sizes)))
             report.settings["photo"] = case.name
             options = ("--preset", self.preset, "--completion", self.completion)
+            # --- Whole inversions ---
             for size in sizes:
                 yield inversion(self, case, size, folder, *options)
                 if self.at_once > 1:
                     yield self._together(case, size, folder, *options)
+            # --- One step of the material fit ---
             if self.step_size:
                 photo = read_photo(
                     _at_least(case, self.step_size, folder), size=self.step_size, fov=case.fov
@@ -127,6 +130,7 @@ class InvertBench(Benchmark):
 
     def _together(self, case: InvertedPhoto, size: int, folder: Path, *options: str) -> Row:
         """The row of `at_once` inversions: the time until the last of them ends. Twice that of one is fair for two."""
+        # Folders of their own: scenes of one size have one name.
         places = [Path(tempfile.mkdtemp(dir=folder)) for _ in range(self.at_once)]
         with ThreadPoolExecutor(self.at_once) as pool:
             cost = timed(
@@ -145,6 +149,7 @@ def photo_case(
     bench: Benchmark, data: Path | None, photo: str, folder: Path, size: int
 ) -> InvertedPhoto:
     """What to invert, by the options; a synthetic photo with its true maps is written into `folder`."""
+    # --- A photo of the user's, of DATA, or a synthetic one ---
     if photo:
         return InvertedPhoto(Path(photo).name, photo, "auto")
     if data is not None:
@@ -155,6 +160,7 @@ def photo_case(
             f"{data} holds neither official_indoor/ nor photo.png with maps/ beside it; give such a folder, a --photo, "
             "or leave out --data for a synthetic photo."
         )
+    # The true maps are the prior, as the published network's are for DATA.
     setup(bench.device)
     sample = make_sample(0, 0, 0, size=size, seed=bench.seed)
     write_png(folder / "photo.png", sample.photo.linear)
@@ -192,9 +198,11 @@ def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *o
         "--json",
         *options,
     )
+    # The clock sees what a user waits for: start of Python, reading and writing included.
     seconds = timed(lambda: materialist(*command))[1]["seconds"]
-    told = json.loads((scene / "report.json").read_text())
+    report = json.loads((scene / "report.json").read_text())
     camera = json.loads((scene / "scene.json").read_text())["camera"]
+    # Column -> key in the inversion's report; those that it lacks stay empty.
     names = {f"{name}_l1": f"prior_l1_{name}" for name in ("albedo", "roughness", "metallic")}
     names |= {"psnr": "rerender_psnr_path", "ssim": "rerender_ssim_path", "peak_mb": "peak_rss_mb"}
     return {
@@ -202,8 +210,10 @@ def inversion(bench: Benchmark, case: InvertedPhoto, size: int, folder: Path, *o
         "sample": case.name,
         "seconds": seconds,
         "seconds_per_mpixel": seconds / (camera["width"] * camera["height"]) * 1e6,
-        **{ours: told[theirs] for ours, theirs in names.items() if told.get(theirs) is not None},
-        **stages(told["stages"], seconds),
+        **{
+            ours: report[theirs] for ours, theirs in names.items() if report.get(theirs) is not None
+        },
+        **stages(report["stages"], seconds),
     }
 
 
@@ -220,10 +230,10 @@ def _at_least(case: InvertedPhoto, size: int, folder: Path) -> Path | str:
     return path
 
 
-def stages(told: list[dict[str, Any]], seconds: float) -> dict[str, float]:
+def stages(timings: list[dict[str, Any]], seconds: float) -> dict[str, float]:
     """Seconds by stage, repeated stages added up; `other` is what no stage claims, start and writing among it."""
     spent: Counter[str] = Counter()
-    for stage in told:
+    for stage in timings:
         # Stages named by what they move, as albedo, count as materials.
         name = {"trace": "engine"}.get(stage["name"], stage["name"])
         spent[name if name in STAGES else "materials"] += stage["seconds"]
@@ -243,11 +253,13 @@ def step_row(photo: Photo, prior: Prediction, bench: Benchmark) -> Row:
     seed = bench.seed
     camera = photo.camera
     light = np.full((256, 512, 3), 0.6, np.float32)
+    # --- Both engines for one scene, on the pixels that the cached one fits ---
     geometry = build_geometry(prior.depth, prior.normal, camera, seed=seed)
     cached: Any = TransportEngine(geometry, camera, photo.linear, seed=seed)
     problem, traced = timed(lambda: cached.material_problem(light))
     mesh = RenderScene(geometry, camera, device=bench.device)
     path: Any = PathEngine(mesh, camera, cached.pixels.numpy(), seed=seed)
+    # --- Steps: L1 and its gradients, without the optimiser, which is the same for both ---
     maps = placed(stacked(prior.materials))[cached.pixels]
     target = placed(photo.linear.reshape(-1, 3))[cached.pixels]
 

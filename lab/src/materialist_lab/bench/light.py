@@ -125,17 +125,18 @@ class LightBench(Benchmark):
     )
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        # Unknown names end the bench before anything slow.
         methods = names("methods", self.methods, METHODS)
         for scene, view, light in product(
             range(self.scenes), range(self.views), range(self.lights)
         ):
-            how: dict[str, Any] = {
+            options: dict[str, Any] = {
                 "size": self.size,
                 "data": data,
                 "seed": self.seed,
                 "unseen": self.unseen,
             }
-            sample, other = sample_and_light(scene, view, scene + view + light, **how)
+            sample, other = sample_and_light(scene, view, scene + view + light, **options)
             sample = mirrored(sample) if self.mirrors else sample
             stage = _Stage(self, sample, other)
             for row in chain(stage.relit() if self.relight else (), stage.fitted(methods)):
@@ -166,6 +167,7 @@ class _Stage:
             relit = self._rendered(replace(scene, envmap=self.other))
             return self._on(scene) | {"relit_psnr": metrics.psnr(relit, after)}
 
+        # The ceiling is the true scene, limited by its depth mesh alone.
         for completion, suffix in COMPLETIONS.items():
             perfect = true_scene(self.sample, completion=completion, seed=self.bench.seed)
             yield {"method": CEILING + suffix, **on(perfect)}
@@ -174,9 +176,10 @@ class _Stage:
                 "seed": self.bench.seed,
                 "device": device,
             }
-            found, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
-            off = np.abs(found.materials.albedo - truth.materials.albedo)[truth.depth > 0]
-            figures = self._of_light(found.envmap) | on(found)
+            inverted, cost = timed(pipeline.invert, self.sample.photo, prior=truth, **options)
+            # Only where there is a surface.
+            off = np.abs(inverted.materials.albedo - truth.materials.albedo)[truth.depth > 0]
+            figures = self._of_light(inverted.envmap) | on(inverted)
             yield {
                 "method": "inversion" + suffix,
                 **figures,
@@ -187,13 +190,14 @@ class _Stage:
     def fitted(self, methods: list[str]) -> Iterator[Row]:
         """A row for every method of fitting the light."""
         bench = self.bench
+        # All methods are judged on the true maps, with their own mesh and light.
         perfect = true_scene(self.sample)
         for name in methods:
             method = METHODS[name]
             completion = bench.completion
-            given = given_maps(self.sample, method, seed=bench.seed, device=bench.device)
+            maps = given_maps(self.sample, method, seed=bench.seed, device=bench.device)
             (envmap, steps, geometry), cost = timed(
-                fit, self.sample, method, given, completion, seed=bench.seed, device=bench.device
+                fit, self.sample, method, maps, completion, seed=bench.seed, device=bench.device
             )
             figures = self._of_light(envmap) | self._on(
                 replace(perfect, geometry=geometry, envmap=envmap)
@@ -202,6 +206,7 @@ class _Stage:
 
     def _of_light(self, envmap: Array) -> dict[str, float]:
         """The map against the true one, and the true scene under it against the photo."""
+        # Other seeds than the photo's: the same noise would flatter.
         picture = self.sample.scene.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
         of_map = metrics.envmap_metrics(envmap, self.sample.envmap)
         for part, mask in (("render", None), ("surface", self.sample.truth.depth > 0)):
@@ -222,13 +227,14 @@ class _Stage:
 def fit(
     sample: SyntheticSample,
     method: Method,
-    given: Prediction,
+    maps: Prediction,
     completion: str,
     *,
     seed: int = 0,
     device: str = "auto",
 ) -> tuple[Array, int, Geometry]:
-    """(envmap [256, 512, 3], steps, mesh): what the method finds for the photo with the maps `given`."""
+    """(envmap [256, 512, 3], steps, mesh): what the method finds for the photo with these `maps`."""
+    # --- The preset, with the light field of the method ---
     photo = sample.photo
     named = preset(method.preset)
     height = sample.envmap.shape[0]
@@ -237,9 +243,10 @@ def fit(
         light = replace(
             light, field=method.field or light.field, height=method.height or light.height
         )
+    # --- The geometry and the start, as an inversion has them ---
     setup = FitSetup(
         photo,
-        given,
+        maps,
         replace(named, light=light),
         completion,
         method.engine,
@@ -249,21 +256,23 @@ def fit(
     )
     fit = prepare(setup)
     state = fit.start()
+    # --- A light that needs no fit, or the fit ---
     if method.field in FITLESS:
-        problem = fit.engine.light_problem(given.materials)
+        problem = fit.engine.light_problem(maps.materials)
         target = placed(photo.linear.reshape(-1, 3))
         if method.field == "constant":
-            found = constant_light(problem, target)
+            radiance = constant_light(problem, target)
         else:
-            found = start_light(target, light, given.light, problem).radiance
-        state.envmap = fit.prepared_light(found)
+            radiance = start_light(target, light, maps.light, problem).radiance
+        state.envmap = fit.prepared_light(radiance)
     else:
-        fit.fit_light(state, given.materials)
+        fit.fit_light(state, maps.materials)
     return state.envmap, sum(stage["steps"] for stage in state.stages), fit.geometry
 
 
 def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: str) -> Prediction:
     """The maps that a method is given: true, predicted, or with the paper's neutral materials."""
+    # Predicted once, for materials and shape alike.
     source: dict[str, Prediction] = {"true": sample.truth}
     if "predicted" in (method.maps, method.shape):
         source["predicted"] = get_predictor("bundled", device=device).predict(
@@ -271,6 +280,7 @@ def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: st
         )
     if method.maps != "neutral":
         return replace(source[method.shape], materials=source[method.maps].materials)
+    # Neutral: the same value everywhere.
     maps = zip(vars(sample.truth.materials).values(), NEUTRAL, strict=True)
     return replace(
         source[method.shape], materials=Materials(*(np.full_like(m, v) for m, v in maps))
@@ -279,18 +289,21 @@ def given_maps(sample: SyntheticSample, method: Method, *, seed: int, device: st
 
 def constant_light(problem: Any, photo: Any) -> Any:
     """[h, 2h, 3] tensor of the colour that explains the photo [H W, 3] with the least square error."""
+    # Rendering is affine in the light: P(c) = P(0) + c (P(1) - P(0)).
     dark, lit = (
         problem.render(photo.new_full((problem.height, 2 * problem.height, 3), v))
         for v in (0.0, 1.0)
     )
     gain = lit - dark
     missing = photo[problem.pixels] - dark
+    # Least squares for each channel.
     colour = ((missing * gain).sum(0) / (gain**2).sum(0)).clamp(min=0)
     return colour.expand(problem.height, 2 * problem.height, 3)
 
 
 def mirrored(sample: SyntheticSample) -> SyntheticSample:
     """The sample with its objects in polished metal, photographed under the same light."""
+    # Ground and walls keep their materials.
     stage = sample.scene
     polished: dict[str, Any] = {"roughness": 0.1, "metallic": 1.0}
     scene = staged(

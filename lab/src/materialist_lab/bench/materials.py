@@ -79,21 +79,23 @@ class MaterialsBench(Benchmark):
             raise InputError(
                 "There is nothing to score; give --data DIR: materialist train data --split heldout -o DIR."
             )
+        # Predictors are loaded once for all samples.
         sources = {
             spec: get_predictor(spec, device=self.device)
             for spec in names("predictor", self.predictor)
         }
         for k, (name, photo, truth) in enumerate(self.samples(data, report)):
+            # Maps that the data set lacks are filled with something: no figures of them.
             absent = [name for name in MAPS if truth.sources and name not in truth.sources]
             report.settings.update({f"no true {which}": True for which in absent})
             predictions = []
             for spec, source in sources.items():
-                found, cost = timed(source.predict, photo, seed=self.seed)
-                predictions.append(found)
+                predicted, cost = timed(source.predict, photo, seed=self.seed)
+                predictions.append(predicted)
                 yield {
                     "method": spec,
                     "sample": name,
-                    **_scores(found, truth, absent),
+                    **_scores(predicted, truth, absent),
                     "seconds": cost["seconds"],
                 }
             if k < self.pictures:
@@ -102,6 +104,7 @@ class MaterialsBench(Benchmark):
 
     def samples(self, data: Path, report: Report) -> Iterator[tuple[str, Photo, Prediction]]:
         """(name, photo, truth) of the samples; see the module for what `data` may be. Raises InputError."""
+        # --- Photographs with maps beside them, or a data set ---
         folders = photo_folders(data)
         if folders:
             for folder in spread(folders, self.limit):
@@ -112,6 +115,7 @@ class MaterialsBench(Benchmark):
             report.settings["left out"] = " ".join(source.notes) or None
         for index in spread(list(range(len(source))), self.limit):
             sample = source.read(index)
+            # Procedural pictures are clean; InteriorVerse's are left as they are.
             spoilt = self.photographic and isinstance(source, SampleFolder)
             seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
             yield f"{index:07d}", photo_of(seen), sample.truth()
@@ -121,6 +125,7 @@ def photo_of(sample: Sample) -> Photo:
     """The picture of a sample as an ordinary photograph, clipped to [0, 1], with its true field of view."""
     linear = np.clip(sample.image, 0, 1).astype(np.float32)
     height, width = linear.shape[:2]
+    # Rays go through pixel centres: the half width lies half a pixel further out.
     fov = 2 * np.degrees(np.arctan(sample.rays[0, -1, 0] * width / (width - 1)))
     return Photo(linear, Camera(width, height, float(fov)), original=linear, fov_source="option")
 
@@ -136,15 +141,15 @@ def _read_folder(folder: Path) -> tuple[Photo, Prediction]:
     maps = folder / "maps"
     photo = read_photo(str(min(folder.glob("photo.*"))), size=1024)
     truth = MapsPredictor(maps).predict(photo)
-    there = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
-    return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=there)
+    sources = {name: "truth" for name in MAPS if any(maps.glob(f"{name}.*"))}
+    return replace(photo, linear=np.clip(photo.linear, 0, 1)), replace(truth, sources=sources)
 
 
-def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:
+def _scores(predicted: Prediction, truth: Prediction, absent: list[str]) -> dict[str, float]:
     """The figures of a prediction; none of the maps that the truth lacks, in whose place something else stands."""
-    figures = score(found, truth)
+    figures = score(predicted, truth)
     if (truth.depth > 0).any():
-        figures["depth_order"] = ordinal_accuracy(found.depth, truth.depth)
+        figures["depth_order"] = ordinal_accuracy(predicted.depth, truth.depth)
     return {
         key: value
         for key, value in figures.items()
@@ -155,9 +160,13 @@ def _scores(found: Prediction, truth: Prediction, absent: list[str]) -> dict[str
 def _pool(rows: list[Row]) -> None:
     """Give all rows the pooled PSNRs of their method, so that the table of means shows them."""
     for method in {row["method"] for row in rows}:
-        own = [row for row in rows if row["method"] == method]
+        of_method = [row for row in rows if row["method"] == method]
+        # Pooled: the mean of squared errors over all samples, then one PSNR of it.
         means = summary(
-            [{key: value for key, value in row.items() if key.endswith("_mse")} for row in own]
+            [
+                {key: value for key, value in row.items() if key.endswith("_mse")}
+                for row in of_method
+            ]
         )
-        for row in own:
+        for row in of_method:
             row.update({key: value for key, value in means.items() if key.endswith("_psnr_pooled")})

@@ -88,6 +88,7 @@ class PhotoAloneBench(Benchmark):
         for scene in range(self.scenes):
             sample, light = unseen_sample(scene, data, self.size)
             scenes = {}
+            # --- Inversions, and how far their maps are from the truth ---
             for name, fitted, cost in self._fitted(sample):
                 scenes[name] = fitted
                 if name == "fitted":
@@ -109,6 +110,7 @@ class PhotoAloneBench(Benchmark):
                     "light": light_error(fitted.envmap, sample.envmap),
                     **cost,
                 }
+            # --- Edits of each of them against the edited truth ---
             before = sample.scene.render(sample.envmap, spp=self.truth_spp, seed=5)
             for edit in edits(sample, light, kinds):
                 for row in self._compared(edit, sample, before, scenes, report):
@@ -122,19 +124,21 @@ class PhotoAloneBench(Benchmark):
             "device": self.device,
         }
 
-        def inverted(**how: Any) -> tuple[Scene, dict[str, float]]:
-            found, cost = timed(pipeline.invert, sample.photo, **shared, **how)
+        # Every inversion with its cost and how far its maps are from the prior's.
+        def inverted(**options: Any) -> tuple[Scene, dict[str, float]]:
+            result, cost = timed(pipeline.invert, sample.photo, **shared, **options)
             left = {
                 f"{key[9:]}_l1": v
-                for key, v in found.report.metrics.items()
+                for key, v in result.report.metrics.items()
                 if key.startswith("prior_l1_")
             }
-            return found, {
+            return result, {
                 **cost,
                 **left,
-                "rerender": metrics.psnr(found.rerender, sample.photo.linear),
+                "rerender": metrics.psnr(result.rerender, sample.photo.linear),
             }
 
+        # --- From the photo alone, and by the paper's algorithm ---
         scene, cost = inverted(predictor=self.predictor)
         yield "fitted", scene, cost
         if self.paper:
@@ -146,8 +150,11 @@ class PhotoAloneBench(Benchmark):
             )
         if not self.decompose:
             return
-        for given in GIVEN:
-            if given == "light":
+        # --- With a part of the truth given: what that part costs ---
+        for known in GIVEN:
+            if known == "light":
+                # Light times albedo is what the photo fixes: the true light fits the albedo's
+                # scale.
                 scale = best_scale(
                     sample.truth.materials.albedo, scene.materials.albedo, sample.truth.depth > 0
                 )
@@ -157,7 +164,7 @@ class PhotoAloneBench(Benchmark):
                     {},
                 )
             else:
-                yield f"+ {given}", *inverted(prior=with_truth(scene.prior, sample.truth, given))
+                yield f"+ {known}", *inverted(prior=with_truth(scene.prior, sample.truth, known))
         yield CEILING, true_scene(sample), {}
 
     def _compared(
@@ -170,6 +177,7 @@ class PhotoAloneBench(Benchmark):
     ) -> Iterator[Row]:
         """Rows of one edit, and its strip of the sheet; `before` is the true picture of the photo."""
         after = edit.truth.render(edit.envmap, spp=self.truth_spp, seed=5)
+        # The true picture tells where an edit shows.
         region = edit.region(before, after), edit.traces(before, after)
         shown = [sample.photo.linear, after]
         yield {
@@ -180,10 +188,12 @@ class PhotoAloneBench(Benchmark):
             try:
                 edited = edit.change(scene)
                 picture = composite(scene, edited, spp=self.spp, seed=self.seed, device=self.device)
+            # An edit that refuses counts as the photo left alone.
             except InputError:
                 edited = scene
                 picture = sample.photo.linear
             if (edit.kind, name) == ("insert", "fitted"):
+                # The baseline: shadows in screen space, without a mesh.
                 photo = sample.photo.linear
                 flat = (
                     photo
@@ -200,13 +210,14 @@ class PhotoAloneBench(Benchmark):
     def _scores(
         self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array
     ) -> dict[str, float]:
+        # Albedo and light share a factor that the photo does not tell.
         if edit.kind in SCALED:
-            found = {"inside": aligned_psnr(picture, truth, inside)}
+            figures = {"inside": aligned_psnr(picture, truth, inside)}
         else:
-            found = {"inside": metrics.psnr(picture, truth, mask=inside)}
+            figures = {"inside": metrics.psnr(picture, truth, mask=inside)}
         if edit.kind in TRACED and traces.any():
-            found["shadow"] = metrics.psnr(picture, truth, mask=traces)
-        return found
+            figures["shadow"] = metrics.psnr(picture, truth, mask=traces)
+        return figures
 
 
 def unseen_sample(scene: int, data: Path | None, size: int) -> tuple[SyntheticSample, Array]:
@@ -215,11 +226,11 @@ def unseen_sample(scene: int, data: Path | None, size: int) -> tuple[SyntheticSa
     return sample_and_light(scene, 0, scene, size=size, data=source, seed=SCENE_SEED, unseen=True)
 
 
-def with_truth(prior: Prediction, truth: Prediction, given: str) -> Prediction:
+def with_truth(prior: Prediction, truth: Prediction, known: str) -> Prediction:
     """The prior with the true albedo, the true depth and normals, or both."""
-    if "albedo" in given:
+    if "albedo" in known:
         prior = replace(prior, materials=replace(prior.materials, albedo=truth.materials.albedo))
-    if "geometry" in given:
+    if "geometry" in known:
         prior = replace(prior, depth=truth.depth, normal=truth.normal)
     return prior
 
@@ -238,6 +249,7 @@ def map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:
 
 def light_error(estimate: Array, truth: Array) -> float:
     """Relative error of the spherical harmonics of a light [h, 2h, 3], after the factor that makes it least."""
+    # argmin_s |s a - b|^2 = a . b / a . a.
     a = metrics.sh_coefficients(estimate)
     b = metrics.sh_coefficients(truth)
     return metrics.sh_error_relative(estimate * (np.sum(a * b) / max(np.sum(a * a), 1e-12)), truth)

@@ -54,6 +54,7 @@ class PlateBench(Benchmark):
             raise InputError(
                 f"This benchmark needs a pair of photos: --data DIR with {PLATE} and {PHOTO}."
             )
+        # --- The plate over the photo, and where it covers it ---
         photo = read_photo(data / PHOTO, size=self.size)
         plate = read_photo(data / PLATE).original
         sides = photo.original.shape[1::-1]
@@ -62,8 +63,11 @@ class PlateBench(Benchmark):
             cv2.warpAffine(x, ALIGNED, sides, flags=cv2.INTER_LINEAR)
             for x in (plate, np.ones_like(plate))
         ]
-        truth, there = (np.asarray(cv2.resize(x, size, interpolation=cv2.INTER_AREA)) for x in over)
-        shown = there[..., 0] > 0.999
+        truth, coverage = (
+            np.asarray(cv2.resize(x, size, interpolation=cv2.INTER_AREA)) for x in over
+        )
+        shown = coverage[..., 0] > 0.999
+        # --- The jug, and a ring around it for its shadow and reflection ---
         mask = grown(orange(photo.linear), max(1, self.size // 170))
         inside = mask & shown
         around = grown(mask, self.size // 16) & ~mask & shown
@@ -81,9 +85,11 @@ class PlateBench(Benchmark):
             return {"method": method, "sample": "jug", **figures, **more}
 
         yield row("untouched", photo.linear)
+        # --- Baseline: inpainting by colour alone ---
         shades = np.round(linear_to_srgb(photo.linear) * 255).astype(np.uint8)
         filled = cv2.inpaint(shades, mask.astype(np.uint8), 5, cv2.INPAINT_TELEA)
         yield row("diffused", srgb_to_linear(filled))
+        # --- Removal with each predictor's maps ---
         sources = {"bundled": "bundled"} | (
             {"published maps": f"maps:{data / MAPS}"} if (data / MAPS).is_dir() else {}
         )
@@ -107,6 +113,7 @@ def grown(mask: Array, pixels: int) -> Array:
 def orange(linear: Array) -> Array:
     """[H, W] bool: the largest connected thing of a photo [H, W, 3] in saturated orange."""
     hue, saturation, _ = cv2.split(cv2.cvtColor(linear_to_srgb(linear), cv2.COLOR_RGB2HSV))
-    found = ((hue < 30) & (saturation > 0.75)).astype(np.uint8)
-    _, label, stats, _ = cv2.connectedComponentsWithStats(found)
+    red = ((hue < 30) & (saturation > 0.75)).astype(np.uint8)
+    _, label, stats, _ = cv2.connectedComponentsWithStats(red)
+    # Label 0 is the background.
     return label == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))

@@ -41,11 +41,13 @@ class PredictorBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         report.settings.update(threads=torch.get_num_threads(), cores=os.cpu_count())
+        # The time does not depend on what is in the picture.
         noise = np.random.default_rng(self.seed).random((self.size, self.size, 3), dtype=np.float32)
         photo = Photo(linear=noise, camera=Camera(self.size, self.size), original=noise)
         for spec in names("predictor", self.predictor):
             source: Any = get_predictor(spec, device=self.device)
             network = getattr(source, "network", None)
+            # The whole prediction, and where there is one the network alone.
             work: dict[str, Callable[[], Any]] = {
                 "predict": partial(source.predict, photo, seed=self.seed)
             }
@@ -55,6 +57,7 @@ class PredictorBench(Benchmark):
                 work = {"network": forward(network, self.size), **work}
             for name, call in work.items():
                 seconds = [timed(call)[1]["seconds"] for _ in range(self.warmups + self.runs)]
+                # The first calls allocate memory and choose kernels.
                 taken = 1e3 * np.array(seconds[self.warmups :])
                 yield {
                     "method": f"{spec} {name}",
@@ -69,6 +72,7 @@ class PredictorBench(Benchmark):
 def forward(network: Any, size: int) -> Callable[[], Any]:
     """The forward pass of the bundled network or MatNet on noise; it waits for the device."""
     device = next(network.parameters()).device
+    # Sides that the network can divide, 14 being the patch of MatNet's encoder.
     step = STRIDE if isinstance(network, BundledNetwork) else 14
     side = max(step, round(size / step) * step)
     inputs = [torch.rand(1, 3, side, side, device=device)]
@@ -81,6 +85,7 @@ def forward(network: Any, size: int) -> Callable[[], Any]:
     def call() -> None:
         with torch.inference_mode():
             network(*inputs)
+        # Calls return before the device has finished.
         if device.type == "cuda":
             torch.cuda.synchronize(device)
 

@@ -102,6 +102,7 @@ def means(report: Report) -> dict[str, dict[str, float]]:
     """Mean of every column by method, in the order the methods were first met; infinite figures are left out."""
     result: dict[str, dict[str, float]] = {}
     for method in dict.fromkeys(row["method"] for row in report.rows):
+        # Columns that no row of the method has stay empty.
         rows = [row for row in report.rows if row["method"] == method]
         result[method] = {"samples": len(rows)}
         for column in report.columns:
@@ -124,6 +125,7 @@ def markdown(report: Report) -> str:
         "| " + " | ".join(head) + " |",
         "|---" * len(head) + "|",
     ]
+    # --- The best of each column among the methods of one part; ceilings do not compete ---
     best: dict[tuple[str, str], float] = {}
     for c in report.columns:
         values: dict[str, list[float]] = {}
@@ -131,7 +133,11 @@ def markdown(report: Report) -> str:
             if c.better and c.key in figures and CEILING not in method:
                 values.setdefault(_part(method), []).append(figures[c.key])
         choose = max if c.better == "higher" else min
-        best |= {(part, c.key): choose(found) for part, found in values.items() if len(found) > 1}
+        best |= {
+            (part, c.key): choose(values_of_part)
+            for part, values_of_part in values.items()
+            if len(values_of_part) > 1
+        }
     for method, figures in table.items():
         cells = [method, str(int(figures["samples"]))]
         for c in report.columns:
@@ -140,6 +146,7 @@ def markdown(report: Report) -> str:
             winner = rival and figures[c.key] == best.get((_part(method), c.key))
             cells.append(f"**{text}**" if winner else text)
         lines.append("| " + " | ".join(cells) + " |")
+    # --- What the run was called with ---
     settings = ", ".join(f"{k} {v}" for k, v in report.settings.items() if v is not None)
     return "\n".join([*lines, "", f"Settings: {settings}.", ""])
 
@@ -153,6 +160,7 @@ def _plot(report: Report, path: Path) -> None:
     """One panel a plotted column: a dot for every sample, a bar for the mean of each method."""
     table = means(report)
     titles = {c.key: c.title for c in report.columns}
+    # Without pyplot: no window, no global state.
     figure = Figure(
         figsize=(3.6 * len(report.plotted), 0.45 * len(table) + 1.6), layout="constrained"
     )

@@ -61,23 +61,25 @@ class SelectBench(Benchmark):
     spp: int = option(100, "Samples a pixel of the pictures.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        # A missing folder ends the bench before anything slow.
         if data is not None:
             arrangement(0, seed=self.seed, data=data)  # that there are meshes
         predictor = BundledPredictor()
         if data is not None:
             yield from self._outlined(data / "photos", predictor)
+        # --- Synthetic pictures, procedural and of captured meshes, with both kinds of maps ---
         for folder in (None,) if data is None else (None, data):
             for k in range(self.scenes):
                 sample = make_sample(
                     k, 1, k, size=self.size, data=folder, seed=self.seed, spp=self.spp
                 )
                 name = f"{'captured' if folder else 'procedural'} {sample.name}"
-                for maps, found in (
+                for maps, prediction in (
                     ("bundled", predictor.predict(sample.photo)),
                     ("true", sample.truth),
                 ):
                     things = [(mask, mask) for mask in sample.scene.things.values()]
-                    for row in self._selected(true_scene(sample, found), things, k):
+                    for row in self._selected(true_scene(sample, prediction), things, k):
                         yield {
                             **row,
                             "method": f"{row['method']}, {maps} maps",
@@ -91,6 +93,7 @@ class SelectBench(Benchmark):
                 continue
             photo = read_photo(str(folder / name), size=self.photo_size)
             maps = predictor.predict(photo)
+            # Selection uses the maps alone: any light will do.
             scene = scene_of(photo, maps, np.ones((16, 32, 3), np.float32))
             things = clickable(objects, maps.depth.shape)
             for row in self._selected(scene, things, k):
@@ -105,16 +108,17 @@ class SelectBench(Benchmark):
     ) -> Iterator[Row]:
         """A row a click, and a box, by every method; `things` are masks and where in them clicks may lie."""
         for method, (j, (mask, place)) in product(METHODS, enumerate(things)):
+            # What is hardly seen cannot be meant.
             if mask.sum() < self.smallest:
                 continue
             for k, click in enumerate(
                 clicks(place, scene.depth > 0, np.random.default_rng([number, j]))
             ):
-                found = _scores(scene, mask, click=click, method=method)
-                yield {"method": method, "sample": f"object {j} click {k}", **found}
-            for what, box in boxes(mask, self.loose).items():
-                found = _scores(scene, mask, box=box, method=method)
-                yield {"method": f"{method}, {what}", "sample": f"object {j}", **found}
+                scores = _scores(scene, mask, click=click, method=method)
+                yield {"method": method, "sample": f"object {j} click {k}", **scores}
+            for fit, box in boxes(mask, self.loose).items():
+                scores = _scores(scene, mask, box=box, method=method)
+                yield {"method": f"{method}, {fit}", "sample": f"object {j}", **scores}
 
 
 def outlines() -> dict[str, list[dict[str, Any]]]:
@@ -129,6 +133,7 @@ def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
     scale = max(shape) / 512
     for inside, polygons in ((True, [thing["outline"]]), (False, thing.get("holes", []))):
         for corners in polygons:
+            # Outlines are in pixels of 512, whose centres are halves.
             columns, rows = np.array(corners, float).T * scale - 0.5
             mask[polygon(rows, columns, shape)] = inside
     return mask
@@ -138,6 +143,7 @@ def clickable(
     objects: Sequence[dict[str, Any]], shape: tuple[int, ...]
 ) -> list[tuple[Array, Array]]:
     """Masks of objects, and where in them a click means them: not on a `part`, which is an object of its own."""
+    # A click on a part means the part, not the whole that it belongs to.
     masks = [drawn(thing, shape) for thing in objects]
     parts = [mask for thing, mask in zip(objects, masks, strict=True) if thing.get("part")]
     other = np.logical_or.reduce([np.zeros(shape, bool), *parts])
@@ -152,18 +158,19 @@ def clicks(
 ) -> list[tuple[int, int]]:
     """Two (column, row) in a mask [H, W] bool: its middle, and any place `inside` pixels from its border or more; both
     `usable` [H, W] bool."""
+    # Padded: the border of the picture is a border of the object.
     away = distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
     places = [np.argwhere(away == away.max()), np.argwhere((away > inside) & usable)]
     chosen = [places[0][0], *([places[1][rng.integers(len(places[1]))]] if len(places[1]) else [])]
     return [(int(column), int(row)) for row, column in chosen if usable[row, column]]
 
 
-def _scores(scene: Scene, mask: Array, **how: Any) -> dict[str, float]:
+def _scores(scene: Scene, mask: Array, **prompt: Any) -> dict[str, float]:
     try:
-        found = select(scene, **how)
+        selected = select(scene, **prompt)
     except InputError:  # nothing was found there
-        found = np.zeros_like(mask)
-    iou = float((found & mask).sum() / (found | mask).sum())
+        selected = np.zeros_like(mask)
+    iou = float((selected & mask).sum() / (selected | mask).sum())
     return {"iou": iou, "good": float(iou > 0.8), "lost": float(iou < 0.3)}
 
 

@@ -104,6 +104,7 @@ class StudioBench(Benchmark):
     scene: str = option("", "A scene package that is opened in place of the photo.", kind="name")
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
+        # Checked before the server and the browser start.
         photo = example_path(self.photo) if self.photo.startswith(PREFIX) else Path(self.photo)
         if not photo.is_file():
             raise InputError(f"There is no photo at {self.photo}.")
@@ -118,10 +119,12 @@ class StudioBench(Benchmark):
     def _measured(
         self, server: psutil.Process, address: str, browser: Any, photo: Path
     ) -> dict[str, float]:
+        # --- Page load, and memory without a scene ---
         row = {"idle_mb": _resident(server)}
         if not self.scene:  # else every page would open the scene
             row["load_s"] = float(np.median([_load(browser, address) for _ in range(5)]))
             row["idle_mb"] = max(row["idle_mb"], _resident(server))
+        # --- From the photo or the scene to the first slider ---
         page = browser.new_page(viewport={"width": 1280, "height": 1000})
         page.set_default_timeout(900_000)
         start = time.perf_counter()
@@ -135,6 +138,7 @@ class StudioBench(Benchmark):
         page.wait_for_selector("#stage .view[data-selected=yes]")
         page.evaluate(_MOVE, ["hue", 40, False])
         row["reopen_s" if self.scene else "drop_s"] = time.perf_counter() - start
+        # --- Sliders of the material, then of the light ---
         stand = {name: float(page.input_value(f"#{name} input[type=range]")) for name in _RANGES}
         times = [
             page.evaluate(_MOVE, [*move, False])
@@ -146,9 +150,11 @@ class StudioBench(Benchmark):
             np.median([page.evaluate(_MOVE, ["rotate", 30 * k, False]) for k in (1, 2, 3)])
         )
         page.evaluate(_MOVE, ["rotate", 0, False])
+        # --- Memory with the scene; glass ---
         row["scene_mb"] = _resident(server) - row["idle_mb"]
         row |= _glass(page)
         page.close()
+        # --- What closed pages leave behind; the first one may fill caches ---
         for k in range(CYCLES + 1):
             page = browser.new_page()
             page.goto(address)
@@ -157,6 +163,7 @@ class StudioBench(Benchmark):
             page.wait_for_selector("text=Ready: click an object", timeout=300_000)
             page.close()
             if k in (0, CYCLES):
+                # Until the server noticed that the page is gone.
                 time.sleep(3)
                 row["kept_mb"] = _resident(server) - row.get("kept_mb", 0.0)
         return row
@@ -191,6 +198,7 @@ def slider_moves(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tup
     for k in range(moves):
         name = list(_RANGES)[k % len(_RANGES)]
         low, high = _RANGES[name]
+        # A smaller move may leave the picture as it was, and the wait for another would not end.
         while abs((value := round(float(rng.uniform(low, high)), 2)) - last[name]) < 0.05 * (
             high - low
         ):
@@ -201,6 +209,7 @@ def slider_moves(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tup
 
 def _glass(page: Any) -> dict[str, float]:
     """The selection as glass: its first picture, and its sliders."""
+    # --- The first traced picture: the page waits, then no longer ---
     page.get_by_role("tab", name="Objects").click()
     page.get_by_role("button", name="Turn the selection to glass").click()
     start = time.perf_counter()
@@ -218,6 +227,7 @@ def _glass(page: Any) -> dict[str, float]:
 @contextlib.contextmanager
 def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
     """A studio, and its address once it answers."""
+    # A port that is free now; the studio binds it a moment later.
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -235,6 +245,7 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
     )
     address = f"http://127.0.0.1:{port}"
     try:
+        # --- Until it answers ---
         end = time.monotonic() + 120
         while True:
             with contextlib.suppress(OSError):
@@ -252,6 +263,7 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
 @contextlib.contextmanager
 def _browser() -> Iterator[Any]:
     """Chromium without a window. Raises SetupError where it is missing."""
+    # The browser of the system: Playwright's own is a large download.
     program = shutil.which("chromium") or shutil.which("google-chrome")
     try:
         from playwright.sync_api import sync_playwright

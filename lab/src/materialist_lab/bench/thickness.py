@@ -54,8 +54,10 @@ class ThicknessBench(Benchmark):
         setup("cpu")
         network, _ = RefractionNet.load(Path(self.weights) if self.weights else WEIGHTS)
         plan = ViewPlan(self.shapes, self.views, "heldout", self.seed)
+        # --- Shapes of the held-out split, made worse as predicted maps are ---
         for k in range(self.shapes):
             yield from _rows("held-out", f"shape {k}", network, make_views(k, plan))
+        # --- Captured meshes, shown exactly ---
         for group in (
             sorted(p for p in (data / "meshes").iterdir() if p.is_dir()) if data is not None else ()
         ):
@@ -70,13 +72,15 @@ class ThicknessBench(Benchmark):
 
 def _rows(group: str, name: str, network: Any, views: dict[str, Array]) -> Iterator[Row]:
     """A row a view for the network and for the prior."""
+    # Column -> key of `errors`; the prior knows nothing of walls.
     each = errors(network, views)
-    own = {"solid": "solid", "hollow": "hollow", "back": "back"}
-    prior = {"solid": "symmetry", "back": "back_symmetry"}
+    of_network = {"solid": "solid", "hollow": "hollow", "back": "back"}
+    of_prior = {"solid": "symmetry", "back": "back_symmetry"}
     for k in range(len(each["solid"])):
-        for method, names in (("RefractionNet", own), ("symmetry", prior)):
+        for method, names in (("RefractionNet", of_network), ("symmetry", of_prior)):
             figures = {
                 key: float(each[source][k]) for key, source in names.items() if source in each
             }
+            # Views without a wall or a back have NaN there.
             figures = {key: value for key, value in figures.items() if np.isfinite(value)}
             yield {"method": f"{group}: {method}", "sample": f"{name} view {k}", **figures}

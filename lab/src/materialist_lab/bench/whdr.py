@@ -51,9 +51,11 @@ class WhdrBench(Benchmark):
             raise InputError(
                 "This benchmark needs the IIW data set: --data DIR with NAME.png and NAME.json."
             )
+        # --- Pictures with judgements ---
         pairs = find(data)[:: self.every]
         pairs = pairs[: self.limit] if self.limit else pairs
         report.settings["pictures"] = len(pairs)
+        # --- Baselines and predictors ---
         sources: dict[str, Any] = dict.fromkeys(BASELINES)
         sources |= {
             spec: get_predictor(spec, device=self.device)
@@ -65,8 +67,8 @@ class WhdrBench(Benchmark):
                 albedo = np.ones_like(photo.linear) if spec == "constant" else photo.linear
                 cost: dict[str, float] = {}
                 if source is not None:
-                    found, cost = timed(source.predict, photo, seed=self.seed)
-                    albedo = found.materials.albedo
+                    predicted, cost = timed(source.predict, photo, seed=self.seed)
+                    albedo = predicted.materials.albedo
                 error, count = judged(albedo, file, self.delta)
                 row = {"method": spec, "sample": picture.stem, "whdr": error, "judgements": count}
                 yield row | {"seconds": cost.get("seconds", np.nan)}
@@ -74,24 +76,24 @@ class WhdrBench(Benchmark):
 
 def find(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name; raises InputError when there is none."""
-    found = pairs(folder)
-    if not found:
+    judged = pairs(folder)
+    if not judged:
         raise InputError(
             f"{folder} holds no picture with judgements (NAME.png and NAME.json, as IIW has them)."
         )
-    return found
+    return judged
 
 
 def pairs(folder: Path) -> list[tuple[Path, Path]]:
     """(picture, judgements) of every picture in the folder, sorted by name."""
-    found = []
+    judged = []
     for file in sorted(folder.glob("*.json")):
         picture = next(
             (p for s in ("png", "jpg") if (p := file.with_suffix(f".{s}")).is_file()), None
         )
         if picture is not None:
-            found.append((picture, file))
-    return found
+            judged.append((picture, file))
+    return judged
 
 
 def judged(albedo: Array, file: Path, delta: float = 0.1) -> tuple[float, int]:
@@ -108,6 +110,7 @@ def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple
     Judgements count when both points are opaque, the answer is '1', '2' or 'E', and its score is positive.
     """
     height, width = albedo.shape[:2]
+    # --- Weighted disagreement over all judgements that count ---
     points = {p["id"]: p for p in judgements["intrinsic_points"]}
     wrong = total = 0.0
     count = 0
@@ -122,11 +125,13 @@ def whdr(albedo: Array, judgements: dict[str, Any], delta: float = 0.1) -> tuple
             or not all(p["opaque"] for p in pair)
         ):
             continue
+        # Points are shares of width and height.
         places = [
             (min(int(p["y"] * height), height - 1), min(int(p["x"] * width), width - 1))
             for p in pair
         ]
         first, second = (max(1e-10, float(albedo[place].mean())) for place in places)
+        # '1' says that the first point is darker.
         said = "1" if second / first > 1 + delta else "2" if first / second > 1 + delta else "E"
         wrong += weight * (said != answer)
         total += weight

@@ -42,8 +42,8 @@ class Learning(OperationOptions):
         kind="file",
     )
 
-    def recipe(self, usual: Any) -> Any:
+    def recipe(self, defaults: Any) -> Any:
         """The recipe `usual` with what was given."""
-        return usual.changed(
+        return defaults.changed(
             batch=self.batch, side=self.side, rate=self.rate, bfloat16=self.bfloat16
         )

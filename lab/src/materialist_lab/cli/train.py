@@ -51,7 +51,7 @@ class Views(OperationOptions):
 
 def data(
     output: Annotated[Path, output_option("DIR", "Folder of the data set.")],
-    wanted: DataSetOptions,
+    options: DataSetOptions,
     computing: Computing,
     count: Annotated[int, typer.Option(help="Samples the set should hold.")] = 1000,
     workers: Annotated[int, typer.Option(help="Processes that render.")] = 1,
@@ -67,6 +67,7 @@ def data(
     ] = False,
 ) -> None:
     """Render a seeded, labelled data set; sample i is the same whatever the count and the workers."""
+    # --- Only the sheet of a set that is there ---
     if sheet is not None:
         from materialist.io.image import ensure_image_writable
         from materialist_lab.procedural.dataset import write_data_sheet
@@ -81,22 +82,23 @@ def data(
     from materialist_lab.procedural.catalog.packages import missing
     from materialist_lab.procedural.dataset import produce
 
+    # --- The set; what could be installed for a better one is said at the start ---
     require_parent(output)
     start = time.monotonic()
-    note = "" if wanted.real == 0 else missing(wanted.furniture)
+    note = "" if options.real == 0 else missing(options.furniture)
     if note and not computing.as_json:
         typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
-        made = produce(
-            output, wanted, count=count, workers=workers, resume=resume, progress=progress
+        rendered = produce(
+            output, options, count=count, workers=workers, resume=resume, progress=progress
         )
     facts = {
         "output": str(output),
-        "rendered": made,
-        "existing": count - made,
+        "rendered": rendered,
+        "existing": count - rendered,
         "seconds": time.monotonic() - start,
     }
-    lines = [f"{count} samples in {output} ({made} new, {facts['seconds']:.0f} s)"]
+    lines = [f"{count} samples in {output} ({rendered} new, {facts['seconds']:.0f} s)"]
     report_success("train data", computing.as_json, lines, **facts)
 
 
@@ -115,6 +117,7 @@ def matnet(
     from materialist_lab.train import bundled
     from materialist_lab.train import matnet as paper
 
+    # Imported here: torch takes seconds, and `--help` must not wait for it.
     make: Any
     make, base = {
         "bundled": (bundled.BundledTask, bundled.RECIPE),
@@ -139,9 +142,11 @@ def refraction(
     from materialist_lab.procedural.thickness.dataset import ViewPlan, produce
     from materialist_lab.train.refraction import RECIPE, RefractionTask
 
+    # Views elsewhere can serve several runs.
     folder = views.data or output / "views"
     lessons = folder / "train"
     aside = folder / "heldout"
+    # Few views of each held-out shape suffice for figures.
     plans = {
         aside: ViewPlan(views.heldout, min(views.views, 8), "heldout", training.seed),
         lessons: ViewPlan(views.shapes, views.views, "train", training.seed),
@@ -205,13 +210,16 @@ def _train(
     from materialist_lab.train.schedule import Budget
     from materialist_lab.train.trainer import RunOptions, Trainer
 
+    # --- How long, where, and what is said ---
     unlimited = training.steps is None and training.minutes is None
     budget = Budget(training.steps, minutes if unlimited else training.minutes)
     options = RunOptions(checkpoint_seconds=training.every, workers=workers, seed=training.seed)
     device = "cuda" if on_gpu(training.device) else "cpu"
     note = (lambda _: None) if training.as_json else lambda text: typer.echo(text, err=True)
+    # --- Refusals come before anything slow ---
     require_parent(output)
     checkpoint.load(output, kind, resume=training.resume)
+    # --- The run ---
     with stage_progress(quiet=training.as_json) as progress:
         trainer = Trainer(
             make_task(init, progress),
@@ -223,6 +231,7 @@ def _train(
             note=note,
         )
         scores = trainer.fit(progress)
+    # --- What came of it ---
     step = trainer.schedule.step
     sheet = output / "sheet.png"
     if trainer.interrupted:

@@ -41,6 +41,7 @@ def arrangement(
         solid = _object(rng, meshes)
         turned = shapes.placed(solid, scale=rng.uniform(0.75, 1.25), turn=rng.uniform(0, 2 * np.pi))
         radius = float(np.hypot(turned.vertices[:, 0], turned.vertices[:, 2]).max())
+        # Where there is no room, the object is left out.
         at = _free_place(rng, radius, taken)
         if at is not None:
             taken.append((*at, radius))
@@ -56,9 +57,11 @@ def view(scene_index: int, view_index: int, *, seed: int) -> Viewpoint:
     rng = np.random.default_rng([seed, 2, scene_index, view_index])
     fov = rng.uniform(35, 60)
     tilt = np.radians(rng.uniform(10, 35))
+    # By the number of walls: from anywhere, before one wall, before a corner.
     azimuth = np.radians(
         {0: rng.uniform(-180, 180), 1: rng.uniform(-55, 55), 2: rng.uniform(5, 60)}[scene_index % 3]
     )
+    # So far that about two metres fit into the picture.
     distance = 0.95 / np.tan(np.radians(fov) / 2) + 0.3
     target = np.array([rng.uniform(-0.1, 0.1), rng.uniform(0.2, 0.35), rng.uniform(-0.1, 0.1)])
     return orbit(target, distance, azimuth, tilt, fov)
@@ -84,6 +87,7 @@ def _room(rng: np.random.Generator, walls: int, natural: bool) -> list[Item]:
     ]
     back = rng.uniform(1.3, 1.7)
     height = rng.uniform(1.0, 1.6)
+    # The back wall, then the left one.
     if walls >= 1:
         wall = shapes.panel(
             np.array([-half, 0, -back]), edge * x, height * y, (edge / 2, height / 2)
@@ -105,6 +109,7 @@ def _object(rng: np.random.Generator, meshes: list[Path]) -> Solid:
         return shapes.placed(
             shapes.load(meshes[rng.integers(len(meshes))]), scale=rng.uniform(0.5, 0.75)
         )
+    # Box, ball, superquadric, capsule, vase, bowl: each as likely.
     size = rng.uniform(0.25, 0.55, 3)
     kind = rng.integers(6)
     if kind == 0:
@@ -119,6 +124,7 @@ def _object(rng: np.random.Generator, meshes: list[Path]) -> Solid:
         radius = rng.uniform(0.12, 0.2)
         height = rng.uniform(0.4, 0.75)
         neck = rng.uniform(0.4, 0.7)
+        # (radius, height) of a belly and a neck.
         control = np.array(
             [(0.6, 0), (1, 0.3), (rng.uniform(0.8, 1.0), 0.5), (neck, 0.8), (neck * 1.2, 1)]
         )
@@ -139,6 +145,7 @@ def _painted(
     natural: bool = False,
 ) -> Item:
     """The solid with a random material: a share `metals` of them is metal, the others dielectric."""
+    # Metals have one colour and are never rough.
     metal = rng.random() < metals
     kind = "plain" if metal else str(rng.choice(kinds))
     roughness = rng.uniform(0.2, 0.5) if metal else rng.uniform(0.25, 0.9)
@@ -155,6 +162,7 @@ def _free_place(
 ) -> tuple[float, float] | None:
     """A place (x, z) where a disc of that radius touches no other (x, z, radius); None when none was found."""
     for _ in range(60):
+        # Uniform over a disc: the radius goes with the square root.
         angle = rng.uniform(0, 2 * np.pi)
         distance = 0.85 * np.sqrt(rng.random())
         x = distance * np.cos(angle)

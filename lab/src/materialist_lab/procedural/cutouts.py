@@ -19,7 +19,7 @@ ENDINGS = (".png", ".webp")
 class PasteSettings:
     """How cut-outs are placed; lengths in sides of the picture; tuned by eye."""
 
-    most: int = 4  # cut-outs in a picture, at least one
+    max_cutouts: int = 4  # cut-outs in a picture, at least one
     again: float = 0.3  # share of cut-outs that are the last one once more: another of its kind is another thing
     size: tuple[float, float] = (0.15, 0.8)  # longer side, from and to
     turned: float = 12.0  # standard deviation of the rotation, degrees
@@ -39,12 +39,12 @@ SETTINGS = PasteSettings()
 
 def cutout_files(folder: Path) -> list[Path]:
     """The pictures of a folder and those inside it, sorted. Raises InputError where there are none."""
-    found = sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS)
-    if not found:
+    paths = sorted(p for p in folder.rglob("*") if p.suffix.lower() in ENDINGS)
+    if not paths:
         raise InputError(
             f"{folder} holds no {' or '.join(ENDINGS)} files; give a folder of things cut out."
         )
-    return found
+    return paths
 
 
 def load_cutout(path: Path) -> Array | None:
@@ -81,7 +81,7 @@ def paste(
     image = image.astype(np.float32)
     thing = thing.copy()
     last = -1
-    for _ in range(int(rng.integers(1, SETTINGS.most + 1))):
+    for _ in range(int(rng.integers(1, SETTINGS.max_cutouts + 1))):
         last = (
             last if last >= 0 and rng.random() < SETTINGS.again else int(rng.integers(len(cutouts)))
         )
@@ -93,11 +93,13 @@ def paste(
             continue
         if rng.random() < SETTINGS.shadow:
             image *= _shadow(share, rng)[..., None]
-        own = np.median(luminance(colour[mask] / share[mask][:, None]))
+        brightness = np.median(luminance(colour[mask] / share[mask][:, None]))
         around = np.median(
             luminance(image[cv2.dilate(mask.astype(np.uint8), np.ones((15, 15))) > 0])
         )
-        gain = (max(float(around), 1e-3) / max(float(own), 1e-3)) ** rng.uniform(*SETTINGS.matched)
+        gain = (max(float(around), 1e-3) / max(float(brightness), 1e-3)) ** rng.uniform(
+            *SETTINGS.matched
+        )
         gain = float(np.clip(gain, 0.1, 8)) * np.exp(rng.normal(0, 0.3)) * _ramp(thing.shape, rng)
         image = colour * gain[..., None] + image * (1 - share[..., None])
         thing[mask] = max(int(thing.max()), 0) + 1

@@ -47,11 +47,13 @@ def produce(
         setup(options.device)
     for path in options.mesh_files:  # a damaged one must not end a long run
         shapes.load(path)
+    # The catalogue is read here, not by every worker.
     made_of = _listed(options, progress)
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(
             f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
         )
+    # A set is gone on with only where it was begun with the same options.
     claim_folder(folder, DESCRIPTION, _description(options), _IDENTITY)
     if made_of:
         write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
@@ -73,6 +75,7 @@ def sample_path(folder: Path, index: int) -> Path:
 
 def _description(options: DataSetOptions) -> dict[str, Any]:
     files = {"meshes": options.mesh_files, "envmaps": options.envmap_files}
+    # Names, not paths: a set is the same on another machine.
     drawn: dict[str, Any] = {"spp": options.spp} | {
         name: [p.stem for p in paths] for name, paths in files.items()
     }
@@ -82,14 +85,14 @@ def _description(options: DataSetOptions) -> dict[str, Any]:
             "share": options.real_share,
             "files": [f"{p.name} {p.stat().st_size}" for p in real],
         }
-    told = {
+    facts = {
         "format": FORMAT,
         "size": options.size,
         "seed": options.seed,
         "split": options.split,
         "content": CONTENT,
     }
-    return told | {
+    return facts | {
         "options": drawn | ({"only": options.only} if options.only else {}),
         "tool_version": __version__,
     }
@@ -101,12 +104,12 @@ def identity(folder: str | Path) -> dict[str, Any]:
     Raises InputError where DIR/dataset.json is none that this version can read.
     """
     file = Path(folder) / DESCRIPTION
-    found = described(file)
-    if found is None or found.get("format") != FORMAT:
+    facts = described(file)
+    if facts is None or facts.get("format") != FORMAT:
         raise InputError(
             f"{file} describes no data set of format {FORMAT}; make one: materialist train data."
         )
-    return {name: found.get(name) for name in _IDENTITY}
+    return {name: facts.get(name) for name in _IDENTITY}
 
 
 def write_data_sheet(

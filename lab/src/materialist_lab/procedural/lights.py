@@ -57,8 +57,10 @@ def _capture(path: Path, turn: float) -> Radiance:
     wrapped = cv2.copyMakeBorder(source, 0, 0, 1, 1, cv2.BORDER_WRAP)
 
     def lookup(d: Array) -> Array:
+        # Equirectangular: u = azimuth / 2 pi + 1/2, v = angle from +Y / pi.
         u = ((np.arctan2(d[..., 0], -d[..., 2]) + turn) / (2 * np.pi) + 0.5) % 1
         v = np.arccos(np.clip(d[..., 1], -1, 1)) / np.pi
+        # Texel centres lie at halves; the border added on the left shifts x by one.
         x = (u * w + 0.5).astype(np.float32)
         y = (v * h - 0.5).astype(np.float32)
         return cv2.remap(wrapped, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
@@ -68,13 +70,10 @@ def _capture(path: Path, turn: float) -> Radiance:
 
 def _axis(azimuth: float, elevation: float) -> Array:
     """[3] unit direction at an azimuth (from -Z towards +X) and elevation, radians."""
-    return np.array(
-        [
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-            -np.cos(elevation) * np.cos(azimuth),
-        ]
-    )
+    x = np.cos(elevation) * np.sin(azimuth)
+    y = np.sin(elevation)
+    z = -np.cos(elevation) * np.cos(azimuth)
+    return np.array([x, y, z])
 
 
 def _step(x: Array, width: float) -> Array:
@@ -85,21 +84,20 @@ def _step(x: Array, width: float) -> Array:
 
 def _window(d: Array, axis: Array, half: tuple[float, float]) -> Array:
     """[...] 1 inside a rectangular light of angular half sizes (radians) about an axis, soft at its border."""
+    # Coordinates on a plane at distance 1 across the axis, where the light is a rectangle.
     right, up, _ = turn_upright(axis).T
     front = np.maximum(d @ axis, 1e-6)
     x = np.abs(d @ right) / front
     y = np.abs(d @ up) / front
-    inside = _step(np.tan(half[0]) - x + 0.02, 0.04) * _step(np.tan(half[1]) - y + 0.02, 0.04)
+    across = _step(np.tan(half[0]) - x + 0.02, 0.04)
+    inside = across * _step(np.tan(half[1]) - y + 0.02, 0.04)
     return np.where(d @ axis > 0, inside, 0)
 
 
 def _tint(rng: np.random.Generator, saturation: float) -> Array:
     """[3] light colour between warm and cool, brightest channel 1."""
-    return np.array(
-        colorsys.hsv_to_rgb(
-            rng.choice([rng.uniform(0.05, 0.12), rng.uniform(0.55, 0.63)]), saturation, 1
-        )
-    )
+    hue = rng.choice([rng.uniform(0.05, 0.12), rng.uniform(0.55, 0.63)])
+    return np.array(colorsys.hsv_to_rgb(hue, saturation, 1))
 
 
 def _sky(rng: np.random.Generator) -> Radiance:
@@ -116,6 +114,7 @@ def _sky(rng: np.random.Generator) -> Radiance:
         y = d[..., 1:2]
         sky = horizon + (zenith - horizon) * np.clip(y, 0, 1) ** 0.6
         base = sky + (ground - sky) * (1 - _step(y + 0.03, 0.06))
+        # The sun: a Gaussian disc of irradiance `power` times pi, whatever its width, and a wide glow.
         angle = np.arccos(np.clip(d @ sun, -1, 1))[..., None]
         disc = np.exp(-((angle / width) ** 2)) * (power * np.pi / (np.pi * width**2))
         return base + (disc + 0.6 * np.exp(-angle / 0.25)) * colour
@@ -132,9 +131,9 @@ def _overcast(rng: np.random.Generator) -> Radiance:
 
     def radiance(d: Array) -> Array:
         y = d[..., 1:2]
-        sky = (
-            (1 + 2 * np.clip(y, 0, 1)) / 3 * (1 + amount * np.clip(d @ side, 0, 1)[..., None] ** 3)
-        )
+        # Overcast sky of the CIE, L(y) = L_z (1 + 2 y) / 3, brighter on one side.
+        brighter = 1 + amount * np.clip(d @ side, 0, 1)[..., None] ** 3
+        sky = (1 + 2 * np.clip(y, 0, 1)) / 3 * brighter
         return (ground + (sky - ground) * _step(y + 0.1, 0.2)) * tint
 
     return radiance
@@ -143,6 +142,7 @@ def _overcast(rng: np.random.Generator) -> Radiance:
 def _studio(rng: np.random.Generator) -> Radiance:
     """Two or three soft boxes in a dim room: strong contrast."""
     ambient = rng.uniform(0.05, 0.2) * _tint(rng, 0.2)
+    # (axis, angular half sizes, radiance) of each box.
     lamps = [
         (
             _axis(rng.uniform(-np.pi, np.pi), np.radians(rng.uniform(10, 60))),
@@ -172,13 +172,14 @@ def _room(rng: np.random.Generator) -> Radiance:
     windows = [_axis(azimuth + k * 0.5, np.radians(12)) for k in range(int(rng.integers(1, 4)))]
 
     def radiance(d: Array) -> Array:
+        # A wall belongs to the larger horizontal component of a direction.
         ends = np.where(d[..., 2:] < 0, paint[0], paint[1])
         sides = np.where(d[..., :1] < 0, paint[2], paint[3])
         wall = np.where(np.abs(d[..., :1]) < np.abs(d[..., 2:]), ends, sides)
         y = d[..., 1:2]
-        total = (
-            wall + (ceiling - wall) * _step(y - 0.6, 0.02) + (floor - wall) * _step(-y - 0.5, 0.02)
-        )
+        above = (ceiling - wall) * _step(y - 0.6, 0.02)
+        below = (floor - wall) * _step(-y - 0.5, 0.02)
+        total = wall + above + below
         for axis in windows:
             total = total + _window(d, axis, (0.18, 0.3))[..., None] * outside
         return total + _window(d, _axis(azimuth + 1, 1.3), (0.2, 0.2))[..., None] * lamp
@@ -188,19 +189,19 @@ def _room(rng: np.random.Generator) -> Radiance:
 
 def _clouds(rng: np.random.Generator) -> Radiance:
     """A sky of any colour between deep blue and haze, with clouds from a few to many, and a sun that they may hide."""
+    # --- Sun, sky and ground ---
     sun = _axis(rng.uniform(-np.pi, np.pi), np.radians(rng.uniform(8, 70)))
-    zenith = np.array(
-        colorsys.hsv_to_rgb(rng.uniform(0.54, 0.63), rng.uniform(0.3, 0.85), 1)
-    ) * rng.uniform(0.3, 0.9)
+    blue = colorsys.hsv_to_rgb(rng.uniform(0.54, 0.63), rng.uniform(0.3, 0.85), 1)
+    zenith = np.array(blue) * rng.uniform(0.3, 0.9)
     horizon = zenith + (_tint(rng, 0.15) - zenith) * rng.uniform(0.4, 1)
     ground = np.array([0.3, 0.26, 0.2]) * rng.uniform(0.4, 1.2)
     width = np.radians(rng.uniform(1.5, 3))
     power = rng.uniform(0.1, 1.5)
     colour = _tint(rng, rng.uniform(0, 0.4))
-    field = (0.75 * tiles.noise(rng, rng.uniform(1.4, 2)) + 0.25 * tiles.noise(rng, 1.2)).astype(
-        np.float32
-    )
-    least = np.quantile(field, rng.uniform(0, 0.95))
+    # --- Clouds: where noise is above a quantile, so that any share of the sky may be covered ---
+    coarse = tiles.noise(rng, rng.uniform(1.4, 2))
+    field = (0.75 * coarse + 0.25 * tiles.noise(rng, 1.2)).astype(np.float32)
+    threshold = np.quantile(field, rng.uniform(0, 0.95))
     soft = rng.uniform(0.08, 0.4)
     thick = rng.uniform(0.3, 0.8)
     bright = rng.uniform(1, 2)
@@ -211,20 +212,17 @@ def _clouds(rng: np.random.Generator) -> Radiance:
         y = d[..., 1:2]
         # Clouds lie on a plane above; where it is seen flat, haze covers them.
         at = (d[..., [0, 2]] / np.maximum(y, 0.04) * spacing).astype(np.float32)
-        above = (
-            cv2.remap(field, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)[
-                ..., None
-            ]
-            - least
+        cover = cv2.remap(
+            field, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP
         )
+        above = cover[..., None] - threshold
         density = _step(above, soft) * _step(y - 0.02, 0.12)
+        # Bright towards the sun, dark where they are thick.
         angle = np.arccos(np.clip(d @ sun, -1, 1))[..., None]
-        lit = (
-            bright
-            * (1 + 0.7 * np.exp(-angle / 0.4))
-            * (1 - (1 - dark) * _step(above, thick))
-            * colour
-        )
+        towards_sun = 1 + 0.7 * np.exp(-angle / 0.4)
+        shadow = 1 - (1 - dark) * _step(above, thick)
+        lit = bright * towards_sun * shadow * colour
+        # The disc of the sun as in `_sky`, dimmed by the clouds before it.
         sky = horizon + (zenith - horizon) * np.clip(y, 0, 1) ** 0.6
         disc = np.exp(-((angle / width) ** 2)) * (power / width**2) * (1 - density) ** 2
         sky = sky + (lit - sky) * density + (disc + 0.6 * np.exp(-angle / 0.25)) * colour
@@ -240,6 +238,7 @@ def outdoors(rng: np.random.Generator, captures: tuple[Path, ...] = ()) -> Array
     """[h, 2h, 3] float32: a sky over ground, or often, where there are any, a capture not much darker above."""
     if captures and rng.random() < 0.6:
         picture = captured(rng, captures)
+        # An indoor capture is dark above: no sky.
         if luminance(picture[: len(picture) // 3]).mean() > 0.8 * luminance(picture).mean():
             return picture
     return procedural(rng, (_sky, _overcast, _clouds, _clouds))
@@ -262,6 +261,7 @@ def procedural(
 
 def captured(rng: np.random.Generator, captures: tuple[Path, ...]) -> Array:
     """One of the files, turned about the vertical, mirrored and tinted at random."""
+    # Below the largest half float, in which samples are stored.
     picture = np.minimum(_load(captures[rng.integers(len(captures))]), 6e4)
     picture = np.roll(picture, int(rng.integers(picture.shape[1])), axis=1)
     if rng.random() < 0.5:
@@ -276,5 +276,6 @@ def _load(path: Path) -> Array:
 
 def levelled(envmap: Array) -> Array:
     """The map scaled to a mean luminance over the sphere of 1."""
-    mean = float(np.average(luminance(envmap).mean(1), weights=row_solid_angle(len(envmap))))
+    rows = luminance(envmap).mean(1)
+    mean = float(np.average(rows, weights=row_solid_angle(len(envmap))))
     return (envmap / max(mean, 1e-9)).astype(np.float32)

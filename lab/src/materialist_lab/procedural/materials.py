@@ -58,20 +58,25 @@ class Material:
 
         start: place of the picture's first pixel in the buffer of all pictures, in units of 64 pixels.
         """
+        c0, c1, c2 = self.colours
+        r0, r1 = self.roughness
+        m0, m1 = self.metallic
+        # Texture coordinates are turned and divided by the size of a tile: s = (c u + s v) / repeat_u + offset.
         c = np.cos(self.turn)
         s = np.sin(self.turn)
-        (c0, c1, c2), (r0, r1), (m0, m1) = self.colours, self.roughness, self.metallic
         offset = shift if self.offset is None else self.offset
         height, width = (0, 0) if self.picture is None else self.picture.pixels.shape[:2]
         solid = [1.0, 1.0, 1.0, 0.0, 0.0] if self.relief is None else self.relief.row()
         return np.array(
             [
+                # Rows 0 to 2: colours, with roughness and grain in the fourth place.
                 *c0,
                 r0,
                 *c1,
                 r1,
                 *c2,
                 self.grain,
+                # Rows 3 and 4: metallic, and the map from (u, v) to the tile.
                 m0,
                 m1,
                 c / self.repeat[0],
@@ -80,12 +85,15 @@ class Material:
                 c / self.repeat[1],
                 offset[0],
                 offset[1],
+                # Row 5: emission and the tile.
                 *self.emission,
                 float(self.tile),
+                # Row 6: the picture, and the height of the tile's relief.
                 start,
                 width,
                 height,
                 self.emboss,
+                # Rows 7 and 8: solid noise; the rest fills the row of four.
                 *solid,
                 0,
                 0,
@@ -97,7 +105,10 @@ class Material:
 
 def hsv(h: float, s: float, v: float) -> Colour:
     """Linear colour of hue, saturation and value given in sRGB, as people name colours; kept within [0.02, 0.92]."""
-    srgb = np.array(colorsys.hsv_to_rgb(h % 1, min(max(s, 0), 1), min(max(v, 0), 1)))
+    saturation = min(max(s, 0), 1)
+    value = min(max(v, 0), 1)
+    srgb = np.array(colorsys.hsv_to_rgb(h % 1, saturation, value))
+    # No real surface is darker than soot or brighter than fresh snow.
     return tuple(np.clip(srgb**2.2, 0.02, 0.92).tolist())
 
 
@@ -147,40 +158,48 @@ class Finish:
     """Kinds of tile, separated by spaces; one named twice is drawn twice as often."""
     base: tuple[Shade, ...] = ANY_COLOUR
     second: tuple[float, float, float] = (0, 1, 1)
-    """Probability that the second colour is the first one times a factor, from and to; else it is any colour."""
+    """(probability, from, to): with it the second colour is the first one times a factor; otherwise any colour."""
     third: tuple[float, float, float] | tuple[Shade, ...] = (0, 1, 1)
-    """The same for the third colour, or its own ranges."""
+    """The same for the third colour, or ranges that it is drawn from."""
     grain: Range = (0, 0.1)
     roughness: tuple[tuple[float, float, float], ...] = ((1, 0.6, 0.6),)
     """(share, from, to) at 0 of the tile's roughness channel."""
     rougher: Range = (0, 0)
-    """How much larger it is at 1 of that channel."""
+    """What is added to the roughness at 1 of that channel, from and to."""
     repeat: Range = (0.3, 1)
     """Metres that a tile covers, log-uniform."""
     stretch: Range = (1, 1)
-    """Factor on that along u."""
+    """Factor on the size along u, from and to."""
     quarter: bool = False
     """Whether the tile is turned by 90 degrees half of the time."""
 
     def __call__(self, rng: np.random.Generator) -> Material:
+        # The order of the draws is part of every data set: a seed must keep its materials.
         first = shade(rng, self.base)
-        rough = rng.uniform(
-            *pick(rng, tuple((share, (low, high)) for share, low, high in self.roughness))
-        )
+        ranges = tuple((share, (low, high)) for share, low, high in self.roughness)
+        rough = rng.uniform(*pick(rng, ranges))
+        # Log-uniform: halving a size is as likely as doubling it.
         size = float(np.exp(rng.uniform(*np.log(self.repeat))))
+        number = tile(rng, str(rng.choice(self.tiles.split())))
+        second = self._other(rng, first, self.second)
+        third = self._other(rng, first, self.third)
+        grain = rng.uniform(*self.grain)
+        rougher = float(np.clip(rough + rng.uniform(*self.rougher), 0.06, 1))
         return Material(
-            tile(rng, str(rng.choice(self.tiles.split()))),
-            (first, self._other(rng, first, self.second), self._other(rng, first, self.third)),
-            rng.uniform(*self.grain),
-            (rough, float(np.clip(rough + rng.uniform(*self.rougher), 0.06, 1))),
+            number,
+            (first, second, third),
+            grain,
+            (rough, rougher),
             repeat=(size * rng.uniform(*self.stretch), size),
             turn=rng.choice([0, np.pi / 2]) if self.quarter else 0.0,
         )
 
-    def _other(self, rng: np.random.Generator, first: Colour, how: tuple) -> Colour:
-        if isinstance(how[0], tuple):
-            return shade(rng, how)
-        return near(rng, first, how[1], how[2]) if rng.random() < how[0] else shade(rng)
+    def _other(self, rng: np.random.Generator, first: Colour, spread: tuple) -> Colour:
+        """The second or third colour: near the first one, or of its own."""
+        if isinstance(spread[0], tuple):
+            return shade(rng, spread)
+        probability, low, high = spread
+        return near(rng, first, low, high) if rng.random() < probability else shade(rng)
 
 
 def tile(rng: np.random.Generator, kind: str) -> int:
@@ -189,29 +208,31 @@ def tile(rng: np.random.Generator, kind: str) -> int:
     return int(rng.integers(where.start, where.stop))
 
 
+# --- Ranges that several finishes share ---
 SHINY_OR_MATT = ((0.5, 0.08, 0.35), (0.5, 0.35, 0.7))
 TIMBER: tuple[Shade, ...] = ((1, (0.045, 0.105), (0.25, 0.7), (0.2, 0.88)),)
 EARTH: tuple[Shade, ...] = ((1, (0.03, 0.14), (0, 0.4), (0.2, 0.8)),)
 MORTAR: tuple[Shade, ...] = ((1, (0.1, 0.1), (0, 0.15), (0.25, 0.85)),)
 
+# --- Walls and paint; most finishes are made here, and the rest varies one of them ---
 wall_paint = Finish(
     "plain plain plain cloudy",
-    (
+    base=(
         (0.5, (0.05, 0.17), (0, 0.18), (0.6, 0.97)),
         (0.35, ALL, (0, 0.18), (0.6, 0.97)),
         (0.15, ALL, (0.1, 0.5), (0.25, 0.85)),
     ),
-    (1, 0.85, 1.05),
-    (1, 0.6, 0.95),
-    (0, 0.12),
-    ((1, 0.45, 0.95),),
-    (0.1, 0.1),
-    (0.8, 3),
+    second=(1, 0.85, 1.05),
+    third=(1, 0.6, 0.95),
+    grain=(0, 0.12),
+    roughness=((1, 0.45, 0.95),),
+    rougher=(0.1, 0.1),
+    repeat=(0.8, 3),
 )
 wallpaper = Finish(
     "ornament ornament ornament stripes stripes spots plaid",
-    ((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))),
-    (0.7, 0.5, 0.95),
+    base=((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))),
+    second=(0.7, 0.5, 0.95),
     rougher=(0.2, 0.2),
     repeat=(0.4, 1.5),
 )
@@ -228,51 +249,57 @@ white_paint = replace(
 plastic = replace(
     lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT
 )
+# --- Wood ---
 raw_wood = Finish(
     "wood",
-    TIMBER,
-    (1, 0.35, 0.75),
-    (1, 0.15, 0.4),
-    (0.1, 0.5),
-    ((1, 0.4, 0.8),),
-    (0.2, 0.2),
-    (0.5, 1.4),
-    (1, 2),
+    base=TIMBER,
+    second=(1, 0.35, 0.75),
+    third=(1, 0.15, 0.4),
+    grain=(0.1, 0.5),
+    roughness=((1, 0.4, 0.8),),
+    rougher=(0.2, 0.2),
+    repeat=(0.5, 1.4),
+    stretch=(1, 2),
 )
 wood = replace(raw_wood, roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)))
 """Pale, brown, red or nearly black timber, raw or varnished."""
 floor_boards = replace(wood, tiles="planks", repeat=(0.9, 2.2))
+# --- Tiles, stone, bricks ---
 tiled = Finish(
     "tiling tiling tiling checker",
-    (*ANY_COLOUR, PALE),
-    (0.75, 0.75, 1.0),
-    MORTAR,
-    (0, 0.2),
-    ((1, 0.06, 0.5),),
-    (0.2, 0.8),
-    (0.6, 3),
+    base=(*ANY_COLOUR, PALE),
+    second=(0.75, 0.75, 1.0),
+    third=MORTAR,
+    grain=(0, 0.2),
+    roughness=((1, 0.06, 0.5),),
+    rougher=(0.2, 0.8),
+    repeat=(0.6, 3),
 )
 stone = Finish(
     "marble speckle cloudy",
-    ((1, (0.03, 0.16), (0, 0.25), (0.2, 0.92)),),
-    (0.7, 0.3, 0.8),
-    (0.7, 0.3, 0.8),
-    (0.1, 0.6),
-    ((0.5, 0.08, 0.4), (0.5, 0.5, 0.95)),
-    (0.15, 0.15),
-    (0.4, 2),
+    base=((1, (0.03, 0.16), (0, 0.25), (0.2, 0.92)),),
+    second=(0.7, 0.3, 0.8),
+    third=(0.7, 0.3, 0.8),
+    grain=(0.1, 0.6),
+    roughness=((0.5, 0.08, 0.4), (0.5, 0.5, 0.95)),
+    rougher=(0.15, 0.15),
+    repeat=(0.4, 2),
 )
 """Marble, granite, terrazzo, concrete."""
 brick = Finish(
     "bricks",
-    ((0.8, (0.0, 0.09), (0.15, 0.7), (0.3, 0.85)), (0.2, (0.1, 0.1), (0.03, 0.03), (0.7, 0.92))),
-    (1, 0.5, 1.0),
-    MORTAR,
-    (0.3, 0.9),
-    ((1, 0.75, 0.75),),
-    (0.2, 0.2),
-    (0.6, 1.2),
+    base=(
+        (0.8, (0.0, 0.09), (0.15, 0.7), (0.3, 0.85)),
+        (0.2, (0.1, 0.1), (0.03, 0.03), (0.7, 0.92)),
+    ),
+    second=(1, 0.5, 1.0),
+    third=MORTAR,
+    grain=(0.3, 0.9),
+    roughness=((1, 0.75, 0.75),),
+    rougher=(0.2, 0.2),
+    repeat=(0.6, 1.2),
 )
+# --- Cloth and pottery ---
 woven = Finish(
     "weave",
     second=(0.5, 0.4, 0.9),
@@ -285,32 +312,36 @@ printed_cloth = replace(
 )
 ceramic = Finish(
     "plain plain plain stripes ornament spots cloudy",
-    (*ANY_COLOUR, PALE),
+    base=(*ANY_COLOUR, PALE),
     grain=(0, 0.15),
     roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)),
     repeat=(0.1, 0.5),
     quarter=True,
 )
 """Glazed pottery: white, coloured, decorated; matt clay now and then."""
+# --- Outdoors ---
 foliage = Finish(
     "cloudy",
-    ((0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)), (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65))),
-    (1, 0.5, 1.3),
-    (1, 1.0, 1.6),
-    (0.2, 0.6),
-    ((1, 0.35, 0.7),),
+    base=(
+        (0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)),
+        (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65)),
+    ),
+    second=(1, 0.5, 1.3),
+    third=(1, 1.0, 1.6),
+    grain=(0.2, 0.6),
+    roughness=((1, 0.35, 0.7),),
     repeat=(0.1, 0.3),
 )
 """Leaves, fresh or autumnal."""
 paved = Finish(
     "speckle speckle bricks bricks cloudy tiling tiling",
-    EARTH,
-    (1, 0.55, 1.1),
-    (0.8, 0.35, 0.8),
-    (0.3, 1.1),
-    ((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)),
-    (0.1, 0.1),
-    (1, 4),
+    base=EARTH,
+    second=(1, 0.55, 1.1),
+    third=(0.8, 0.35, 0.8),
+    grain=(0.3, 1.1),
+    roughness=((0.88, 0.7, 1.0), (0.12, 0.2, 0.5)),
+    rougher=(0.1, 0.1),
+    repeat=(1, 4),
 )
 grass = replace(
     paved,
@@ -320,13 +351,13 @@ grass = replace(
 )
 facade = Finish(
     "facade",
-    ((0.85, (0.02, 0.16), (0, 0.5), (0.35, 0.95)), (0.15, ALL, (0, 0.9), (0.2, 0.9))),
-    (0.5, 0.5, 1.5),
-    ((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),),
-    (0.1, 0.5),
-    ((1, 0.7, 0.95),),
-    (-0.8, -0.5),
-    (5, 12),
+    base=((0.85, (0.02, 0.16), (0, 0.5), (0.35, 0.95)), (0.15, ALL, (0, 0.9), (0.2, 0.9))),
+    second=(0.5, 0.5, 1.5),
+    third=((1, (0.5, 0.65), (0, 0.3), (0.1, 0.35)),),
+    grain=(0.1, 0.5),
+    roughness=((1, 0.7, 0.95),),
+    rougher=(-0.8, -0.5),
+    repeat=(5, 12),
 )
 """House front with rows of dark or mirroring windows, which are smoother than the wall."""
 
@@ -352,12 +383,11 @@ def ground(rng: np.random.Generator) -> Material:
 
 def metal(rng: np.random.Generator) -> Material:
     """Steel, aluminium, brass, copper, gold, iron: polished, brushed, or worn."""
-    colour = cast(
-        Colour,
-        tuple((np.array(METALS[rng.integers(len(METALS))]) * rng.uniform(0.85, 1, 3)).tolist()),
-    )
+    reflectance = np.array(METALS[rng.integers(len(METALS))])
+    # A little darker than the pure metal: oxide, dirt, alloys.
+    colour = cast(Colour, tuple((reflectance * rng.uniform(0.85, 1, 3)).tolist()))
     kind = str(rng.choice(["plain", "brushed", "rust"], p=[0.5, 0.35, 0.15]))
-    made = Finish(
+    material = Finish(
         kind,
         grain=(0, 0.3),
         roughness=((0.5, 0.05, 0.25), (0.5, 0.25, 0.6)),
@@ -365,33 +395,38 @@ def metal(rng: np.random.Generator) -> Material:
         repeat=(0.1, 0.5),
         quarter=True,
     )(rng)
-    if kind == "rust":  # corroded or painted over where the tile's first channel is 1
-        return replace(made, colours=(colour, *made.colours[1:]), metallic=(1.0, 0.0))
-    return replace(made, colours=(colour,) * 3, metallic=(1.0, 1.0))
+    # Corroded or painted over where the tile's first channel is 1.
+    if kind == "rust":
+        return replace(material, colours=(colour, *material.colours[1:]), metallic=(1.0, 0.0))
+    return replace(material, colours=(colour,) * 3, metallic=(1.0, 1.0))
 
 
 def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
     """A carpet of that size in metres, its tile fitted once."""
-    made = Finish("carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),))(
-        rng
-    )
-    return replace(made, repeat=(width, depth), offset=(0.5, 0.5))
+    material = Finish(
+        "carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),)
+    )(rng)
+    return replace(material, repeat=(width, depth), offset=(0.5, 0.5))
 
 
 def printed(rng: np.random.Generator, width: float, height: float) -> Material:
     """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
     kinds = "picture picture picture print ornament cloudy spots"
-    made = Finish(kinds, (*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),))(rng)
-    return replace(made, repeat=(width, -height), offset=(0.5, 0.5))
+    material = Finish(
+        kinds, base=(*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),)
+    )(rng)
+    return replace(material, repeat=(width, -height), offset=(0.5, 0.5))
 
 
 def light(rng: np.random.Generator, radiance: Colour) -> Material:
     """A luminous white surface of that radiance."""
+    # Radiance is emission times albedo, and the albedo is 0.8.
     emission = cast(Colour, tuple((np.array(radiance) / 0.8).tolist()))
     return Material(tile(rng, "plain"), ((0.8, 0.8, 0.8),) * 3, 0.0, emission=emission)
 
 
 Maker = Callable[[np.random.Generator], Material]
+# (share, maker) of what movable things are made of.
 OBJECTS: tuple[tuple[float, Maker], ...] = (
     (0.2, ceramic),
     (0.2, plastic),
@@ -406,6 +441,7 @@ OBJECTS: tuple[tuple[float, Maker], ...] = (
 def any_object(rng: np.random.Generator) -> Material:
     """What a movable thing may be made of, at a scale that suits 10 to 40 centimetres."""
     material = pick(rng, OBJECTS)(rng)
+    # Patterns made for walls and floors are too large for what stands on a table.
     shrink = rng.uniform(0.15, 0.5) if max(material.repeat) > 0.5 else 1.0
     return replace(material, repeat=(material.repeat[0] * shrink, material.repeat[1] * shrink))
 

@@ -14,9 +14,9 @@ REAL_KINDS = ("furnished", "laid", "single", "outside")
 """Kinds of scenes of real things."""
 KINDS = (*TOY_KINDS, *REAL_KINDS)
 REAL_SHARE = 0.75
-"""Share of the latter where nothing else is said and their packages are installed."""
+"""Default share of scenes of real things, where their packages are installed."""
 SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
-"""What a split adds to the key of a sample's randomness, so that no two splits show the same scenes."""
+"""Split -> the numbers it adds to the random seed of a sample: no two splits show the same scenes."""
 HELD_OUT = frozenset(
     (
         "binoculars",
@@ -34,7 +34,7 @@ HELD_OUT = frozenset(
         "venice_sunset",
     )
 )
-"""Stems of the meshes and HDR captures that no training set may use, and which the split 'heldout' uses alone."""
+"""Stems of meshes and HDR captures. No training set may use them; the split 'heldout' uses nothing else."""
 
 
 def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[Path]:
@@ -42,10 +42,10 @@ def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[P
 
     Raises InputError where there are none.
     """
-    found = sorted(
+    paths = sorted(
         p for p in folder.glob(pattern) if held_out is None or (p.stem in HELD_OUT) == held_out
     )
-    if not found:
+    if not paths:
         which = (
             ""
             if held_out is None
@@ -54,7 +54,7 @@ def captures(folder: Path, pattern: str, held_out: bool | None = None) -> list[P
         raise InputError(
             f"{folder} holds no {Path(pattern).suffix} files{which}; give another folder, or none."
         )
-    return found
+    return paths
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +102,7 @@ class DataSetOptions(OperationOptions):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        # The tracer ends 16 lanes together: see `tracer.VECTOR`.
         if self.size % 4:
             raise InputError(f"The size is {self.size}; give a multiple of 4.")
         if self.only and self.only not in KINDS:
@@ -128,10 +129,11 @@ class DataSetOptions(OperationOptions):
     @property
     def real_share(self) -> float:
         """Share of pictures of real things."""
+        # One kind alone is wholly of the one or of the other.
         if self.only:
             return float(self.only in REAL_KINDS)
-        usual = REAL_SHARE if self.archives else 0.0
-        return usual if self.real is None else self.real
+        default = REAL_SHARE if self.archives else 0.0
+        return default if self.real is None else self.real
 
     @cached_property
     def mesh_files(self) -> tuple[Path, ...]:
@@ -150,5 +152,5 @@ class DataSetOptions(OperationOptions):
             raise InputError(
                 f"There is no folder {folder} to take {ending} files from; give one that exists."
             )
-        wanted = captures(folder, f"**/*{ending}", self.split == "heldout")
-        return tuple(sorted(wanted, key=lambda p: (p.name, str(p))))
+        paths = captures(folder, f"**/*{ending}", self.split == "heldout")
+        return tuple(sorted(paths, key=lambda p: (p.name, str(p))))

@@ -62,6 +62,7 @@ class Packed:
 
 def pack(world: World, rng: np.random.Generator) -> Packed:
     """Buffers of a world; `rng` shifts the tiles of materials."""
+    # --- The mesh in the camera frame ---
     rotation = world.view.to_scene
     origin = world.view.position
     place = [(p.solid.vertices - origin) @ rotation for p in world.parts]
@@ -71,14 +72,17 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
     corner = np.concatenate([vertices, np.concatenate(normal), uv], -1)
     faces = joined_faces([p.solid for p in world.parts])[1].astype(np.uint32)
     owner = np.repeat(np.arange(len(world.parts)), [len(p.solid.faces) for p in world.parts])
+    # --- Materials ---
     pictures, starts = _pictures(world)
     rows = [
         p.material.row(tuple(rng.random(2)), starts.get(p.material.picture, 0)) for p in world.parts
     ]
     material = np.stack(rows).astype(np.float32)
+    # --- Light ---
     lamps, density = _lamps(vertices, faces, owner, material)
     extra = np.zeros((len(faces), 4), np.float32)
-    extra[:, 0], extra[:, 1] = owner, density
+    extra[:, 0] = owner
+    extra[:, 1] = density
     face = np.concatenate([corner[faces].reshape(len(faces), 24), extra], -1).astype(np.float32)
     env_table, env_density, sunny = _directions(world)
     portals = _portals(world)
@@ -102,6 +106,7 @@ def pack(world: World, rng: np.random.Generator) -> Packed:
 
 def _pictures(world: World) -> tuple[Array, dict[ColourPicture | None, int]]:
     """(pixels of all pictures of a world, picture -> its place in units of PICTURE_START)."""
+    # Place 0 means no picture.
     pieces = [np.zeros(PICTURE_START, np.uint32)]
     starts: dict[ColourPicture | None, int] = {}
     end = 1
@@ -111,6 +116,7 @@ def _pictures(world: World) -> tuple[Array, dict[ColourPicture | None, int]]:
             continue
         red, green, blue = (picture.pixels[..., k].astype(np.uint32).ravel() for k in range(3))
         pixels = red | green << 8 | blue << 16
+        # Rounded up to whole units, so that the next picture begins at one.
         length = -(-len(pixels) // PICTURE_START)
         pieces.append(np.pad(pixels, (0, length * PICTURE_START - len(pixels))))
         starts[picture] = end
@@ -121,6 +127,7 @@ def _pictures(world: World) -> tuple[Array, dict[ColourPicture | None, int]]:
 def _lamps(vertices: Array, faces: Array, owner: Array, material: Array) -> tuple[Array, Array]:
     """(table of luminous faces, [F] density 1 / m2), each face drawn by its power."""
     density = np.zeros(len(faces), np.float32)
+    # Radiance is emission times albedo; see `Material.row` for the columns.
     glow = luminance(material[:, 20:23] * material[:, 0:3])[owner]
     shining = np.flatnonzero(glow > 0)
     if not len(shining):
@@ -135,6 +142,7 @@ def _lamps(vertices: Array, faces: Array, owner: Array, material: Array) -> tupl
 
 def resample(weight: Array, entries: int) -> tuple[Array, Array]:
     """(`entries` indices drawn systematically by weight [N], [N] how often each occurs)."""
+    # Systematic: entries at even steps of the cumulative weight.
     edges = np.cumsum(weight, dtype=np.float64)
     places = (np.arange(entries) + 0.5) / entries * edges[-1]
     chosen = np.minimum(np.searchsorted(edges, places), len(weight) - 1)
@@ -148,9 +156,11 @@ def _directions(world: World) -> tuple[Array, Array, bool]:
         np.float64
     )
     angle = np.repeat(row_solid_angle(ENV_ROWS), 2 * ENV_ROWS)
+    # A little everywhere: what a lookup meets must have a density.
     weight = np.maximum(glow.ravel(), 1e-6) * angle
     if world.portals:
         weight *= _entering(world)
+    # The share of the light that the brightest two hundredth of the texels give.
     top = np.sort(weight)[-len(weight) // 200 :].sum() / max(weight.sum(), 1e-30)
     if weight.sum() <= 0:
         weight = angle
@@ -166,6 +176,7 @@ def _entering(world: World) -> Array:
 
 
 def _portals(world: World) -> Array:
+    """[MAX_PORTALS, PORTAL] float32, as `Packed.portals`; unused rows are 0."""
     table = np.zeros((MAX_PORTALS, PORTAL), np.float32)
     used = world.portals[:MAX_PORTALS]
     rotation = world.view.to_scene
@@ -173,19 +184,18 @@ def _portals(world: World) -> Array:
     for k, portal in enumerate(used):
         normal = np.cross(portal.right, portal.up)
         area = np.linalg.norm(normal)
-        sides = [(portal.corner - origin) @ rotation, portal.right @ rotation, portal.up @ rotation]
-        table[k] = [
-            *np.concatenate([*sides, normal / area @ rotation]),
-            1 / (area * len(used)),
-            0,
-            0,
-            0,
-        ]
+        corner = (portal.corner - origin) @ rotation
+        inward = normal / area @ rotation
+        row = np.concatenate([corner, portal.right @ rotation, portal.up @ rotation, inward])
+        # The density per area of a uniform point on any of them; three zeros fill the row.
+        table[k] = [*row, 1 / (area * len(used)), 0, 0, 0]
     return table
 
 
 def _shares(world: World, lamps: bool, sunny: bool) -> Array:
+    """[3] float32 probabilities of aiming at the envmap, at portals and at lamps."""
     sky = float(world.envmap.max()) > 0
+    # Behind portals the envmap is aimed at only where a small part of it, as a sun, is bright.
     env = 0.0 if not sky else 1.0 if not world.portals else 0.35 if sunny else 0.05
     portal = 0.65 if world.portals and sky else 0.0
     shares = np.array([env, portal, 0.5 if lamps else 0.0])

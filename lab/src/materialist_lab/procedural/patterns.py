@@ -30,6 +30,7 @@ def pattern(
 def _colour(rng: np.random.Generator, metal: bool, natural: bool) -> Array:
     """[3] linear colour of a dielectric (any hue) or of a metal (silver, gold, copper)."""
     if metal:
+        # Silver, gold, copper, steel.
         base = np.array(
             [(0.9, 0.88, 0.86), (0.85, 0.64, 0.30), (0.82, 0.50, 0.36), (0.60, 0.60, 0.62)]
         )
@@ -42,6 +43,7 @@ def _colour(rng: np.random.Generator, metal: bool, natural: bool) -> Array:
 
 
 def _checker(rng: np.random.Generator) -> Array:
+    # An even number of fields: the picture repeats without a seam.
     n = 2 * int(rng.integers(2, 5))
     return ((np.floor(X * n) + np.floor(Y * n)) % 2).astype(float)
 
@@ -54,9 +56,9 @@ def _stripes(rng: np.random.Generator) -> Array:
 
 def _wood(rng: np.random.Generator) -> Array:
     n = int(rng.integers(5, 10))
-    rings = 0.5 + 0.5 * np.sin(
-        2 * np.pi * (n * Y + 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * X))
-    )
+    # Rings along x, bent by noise and by one wave.
+    bend = 1.2 * noise(rng, 2.0) + 0.3 * np.sin(2 * np.pi * X)
+    rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * Y + bend))
     return np.clip(0.7 * rings**2 + 0.3 * noise(rng, 0.8), 0, 1)
 
 
@@ -66,6 +68,7 @@ def _spots(rng: np.random.Generator) -> Array:
         cx = rng.random()
         cy = rng.random()
         radius = rng.uniform(0.03, 0.1)
+        # From the nearest repetition of the spot, so that the picture has no seams.
         distance = np.hypot((X - cx + 0.5) % 1 - 0.5, (Y - cy + 0.5) % 1 - 0.5)
         mix = np.maximum(mix, np.clip((radius - distance) * SIZE / 2, 0, 1))
     return mix

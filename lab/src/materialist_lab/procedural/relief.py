@@ -35,13 +35,15 @@ class Relief:
 
     def row(self) -> list[float]:
         """[5] as the path tracer reads it: blocks a metre, slope, number of the kind."""
-        least = min(self.size)
-        return [*(1 / s for s in self.size), self.slope * least, float(SOLID.index(self.kind))]
+        smallest = min(self.size)
+        return [*(1 / s for s in self.size), self.slope * smallest, float(SOLID.index(self.kind))]
 
 
 def _frequency(stretch: tuple[float, float, float] = (1, 1, 1)) -> Array:
+    """[SIDE]*3 frequencies in waves per block; a `stretch` above 1 draws noise out along that axis."""
     axes = [np.fft.fftfreq(SIDE) * SIDE * s for s in stretch]
     f = np.sqrt(sum(a**2 for a in np.meshgrid(*axes, indexing="ij")))
+    # The mean has no wave; 1 avoids a division by zero, and `_field` drops it.
     f[0, 0, 0] = 1
     return f
 
@@ -67,7 +69,8 @@ def _grain(rng):
 
 def _ridges(rng):
     """Sharp ridges and cracks: folded noise."""
-    return -np.abs(_field(rng, _frequency() ** -2.0)) + 0.3 * _field(rng, _frequency() ** -1.8)
+    folded = -np.abs(_field(rng, _frequency() ** -2.0))
+    return folded + 0.3 * _field(rng, _frequency() ** -1.8)
 
 
 def _hammered(rng):
@@ -76,6 +79,7 @@ def _hammered(rng):
     place = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), -1)
     nearest = np.full((SIDE,) * 3, np.inf)
     for point in points:
+        # The shorter way around the block, which repeats.
         away = np.abs(place - point)
         nearest = np.minimum(nearest, (np.minimum(away, SIDE - away) ** 2).sum(-1))
     return nearest / nearest.std()
@@ -83,19 +87,18 @@ def _hammered(rng):
 
 def _carved(rng):
     """Ornament: flat islands with steep sides."""
+    # The hyperbolic tangent flattens what is high or low.
     return np.tanh(4 * _field(rng, np.exp(-(((_frequency() - 4) / 2) ** 2))))
 
 
 def _folds(rng):
     """Soft folds along x, bent by noise."""
     bent = _field(rng, _frequency() ** -2.5)
-    y, z = (
-        np.broadcast_to(a, (SIDE,) * 3)
-        for a in np.meshgrid(*[np.arange(SIDE) / SIDE] * 2, indexing="ij")
-    )
-    return np.sin(2 * np.pi * (3 * y + 2 * z) + 1.6 * bent) + 0.3 * _field(
-        rng, _frequency() ** -2.5
-    )
+    # Whole numbers of folds along both axes: the block stays periodic.
+    axis = np.arange(SIDE) / SIDE
+    y, z = np.meshgrid(axis, axis, indexing="ij")
+    folds = np.sin(2 * np.pi * (3 * y + 2 * z) + 1.6 * bent)
+    return folds + 0.3 * _field(rng, _frequency() ** -2.5)
 
 
 def _hair(rng):
@@ -119,12 +122,12 @@ SOLID = tuple(_SOLID)
 @lru_cache(maxsize=1)
 def heights() -> dict[str, Array]:
     """Kind -> [SIDE]*3 float32 heights along x, y, z, periodic, deviation 1; the same in every process."""
-    made = {
+    fields = {
         kind: make(np.random.default_rng([43, k])) for k, (kind, make) in enumerate(_SOLID.items())
     }
     return {
         kind: ((field - field.mean()) / field.std()).astype(np.float32)
-        for kind, field in made.items()
+        for kind, field in fields.items()
     }
 
 
@@ -141,11 +144,12 @@ def solid_bank() -> Array:
     """
     slabs = []
     for field in heights().values():
-        slope = np.stack(
-            [np.roll(field, -1, k) - np.roll(field, 1, k) for k in range(3)] + [0 * field], -1
-        )
+        # Central differences, periodic; a fourth channel of zeros, since textures have one, two or four.
+        slopes = [np.roll(field, -1, k) - np.roll(field, 1, k) for k in range(3)]
+        slope = np.stack([*slopes, 0 * field], -1)
         slope /= np.sqrt((slope**2).sum(-1).mean())
         slope = slope.transpose(2, 1, 0, 3)
+        # The last layer before the first and the first behind the last, for the interpolation.
         slabs.append(np.concatenate([slope[-1:], slope, slope[:1]]))
     return np.concatenate(slabs).astype(np.float32)
 
@@ -163,12 +167,11 @@ def tile_bank() -> Array:
     words = np.empty(bank.shape[:3], np.uint32)
     for k, tile in enumerate(bank):
         field = 0.3 * tile[..., 2] / 255.0 - depth[k] * tile[..., 1] / 255.0
-        right, down = (
-            (np.roll(field, -1, axis) - np.roll(field, 1, axis)) * tiles.SIZE / 2 for axis in (1, 0)
-        )
-        steps = [
-            np.clip(np.rint(s / FINE_SLOPE) + 32768, 0, 65535).astype(np.uint32)
-            for s in (right, down)
-        ]
+        # Slopes in heights per tile, to the right in the lower 16 bits and down in the upper ones.
+        steps = []
+        for axis in (1, 0):
+            slope = (np.roll(field, -1, axis) - np.roll(field, 1, axis)) * tiles.SIZE / 2
+            rounded = np.rint(slope / FINE_SLOPE) + 32768
+            steps.append(np.clip(rounded, 0, 65535).astype(np.uint32))
         words[k] = steps[0] | steps[1] << 16
     return words

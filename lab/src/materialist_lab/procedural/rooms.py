@@ -30,7 +30,9 @@ def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> wor
     """Things on a table, a sideboard or a kitchen top, seen from close by, with the room behind them."""
     maker = m.pick(rng, f.TO_LOOK_ON)
     piece = maker(rng, meshes)
-    (low, high), top = world.bounds(piece), world.bounds(piece[:1])[1][1]
+    low, high = world.bounds(piece)
+    top = world.bounds(piece[:1])[1][1]  # the first part is what things lie on
+    # The room is large enough for the piece.
     size = rng.uniform([2.6, 3.0, 2.3], [5.0, 5.0, 3.0])
     size[:2] = np.maximum(size[:2], (high - low)[[0, 2]] + 0.7)
     at_wall = maker is not f.set_table or rng.random() < 0.5
@@ -39,13 +41,15 @@ def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> wor
     standing = Furniture(size)
     standing.add(placed(piece, (x, 0, z)))
     standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 2, 4, meshes))
+    # A camera on a sphere about the top, held within the walls.
     target = np.array([x + rng.uniform(-0.4, 0.4) * high[0], top + rng.uniform(0.0, 0.15), z])
     distance, up, turn, fov = rng.uniform(
         [0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60]
     )
     w, d, h = size
-    inside = np.array([[-w / 2 + 0.1, 0.2, -d / 2 + 0.2], [w / 2 - 0.1, h - 0.2, d / 2 - 0.1]])
-    eye = np.clip(world.orbit(target, distance, turn, up, fov).position, *inside)
+    lowest = np.array([-w / 2 + 0.1, 0.2, -d / 2 + 0.2])
+    highest = np.array([w / 2 - 0.1, h - 0.2, d / 2 - 0.1])
+    eye = np.clip(world.orbit(target, distance, turn, up, fov).position, lowest, highest)
     view = world.look(eye, target, fov, rng.normal() * 0.03)
     return _world(rng, size, captures, standing.parts, view, "table")
 
@@ -61,11 +65,13 @@ def _world(
     w, d, _ = size
     parts, portals, envmap = shell(rng, size, captures)
     parts += furniture
+    # A rug near the middle of the floor.
     if rng.random() < 0.5:
         a = w * rng.uniform(0.3, 0.7)
         b = d * rng.uniform(0.25, 0.6)
         rug = m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)
-        parts.append(block((a, 0.012, b), (rng.normal() * 0.3, 0, rng.normal() * 0.4), rug, 0.004))
+        at = (rng.normal() * 0.3, 0, rng.normal() * 0.4)
+        parts.append(block((a, 0.012, b), at, rug, 0.004))
     parts += lamps(rng, size, portals, envmap)
     return world.World(parts, envmap, view, portals, kind)
 
@@ -86,12 +92,11 @@ def shell(
 ) -> tuple[Parts, list[world.Portal], Array]:
     """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size
-    is_open = rng.random() < 0.25
     parts: Parts = []
     portals: list[world.Portal] = []
-    count = (
-        int(rng.choice([0, 1, 2], p=[0.1, 0.6, 0.3])) if not is_open else int(rng.random() < 0.3)
-    )
+    # --- What differs between rooms: the open front, windows, paints ---
+    is_open = rng.random() < 0.25
+    count = int(rng.random() < 0.3) if is_open else int(rng.choice([0, 1, 2], p=[0.1, 0.6, 0.3]))
     with_windows = rng.permutation(2 if is_open else 4)[:count]
     paint = m.wall_paint(rng)
     accent = rng.integers(4) if rng.random() < 0.3 else -1
@@ -99,26 +104,33 @@ def shell(
     wood = m.white_paint(rng) if rng.random() < 0.7 else m.wood(rng)
     x = np.array([1.0, 0, 0])
     z = np.array([0, 0, 1.0])
+    # --- Walls; a missing one is a hole of its whole size ---
     for k, (corner, turn, length) in enumerate(sides(size)):
         holes = [walls.Opening(0, length, 0, h)]
         if not (is_open and k == 2):
             wall = RoomWall(length, h)
-            most = 4 if count == 1 else 3
-            own = walls.windows(rng, wall, int(rng.integers(1, most))) if k in with_windows else []
-            own += walls.door(rng, wall) if rng.random() < 0.35 else []
+            max_windows = 4 if count == 1 else 3
+            hung = (
+                walls.windows(rng, wall, int(rng.integers(1, max_windows)))
+                if k in with_windows
+                else []
+            )
+            hung += walls.door(rng, wall) if rng.random() < 0.35 else []
             makers = (m.wall_paint, m.wallpaper, m.brick, m.tiled, m.wood, m.stone)
-            own += walls.surface(
+            hung += walls.surface(
                 wall, m.one_of(rng, *makers) if k == accent else paint, lower, rng.uniform(0.8, 1.2)
             )
-            own.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
-            own += hangings(rng, wall, int(rng.integers(0, 5)))
-            parts = parts + moved(own, corner, turn)
+            hung.append(walls.board(0, 0, (length, rng.uniform(0.05, 0.14), 0.015), wood))
+            hung += hangings(rng, wall, int(rng.integers(0, 5)))
+            parts = parts + moved(hung, corner, turn)
             holes = wall.holes
+        # A portal a centimetre outside each hole tells the tracer where daylight comes in.
         for hole in holes:
             up = (0, hole.top - hole.bottom, 0)
             sheet = s.sheet((hole.left, hole.bottom, -0.01), (hole.right - hole.left) * x, up)
             low, up, right, _ = s.moved(sheet, corner, turn).vertices
             portals.append(world.Portal(low, right - low, up - low))
+    # --- Floor, ceiling, beams ---
     floor = m.one_of(rng, m.floor_boards, m.floor_boards, m.tiled, m.stone, m.fabric)
     ceiling = m.floor_boards(rng) if rng.random() < 0.08 else m.white_paint(rng)
     parts.append(ScenePart(s.sheet((-w / 2, 0, d / 2), w * x, -d * z), floor))
@@ -127,9 +139,11 @@ def shell(
         beams = np.arange(-w / 2 + 0.4, w / 2, 0.9)
         look = m.wood(rng)
         parts += [block((0.14, 0.2, d), (at, h - 0.2, 0), look) for at in beams]
+    # --- Light from afar, black where none can come in ---
     if not portals:
         return parts, portals, np.zeros((8, 16, 3), np.float32)
-    return parts, portals, (lights.around if is_open else lights.outdoors)(rng, captures)
+    surroundings = lights.around if is_open else lights.outdoors
+    return parts, portals, surroundings(rng, captures)
 
 
 class Furniture:
@@ -144,15 +158,18 @@ class Furniture:
         """Take the piece in, unless it reaches through a wall or into another piece."""
         low, high = world.bounds(piece)
         inside = (np.maximum(-low, high)[[0, 2]] <= self.size[:2] / 2).all()
-        if inside and not any((low < b).all() and (high > a).all() for a, b in self.boxes):
+        touches = any((low < b).all() and (high > a).all() for a, b in self.boxes)
+        if inside and not touches:
             self.parts += piece
             self.boxes.append((low, high))
 
     def along_walls(self, rng: np.random.Generator, pieces: list[Parts]) -> None:
         """Stand pieces with their backs to a wall, most at the back and the sides."""
         for piece in pieces:
-            corner, turn, length = sides(self.size)[rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])]
+            side = rng.choice(4, p=[0.4, 0.25, 0.1, 0.25])
+            corner, turn, length = sides(self.size)[side]
             low, high = world.bounds(piece)
+            # Four centimetres of air to each wall.
             at = rng.uniform(0.04, max(0.05, length - (high - low)[0] - 0.04))
             self.add(moved(placed(piece, (at - low[0], 0, 0.04 - low[2])), corner, turn))
 
@@ -177,37 +194,43 @@ def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
     """
     if portals and rng.random() < 0.4:
         return []
-    through = sum(np.linalg.norm(np.cross(p.right, p.up)) for p in portals) / 2 if portals else 2.0
+    # About what comes in through the windows: their area times a radiance of 1, halved.
+    through = 2.0
+    if portals:
+        through = float(sum(np.linalg.norm(np.cross(p.right, p.up)) for p in portals)) / 2
     power = through * float(np.exp(rng.uniform(np.log(0.08), np.log(8.0))))
+    # Evening.
     if portals and rng.random() < 0.12:
         envmap *= rng.uniform(0.005, 0.1)
+    # One or two kinds of lamps share the power.
+    makers = (_panels, _globes, _shade)
     chosen = rng.permutation(3)[: int(rng.integers(1, 3))]
-    return [
-        p for k in chosen for p in (_panels, _globes, _shade)[k](rng, size, power / len(chosen))
-    ]
+    return [part for k in chosen for part in makers[k](rng, size, power / len(chosen))]
 
 
 def _panels(rng, size, power) -> Parts:
     """A few long panels or several small spots on the ceiling."""
     w, d, h = size
     spots = rng.random() < 0.5
-    n, a, b = (
-        (rng.integers(2, 7), 0.1, 0.1)
-        if spots
-        else (rng.integers(1, 4), *rng.uniform(0.12, [0.6, 1.2]))
-    )
+    if spots:
+        n = rng.integers(2, 7)
+        a, b = 0.1, 0.1
+    else:
+        n = rng.integers(1, 4)
+        a, b = rng.uniform(0.12, [0.6, 1.2])
     glow = _glow(rng, power, n * a * b)
     edge = m.metal(rng)
     parts = []
     for x, z in rng.uniform(-0.4, 0.4, (n, 2)) * [w, d]:
+        # The luminous sheet lies just below its casing.
         parts.append(block((a + 0.03, 0.03, b + 0.03), (x, h - 0.03, z), edge))
-        parts.append(
-            ScenePart(s.sheet((x - a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b)), glow)
-        )
+        panel = s.sheet((x - a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b))
+        parts.append(ScenePart(panel, glow))
     return parts
 
 
 def _globes(rng, size, power) -> Parts:
+    """A row of luminous balls on cords."""
     w, d, h = size
     n = int(rng.integers(1, 4))
     r = rng.uniform(0.06, 0.2)
@@ -222,9 +245,12 @@ def _globes(rng, size, power) -> Parts:
 
 
 def _shade(rng, size, power) -> Parts:
+    """A standard lamp near the left or the right wall."""
     w, d, _ = size
     r, tall, height = rng.uniform([0.12, 1.1, 0.18], [0.25, 1.7, 0.35])
-    at = np.array([rng.choice([-1, 1]) * (w / 2 - r - 0.1), 0, rng.uniform(-0.45, 0.2) * d])
+    side = rng.choice([-1, 1])
+    at = np.array([side * (w / 2 - r - 0.1), 0, rng.uniform(-0.45, 0.2) * d])
+    # The shade's area, about that of a cylinder, shares the power out.
     glow = _glow(rng, power, 2 * np.pi * r * height)
     stand = m.metal(rng)
     shade = s.lathe(np.array([(r, tall), (r * rng.uniform(0.5, 1), tall + height)]), 32)
@@ -236,14 +262,19 @@ def _shade(rng, size, power) -> Parts:
 def view_of(rng: np.random.Generator, size: Size, standing: Furniture) -> world.Viewpoint:
     """Somebody in the front half of the room who looks towards its back."""
     w, d, h = size
+    # A place on the floor that no furniture takes; the last one tried in a full room.
     for _ in range(30):
         eye = rng.uniform([-0.44, 0, 0.05], [0.44, 0, 0.48]) * [w, 0, d]
-        if not any(
+        taken = any(
             (eye > low - 0.25).all() and (eye < high + 0.25).all() for low, high in standing.boxes
-        ):
+        )
+        if not taken:
             break
-    eye[1] = min(rng.uniform(1.2, 1.75) if rng.random() < 0.7 else rng.uniform(0.5, 2.0), h - 0.3)
-    target = np.array(
-        [rng.uniform(-0.5, 0.5) * w, rng.uniform(0.3, 1.5), -d / 2 * rng.uniform(0.2, 1.0)]
-    )
+    # Eye level of people mostly; now and then that of a child or a tripod.
+    level = rng.uniform(1.2, 1.75) if rng.random() < 0.7 else rng.uniform(0.5, 2.0)
+    eye[1] = min(level, h - 0.3)
+    x = rng.uniform(-0.5, 0.5) * w
+    y = rng.uniform(0.3, 1.5)
+    z = -d / 2 * rng.uniform(0.2, 1.0)
+    target = np.array([x, y, z])
     return world.look(eye, target, rng.uniform(35, 75), rng.normal() * 0.025)

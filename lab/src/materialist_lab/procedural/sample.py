@@ -24,11 +24,11 @@ from materialist_lab.procedural.world import World
 DENOISING = "balanced"
 """Quality of the filter: less than half of the time of 'high'."""
 LIGHT_SPP = 128
-"""Rays of each of its texels."""
+"""Rays per texel of the stored light."""
 LIGHT_HIDDEN = 0.1
-"""Weight, in it, of the sky behind visible surfaces, where there is a sky."""
+"""Weight of the sky behind visible surfaces in the stored light, for kinds of worlds under an open sky."""
 ATTEMPTS = 6
-"""Cameras that see too little are thrown away at most that often."""
+"""Largest number of worlds that are drawn until a camera sees enough; the last one is taken as it is."""
 MAKERS: dict[str, tuple[Callable[..., World], float]] = {
     "room": (rooms.room, 0.38),
     "table": (rooms.table_top, 0.22),
@@ -42,11 +42,11 @@ REAL_MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], floa
     "single": (single, 0.35),
     "outside": (outside, 0.1),
 }
-"""The same of the pictures of real things."""
+"""Kind of scene -> its maker, and its share of the pictures of real things."""
 OPEN_KINDS = ("outdoor", "still life", "single", "outside")
 """Kinds of worlds under an open sky."""
 SINGLE_COVERS = (0.08, 0.92)
-"""Least and most of a picture that a single thing may cover."""
+"""Smallest and largest share of a picture that a single thing may cover."""
 
 
 def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
@@ -68,6 +68,7 @@ def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
 
 def make_world(rng: np.random.Generator, options: DataSetOptions) -> World:
     """A random scene of the kinds' shares, or of the one kind that the options name."""
+    # No number is drawn where there is nothing to choose: old sets keep their samples.
     share = options.real_share
     if share and (share == 1 or rng.random() < share):
         makers, shares = _chosen(REAL_MAKERS, options.only)
@@ -99,6 +100,7 @@ def stock_of(options: DataSetOptions) -> Stock:
 
 def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
     """Whether a view shows several things at a distance, or a single one well, rather than the inside of a cupboard."""
+    # One ray a pixel is enough here.
     owner = probe["owner"][..., 0]
     depth = probe["depth"][..., 0]
     seen = owner >= 0
@@ -106,9 +108,11 @@ def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
         subject = np.array([part.thing is not None for part in world.parts])
         covered = float((seen & subject[owner.astype(int)]).mean())
         return SINGLE_COVERS[0] < covered < SINGLE_COVERS[1]
+    # Half a dozen things of a visible size.
     _, counts = np.unique(owner[seen], return_counts=True)
     if seen.mean() < 0.3 or (counts > owner.size / 400).sum() < 6:
         return False
+    # Not mostly something close to the lens, nor one thing that fills the picture.
     near = np.median(depth[seen]) * 0.25
     return bool((depth[seen] < near).mean() < 0.3 and counts.max() / owner.size < 0.75)
 
@@ -116,6 +120,7 @@ def worth_seeing(world: World, probe: dict[str, Array]) -> bool:
 def _developed(
     world: World, probe, tracer, rng: np.random.Generator, options: DataSetOptions
 ) -> dict[str, Array]:
+    # --- The picture and its shading, denoised ---
     noisy, white = tracer.render(spp=options.spp, seed=int(rng.integers(2**31)))
     normal = probe["normal"].mean(2)
     image = denoise(noisy, albedo=probe["albedo"].mean(2), normal=normal, quality=DENOISING)
@@ -124,16 +129,19 @@ def _developed(
     shading = denoise(
         white, albedo=np.repeat(covered[..., None], 3, -1), normal=normal, quality=DENOISING
     )
+    # --- Exposure and white balance, as a camera sets them ---
     labels = labels_of(probe)
     lit = labels["mask"] if world.backdrop is not None else None
     gain = exposure(image, rng, lit) * balance(shading, rng)
     if world.backdrop is not None:
         image = before(world.backdrop, image, covered)
     image = image * gain
+    # --- Defocus ---
     view = world.view
     sharp = view.aperture == 0
     if not sharp:
         image = defocused(image, labels["depth"], tracer.camera, view.aperture, view.focus)
+    # --- The light that reaches what is seen ---
     hidden = LIGHT_HIDDEN if world.kind in OPEN_KINDS else 0
     light = tracer.light(
         probe, rows=LIGHT_ROWS, spp=LIGHT_SPP, seed=int(rng.integers(2**31)), hidden=hidden
@@ -164,11 +172,14 @@ def _developed(
 
 def things_of(world: World, probe: dict[str, Array]) -> Array:
     """[H, W] int16: the number of the thing at a pixel's centre, negative for walls and the like, 0 for nothing."""
+    # Numbers from 1 in the order of the parts; several parts may be one thing.
     number: dict[object, int] = {}
     of_part = [0]
     for k, part in enumerate(world.parts):
-        own = number.setdefault(("part", k) if part.thing is None else part.thing, len(number) + 1)
-        of_part.append(-own if part.thing is None else own)
+        label = number.setdefault(
+            ("part", k) if part.thing is None else part.thing, len(number) + 1
+        )
+        of_part.append(-label if part.thing is None else label)
     owner = probe["owner"][..., CENTRE].astype(int)
     return np.array(of_part, np.int16)[owner + 1]
 
@@ -227,7 +238,9 @@ def exposure(image: Array, rng: np.random.Generator, surface: Array | None = Non
 
 def balance(shading: Array, rng: np.random.Generator) -> Array:
     """[3] gains, about 1, that make most of the light's colour white, as the maker of a camera would have it."""
+    # The light's colour, as white surfaces show it.
     light = np.median(shading.reshape(-1, 3), 0) + 1e-6 + 1e-3 * shading.mean()
     strength = rng.uniform(0.4, 1.0) if rng.random() < 0.85 else rng.uniform(0.0, 0.4)
+    # Camera makers correct most of it, not all.
     gains = (luminance(light) / light) ** strength * np.exp(rng.normal(0, 0.04, 3))
     return np.clip(gains, 0.2, 5).astype(np.float32)

@@ -26,7 +26,7 @@ from materialist_lab.procedural.packing import (
 )
 
 _ALBEDO_RANGE = (0.01, 0.95)
-_LEAST_ROUGHNESS = 0.05
+_MIN_ROUGHNESS = 0.05
 
 
 @dataclass
@@ -84,19 +84,28 @@ class Shading:
         ]
         """Three rows of the rotation from camera to scene directions."""
 
-    def hit(self, found, d, fine=None) -> Hit:
-        """The surface at preliminary intersections `found` of rays with directions d; see `at` for `fine`."""
-        return self.at(found.prim_index, found.prim_uv, d, found.t, found.is_valid(), fine)
+    def hit(self, preliminary, d, fine=None) -> Hit:
+        """The surface at preliminary intersections of rays with directions d; see `at` for `fine`."""
+        return self.at(
+            preliminary.prim_index,
+            preliminary.prim_uv,
+            d,
+            preliminary.t,
+            preliminary.is_valid(),
+            fine,
+        )
 
     def at(self, index, b, d, t, valid, fine=None) -> Hit:
         """The surface at barycentric coordinates b of faces, seen along directions d.
 
         fine: where normals are bent by the relief of the material; nowhere by default.
         """
+        # --- The corners of the face: place, normal and texture coordinates, 8 numbers each ---
         row = [
             dr.gather(mi.Vector4f, self.face, index * (FACE // 4) + k, valid)
             for k in range(FACE // 4)
         ]
+        owner = mi.UInt32(row[6].x)
         corners = [(row[2 * k], row[2 * k + 1]) for k in range(3)]
         place = [mi.Point3f(a.x, a.y, a.z) for a, _ in corners]
         normal = [mi.Vector3f(a.w, c.x, c.y) for a, c in corners]
@@ -105,13 +114,15 @@ class Shading:
         def mix(v):
             return v[0] * (1 - b.x - b.y) + v[1] * b.x + v[2] * b.y
 
+        # --- Geometric normal, and shading normal as the mean of the corners' ---
         ng = dr.cross(place[1] - place[0], place[2] - place[0])
         ng = ng * dr.rsqrt(dr.maximum(dr.squared_norm(ng), 1e-30))
         n = mix(normal)
         n = n * dr.rsqrt(dr.maximum(dr.squared_norm(n), 1e-20))
         front = dr.dot(ng, d) < 0
         if fine is not None:
-            n = self._bent(n, mi.UInt32(row[6].x), mix(place), mix(uv), place, uv, valid & fine)
+            n = self._bent(n, owner, mix(place), mix(uv), place, uv, valid & fine)
+        # --- Both on the viewer's side ---
         ng = dr.select(front, ng, -ng)
         n = dr.select(dr.dot(n, ng) < 0, -n, n)
         # Bend normals that turn away from the viewer back to the silhouette.
@@ -126,24 +137,31 @@ class Shading:
             mi.Frame3f(n),
             mix(uv),
             front,
-            mi.UInt32(row[6].x),
+            owner,
             row[6].y,
         )
 
     def _bent(self, n, owner, p, uv, places, corners, active):
-        """Shading normals n on the front side, bent by the relief at points p; `places` and `corners` are those of the
-        faces."""
+        """Shading normals n on the front side, bent by the relief at points p.
+
+        `places` and `corners` are the places and the texture coordinates of the faces' corners. A height h along the
+        normal bends it to n - (g - (g . n) n), g the gradient of h.
+        """
+        # Rows 3 to 8 of the material: see `Material.row`.
         r = [
             dr.gather(mi.Vector4f, self.material, owner * (MATERIAL // 4) + k, active)
             for k in range(3, 9)
         ]
         emboss = r[3].w
         solid = active & (r[4].w > 0)
-        # Tiles: how the texture coordinates change along the face, and the height with them.
+        # --- Tiles: the slope of the height along s and t, two numbers of 16 bits in a word ---
         s, t = self._place_on_tile(uv, r[0], r[1])
-        word = dr.gather(mi.UInt32, self.slopes, self._texel(s, t, r[2].w), active & (emboss > 0))
+        texel = self._texel(s, t, r[2].w)
+        word = dr.gather(mi.UInt32, self.slopes, texel, active & (emboss > 0))
         along_s = (mi.Float(word & 0xFFFF) - 32768) * relief.FINE_SLOPE
         along_t = (mi.Float(word >> 16) - 32768) * relief.FINE_SLOPE
+        # The gradients of u and v on the face, from the edges and their texture coordinates:
+        # `across` and `up` are the dual basis of the edges, times the square of twice the area.
         first = places[1] - places[0]
         second = places[2] - places[0]
         du = corners[1] - corners[0]
@@ -154,24 +172,29 @@ class Shading:
         scale = dr.rcp(dr.maximum(dr.squared_norm(flat), 1e-20))
         u = (du.x * across + dv.x * up) * scale
         v = (du.y * across + dv.y * up) * scale
+        # The chain rule: (s, t) is a linear map of (u, v).
         by_u = along_s * r[0].z + along_t * r[1].x
         by_v = along_s * r[0].w + along_t * r[1].y
         slope = dr.select(emboss > 0, emboss * (by_u * u + by_v * v), 0)
-        # Solid noise at the place in the scene.
-        place = mi.Vector3f(*(dr.dot(row, p) for row in self.turn)) * mi.Vector3f(
-            r[4].x, r[4].y, r[4].z
-        )
+        # --- Solid noise at the place in the scene, turns per metre in r[4] ---
+        frequency = mi.Vector3f(r[4].x, r[4].y, r[4].z)
+        place = mi.Vector3f(*(dr.dot(row, p) for row in self.turn)) * frequency
+        # The kinds of noise lie in slabs above each other in one texture, r[5].x the number.
         layer = place.z - dr.floor(place.z)
         layer = (r[5].x * relief.SLAB + 1 + layer * relief.SIDE) / (relief.SLAB * len(relief.SOLID))
-        found = self.solid.eval(mi.Point3f(place.x, place.y, layer), solid)
-        scene = mi.Vector3f(found[0] * r[4].x, found[1] * r[4].y, found[2] * r[4].z) * r[4].w
-        rows = self.turn
-        noise = mi.Vector3f(
-            *(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3))
-        )
-        slope += dr.select(solid, noise, 0)
+        gradient = self.solid.eval(mi.Point3f(place.x, place.y, layer), solid)
+        scene = mi.Vector3f(*(gradient[k] * frequency[k] for k in range(3))) * r[4].w
+        slope += dr.select(solid, self._to_camera(scene), 0)
+        # --- Only the part of the gradient along the surface bends the normal ---
         bent = dr.normalize(n - (slope - dr.dot(slope, n) * n))
         return dr.select(solid | (active & (emboss > 0)), bent, n)
+
+    def _to_camera(self, scene):
+        """Directions of the scene as those of the camera: the transposed rotation."""
+        rows = self.turn
+        return mi.Vector3f(
+            *(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3))
+        )
 
     def _place_on_tile(self, uv, third, fourth):
         """(s, t) on tiles of texture coordinates, by the fourth and fifth row of four of the material."""
@@ -183,12 +206,14 @@ class Shading:
     def _texel(self, s, t, tile, shift=(0.5, 0.5)):
         """Number in the bank of the texel at (s, t) of a tile."""
         side = tiles.SIZE
-        column = (
-            mi.UInt32(mi.Int32(dr.floor((s - dr.floor(s)) * side + shift[0] - 0.5)) + side) % side
-        )
-        line = (
-            mi.UInt32(mi.Int32(dr.floor((t - dr.floor(t)) * side + shift[1] - 0.5)) + side) % side
-        )
+
+        def wrapped(x, by):
+            texel = mi.Int32(dr.floor((x - dr.floor(x)) * side + by - 0.5))
+            # The side is added before the remainder: -1 is the last texel.
+            return mi.UInt32(texel + side) % side
+
+        column = wrapped(s, shift[0])
+        line = wrapped(t, shift[1])
         return (mi.UInt32(tile) * side + line) * side + column
 
     def look(self, hit: Hit, texel) -> Look:
@@ -197,18 +222,20 @@ class Shading:
             dr.gather(mi.Vector4f, self.material, hit.owner * (MATERIAL // 4) + k, hit.valid)
             for k in range(7)
         ]
+        # --- The four channels of the tile, 8 bits each ---
         s, t = self._place_on_tile(hit.uv, r[3], r[4])
-        word = dr.gather(
-            mi.UInt32, self.bank, self._texel(s, t, r[5].w, (texel.x, texel.y)), hit.valid
-        )
+        index = self._texel(s, t, r[5].w, (texel.x, texel.y))
+        word = dr.gather(mi.UInt32, self.bank, index, hit.valid)
         f: list[Any] = [mi.Float((word >> (8 * k)) & 255) / 255 for k in range(4)]
+        # --- Colour: of the tile, or of a picture where the material has one ---
         colours: list[Any] = [mi.Color3f(v.x, v.y, v.z) for v in r[:3]]
         albedo: Any = dr.lerp(dr.lerp(colours[0], colours[1], f[0]), colours[2], f[1])
-        albedo = dr.select(
-            r[6].y > 0, self._printed(r[6], s, t, texel, hit.valid) * colours[0], albedo
-        )
+        printed = self._printed(r[6], s, t, texel, hit.valid)
+        albedo = dr.select(r[6].y > 0, printed * colours[0], albedo)
+        # Grain as `Material.grain` says: albedo times exp(grain (g - 0.5)).
         albedo = dr.clip(albedo * dr.exp(r[2].w * (f[2] - 0.5)), *_ALBEDO_RANGE)
-        roughness = dr.clip(dr.lerp(r[0].w, r[1].w, f[3]), _LEAST_ROUGHNESS, 1)
+        # --- Finish ---
+        roughness = dr.clip(dr.lerp(r[0].w, r[1].w, f[3]), _MIN_ROUGHNESS, 1)
         metallic = dr.lerp(r[3].x, r[3].y, f[0])
         emission = mi.Color3f(r[5].x, r[5].y, r[5].z) * albedo
         return Look(albedo, roughness, metallic, emission)
@@ -223,6 +250,7 @@ class Shading:
         line = mi.UInt32(dr.clip(y, 0, mi.Int32(height) - 1))
         place = mi.UInt32(where.x) * PICTURE_START + line * width + column
         word = dr.gather(mi.UInt32, self.pictures, place, valid & (where.y > 0))
+        # Stored as square roots, which 8 bits resolve better in the dark.
         root = mi.Color3f(*(mi.Float((word >> (8 * k)) & 255) / 255 for k in range(3)))
         return root * root
 
@@ -240,23 +268,26 @@ class Shading:
 
     def density(self, ray, hit: Hit):
         """Density per solid angle with which `aim` would have found what the ray found, seen from its origin."""
+        # From a density per area to one per solid angle: p_w = p_A t^2 / |cos|.
         cosine = dr.abs(dr.dot(hit.ng, ray.d))
         lamp = self.shares[2] * hit.density * hit.t * hit.t / dr.maximum(cosine, 1e-6)
         return dr.select(hit.valid, dr.select(hit.front, lamp, 0), self._sky_density(ray.o, ray.d))
 
     def _sky_density(self, p, d):
+        """Density per solid angle of aiming along d from p at light from afar, by envmap and portals."""
         u, v = self._place(d)
         column = dr.minimum(mi.UInt32(u * (2 * ENV_ROWS)), 2 * ENV_ROWS - 1)
         row = dr.minimum(mi.UInt32(v * ENV_ROWS), ENV_ROWS - 1)
-        total = self.shares[0] * dr.gather(
-            mi.Float, self.env_density, row * (2 * ENV_ROWS) + column
-        )
+        by_envmap = dr.gather(mi.Float, self.env_density, row * (2 * ENV_ROWS) + column)
+        total = self.shares[0] * by_envmap
         return total + self.shares[1] * self._portal_density(p, d)
 
     def _portal_density(self, p, d):
+        """Density per solid angle of aiming along d from p through one of the portals."""
         total = mi.Float(0)
         for k in range(MAX_PORTALS):
             corner, right, up, normal, share = self._portal(mi.UInt32(k))
+            # Where the ray meets the plane of the portal, as shares (a, b) of its sides.
             cosine = -dr.dot(normal, d)
             t = -dr.dot(normal, corner - p) / dr.maximum(cosine, 1e-6)
             q = p + d * t - corner
@@ -267,6 +298,7 @@ class Shading:
         return total
 
     def _portal(self, k):
+        """(corner, right, up, normal, share per area) of portal k."""
         r = [
             dr.gather(mi.Vector4f, self.portals, k * (PORTAL // 4) + i) for i in range(PORTAL // 4)
         ]
@@ -288,15 +320,15 @@ class Shading:
         s0, s1, s2 = self.shares
         to_sky = draws.which < s0
         to_portal = draws.which < s0 + s1
-        # The envmap: a texel from the table, a uniform direction within it.
+        # --- The envmap: a texel from the table, a uniform direction within it ---
         entry = mi.UInt32(dr.clip(draws.which / dr.maximum(s0, 1e-6), 0, 0.999999) * ENV_TABLE)
         d_sky = self._texel_direction(dr.gather(mi.UInt32, self.env_table, entry), draws.light)
-        # A portal: a uniform point on it.
+        # --- A portal: a uniform point on it ---
         count = dr.maximum(mi.Float(0), draws.which - s0) / dr.maximum(s1, 1e-6)
         k = mi.UInt32(dr.clip(count, 0, 0.999999) * self.portal_count)
         corner, right, up, _, _ = self._portal(dr.minimum(k, MAX_PORTALS - 1))
         d_portal = dr.normalize(corner + right * draws.light.x + up * draws.light.y - hit.p + 1e-9)
-        # A luminous face: a uniform point on it.
+        # --- A luminous face: a uniform point on it, by square-root barycentric coordinates ---
         rest = dr.clip((draws.which - s0 - s1) / dr.maximum(s2, 1e-6), 0, 0.999999)
         face = dr.gather(mi.UInt32, self.lamps, mi.UInt32(rest * LIGHT_TABLE))
         root = dr.sqrt(draws.light.x)
@@ -305,29 +337,29 @@ class Shading:
         away = lamp.p - hit.p
         distance = dr.norm(away)
         d_lamp = away / dr.maximum(distance, 1e-9)
+        # Lamps shine from their front alone: `towards` is negative where it looks at the hit.
         towards = dr.dot(dr.select(lamp.front, lamp.ng, -lamp.ng), d_lamp)
         look = self.look(lamp, draws.texel)
         lamp_pdf = s2 * lamp.density * distance * distance / dr.maximum(-towards, 1e-6)
+        # --- The one that was drawn ---
         d = dr.select(to_sky, d_sky, dr.select(to_portal, d_portal, d_lamp))
         pdf = dr.select(to_portal, self._sky_density(hit.p, d), dr.select(towards < 0, lamp_pdf, 0))
         radiance = dr.select(to_portal, self.sky(d), look.emission)
         return d, dr.select(to_portal, 1e8, distance * 0.999), radiance, pdf
 
     def _texel_direction(self, texel, u):
+        """The direction at u in [0, 1)^2 of a texel, uniform over its solid angle."""
         row = texel // (2 * ENV_ROWS)
         column = texel % (2 * ENV_ROWS)
         step = float(np.pi / ENV_ROWS)
+        # Uniform in the height y: equal steps of it cover equal areas of the sphere.
         top = dr.cos(mi.Float(row) * step)
         bottom = dr.cos(mi.Float(row + 1) * step)
         y = dr.lerp(top, bottom, u.y)
         phi = (mi.Float(column) + u.x) * step - dr.pi
         s, c = dr.sincos(phi)
         r = dr.safe_sqrt(1 - y * y)
-        scene = mi.Vector3f(r * s, y, -r * c)
-        rows = self.turn
-        return mi.Vector3f(
-            *(rows[0][k] * scene.x + rows[1][k] * scene.y + rows[2][k] * scene.z for k in range(3))
-        )
+        return self._to_camera(mi.Vector3f(r * s, y, -r * c))
 
 
 @cache
@@ -357,6 +389,7 @@ def value(wi, wo, look: Look):
     """
     above = (wi.z > 0) & (wo.z > 0)
     alpha = alpha_of(look.roughness)
+    # The reflectance at normal incidence, F_0, goes from that of a dielectric to the albedo with metallic.
     specular = lobes.specular(wi, wo, alpha, base_reflectance(look.albedo, look.metallic))
     density = lobes.density(wi, wo, alpha, _specular_probability(wi, look))
     return (

@@ -70,11 +70,13 @@ def make_sample(
     """
     height, width = (size, size) if isinstance(size, int) else size
     truth_scene = _true_scene(scene_index, view_index, height, width, data, seed, unseen)
+    # --- Light, in the camera frame ---
     radiance = lights.environment(light_index, seed=seed, data=data, unseen=unseen)
     envmap = lights.envmap(radiance, truth_scene.view.to_scene)
     photo_seed = int(
         np.random.default_rng((scene_index, view_index, light_index)).integers(1, 2**31)
     )
+    # --- The picture, exposed; the light in the same units ---
     picture = truth_scene.render(envmap, spp=spp, seed=photo_seed)
     exposure = _exposure(picture, truth_scene.truth.depth > 0)
     name = f"scene {scene_index} view {view_index} light {light_index}"
@@ -126,7 +128,7 @@ class TrueScene:
     @property
     def things(self) -> dict[int, Array]:
         """Item number -> [H, W] bool mask, of the objects that are seen; ground and walls left out."""
-        flat = {k for k, one in enumerate(self.items) if len(one.solid.vertices) <= 4}
+        flat = {k for k, item in enumerate(self.items) if len(item.solid.vertices) <= 4}
         return {
             int(k): self.seen == k for k in np.unique(self.seen[self.seen >= 0]) if k not in flat
         }
@@ -152,13 +154,14 @@ class TrueScene:
 
     def _batches(self, spp: int) -> list[int]:
         """Samples a pixel of each pass: squares, together at least spp, each within WAVEFRONT paths."""
-        most = max(1, int(np.sqrt(WAVEFRONT / (self.camera.width * self.camera.height))) ** 2)
-        count = -(-spp // most)
+        max_spp = max(1, int(np.sqrt(WAVEFRONT / (self.camera.width * self.camera.height))) ** 2)
+        count = -(-spp // max_spp)
         return [int(np.ceil(np.sqrt(spp / count))) ** 2] * count
 
     @cached_property
     def truth(self) -> Prediction:
         """Depth and normal at pixel centres; albedo averaged over 4 x 4 places on the object at the centre."""
+        # Only rays that meet the item at the centre count: edges do not mix.
         centre = self._centre
         sub = 4
         item = centre["item"]
@@ -182,10 +185,11 @@ class TrueScene:
         """[H, W, 3] albedo of what a probe saw, looked up as Mitsuba does: bilinear, repeated; 0 for sky."""
         albedo = np.zeros((*seen["item"].shape, 3))
         for k, item in enumerate(self.items):
-            here = seen["item"] == k
+            inside = seen["item"] == k
+            # A border of one texel lets bilinear lookups wrap around.
             around = np.pad(item.albedo, ((1, 1), (1, 1), (0, 0)), mode="wrap")
-            place = seen["uv"][here].astype(np.float64) % 1 * item.albedo.shape[1::-1]
-            albedo[here] = bilinear(around, place + 1)
+            place = seen["uv"][inside].astype(np.float64) % 1 * item.albedo.shape[1::-1]
+            albedo[inside] = bilinear(around, place + 1)
         return albedo
 
     @cached_property
@@ -197,6 +201,7 @@ class TrueScene:
         """What rays through that (x, y) place in each pixel see: item (-1 = sky), depth, normal [., 3], uv [., 2]."""
         height = self.camera.height
         width = self.camera.width
+        # The camera looks along -Z from the origin, y up.
         columns, rows = np.meshgrid(np.arange(width) + offset[0], np.arange(height) + offset[1])
         x = floats(mi, (columns - width / 2) / self.camera.focal)
         y = floats(mi, (height / 2 - rows) / self.camera.focal)

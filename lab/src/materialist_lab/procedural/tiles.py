@@ -25,17 +25,20 @@ def bank() -> tuple[Array, dict[str, range]]:
     for k, (kind, make) in enumerate(_KINDS.items()):
         where[kind] = range(len(tiles), len(tiles) + VARIANTS)
         for v in range(VARIANTS):
+            # A seed of its own for each tile: a new kind at the end changes none of the others.
             channels = make(np.random.default_rng([41, k, v]))
             tiles.append(np.stack([np.broadcast_to(c, (SIZE, SIZE)) for c in channels], -1))
     return (np.clip(np.stack(tiles), 0, 1) * 255 + 0.5).astype(np.uint8), where
 
 
 def noise(rng: np.random.Generator, slope: float, stretch: tuple[float, float] = (1, 1)) -> Array:
-    """Periodic noise [SIZE, SIZE] of spectrum 1 / f**slope, in [0, 1], mean 0.5, deviation 0.2; `stretch` (down, right)
-    > 1 draws it out along an axis."""
-    f = np.hypot(
-        np.fft.fftfreq(SIZE)[:, None] * stretch[0], np.fft.fftfreq(SIZE)[None, :] * stretch[1]
-    )
+    """Periodic noise [SIZE, SIZE] of spectrum 1 / f**slope, in [0, 1], mean 0.5, deviation 0.2.
+
+    A `stretch` (down, right) above 1 draws the noise out along that axis.
+    """
+    frequency = np.fft.fftfreq(SIZE)
+    f = np.hypot(frequency[:, None] * stretch[0], frequency[None, :] * stretch[1])
+    # White noise, coloured in the Fourier domain, is periodic: its tiles have no seams.
     f[0, 0] = 1
     spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) / f**slope
     spectrum[0, 0] = 0
@@ -48,40 +51,49 @@ X, Y = np.meshgrid((np.arange(SIZE) + 0.5) / SIZE, (np.arange(SIZE) + 0.5) / SIZ
 
 
 def _step(x: Array, soft: float = 0.01) -> Array:
+    """0 below zero and 1 above it, with a ramp of that width."""
     return np.clip(x / soft + 0.5, 0, 1)
 
 
 def _from_line(x: Array) -> Array:
+    """Distance to the nearest whole number."""
     return np.abs(x - np.round(x))
 
 
+# --- The kinds of tile: each returns its four channels, arrays or numbers ---
+
+
 def _plain(rng):
-    return 0.0, 0.0, noise(rng, rng.uniform(0.6, 1.6)), noise(rng, 1.5)
+    """One colour with fine grain."""
+    grain = noise(rng, rng.uniform(0.6, 1.6))
+    return 0.0, 0.0, grain, noise(rng, 1.5)
 
 
 def _cloudy(rng):
     """Plaster, concrete, leather, worn paint: soft patches."""
     soft = noise(rng, rng.uniform(1.2, 2.0))
-    return soft, 1.2 * _step(noise(rng, 1.4) - 0.78, 0.1), noise(rng, 0.7), noise(rng, 1.6)
+    patches = 1.2 * _step(noise(rng, 1.4) - 0.78, 0.1)
+    return soft, patches, noise(rng, 0.7), noise(rng, 1.6)
 
 
 def _speckle(rng):
     """Terrazzo, granite, gravel, asphalt."""
     fine = noise(rng, rng.uniform(0.3, 0.9))
     coarse = noise(rng, rng.uniform(0.9, 1.3))
-    return (
-        _step(coarse - 0.55, 0.1),
-        _step(fine - rng.uniform(0.7, 0.8), 0.05),
-        noise(rng, 0.4),
-        coarse,
-    )
+    grains = _step(coarse - 0.55, 0.1)
+    specks = _step(fine - rng.uniform(0.7, 0.8), 0.05)
+    return grains, specks, noise(rng, 0.4), coarse
 
 
 def _marble(rng):
+    """Thin veins: the zeros of a warped sine."""
     warp = noise(rng, 2.2) * rng.uniform(1.5, 4)
+    # Whole numbers of waves along both axes keep the tile seamless.
     n = int(rng.integers(1, 4))
-    vein = np.abs(np.sin(np.pi * (n * X + int(rng.integers(0, 3)) * Y + warp)))
-    return np.exp(-vein * rng.uniform(4, 12)), noise(rng, 2.0) * 0.5, noise(rng, 1.0), 0.3
+    m = int(rng.integers(0, 3))
+    distance = np.abs(np.sin(np.pi * (n * X + m * Y + warp)))
+    vein = np.exp(-distance * rng.uniform(4, 12))
+    return vein, noise(rng, 2.0) * 0.5, noise(rng, 1.0), 0.3
 
 
 def _wood(rng):
@@ -90,12 +102,9 @@ def _wood(rng):
     n = int(rng.integers(3, 12))
     rings = 0.5 + 0.5 * np.sin(2 * np.pi * (n * Y + rng.uniform(1, 4) * warp))
     fibre = noise(rng, 0.7, (1, 16))
-    return (
-        np.clip(0.55 * rings ** rng.uniform(1, 3) + 0.45 * fibre, 0, 1),
-        0.0,
-        fibre,
-        0.5 * rings + 0.5 * fibre,
-    )
+    # The exponent makes the dark late wood of the rings narrow.
+    mix = np.clip(0.55 * rings ** rng.uniform(1, 3) + 0.45 * fibre, 0, 1)
+    return mix, 0.0, fibre, 0.5 * rings + 0.5 * fibre
 
 
 def _planks(rng):
@@ -103,51 +112,54 @@ def _planks(rng):
     rows = int(rng.integers(4, 11))
     columns = int(rng.integers(1, 4))
     r = np.floor(Y * rows).astype(int)
+    # Each row is shifted by an amount of its own.
     x = (X + rng.random(rows)[r]) % 1 * columns
     shade = rng.random((rows, columns))[r, np.floor(x).astype(int) % columns]
-    seam = _step(0.035 - np.minimum(_from_line(Y * rows), _from_line(x) * rows / columns / 2), 0.03)
+    # Distances to the seams, both in widths of a plank.
+    across = _from_line(Y * rows)
+    along = _from_line(x) * rows / columns / 2
+    seam = _step(0.035 - np.minimum(across, along), 0.03)
     fibre = noise(rng, 0.9, (1, 14))
     mix = np.clip(0.15 + 0.55 * shade + 0.6 * (fibre - 0.5), 0, 1)
-    return mix, seam * rng.uniform(0.5, 1), 0.5 + 0.6 * (fibre - 0.5), np.maximum(0.4 * fibre, seam)
+    dark = seam * rng.uniform(0.5, 1)
+    return mix, dark, 0.5 + 0.6 * (fibre - 0.5), np.maximum(0.4 * fibre, seam)
 
 
 def _bricks(
     rng, rows: tuple[int, int] = (6, 13), aspect: float = 2.5, shift: bool = True, gap: float = 0.06
 ):
+    """Bricks or tiles with joints; `aspect` is their width by their height, `gap` half a joint in heights."""
+    # An even number of rows, every other one shifted by half a brick: the tile stays seamless.
     n = 2 * int(rng.integers(rows[0] // 2, rows[1] // 2 + 1))
     m = max(1, round(n / aspect))
     r = np.floor(Y * n).astype(int)
     x = X * m + (0.5 * (r % 2) if shift else 0)
     wobble = 0.03 * (noise(rng, 0.8) - 0.5)
-    joint = _step(gap + wobble - np.minimum(_from_line(x) * n / m, _from_line(Y * n)), 0.05)
+    nearest = np.minimum(_from_line(x) * n / m, _from_line(Y * n))
+    joint = _step(gap + wobble - nearest, 0.05)
     shade = rng.random((n, m))[r % n, np.floor(x).astype(int) % m]
-    return (
-        shade,
-        joint,
-        0.5 + 0.7 * (noise(rng, 0.8) - 0.5),
-        np.maximum(joint, 0.3 * noise(rng, 1.2)),
-    )
+    grain = 0.5 + 0.7 * (noise(rng, 0.8) - 0.5)
+    return shade, joint, grain, np.maximum(joint, 0.3 * noise(rng, 1.2))
 
 
 def _tiling(rng):
     """Square or oblong ceramic tiles."""
-    return _bricks(
-        rng,
-        (2, 10),
-        float(rng.choice([1, 1, 2, 0.5])),
-        bool(rng.random() < 0.25),
-        rng.uniform(0.02, 0.05),
-    )
+    aspect = float(rng.choice([1, 1, 2, 0.5]))
+    shift = bool(rng.random() < 0.25)
+    return _bricks(rng, (2, 10), aspect, shift, rng.uniform(0.02, 0.05))
 
 
 def _checker(rng):
+    """A chessboard with narrow joints."""
     n = 2 * int(rng.integers(1, 6))
     board = (np.floor(X * n) + np.floor(Y * n)) % 2
     edge = np.minimum(_from_line(X * n), _from_line(Y * n))
-    return board, 0.6 * _step(0.02 - edge, 0.02), 0.5 + 0.6 * (noise(rng, 1.0) - 0.5), 0.2
+    joint = 0.6 * _step(0.02 - edge, 0.02)
+    return board, joint, 0.5 + 0.6 * (noise(rng, 1.0) - 0.5), 0.2
 
 
 def _stripes(rng):
+    """Upright stripes of two or three colours."""
     n = int(rng.integers(3, 16))
     k = int(rng.integers(2, 5))
     profile = rng.choice([0, 0.5, 1], size=n * k)
@@ -158,31 +170,39 @@ def _stripes(rng):
 
 def _plaid(rng):
     """Three stripes of their own along both axes."""
-    a, b, c = np.tile(np.repeat(rng.random((3, 8)) < 0.4, SIZE // 32, axis=1), (1, 4)).astype(float)
-    return 0.5 * a[:, None] + 0.5 * b, 0.7 * c[:, None] * c, noise(rng, 0.3), 0.5
+    # Eight bands each, repeated four times over the tile.
+    bands = np.repeat(rng.random((3, 8)) < 0.4, SIZE // 32, axis=1)
+    a, b, c = np.tile(bands, (1, 4)).astype(float)
+    mix = 0.5 * a[:, None] + 0.5 * b
+    third = 0.7 * c[:, None] * c
+    return mix, third, noise(rng, 0.3), 0.5
 
 
 def _weave(rng):
     """Cloth seen close: crossing threads."""
     n = int(rng.integers(24, 56))
+    # Where `over`, the thread along one axis lies on top; each thread is bright along its middle.
     over = (np.floor(X * n * 2) + np.floor(Y * n * 2)) % 2 > 0
     thread = np.abs(np.sin(2 * np.pi * n * np.where(over, X, Y)))
+    # Colour that changes along the threads, not across them.
     melange = np.where(over, noise(rng, 0.3, (1, 8)), noise(rng, 0.3, (8, 1)))
-    return np.clip(melange * rng.uniform(0.2, 1.2), 0, 1), 0.0, 0.25 + 0.45 * thread, 0.5
+    mix = np.clip(melange * rng.uniform(0.2, 1.2), 0, 1)
+    return mix, 0.0, 0.25 + 0.45 * thread, 0.5
 
 
 def _carpet(rng):
     """Rug with borders and a mirrored ornament; the tile is the whole rug."""
+    # An ornament that is mirrored along both axes.
     quarter = noise(rng, rng.uniform(1.2, 2.2))
     field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4 - 0.5
+    # Striped bands around it.
     edge = np.minimum(_from_line(X), _from_line(Y))
     bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
     border = edge < rng.uniform(0.08, 0.2)
     stripes = rng.random((2, 16)) < 0.5
     second = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
-    mix, third = (
-        np.where(border, s[bands], f) for s, f in zip(stripes, (_step(field, 0.02), second))
-    )
+    mix = np.where(border, stripes[0][bands], _step(field, 0.02))
+    third = np.where(border, stripes[1][bands], second)
     return mix, third, noise(rng, 0.2), 0.5
 
 
@@ -191,16 +211,15 @@ def _ornament(rng):
     n = int(2 ** rng.integers(1, 4))
     base = noise(rng, rng.uniform(1.5, 2.2))[::n, ::n]
     base = np.tile((base + base[:, ::-1]) / 2, (n, n))
+    # The motif is what lies above a quantile, so that it always covers a share of the tile.
     t = np.quantile(base, rng.uniform(0.55, 0.85))
-    return (
-        _step(base - t, 0.04),
-        _step(base - t - 0.12, 0.04),
-        noise(rng, 0.6),
-        0.6 - 0.3 * _step(base - t, 0.04),
-    )
+    motif = _step(base - t, 0.04)
+    inner = _step(base - t - 0.12, 0.04)
+    return motif, inner, noise(rng, 0.6), 0.6 - 0.3 * motif
 
 
 def _spots(rng):
+    """Discs of two colours, anywhere."""
     first = np.zeros((SIZE, SIZE))
     second = np.zeros((SIZE, SIZE))
     radius = rng.uniform(0.015, 0.08)
@@ -208,7 +227,10 @@ def _spots(rng):
         x = rng.random()
         y = rng.random()
         r = radius * rng.uniform(0.5, 1.3)
-        disc = _step(r - np.hypot((X - x + 0.5) % 1 - 0.5, (Y - y + 0.5) % 1 - 0.5), 0.006)
+        # The nearest of the disc's repetitions: it goes on at the other side of the tile.
+        dx = (X - x + 0.5) % 1 - 0.5
+        dy = (Y - y + 0.5) % 1 - 0.5
+        disc = _step(r - np.hypot(dx, dy), 0.006)
         first = np.maximum(first, disc)
         second = np.maximum(second, disc * (rng.random() < 0.4))
     return first, second, noise(rng, 1.0), 0.3
@@ -220,6 +242,7 @@ def _picture(rng):
     hills = _step(Y - line, 0.02)
     first = np.clip(hills * noise(rng, 1.6) * 1.6, 0, 1)
     second = np.clip((1 - hills) * (1 - Y) * rng.uniform(0.5, 1.5), 0, 1)
+    # Blocks, later ones before earlier ones.
     for _ in range(int(rng.integers(0, 9))):
         x = rng.random()
         y = rng.random()
@@ -235,11 +258,14 @@ def _print(rng):
     """Lines of text, labels, book pages."""
     first = np.zeros((SIZE, SIZE))
     rows = int(rng.integers(8, 28))
+    height = np.abs((Y * rows) % 1 - 0.5) < 0.28
     for r in range(rows):
+        # Empty lines now and then.
         if rng.random() < 0.85:
             words = np.repeat(rng.random(SIZE // 4) < 0.8, 4)
             inside = (np.abs(X - 0.3) < rng.uniform(0.1, 0.22)) & (np.floor(Y * rows) == r)
-            first = np.maximum(first, inside * words[None] * (np.abs((Y * rows) % 1 - 0.5) < 0.28))
+            first = np.maximum(first, inside * words[None] * height)
+    # A picture, often.
     block = (np.abs(X - rng.random()) < 0.2) & (np.abs(Y - rng.random()) < 0.15)
     return first * 0.9, block * (rng.random() < 0.6) * 0.9, noise(rng, 1.2), 0.5
 
@@ -252,16 +278,22 @@ def _facade(rng):
     y = (Y * n) % 1
     w = rng.uniform(0.18, 0.38)
     h = rng.uniform(0.22, 0.36)
-    frame = _step(np.minimum(w + 0.04 - np.abs(x - 0.5), h + 0.04 - np.abs(y - 0.5)), 0.02)
-    bars = np.minimum(np.abs(x - 0.5), np.abs(y - 0.5 - rng.uniform(-0.1, 0.1))) < 0.012
-    pane = _step(np.minimum(w - np.abs(x - 0.5), h - np.abs(y - 0.5)), 0.02) * (1 - bars)
+    # Each window about the middle of its cell: a frame, glazing bars, the pane between them.
+    from_x = np.abs(x - 0.5)
+    from_y = np.abs(y - 0.5)
+    frame = _step(np.minimum(w + 0.04 - from_x, h + 0.04 - from_y), 0.02)
+    bars = np.minimum(from_x, np.abs(y - 0.5 - rng.uniform(-0.1, 0.1))) < 0.012
+    pane = _step(np.minimum(w - from_x, h - from_y), 0.02) * (1 - bars)
     wall = 0.35 * noise(rng, 1.4) * (1 - frame) + frame
-    return wall, pane, 0.5 + 0.6 * (noise(rng, 1.0) - 0.5) * (1 - pane), pane
+    grain = 0.5 + 0.6 * (noise(rng, 1.0) - 0.5) * (1 - pane)
+    return wall, pane, grain, pane
 
 
 def _grass(rng):
+    """Upright blades in patches of two greens."""
     blades = noise(rng, 0.5, (3, 1))
-    return noise(rng, 1.3), _step(noise(rng, 0.9) - 0.7, 0.1), blades, 0.6
+    mix = noise(rng, 1.3)
+    return mix, _step(noise(rng, 0.9) - 0.7, 0.1), blades, 0.6
 
 
 def _rust(rng):
@@ -272,7 +304,9 @@ def _rust(rng):
 
 
 def _brushed(rng):
-    return 0.0, 0.0, 0.5 + 0.5 * (noise(rng, 0.4, (1, 40)) - 0.5), noise(rng, 0.8, (1, 40))
+    """Metal with fine scratches along x."""
+    grain = 0.5 + 0.5 * (noise(rng, 0.4, (1, 40)) - 0.5)
+    return 0.0, 0.0, grain, noise(rng, 0.8, (1, 40))
 
 
 _KINDS = {

@@ -62,6 +62,7 @@ class SampleTracer:
         """
         h = self.camera.height
         w = self.camera.width
+        # Stratified: a square number of samples, one in each cell of a pixel.
         rows = max(1, int(np.ceil(np.sqrt(spp))))
         spp = rows * rows
         lane = dr.arange(mi.UInt32, h * w * spp)
@@ -77,6 +78,7 @@ class SampleTracer:
         ray = self._camera_ray(pixel, jitter / rows)
         total, white = self._paths(ray, pixel, sample, rng, dr.opaque(mi.UInt32, seed))
         dr.eval(*total, *white)
+        # --- Means over the samples of a pixel, put back into their order ---
         planes = [
             np.array(c).reshape(spp, h * w // VECTOR, VECTOR).mean(0).T for c in (*total, *white)
         ]
@@ -101,6 +103,7 @@ class SampleTracer:
         look = self.shading.look(hit, mi.Point2f(0.5, 0.5))
         depth = dr.select(hit.valid, -hit.p.z, 0)
         owner = dr.select(hit.valid, mi.Int32(hit.owner), -1)
+        # One evaluation for all of them: the rays are traced once.
         out = {
             "owner": owner,
             "depth": depth,
@@ -137,6 +140,7 @@ class SampleTracer:
         seen = np.flatnonzero(owner.ravel() >= 0)
         if not len(seen):
             return np.zeros((rows, 2 * rows, 4), np.float32)
+        # --- A random surface point and a random direction within each texel ---
         texels = 2 * rows * rows
         rng = np.random.default_rng(seed)
         chosen = seen[rng.integers(len(seen), size=texels * spp)]
@@ -147,14 +151,16 @@ class SampleTracer:
         phi = ((texel % (2 * rows) + place[1]) / rows - 1) * np.pi
         d = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta), -np.sin(theta) * np.cos(phi)])
         points = unproject(depth, self.camera).reshape(-1, 3)[chosen]
+        # Off the surface by two thousandths of the distance, against self-intersection.
         points += normal[chosen] * (0.002 * depth.ravel()[chosen, None])
         ray = mi.Ray3f(
             mi.Point3f(*(floats(mi, c) for c in points.T)), mi.Vector3f(*(floats(mi, c) for c in d))
         )
         lane = dr.arange(mi.UInt32, texels * spp)
         hit = self._hit(ray, mi.Bool(True))
-        found = np.stack([np.array(c) for c in hit.p], -1)
-        screen, far = project(found, self.camera)
+        # --- Blocked where the ray meets a surface that the camera sees, or starts into its own ---
+        position = np.stack([np.array(c) for c in hit.p], -1)
+        screen, far = project(position, self.camera)
         column, row = (
             np.clip(np.nan_to_num(screen[:, k]), 0, size - 1).astype(int)
             for k, size in ((0, w), (1, h))
@@ -164,6 +170,7 @@ class SampleTracer:
         near = np.abs(depth[row, column] - far) < 0.05 * far
         below = (normal[chosen] * d.T).sum(-1) <= 0  # into the surface itself
         open_ = ~((np.array(hit.valid) & inside & same & near) | below)
+        # --- Radiance along the rays, and its mean over the open ones ---
         random = mi.PCG32(initstate=dr.opaque(mi.UInt64, seed), initseq=mi.UInt64(lane))  # type: ignore[operator]
         total, _ = self._paths(
             ray, lane % texels, lane // texels, random, dr.opaque(mi.UInt32, seed)
@@ -183,13 +190,15 @@ class SampleTracer:
         return mi.Ray3f(mi.Point3f(0), dr.normalize(mi.Vector3f(x, y, -1)))
 
     def _hit(self, ray, active, fine=None) -> Hit:
-        found = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
-        return self.shading.hit(found, ray.d, fine)
+        preliminary = self.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+        return self.shading.hit(preliminary, ray.d, fine)
 
     def _paths(self, ray, pixel, sample, rng, seed):
         """Radiance and white diffuse shading along camera rays; each three Floats."""
         even = _Even(pixel, sample, seed)
         lanes = dr.width(pixel)
+        # `fate` ends paths, alike for all lanes of a vector; `beta` is the throughput of a path,
+        # `beta_white` the same with a white first surface, `pdf` the density of its last direction.
         fate = mi.PCG32(
             initstate=mi.UInt64(seed) + 311,
             initseq=mi.UInt64(dr.arange(mi.UInt32, lanes) // VECTOR),
@@ -209,7 +218,8 @@ class SampleTracer:
             hit = self._hit(ray, active, active & (depth == 0))
             draws = even.draw(rng, depth)
             look = self.shading.look(hit, draws.texel)
-            # What the ray itself found: the sky, or a lamp; weighed against having been aimed at.
+            # --- What the ray itself met: the sky, or a lamp. Balance heuristic,
+            # --- w = p_bsdf / (p_bsdf + p_light); rays of the camera (pdf < 0) count in full.
             aimed = self.shading.density(ray, hit)
             weight = dr.select(pdf < 0, 1, pdf / dr.maximum(pdf + aimed, 1e-20))
             glow = dr.select(
@@ -223,24 +233,26 @@ class SampleTracer:
             total = total + beta * glow
             white = white + beta_white * glow
             active = active & hit.valid & (depth < MAX_DEPTH)
-            # Aim at a light.
+            # --- Emitter sampling: one light, a shadow ray ---
             to_light, distance, radiance, chance = self.shading.aim(hit, draws)
             start = hit.p + hit.ng * self.offset
             wo = hit.frame.to_local(to_light)
             above = dr.dot(hit.ng, to_light) > 0
-            wanted = active & above & (wo.z > 0) & (chance > 0)
+            lit = active & above & (wo.z > 0) & (chance > 0)
             shadow = mi.Ray3f(start, to_light)
             shadow.maxt = distance
-            wanted &= ~self.scene.ray_test(shadow, coherent=False, active=wanted)
+            lit &= ~self.scene.ray_test(shadow, coherent=False, active=lit)
             wi = hit.frame.to_local(-ray.d)
             diffuse, specular, density = shading.value(wi, wo, look)
+            # L / p_light times its weight p_light / (p_light + p_bsdf).
             share = radiance / dr.maximum(chance + density, 1e-20)
-            share = dr.select(wanted, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
+            share = dr.select(lit, dr.select(depth > 0, dr.minimum(share, CLAMP), share), 0)
             first = depth == 0
+            # f cos = albedo (1 - metallic) f_d cos + f_s cos.
             full = look.albedo * (1 - look.metallic) * diffuse + specular
             total = total + beta * full * share
             white = white + dr.select(first, mi.Color3f(diffuse), beta_white * full) * share
-            # Go on.
+            # --- BSDF sampling: throughput times f cos / p ---
             wo = shading.sample(wi, look, draws)
             diffuse, specular, pdf = shading.value(wi, wo, look)
             full = look.albedo * (1 - look.metallic) * diffuse + specular
@@ -250,6 +262,7 @@ class SampleTracer:
                 pdf, 1e-20
             )
             beta = beta * full / dr.maximum(pdf, 1e-20)
+            # --- Russian roulette: what goes on counts for what ended ---
             keep = dr.select(first, *KEEP)
             active &= fate.next_float32() < keep
             beta = beta / keep
@@ -296,10 +309,12 @@ class _Even:
 
     def draw(self, rng, depth):
         """The numbers that one surface needs; `rng` goes on."""
+        # Eight at every surface, so that all lanes keep the same place in their streams.
         free = [rng.next_float32() for _ in range(8)]
         index = mi.Float(self.sample)
         even = [s + index * step for s, step in zip(self.shift, self._STEPS)]
         u = [dr.select(depth == 0, e - dr.floor(e), f) for e, f in zip(even, free)]
+        # The largest float below 1: rounding must not reach it.
         u = [dr.minimum(x, 0.99999994) for x in u]
         return Draws(
             u[0], mi.Point2f(u[1], u[2]), u[3], mi.Point2f(u[4], u[5]), mi.Point2f(free[6], free[7])

@@ -38,10 +38,13 @@ class RoomWall:
 
     def free(self, rng: np.random.Generator, width: float) -> float | None:
         """The middle of a free stretch of that width, which is then taken; None where there is none."""
+        half = width / 2
+        # Eight tries; none where the wall is too short.
         for _ in range(8 if self.length > width + 0.2 else 0):
             c = float(rng.uniform(width / 2 + 0.05, self.length - width / 2 - 0.05))
-            if all(c + width / 2 < a or c - width / 2 > b for a, b in self.taken):
-                self.taken.append((c - width / 2 - 0.05, c + width / 2 + 0.05))
+            if all(c + half < a or c - half > b for a, b in self.taken):
+                # Five centimetres stay free at both sides.
+                self.taken.append((c - half - 0.05, c + half + 0.05))
                 return c
         return None
 
@@ -50,15 +53,18 @@ def surface(
     wall: RoomWall, material: m.Material, lower: m.Material | None = None, split: float = 1.0
 ) -> Parts:
     """The wall around its holes; with `lower`, another material up to `split` metres."""
-    levels = sorted(
-        {0.0, wall.height, *([split] if lower else []), *(v for h in wall.holes for v in h[2:])}
-    )
+    # Horizontal bands between all heights at which something begins or ends.
+    heights = {0.0, wall.height, *(v for h in wall.holes for v in h[2:])}
+    if lower:
+        heights.add(split)
     parts = []
-    for y0, y1 in pairwise(levels):
+    for y0, y1 in pairwise(sorted(heights)):
+        # Within a band, the wall is what lies between the holes.
         crossing = sorted(h for h in wall.holes if h.bottom < y1 and h.top > y0)
         edges = [0.0, *(x for h in crossing for x in h[:2]), wall.length]
         for x0, x1 in zip(edges[::2], edges[1::2]):
             piece = s.sheet((x0, y0, 0), (x1 - x0) * X, (y1 - y0) * Y)
+            # The pattern runs on from piece to piece.
             piece = replace(piece, uv=piece.uv + np.array([x0, y0]))
             parts.append(ScenePart(piece, lower if lower and y1 <= split else material))
     return parts
@@ -73,17 +79,18 @@ def board(
 
 
 def frame(hole: Opening, wide: float, deep: float, look: m.Material) -> Parts:
+    """Four boards around an opening, `wide` metres in the plane of the wall and `deep` out of it."""
     left, right, bottom, top = hole
-    parts = [board(x, bottom, (wide, top - bottom, deep), look) for x in (left - wide, right)]
-    return parts + [
-        board(left - wide, y, (right - left + 2 * wide, wide, deep), look)
-        for y in (bottom - wide, top)
-    ]
+    upright = (wide, top - bottom, deep)
+    level = (right - left + 2 * wide, wide, deep)
+    parts = [board(x, bottom, upright, look) for x in (left - wide, right)]
+    return parts + [board(left - wide, y, level, look) for y in (bottom - wide, top)]
 
 
 def windows(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
     """Up to `count` windows of one kind with frames, reveals and sills, at times curtains; adds holes to the wall."""
     parts: Parts = []
+    # --- What all windows of the wall share ---
     look = m.pick(rng, ((0.15, m.plastic), (0.25, m.wood), (0.6, m.white_paint)))(rng)
     bottom = rng.uniform(0.4, 1.0) if rng.random() < 0.8 else 0.15
     top = min(wall.height - rng.uniform(0.1, 0.5), bottom + rng.uniform(1.0, 2.2))
@@ -91,6 +98,7 @@ def windows(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
     cloth = m.fabric(rng)
     dressed = rng.random() < 0.5
     panes = rng.integers(1, (4, 3))
+    # --- Each where there is room ---
     for _ in range(count):
         middle = wall.free(rng, width + 0.2)
         if middle is None:
@@ -104,6 +112,7 @@ def windows(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
 
 
 def _window(rng, hole: Opening, look, panes) -> Parts:
+    """A window set back in its wall; `panes` counts them (across, up)."""
     left, right, bottom, top = hole
     deep = rng.uniform(0.1, 0.3)
     t = rng.uniform(0.03, 0.07)
@@ -114,6 +123,7 @@ def _window(rng, hole: Opening, look, panes) -> Parts:
     up = h * Y
     along = w * X
     corner = np.array([left, bottom, 0])
+    # --- The four sides of the opening, from the wall back to the frame ---
     reveals = (
         (corner, up, out),
         (corner + along, out, up),
@@ -121,6 +131,7 @@ def _window(rng, hole: Opening, look, panes) -> Parts:
         (corner, out, along),
     )
     parts = [ScenePart(s.sheet(*reveal), white) for reveal in reveals]
+    # --- Frame and glazing bars: one more of them than panes, along both axes ---
     parts += [
         board(left + x * (w - t), bottom, (t, h, 0.04), look, -deep)
         for x in np.linspace(0, 1, panes[0] + 1)
@@ -129,12 +140,15 @@ def _window(rng, hole: Opening, look, panes) -> Parts:
         board(left, bottom + y * (h - t), (w, t, 0.04), look, -deep)
         for y in np.linspace(0, 1, panes[1] + 1)
     ]
+    # --- Sill, something on it, mouldings around it ---
     parts.append(board(left - 0.06, bottom - 0.03, (w + 0.12, 0.03, 0.12), white))
     if rng.random() < 0.3:
-        parts += placed(
-            things.thing(rng, 0.25), (rng.uniform(left + 0.2, right - 0.2), bottom, 0.05 - deep / 2)
-        )
-    return parts + (frame(hole, rng.uniform(0.06, 0.12), 0.02, white) if rng.random() < 0.6 else [])
+        ornament = things.thing(rng, 0.25)
+        at = (rng.uniform(left + 0.2, right - 0.2), bottom, 0.05 - deep / 2)
+        parts += placed(ornament, at)
+    if rng.random() < 0.6:
+        parts = parts + frame(hole, rng.uniform(0.06, 0.12), 0.02, white)
+    return parts
 
 
 def _blinds(rng, hole: Opening, cloth) -> Parts:
@@ -153,11 +167,13 @@ def _blinds(rng, hole: Opening, cloth) -> Parts:
 def _curtains(rng, hole: Opening, cloth) -> Parts:
     """Folded cloth at both sides, on a rod."""
     left, right, bottom, top = hole
+    # Down to the floor, or to a little below the sill.
     drop = 0.02 if rng.random() < 0.6 else max(bottom - 0.15, 0.02)
     width, waves, phase, deep = rng.uniform([0.2, 4, 0, 0.02], [0.5, 9, 6, 0.05])
     flat = s.sheet((0, 0, 0), width * X, (top + 0.12 - drop) * Y, 48)
 
     def fold(p):
+        """[V] how far the cloth stands out: waves across it that lean a little with the height."""
         return deep * np.sin(p[:, 0] / width * 2 * np.pi * waves + phase + 0.3 * p[:, 1])
 
     cloths = s.warped(flat, lambda p: p + fold(p)[:, None] * [0, 0, 1])
@@ -165,12 +181,8 @@ def _curtains(rng, hole: Opening, cloth) -> Parts:
         ScenePart(s.moved(cloths, (x, drop, 0.1)), cloth)
         for x in (left - 0.6 * width, right - 0.4 * width)
     ]
-    return one_thing(
-        [
-            *hung,
-            rod([(x, top + 0.13, 0.1) for x in (left - 0.4, right + 0.4)], 0.012, m.metal(rng), 6),
-        ]
-    )
+    ends = [(x, top + 0.13, 0.1) for x in (left - 0.4, right + 0.4)]
+    return one_thing([*hung, rod(ends, 0.012, m.metal(rng), 6)])
 
 
 def door(rng: np.random.Generator, wall: RoomWall) -> Parts:
@@ -184,14 +196,14 @@ def door(rng: np.random.Generator, wall: RoomWall) -> Parts:
     left = middle - width / 2
     parts = [board(left, 0.005, (width, height, 0.02), look)]
     parts += frame(Opening(left, left + width, 0, height), rng.uniform(0.05, 0.1), 0.04, look)
+    # Raised panels, none on a flat door.
     rows = int(rng.integers(0, 4))
     columns = int(rng.integers(1, 3))
     for r, k in np.ndindex(rows, columns):
         w = width / columns
         h = height / rows
-        parts.append(
-            board(left + k * w + 0.09, r * h + 0.1, (w - 0.18, h - 0.2, 0.015), look, 0.02)
-        )
+        panel = (w - 0.18, h - 0.2, 0.015)
+        parts.append(board(left + k * w + 0.09, r * h + 0.1, panel, look, 0.02))
     handle = left + (0.06 if rng.random() < 0.5 else width - 0.18)
     return [*parts, board(handle, 1.0, (0.12, 0.02, 0.05), m.metal(rng), 0.02)]
 
@@ -206,9 +218,10 @@ def hangings(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
             continue
         height = width * rng.uniform(0.6, 1.5)
         left = middle - width / 2
-        up = float(
-            np.clip(rng.uniform(1.3, 1.7) - height / 2, 0.9, max(wall.height - height - 0.1, 0.9))
-        )
+        # Its middle at eye level, as far as the wall allows.
+        highest = max(wall.height - height - 0.1, 0.9)
+        up = float(np.clip(rng.uniform(1.3, 1.7) - height / 2, 0.9, highest))
+        # A shelf with things.
         if rng.random() < 0.25:
             on = things.scattered(rng, int(rng.integers(1, 6)), (width / 2, 0.09), (0.08, 0.3))
             parts += [
@@ -216,13 +229,13 @@ def hangings(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
                 *placed(on, (middle, up + 0.03, 0.11)),
             ]
             continue
+        # Or something flat, with a frame at times.
         mirror = m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
         screen = m.uniform(m.hsv(0.6, 0.1, 0.08), 0.1)
         inner = m.pick(rng, ((0.1, mirror), (0.1, screen), (0.8, m.printed(rng, width, height))))
         parts.append(board(left, up, (width, height, 0.012), inner))
         if rng.random() < 0.8:
             look = m.wood(rng) if rng.random() < 0.6 else m.metal(rng)
-            parts += frame(
-                Opening(left, left + width, up, up + height), rng.uniform(0.015, 0.07), 0.03, look
-            )
+            edge = Opening(left, left + width, up, up + height)
+            parts += frame(edge, rng.uniform(0.015, 0.07), 0.03, look)
     return parts

@@ -69,13 +69,14 @@ class World:
 
 def look(position: Array, target: Array, fov: float, roll: float = 0.0) -> Viewpoint:
     """The camera at `position` [3] that looks at `target` [3], rolled by `roll` radians."""
+    # A camera looks along its -Z.
     back = np.asarray(position, float) - target
     upright = turn_upright(back / np.linalg.norm(back))
+    # About the axis of the view.
     c = np.cos(roll)
     s = np.sin(roll)
-    return Viewpoint(
-        np.asarray(position, float), upright @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), fov
-    )
+    rolled = upright @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    return Viewpoint(np.asarray(position, float), rolled, fov)
 
 
 def orbit(
@@ -83,13 +84,10 @@ def orbit(
 ) -> Viewpoint:
     """The camera that looks at `target` [3] from `distance` metres, at an azimuth (from +Z towards +X) and elevation in
     radians."""
-    back = np.array(
-        [
-            np.cos(elevation) * np.sin(azimuth),
-            np.sin(elevation),
-            np.cos(elevation) * np.cos(azimuth),
-        ]
-    )
+    x = np.cos(elevation) * np.sin(azimuth)
+    y = np.sin(elevation)
+    z = np.cos(elevation) * np.cos(azimuth)
+    back = np.array([x, y, z])
     return Viewpoint(target + distance * back, turn_upright(back), float(fov))
 
 
@@ -104,9 +102,9 @@ def through_lens(
         return view
     reach = 2 * np.tan(np.radians(view.fov) / 2)  # widths of the picture a metre, at one metre
     blur = np.exp(rng.uniform(np.log(0.01), np.log(0.06)))
-    return replace(
-        view, aperture=float(blur * reach * focus), focus=float(focus * rng.uniform(0.9, 1.1))
-    )
+    # A point at infinity is blurred over aperture / focus metres at one metre.
+    aperture = float(blur * reach * focus)
+    return replace(view, aperture=aperture, focus=float(focus * rng.uniform(0.9, 1.1)))
 
 
 def block(
@@ -134,6 +132,7 @@ def orb(at: ArrayLike, radius: float, material: Material, n: int = 24) -> SceneP
 
 def one_thing(parts: Parts) -> Parts:
     """The parts, those that belong to nothing yet as one thing."""
+    # Any new object is a name of its own.
     thing = object()
     return [part if part.thing is not None else replace(part, thing=thing) for part in parts]
 

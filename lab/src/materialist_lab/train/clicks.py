@@ -81,11 +81,12 @@ def produce_views(
     views of another set, OutputError for one that cannot be written.
     """
     source = SampleFolder(data)
+    # What tells these views from those of another data set or other cut-outs.
     said = identity(data) | {"cutouts": 0}
     pasted: list[Array] = []
     if cutouts is not None:
         pasted = [
-            found for path in cutout_files(cutouts) if (found := load_cutout(path)) is not None
+            cutout for path in cutout_files(cutouts) if (cutout := load_cutout(path)) is not None
         ]
         if not pasted:
             raise InputError(
@@ -99,22 +100,25 @@ def produce_views(
     def view(number: int) -> View:
         path = source.paths[number // kinds]
         kind = number % kinds
+        # A seed of its own for each view: it is the same in whatever order they are made.
         arrays = read_arrays(path, "thing", "fov")
         rng = np.random.default_rng([int(path.stem), 4, kind])
         image = read_sample(path).image
         thing = arrays["thing"]
         if kind:
+            # Before the camera's processing, which cut-outs and picture then share.
             image, thing = paste(image, thing, pasted, rng)
         linear, _ = photographic(image, rng)
         camera = Camera(linear.shape[1], linear.shape[0], float(arrays["fov"]))
-        found = predictor.predict(
+        # The maps that `select` will have, mistakes included; not the true ones.
+        predicted = predictor.predict(
             Photo(linear, camera, linear, False, "option", path.name, b"", ())
         )
         return {
             "rgb": (linear_to_srgb(linear) * 255 + 0.5).astype(np.uint8),
             "thing": thing,
-            "normal": np.rint(found.normal * 127).astype(np.int8),
-            "depth": found.depth.astype(np.float16),
+            "normal": np.rint(predicted.normal * 127).astype(np.int8),
+            "depth": predicted.depth.astype(np.float16),
         }
 
     names = [
@@ -138,6 +142,7 @@ def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, 
 
     The part is mirrored or not and recoloured, its maps are made worse at times; some examples have several clicks.
     """
+    # --- A square part of the view, at the side of an example ---
     height, width = view["thing"].shape
     size = round(min(height, width) * rng.uniform(DRAW.smallest_crop, 1.0))
     top = rng.integers(height - size + 1)
@@ -155,11 +160,13 @@ def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, 
     depth = scaled("depth", cv2.INTER_NEAREST)
     rgb = scaled("rgb", smooth) / 255
     normal = unit(scaled("normal", smooth))
+    # --- Mirrored: x of the normals changes sign ---
     if rng.random() < 0.5:
         thing = thing[:, ::-1]
         depth = depth[:, ::-1]
         rgb = rgb[:, ::-1]
         normal = normal[:, ::-1] * [-1, 1, 1]
+    # --- A thing, and clicks on it where depth is known ---
     chosen = _chosen(thing, rng)
     if chosen is None:
         return None
@@ -174,9 +181,11 @@ def draw_click(view: View, side: int, rng: np.random.Generator) -> tuple[Array, 
     ]
     if not clicks:
         return None
+    # --- Or a box around it ---
     if rng.random() < DRAW.boxed:
         clicks = []
         box = box_around(mask, rng)
+    # --- Worse maps, other colours ---
     if rng.random() < DRAW.worsened:
         normal, depth = worse(normal, depth, rng)
     rgb = np.clip(rgb * rng.uniform(0.8, 1.2) * rng.uniform(0.92, 1.08, 3), 0, 1)
@@ -194,10 +203,12 @@ def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array,
     def blur(v, s):
         return cv2.GaussianBlur(np.ascontiguousarray(v, np.float32), (0, 0), s * side)
 
+    # Normalised convolution: only pixels with depth count in the blur.
     sigma = float(np.exp(rng.uniform(*np.log(DRAW.blur))))
     logarithm = np.log(np.where(known, depth, 1)) * known
     share = np.maximum(blur(known, sigma), 1e-3)
     even = blur(logarithm, sigma) / share
+    # Three waves for the normal, one for depth, whose size goes with the spread of depth.
     waves = blur(rng.normal(size=(*depth.shape, 4)), rng.uniform(0.06, 0.2))
     waves = waves * (rng.uniform(0, DRAW.waves) / max(float(waves.std()), 1e-6))
     spread = float(even[known].std()) if known.any() else 0.0
@@ -207,6 +218,7 @@ def worse(normal: Array, depth: Array, rng: np.random.Generator) -> tuple[Array,
 
 def click_in(mask: Array, rng: np.random.Generator, inside: float) -> tuple[int, int] | None:
     """(column, row) of a random pixel of a mask [H, W] bool, `inside` pixels from its border where it is as large."""
+    # Half of the largest distance where the thing is thin: there always is a place.
     away = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 3)[1:-1, 1:-1]
     places = np.argwhere(away > min(inside, 0.5 * float(away.max())))
     if not len(places):
@@ -220,6 +232,7 @@ def box_around(mask: Array, rng: np.random.Generator) -> Box:
     rows, columns = np.nonzero(mask)
     low = np.array([columns.min(), rows.min()])
     high = np.array([columns.max(), rows.max()]) + 1
+    # Both corners are off by amounts of their own.
     off = rng.uniform(*DRAW.loose, (2, 2)) * (high - low).min()
     x0, y0 = np.maximum(np.rint(low - off[0]).astype(int), 0).tolist()
     x1, y1 = np.minimum(np.rint(high + off[1]).astype(int), mask.shape[::-1]).tolist()
@@ -228,12 +241,14 @@ def box_around(mask: Array, rng: np.random.Generator) -> Box:
 
 def _chosen(thing: Array, rng: np.random.Generator) -> int | None:
     """The number of something to click on: things rather than walls, large ones somewhat rather than small ones."""
+    # Numbers are positive for things and negative for walls and the like.
     numbers, count = np.unique(thing[thing != 0], return_counts=True)
     large = count >= DRAW.fewest_pixels
     numbers = numbers[large]
     count = count[large]
     if not len(numbers):
         return None
+    # The square root lies between one chance a thing and one a pixel.
     weight = np.sqrt(count)
     for kind, share in ((numbers > 0, DRAW.things), (numbers < 0, 1 - DRAW.things)):
         if kind.any():
@@ -255,13 +270,14 @@ class ClickTask(Task):
         architecture: UNetArchitecture | None = None,
     ):
         """Views to learn from and weights to begin from. Raises InputError for a folder without views."""
-        found = load_views(views)
-        if not found:
+        stored = load_views(views)
+        if not stored:
             raise InputError(f"{views} holds no views to learn from.")
-        aside = HELD_OUT if len(found) >= 10 * HELD_OUT else 0
+        # A small set is all trained on.
+        aside = HELD_OUT if len(stored) >= 10 * HELD_OUT else 0
         super().__init__(recipe, init)
-        self.views = found[: len(found) - aside]
-        self.held_out = found[len(found) - aside :]
+        self.views = stored[: len(stored) - aside]
+        self.held_out = stored[len(stored) - aside :]
         self.architecture = architecture
 
     def count(self) -> int:
@@ -270,8 +286,8 @@ class ClickTask(Task):
     def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
         """maps [C, side, side] and mask [side, side] of a click in that view, or in another one if it shows nothing."""
         for _ in range(DRAWS):
-            if (found := draw_click(self.views[index], side, rng)) is not None:
-                return {"maps": found[0], "mask": found[1].astype(np.float32)}
+            if (click := draw_click(self.views[index], side, rng)) is not None:
+                return {"maps": click[0], "mask": click[1].astype(np.float32)}
             index = int(rng.integers(len(self.views)))
         raise InputError("The views show nothing to click on; make them of a larger data set.")
 
@@ -283,16 +299,18 @@ class ClickTask(Task):
 
     def scores(self, network: nn.Module, folder: Path) -> dict[str, Any]:
         """Mean and median intersection over union of the clicks of examples, on the views kept aside."""
+        # On the CPU, away from what the training uses.
         network = copy.deepcopy(network).cpu()
         overlap = []
         for number, view in enumerate(self.held_out):
+            # The same clicks at every scoring.
             rng = np.random.default_rng([7, number])
             for maps, mask in filter(
                 None, (draw_click(view, self.recipe.side, rng) for _ in range(CLICKS))
             ):
                 with torch.inference_mode():
-                    found = network(torch.from_numpy(maps)[None])[0].numpy() > 0
-                overlap.append((found & mask).sum() / (found | mask).sum())
+                    answer = network(torch.from_numpy(maps)[None])[0].numpy() > 0
+                overlap.append((answer & mask).sum() / (answer | mask).sum())
         return (
             {"iou": float(np.mean(overlap)), "iou_median": float(np.median(overlap))}
             if overlap
@@ -300,11 +318,12 @@ class ClickTask(Task):
         )
 
 
-def click_losses(found: Tensor, mask: Tensor) -> dict[str, Tensor]:
+def click_losses(logits: Tensor, mask: Tensor) -> dict[str, Tensor]:
     """Cross-entropy, and one minus the soft overlap (Dice), of logits [B, S, S] with masks [B, S, S]."""
-    share = found.sigmoid()
+    share = logits.sigmoid()
+    # Dice = 2 |A n B| / (|A| + |B|), with 1 added above and below against empty masks.
     both = 2 * (share * mask).sum((1, 2)) + 1
     return {
-        "entropy": F.binary_cross_entropy_with_logits(found, mask),
+        "entropy": F.binary_cross_entropy_with_logits(logits, mask),
         "overlap": (1 - both / (share.sum((1, 2)) + mask.sum((1, 2)) + 1)).mean(),
     }

@@ -44,12 +44,14 @@ def silog(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     mask = mask * ((true > SILOG_RANGE[0]) & (true <= SILOG_RANGE[1]))
     g = true.clamp(min=SILOG_RANGE[0]).log() - predicted.clamp(min=SILOG_RANGE[0]).log()
     # A root has no gradient at 0.
-    return (mean(g.square(), mask) - SILOG_LAMBDA * mean(g, mask).square()).clamp(min=1e-8).sqrt()
+    variance = mean(g.square(), mask) - SILOG_LAMBDA * mean(g, mask).square()
+    return variance.clamp(min=1e-8).sqrt()
 
 
 def centred_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     """L1 of logarithmic depths after each picture's mean difference is removed: blind to scale, robust to outliers."""
     difference = predicted - true
+    # The scale of depth is not known: a constant of its logarithm is no error.
     centre = (difference * mask).flatten(1).sum(1) / mask.flatten(1).sum(1).clamp(min=1)
     return mean((difference - centre.view(-1, 1, 1, 1)).abs().clamp(max=2), mask)
 
@@ -62,24 +64,26 @@ def laplace(error: Tensor, log_scale: Tensor, mask: Tensor) -> Tensor:
     return mean(error * (-log_scale).exp() + log_scale, mask)
 
 
-def map_errors(found: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
+def map_errors(predicted: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
     """[B, 5, H, W] absolute errors of maps, as `Prediction.spread` counts them; without gradients.
 
     albedo is sRGB-encoded, depth the natural logarithm of relative depth, each up to a constant of the picture.
     """
     with torch.no_grad():
-        cosine = F.cosine_similarity(found["normal"], true["normal"], dim=1).unsqueeze(1)
-        difference = found["depth"] - true["depth"]
+        # Angles of normals, in radians; depth as in `centred_l1`.
+        cosine = F.cosine_similarity(predicted["normal"], true["normal"], dim=1).unsqueeze(1)
+        difference = predicted["depth"] - true["depth"]
         centre = (difference * mask).flatten(1).sum(1) / mask.flatten(1).sum(1).clamp(min=1)
         depth = (difference - centre.view(-1, 1, 1, 1)).abs().clamp(max=2)
-        albedo = (found["albedo"] - true["albedo"]).abs().mean(1, keepdim=True)
-        flat = [(found[name] - true[name]).abs() for name in ("roughness", "metallic")]
+        albedo = (predicted["albedo"] - true["albedo"]).abs().mean(1, keepdim=True)
+        flat = [(predicted[name] - true[name]).abs() for name in ("roughness", "metallic")]
         return torch.cat([albedo, *flat, cosine.clamp(-1, 1).acos(), depth], 1)
 
 
 def scaled_l1(predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
     """L1 of linear albedos after one factor a picture (least squares; itself not a path of the gradient)."""
     with torch.no_grad():
+        # argmin_s sum (s p - t)^2 = sum p t / sum p^2.
         over = (predicted * true * mask).flatten(1).sum(1)
         under = (predicted.square() * mask).flatten(1).sum(1)
         scale = (over / under.clamp(min=1e-6)).clamp(0.25, 4).view(-1, 1, 1, 1)
@@ -95,11 +99,12 @@ def gradient(predicted: Tensor, true: Tensor, mask: Tensor, scales: int = 4) -> 
     for scale in range(scales):
         step = 2**scale
         p, t, m = (x[..., ::step, ::step] for x in (predicted, true, mask))
+        # Gradients are linear: that of the difference is the difference of the gradients.
         difference = p - t
-        across = mean((difference[..., 1:] - difference[..., :-1]).abs(), m[..., 1:] * m[..., :-1])
-        down = mean(
-            (difference[..., 1:, :] - difference[..., :-1, :]).abs(), m[..., 1:, :] * m[..., :-1, :]
-        )
+        change = (difference[..., 1:] - difference[..., :-1]).abs()
+        across = mean(change, m[..., 1:] * m[..., :-1])
+        change = (difference[..., 1:, :] - difference[..., :-1, :]).abs()
+        down = mean(change, m[..., 1:, :] * m[..., :-1, :])
         total = total + across + down
     return total / scales
 
@@ -115,6 +120,7 @@ def slopes(
     depth = F.avg_pool2d(log_depth, step).clamp(-8, 8).exp()
     directions = F.avg_pool2d(rays, step)
     points = torch.cat([directions, -torch.ones_like(depth)], 1) * depth  # [B, 3, h, w]
+    # Central differences of neighbouring cells span the surface.
     across = points[..., 1:-1, 2:] - points[..., 1:-1, :-2]
     down = points[..., 2:, 1:-1] - points[..., :-2, 1:-1]
     normal = torch.linalg.cross(down, across, dim=1)  # +Z to the viewer: rows run downwards
@@ -141,23 +147,27 @@ def light(predicted: Tensor, true: Tensor) -> tuple[Tensor, Tensor]:
     """
     angle, basis = _light_basis(true.shape[-2], true.device)
     weight = true[:, 3:] * angle
+    # Samples without light have no weight anywhere.
     known = (weight.flatten(1).sum(1) > 0).float()
     under = weight.flatten(1).sum(1).clamp(min=1e-6)
     log = predicted[:, :3].clamp(-8, 8)
     scale = predicted[:, 3:].clamp(-4, 3)
+    # --- Likelihood: |e| / b + log b of a Laplace distribution of scale b, `scale` its logarithm ---
     error = (log - true[:, :3].clamp(min=DARKEST).log()).abs()
-    likelihood = ((error * (-scale).exp() + scale).mean(1, keepdim=True) * weight).flatten(1).sum(
-        1
-    ) / under
+    surprise = (error * (-scale).exp() + scale).mean(1, keepdim=True)
+    likelihood = (surprise * weight).flatten(1).sum(1) / under
+
+    # --- Irradiance: harmonics of the radiance, by solid angle and share ---
 
     def project(map_):
         return torch.einsum("bchw,hwk->bck", map_ * weight, basis)
 
     aim = project(true[:, :3])
-    relative = (project(log.exp()) - aim).flatten(1).norm(dim=1) / aim.flatten(1).norm(dim=1).clamp(
-        min=1e-6
-    )
+    difference = (project(log.exp()) - aim).flatten(1).norm(dim=1)
+    relative = difference / aim.flatten(1).norm(dim=1).clamp(min=1e-6)
+    # Logarithmic above 1: a much too bright light must not outweigh the rest of a batch.
     irradiance = torch.where(relative < 1, relative, 1 + relative.clamp(min=1).log())
+    # --- Means over the samples whose light is known ---
     count = known.sum().clamp(min=1)
     return (likelihood * known).sum() / count, (irradiance * known).sum() / count
 
@@ -166,6 +176,5 @@ def light(predicted: Tensor, true: Tensor) -> tuple[Tensor, Tensor]:
 def _light_basis(rows: int, device: torch.device) -> tuple[Tensor, Tensor]:
     """Solid angle [1, 1, h, 1] of the texels of a map of that many rows, and their harmonics [h, 2h, 16]."""
     angle = torch.from_numpy(row_solid_angle(rows)).float().view(1, 1, -1, 1)
-    return angle.to(device), torch.from_numpy(sh_basis(texel_directions(rows, 2 * rows), 3)).to(
-        device
-    )
+    basis = torch.from_numpy(sh_basis(texel_directions(rows, 2 * rows), 3))
+    return angle.to(device), basis.to(device)

@@ -64,7 +64,8 @@ class MapsTask(Task):
 
         Of a set that is too small to hold any out, samples that it learns from are scored, and `of` says so.
         """
-        what, samples = held_out(self.source, self.score_samples)
+        # The same samples and the same camera noise at every scoring.
+        origin, samples = held_out(self.source, self.score_samples)
         rows = []
         strips = []
         for k, sample in enumerate(samples):
@@ -76,39 +77,43 @@ class MapsTask(Task):
         write_sheet(strips, folder / "sheet.png")
         if not samples:
             return {}
-        found = summary([row for row in rows if row])
+        figures = summary([row for row in rows if row])
         shown = {
             name: value
-            for name, value in found.items()
+            for name, value in figures.items()
+            # Those are for pooling over a set; a log needs the rest.
             if not name.endswith(("_mse", "_raw", "_scale"))
         }
-        return {"of": what, **shown}
+        return {"of": origin, **shown}
 
 
 def trained_on(source: Source) -> list[int]:
     """Places of the samples to train on. Their own numbers say which are held out; none of a set that is too small."""
+    # By the sample's own number, so that a growing set keeps its held-out samples.
     count = len(source)
     return [
         k for k in range(count) if count < HELD_OUT_EVERY or (source.number(k) + 1) % HELD_OUT_EVERY
     ]
 
 
-def held_out(source: Source, most: int) -> tuple[str, list[Sample]]:
-    """What samples are scored, and up to `most` of them, spread over the set.
+def held_out(source: Source, max_samples: int) -> tuple[str, list[Sample]]:
+    """What samples are scored, and up to `max_samples` of them, spread over the set.
 
     They come from the source's own validation split where it has one; of a set that is too small to hold any out they
     are the first ones that it learns from. Those that cannot be read are left out.
     """
-    what = HELD_OUT
+    origin = HELD_OUT
+    # --- Which ones ---
     validation = source.validation()
     if validation is not None:
         source = validation
         chosen = list(range(len(validation)))
     elif not (chosen := sorted(set(range(len(source))) - set(trained_on(source)))):
-        what = TRAINED_ON
-        chosen = list(range(min(len(source), most)))
-    found = []
-    for k in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int)):
+        origin = TRAINED_ON
+        chosen = list(range(min(len(source), max_samples)))
+    # --- Read them, evenly spread ---
+    samples = []
+    for k in np.unique(np.linspace(0, len(chosen) - 1, max_samples).astype(int)):
         with suppress(InputError):
-            found.append(source.read(chosen[k]))
-    return what, found
+            samples.append(source.read(chosen[k]))
+    return origin, samples

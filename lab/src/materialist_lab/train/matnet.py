@@ -55,6 +55,7 @@ class PaperTask(MapsTask):
         """`init`: a Depth Anything or DINOv2 checkpoint; it gives what it has, the rest starts at random."""
         self.size = size
         self.lpips = backbone("vgg")
+        # --- What the log says at the start: what differs from the paper ---
         start = (
             "MatNet starts from random weights; the paper starts from Depth Anything (--init FILE)."
             if init is None
@@ -83,6 +84,7 @@ class PaperTask(MapsTask):
 
     def draw(self, index: int, side: int, rng: np.random.Generator) -> dict[str, Array]:
         """The paper's augmentation and no other: a random vertical flip and a random side x side crop; [C, H, W]."""
+        # --- A sample at least as large as the crop ---
         sample = self.read(index)
         maps = {
             name: torch.from_numpy(np.atleast_3d(getattr(sample, name))).permute(2, 0, 1)
@@ -90,12 +92,14 @@ class PaperTask(MapsTask):
         }
         if (factor := side / min(sample.depth.shape)) > 1:
             maps = enlarged(maps, [max(side, round(edge * factor)) for edge in sample.depth.shape])
+        # --- Crop ---
         height, width = maps["depth"].shape[1:]
         top = int(rng.integers(0, height - side + 1))
         left = int(rng.integers(0, width - side + 1))
         maps = {
             name: values[:, top : top + side, left : left + side] for name, values in maps.items()
         }
+        # --- Vertical flip; y of the normals changes sign ---
         if rng.random() < 0.5:
             maps = {name: values.flip(1) for name, values in maps.items()}
             maps["normal"][1] *= -1
@@ -105,6 +109,7 @@ class PaperTask(MapsTask):
         }
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
+        # The encoder takes whole patches: the picture goes in resized, the maps come back.
         image = batch["image"]
         mask = batch["mask"]
         height, width = image.shape[-2:]
@@ -114,6 +119,7 @@ class PaperTask(MapsTask):
             k: F.interpolate(v, (height, width), mode="bilinear", align_corners=False)
             for k, v in out.items()
         }
+        # The paper's terms, each with weight 1.
         albedo = batch["albedo"]
         return {
             "albedo": losses.l1(out["albedo"], albedo, mask)
@@ -124,14 +130,15 @@ class PaperTask(MapsTask):
             "depth": losses.silog(out["depth"], batch["depth"], mask),
         }
 
-    def _perceptual(self, found: Tensor, true: Tensor, mask: Tensor) -> Tensor:
+    def _perceptual(self, predicted: Tensor, true: Tensor, mask: Tensor) -> Tensor:
         """LPIPS of sRGB-encoded albedo [B, 3, H, W], the truth where the mask is 0; or gradients in its place."""
-        found = srgb(found)
+        predicted = srgb(predicted)
         true = srgb(true)
         if self.lpips is None:
-            return losses.gradient(found, true, mask)
-        kept = torch.where(mask > 0, found, true)
-        return self.lpips.to(found.device)(2 * kept - 1, 2 * true - 1).mean()
+            return losses.gradient(predicted, true, mask)
+        # LPIPS sees neighbourhoods: what is masked out must not differ. It expects [-1, 1].
+        kept = torch.where(mask > 0, predicted, true)
+        return self.lpips.to(predicted.device)(2 * kept - 1, 2 * true - 1).mean()
 
     def predict(self, network: nn.Module, sample: Sample) -> Prediction:
         """The maps at the sample's size. A network trained here answers with depth itself, as its loss asks."""
@@ -159,18 +166,20 @@ def enlarged(maps: dict[str, Tensor], size: list[int]) -> dict[str, Tensor]:
     def nearest(values):
         return F.interpolate(values[None], size, mode="nearest-exact")[0]
 
+    # Normalised convolution: sum of values over sum of shares.
     mask = maps["mask"]
     share = smooth(maps["mask"]).clamp(min=1e-6)
-    found = {name: nearest(maps[name]) for name in ("normal", "depth", "mask")}
-    found |= {
+    resized = {name: nearest(maps[name]) for name in ("normal", "depth", "mask")}
+    resized |= {
         name: smooth(maps[name] * mask) / share for name in ("albedo", "roughness", "metallic")
     }
-    return found | {"image": smooth(maps["image"])}
+    return resized | {"image": smooth(maps["image"])}
 
 
 def freeze(network: MatNet) -> None:
     """Let learn what the paper lets learn: the material decoder, and the RefineNet layers of the depth decoder."""
     for name, parameter in network.named_parameters():
+        # Everything else, the encoder among it, is frozen.
         refine = any(f".{layer}." in name for layer in DEPTH_DECODER_LEARNS)
         learns = name.startswith("material_head.") or (name.startswith("depth_head.") and refine)
         parameter.requires_grad_(learns)
@@ -182,15 +191,18 @@ def load_start(network: MatNet, path: Path) -> list[str]:
     DINOv2 gives the encoder (its names lack the prefix 'pretrained.'), Depth Anything also the depth decoder, which the
     material decoder starts as well where shapes agree. Raises WeightsError when there is no encoder in the file.
     """
-    found = read_state(path)
-    if "cls_token" in found:
-        found = {f"pretrained.{name}": tensor for name, tensor in found.items()}
+    stored = read_state(path)
+    # --- DINOv2 has the encoder alone ---
+    if "cls_token" in stored:
+        stored = {f"pretrained.{name}": tensor for name, tensor in stored.items()}
+    # --- What fits by name and shape ---
     state = network.state_dict()
     start = {
         name: tensor
-        for name, tensor in found.items()
+        for name, tensor in stored.items()
         if name in state and tensor.shape == state[name].shape
     }
+    # --- The material decoder starts from the depth decoder ---
     for name in [n for n in start if n.startswith("depth_head.")]:
         twin = name.replace("depth_head.", "material_head.", 1)
         if twin in state and state[twin].shape == start[name].shape:

@@ -143,13 +143,13 @@ def recolour(
     hue = -rand(batch, 3, k).clamp(min=1e-6).log()
     hue = 3 * hue / hue.sum(1, keepdim=True)
     # A colour of its own: any brightness, mostly muted, as paint and cloth are. 1 - u^(1/2.5) is beta(1, 2.5).
-    own = (
+    paint = (
         (0.03 + 0.87 * rand(batch, 1, k))
         * (1 + (hue - 1) * (1 - rand(batch, 1, k) ** (1 / 2.5)))
         / mean
     )
     tint = torch.exp(normal(batch, 1, k) * 0.3 + normal(batch, 3, k) * 0.15)
-    gain = torch.where(rand(batch, 1, k) < 0.5, own, tint)
+    gain = torch.where(rand(batch, 1, k) < 0.5, paint, tint)
     bright = ((mean + 2 * spread) * gain).amax(1, keepdim=True)
     gain = gain * (s.brightest / bright.clamp(min=1e-6)).clamp(max=1)
     known = maps["shading"].isfinite().flatten(1).all(1).view(-1, 1, 1)

@@ -96,14 +96,16 @@ class RefractionTask(Task):
 
     def losses(self, network: nn.Module, batch: Batch) -> dict[str, Tensor]:
         """Errors of lengths and of their logarithms, and of the normals of the back; see `ThicknessLoss`."""
-        found = network(batch["maps"]).float()
+        predicted = network(batch["maps"]).float()
         target = batch["target"]
         weight = ThicknessLoss()
+        # Where the predicted mask and the truth agree that there is the object.
         inside = batch["maps"][:, MASK] * (target[:, 0] > 0)
         count = inside.sum((1, 2)).clamp(min=1)
         terms = {}
         for k, (name, share) in enumerate((("solid", 1.0), ("hollow", weight.hollow))):
-            a = found[:, k]
+            # Absolute errors relative to the mean, and errors of logarithms, which thin parts need.
+            a = predicted[:, k]
             b = target[:, k]
             soft = weight.soft[k]
             mean = (b * inside).sum((1, 2)) / count
@@ -114,7 +116,7 @@ class RefractionTask(Task):
                 each = each * batch["hollow"] / batch["hollow"].mean().clamp(min=0.1)
             terms[name] = share * each.mean()
         # Means over the pixels of smaller views are shorter than 1 where the back is bent: they say less there.
-        cosine = (found[:, BACK_X:] * target[:, BACK_X:]).sum(1)
+        cosine = (predicted[:, BACK_X:] * target[:, BACK_X:]).sum(1)
         length = target[:, BACK_X:].square().sum(1).clamp(min=1e-8).sqrt()
         terms["back"] = weight.back * (((length - cosine) * inside).sum((1, 2)) / count).mean()
         return terms

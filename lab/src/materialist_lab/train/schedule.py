@@ -33,12 +33,14 @@ class TrainingSchedule:
 
         An unfinished budget goes on where it stopped when `budget` is the same; another one is on top of what was done.
         """
+        # Where this budget began, and what was done before it.
         self.budget = budget
         self.first_step = self.step = 0
         self._first_seconds = self._earlier = 0.0
         if state is not None:
             self.step = state["step"]
             self._earlier = state["seconds"]
+            # The same budget again means: go on with it.
             unfinished = (state["steps"], state["minutes"]) == (
                 budget.steps,
                 budget.minutes,
@@ -79,6 +81,7 @@ class TrainingSchedule:
 
         The cosine spans the whole run: a short budget on top of a long run anneals, a long one goes on near the peak.
         """
+        # A resumed run has its moments already and needs a short rise only.
         steps = warm_up if self.first_step == 0 else min(warm_up, WARM_UP_AGAIN)
         rise = min(1.0, (self.step - self.first_step + 1) / steps) if steps else 1.0
         return rise * (last + (1 - last) * 0.5 * (1 + math.cos(math.pi * self.progress)))

@@ -43,10 +43,12 @@ def epoch(
     Raises InputError where ATTEMPTS examples in a row cannot be read.
     """
     task.refresh()
+    # --- The order of this pass, cut to whole batches ---
     order = np.random.default_rng((seed, number)).permutation(task.count())
     order = np.tile(order, -(-batch // len(order)))
     order = order[: len(order) // batch * batch]
     keys = [(int(index), (seed, number, k)) for k, index in enumerate(order)]
+    # --- Loading, without the batches that were done before ---
     random = torch.Generator(device)
     rest: Any = keys[skip * batch :]
     loader: DataLoader[Any] = DataLoader(
@@ -60,13 +62,14 @@ def epoch(
     )
     batches = iter(loader)
     try:
-        for k, found in enumerate(batches, skip):
-            if isinstance(found, str):
-                raise InputError(found)
+        for k, loaded in enumerate(batches, skip):
+            if isinstance(loaded, str):
+                raise InputError(loaded)
+            # A seed of its own for each batch: resuming in the middle of a pass changes nothing.
             random.manual_seed(int(np.random.SeedSequence((seed, number, k)).generate_state(1)[0]))
             with torch.no_grad():
                 varied = task.vary(
-                    {n: t.to(device, non_blocking=True) for n, t in found.items()}, side, random
+                    {n: t.to(device, non_blocking=True) for n, t in loaded.items()}, side, random
                 )
             yield varied
     finally:
@@ -79,6 +82,7 @@ def _drawn(task: Task, side: int, keys: list[Key]) -> Any:
         items = [_readable(task, index, side, np.random.default_rng(seed)) for index, seed in keys]
     except InputError as error:
         return str(error)
+    # `default_collate` would end with a message about tensors.
     if len({tuple(np.shape(array) for array in item.values()) for item in items}) > 1:
         return "The samples have different numbers of pixels; use sets of one size."
     return default_collate(items)
@@ -91,6 +95,7 @@ def _readable(task: Task, index: int, side: int, rng: np.random.Generator) -> di
             return task.draw(index, side, rng)
         except InputError as error:
             logging.getLogger(__name__).warning("%s Another sample is used.", error)
+            # Another example, chosen by the same seed.
             index = int(rng.integers(task.count()))
     return task.draw(index, side, rng)
 
@@ -100,5 +105,6 @@ def _init_worker(_: int) -> None:
     end_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, lambda *_: signal.alarm(GRACE))
+    # Otherwise each worker would start a thread a processor.
     torch.set_num_threads(1)
     cv2.setNumThreads(0)

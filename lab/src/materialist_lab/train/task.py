@@ -67,8 +67,8 @@ class Recipe:
 
     def changed(self, **changes: Any) -> Recipe:
         """The recipe with those changes that are not None; a given `side` holds for the whole run."""
-        given = {k: v for k, v in changes.items() if v is not None}
-        return replace(self, **(({"growth": ()} if "side" in given else {}) | given))
+        kept = {k: v for k, v in changes.items() if v is not None}
+        return replace(self, **(({"growth": ()} if "side" in kept else {}) | kept))
 
 
 def has_bfloat16(device: torch.device) -> bool:

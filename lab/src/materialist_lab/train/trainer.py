@@ -61,6 +61,7 @@ class Trainer:
 
         Raises OutputError when FOLDER holds a run and `resume` is off, InputError when that run is of another network.
         """
+        # --- The run in the folder, if it is resumed ---
         self.task = task
         self.recipe = task.recipe
         self.folder = folder
@@ -71,11 +72,13 @@ class Trainer:
         self._bfloat16 = self.recipe.uses_bfloat16(self.device)
         torch.manual_seed(self.options.seed)
         torch.backends.cudnn.benchmark = self.device.type == "cuda"
+        # --- The network, and the average of its weights ---
         self.network = task.network().to(self.device)
         self.averaged = copy.deepcopy(self.network).requires_grad_(False).eval()
         self._learnt = [p for p in self.network.parameters() if p.requires_grad]
         pairs = zip(self.averaged.parameters(), self.network.parameters(), strict=True)
         self._averages = [mine for mine, theirs in pairs if theirs.requires_grad]
+        # --- The optimiser: biases and scales of normalisation are not decayed ---
         decayed = [p for p in self._learnt if p.ndim > 1]
         others = [p for p in self._learnt if p.ndim <= 1]
         self.optimizer = torch.optim.AdamW(
@@ -87,6 +90,7 @@ class Trainer:
             betas=self.recipe.betas,
             fused=True,
         )
+        # --- Where the run stands ---
         self.schedule = TrainingSchedule(budget, state and state["schedule"])
         self.epoch = 1
         self.batch = 0
@@ -103,6 +107,7 @@ class Trainer:
 
         Always leaves a checkpoint and the averaged weights.
         """
+        # The checkpoint is written whatever ends the run.
         with stop_requests() as stop:
             try:
                 self._train(stop, progress)
@@ -121,6 +126,7 @@ class Trainer:
                 losses[name] = losses.get(name, 0.0) + value
             count += 1
             done = self.schedule.done or bool(stop)
+            # --- A point of the curve ---
             if self.schedule.step % self.options.report_steps == 0 or done:
                 self._report(losses, count, time.monotonic() - since, progress)
                 losses = {}
@@ -128,6 +134,7 @@ class Trainer:
                 since = time.monotonic()
             if done:
                 break
+            # --- Scores and a checkpoint now and then ---
             if time.monotonic() - saved > self.options.checkpoint_seconds:
                 start = time.monotonic()
                 self.score()
@@ -136,6 +143,7 @@ class Trainer:
                 since += saved - start  # the curve tells the speed of training alone
 
     def save(self) -> None:
+        # --- Weights to predict with, and how they came about ---
         schedule = self.schedule.as_dict()
         facts = {
             "step": schedule["step"],
@@ -146,6 +154,7 @@ class Trainer:
             "scores": self.last_scores,
         }
         self.averaged.save(self.folder / checkpoint.WEIGHTS, facts)
+        # --- Everything that going on needs ---
         state = {
             "kind": self.task.kind,
             "architecture": self.network.architecture.as_dict(),
@@ -162,20 +171,20 @@ class Trainer:
 
     def score(self) -> dict[str, Any]:
         """Score the averaged weights; writes a line of scores.jsonl."""
-        found = self.task.scores(self.averaged, self.folder)
-        self.last_scores = {name: _rounded(value) for name, value in found.items()}
+        scores = self.task.scores(self.averaged, self.folder)
+        self.last_scores = {name: _rounded(value) for name, value in scores.items()}
         line = {
             "step": self.schedule.step,
             "seconds": round(self.schedule.seconds, 1),
             **self.last_scores,
         }
-        if found:
+        if scores:
             checkpoint.append_line(self.folder / checkpoint.SCORES, line)
         self.note(
             f"step {self.schedule.step}  "
             + "  ".join(f"{k} {v}" for k, v in self.last_scores.items())
         )
-        return found
+        return scores
 
     def _batches(self) -> Iterator[Batch]:
         """Epoch after epoch, without end; within one, pictures become larger when the recipe says so."""
@@ -194,6 +203,7 @@ class Trainer:
             for batch in batches:
                 self.batch += 1
                 yield batch
+                # The side grows within a pass: go on with the rest of it at the new side.
                 if self.recipe.side_at(self.schedule.progress) != side:
                     break
             else:
@@ -203,12 +213,14 @@ class Trainer:
 
     def _step(self, batch: Batch) -> dict[str, float]:
         """One step of the optimiser; returns the terms of the loss."""
+        # --- Forward ---
         rate = self.recipe.rate * self.schedule.rate(self.recipe.warm_up, self.recipe.last_rate)
         for group in self.optimizer.param_groups:
             group["lr"] = rate
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self._bfloat16):
             terms = self.task.losses(self.network, batch)
         total: Tensor = sum(terms.values(), torch.zeros((), device=self.device))
+        # --- Backward; a gradient that is not finite changes nothing ---
         self.optimizer.zero_grad(set_to_none=True)
         total.backward()
         norm = nn.utils.clip_grad_norm_(self._learnt, self.recipe.clip)
@@ -228,6 +240,7 @@ class Trainer:
             else 0.0
         )
         torch._foreach_lerp_(self._averages, self._learnt, 1 - decay)  # type: ignore[arg-type]
+        # Statistics of normalisation are averages already.
         for mine, theirs in zip(self.averaged.buffers(), self.network.buffers(), strict=True):
             mine.copy_(theirs)
 
@@ -248,6 +261,7 @@ class Trainer:
         progress("train", round(1000 * self.schedule.progress), 1000)
 
     def _restore(self, state: dict[str, Any]) -> None:
+        # Loading would fail in the middle, with a message about tensors.
         if state["architecture"] != self.network.architecture.as_dict():
             raise InputError(
                 f"{self.folder} holds a run of another network; resume it with the options it began with."

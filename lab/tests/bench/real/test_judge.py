@@ -26,6 +26,7 @@ def folder(tmp_path):
 @pytest.fixture
 def real():
     """A photo of two paints on a floor before a wall, with its whole truth."""
+    # Two paints, left and right.
     linear = np.where(
         np.arange(32)[None, :, None] < 16, [0.6, 0.3, 0.2], [0.2, 0.4, 0.5]
     ) * np.ones((24, 1, 1))
@@ -44,6 +45,7 @@ def _maps(real, **changed):
 
 
 def test_the_truth_scores_perfectly_up_to_its_factors(real):
+    # Albedo and depth are known up to a factor.
     figures = map_figures(_maps(real, albedo=real.albedo * 0.5, depth=real.depth * 7), real)
     assert figures["normal_angle"] < 0.1 and figures["steep_angle"] < 0.1
     assert (
@@ -62,6 +64,7 @@ def test_floors_do_not_hide_what_walls_are_like(real):
 
 
 def test_figures_are_of_the_mask(real):
+    # An error outside the mask.
     left = np.zeros(real.depth.shape, bool)
     left[:, :16] = True
     wrong = real.albedo.copy()
@@ -119,6 +122,7 @@ def test_a_fitted_scene_is_relit(folder, measured, monkeypatch):
     """With the true shape and paint, the relit photo is nearer to the other one than the photo itself."""
 
     def fitted(photo, *, prior, **_):
+        # The fit is replaced by the truth, so that only the relighting is judged.
         truth = next(real for real in views if np.array_equal(real.photo.linear, photo.linear))
         lamp = next(
             real.other.envmap for real in views if np.array_equal(real.other.picture, photo.linear)

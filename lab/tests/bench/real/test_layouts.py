@@ -16,11 +16,11 @@ BY_FOLDER = {layout.folder: layout for layout in LAYOUTS}
 def photos(tmp_path):
     """The photos of a layout's tiny folder, by the name of the folder."""
 
-    def read(folder, **how):
+    def read(folder, **options):
         made_real.WRITERS[folder](tmp_path / folder)
         layout = BY_FOLDER[folder]
         items = located(tmp_path)[layout.name]
-        reading = Reading(**{"size": 512, "lamps": 0, **how})
+        reading = Reading(**{"size": 512, "lamps": 0, **options})
         return [real for item in items for real in layout.photos(item, reading)]
 
     return read

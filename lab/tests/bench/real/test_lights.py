@@ -24,10 +24,10 @@ def test_a_mirror_ball_gives_back_the_light_around_it():
     z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
     mirrored = np.stack([2 * z * x, 2 * z * y, 2 * z * z - 1], -1)
     ball = environment(mirrored.reshape(-1, 3), light).reshape(256, 256, 3).astype(np.float32)
-    found = ball_light(ball)
-    directions = texel_directions(*found.shape[:2])
+    measured = ball_light(ball)
+    directions = texel_directions(*measured.shape[:2])
     seen = directions[..., 2] > -0.9  # not what is right behind the ball
-    np.testing.assert_allclose(found[seen], (0.5 + 0.5 * directions)[seen], atol=0.05)
+    np.testing.assert_allclose(measured[seen], (0.5 + 0.5 * directions)[seen], atol=0.05)
 
 
 def test_the_farthest_light():

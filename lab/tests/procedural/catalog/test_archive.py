@@ -9,14 +9,14 @@ from materialist_lab.procedural.catalog.roles import role_of
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
+def catalog(tmp_path_factory):
     return entries(make_archive(tmp_path_factory.mktemp("catalog") / "made.sh3f"))
 
 
-def test_sizes_are_metres_and_names_are_decoded(found):
-    assert len(found) == len(MODELS)
-    table = found[0]
-    sign = found[5]
+def test_sizes_are_metres_and_names_are_decoded(catalog):
+    assert len(catalog) == len(MODELS)
+    table = catalog[0]
+    sign = catalog[5]
     assert (
         table.key == "made-001"
         and table.path == "made/table/table.obj"
@@ -24,12 +24,12 @@ def test_sizes_are_metres_and_names_are_decoded(found):
     )
     assert table.size == pytest.approx((1.2, 0.75, 0.6))
     assert sign.name == "Café sign" and sign.elevation == pytest.approx(1.5)
-    assert found[4].lights == (pytest.approx((0.1, 0.35, 0.1)),)
-    assert found[8].turn == (1, 0, 0, 0, 0, -1, 0, 1, 0)
+    assert catalog[4].lights == (pytest.approx((0.1, 0.35, 0.1)),)
+    assert catalog[8].turn == (1, 0, 0, 0, 0, -1, 0, 1, 0)
 
 
-def test_roles(found):
-    assert [role_of(entry) for entry in found] == [
+def test_roles(catalog):
+    assert [role_of(entry) for entry in catalog] == [
         "table",
         "chair",
         "small",

@@ -27,8 +27,8 @@ def kept(files, tmp_path_factory):
 def test_models_by_role_and_why_others_are_left_out(kept):
     assert kept.models["table"] == ("made-001",) and kept.models["wall"] == ("made-006",)
     assert kept.models["small"] == ("made-003", "made-009")
-    told = json.loads((kept.folder / LIST).read_text())
-    assert told["left_out"] == {
+    facts = json.loads((kept.folder / LIST).read_text())
+    assert facts["left_out"] == {
         "made-007 Jar": "it is of glass",
         "made-008 Net": "its picture has holes",
     }

@@ -51,6 +51,7 @@ def test_worlds_can_be_packed(stock, kind):
 def test_a_model_is_one_thing_of_its_size(stock):
     table = stock.listing.model("made-001")
     parts = pieces.piece(np.random.default_rng(0), table, stock)
+    # All surfaces of a model are labelled as one thing.
     assert len({part.thing for part in parts}) == 1
     low, high = bounds(parts)
     np.testing.assert_allclose(high - low, table.entry.size, rtol=1e-5)
@@ -69,17 +70,20 @@ def test_things_are_laid_on_their_place_side_by_side(stock):
     things = {}
     for part in parts:
         things.setdefault(part.thing, []).append(part)
-    boxes = [bounds(one) for one in things.values()]
+    # Boxes by thing, which may have several parts.
+    boxes = [bounds(parts_of_thing) for parts_of_thing in things.values()]
     assert len(boxes) > 2
     for k, (low, high) in enumerate(boxes):
         assert low[1] == pytest.approx(0.75, abs=0.03)
         assert (np.abs((low + high)[[0, 2]] / 2) < [0.6, 0.3]).all()
         for other_low, other_high in boxes[:k]:
+            # Their middles are apart; boxes of round things may overlap.
             middle = (low + high - other_low - other_high)[[0, 2]] / 2
             assert np.hypot(*middle) > 0.02
 
 
 def test_nothing_is_laid_where_it_does_not_fit(stock):
+    # Five centimetres of air.
     place = LevelPlace(0.2, -0.6, 0.6, -0.3, 0.3, 0.05)
     for k in range(6):
         parts = pieces.laid(np.random.default_rng(k), place, 4, stock)
@@ -91,16 +95,18 @@ def test_finishes_are_physical(stock, family):
     look = CatalogLook(family, (0.4, 0.3, 0.2), 0.5, "", False)
     rng = np.random.default_rng(1)
     for _ in range(20):
-        made = finishes.finish(
+        material = finishes.finish(
             rng,
             type(look)(family, (0.4, 0.3, 0.2), 0.5, "", False),
             None,
             finishes.style(rng),
             stock,
         )
-        assert all(0 < r <= 1 for r in made.roughness) and all(0 <= v <= 1 for v in made.metallic)
-        assert all(0 < c <= 1 for colour in made.colours for c in colour)
-        assert made.relief is None or 0 < made.relief.slope < 0.6
+        assert all(0 < r <= 1 for r in material.roughness) and all(
+            0 <= v <= 1 for v in material.metallic
+        )
+        assert all(0 < c <= 1 for colour in material.colours for c in colour)
+        assert material.relief is None or 0 < material.relief.slope < 0.6
 
 
 @pytest.mark.parametrize(
@@ -117,21 +123,23 @@ def test_hard_lamps_are_small_and_stand_on_the_side_of_the_camera():
     to_camera = np.array([0.0, 0.3, 1.0]) / np.hypot(1, 0.3)
     for k in range(6):
         light = studio_light.hard_lamps(np.random.default_rng(k), to_camera)
+        # Less than three hundredths of the texels are bright, and the rest is dark.
         bright = light.mean(-1) > 0.5 * light.max() / 3
         assert 0 < bright.mean() < 0.03
         assert np.median(light) < 0.05 * light.max()
 
 
 def test_what_is_kept_aside_is_never_trained_on(stock, monkeypatch):
+    # Every other model, so that forty keys suffice.
     monkeypatch.setattr(stocks, "HELD_OUT_EVERY", 2)
     keys = tuple(f"made-{k:03d}" for k in range(40))
-    one, other = (
+    train, held_out = (
         stocks.Stock(stock.listing, held_out=aside)._mine(keys) for aside in (False, True)
     )
     assert (
-        set(one) | set(other) == set(keys)
-        and not set(one) & set(other)
-        and min(len(one), len(other)) > 5
+        set(train) | set(held_out) == set(keys)
+        and not set(train) & set(held_out)
+        and min(len(train), len(held_out)) > 5
     )
 
 
@@ -141,6 +149,7 @@ def test_options_need_the_models(tmp_path, monkeypatch):
     for wrong in ({"real": 0.5}, {"only": "single"}):
         with pytest.raises(InputError, match="apt-get install"):
             o.DataSetOptions(**wrong)
+    # With models installed the share has a default.
     make_archive(tmp_path / "made.sh3f")
     assert o.DataSetOptions().real_share == o.REAL_SHARE
     assert o.DataSetOptions(real=0.25).real_share == 0.25
@@ -165,6 +174,7 @@ def test_a_set_of_real_things_keeps_the_contract_and_the_credits(tmp_path, monke
             assert ((stored["depth"] > 0) == mask).all()
             length = np.linalg.norm(stored["normal"].astype(float) / 127, axis=-1)
             np.testing.assert_allclose(length[mask], 1, atol=0.02)
+            # The cosine between a normal and the ray that sees it is not above 0.
             rays = pixel_rays(Camera(32, 32, float(stored["fov"])))
             towards = (
                 stored["normal"] / 127 * rays / np.linalg.norm(rays, axis=-1, keepdims=True)

@@ -24,20 +24,20 @@ from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
 
 @pytest.mark.parametrize("index", range(20))
 def test_every_kind_of_shape_is_usable(index):
-    made = make_shape(index)
-    vertices = made.solid.vertices
+    shape = make_shape(index)
+    vertices = shape.solid.vertices
     assert np.isfinite(vertices).all() and np.ptp(vertices, axis=0).max() == pytest.approx(1)
     np.testing.assert_allclose(vertices.min(0) + vertices.max(0), 0, atol=1e-9)
-    assert made.solid.faces.max() < len(vertices)
+    assert shape.solid.faces.max() < len(vertices)
     # Level rays from the front meet it from outside, whatever it is, and run through material behind that.
     origin = np.stack(
         np.meshgrid(np.linspace(-0.4, 0.4, 24), np.linspace(-0.4, 0.4, 24), [2.0]), -1
     ).reshape(-1, 3)
-    found = ShapeTracer(made.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
-    hit = np.isfinite(found.first)
-    assert hit.any() and (found.material <= found.solid + 1e-3).all()
-    assert (found.material[hit] > 0).mean() > 0.95
-    assert not made.hollow or found.material[hit].sum() < 0.95 * found.solid[hit].sum()
+    paths = ShapeTracer(shape.solid).trace(origin, np.broadcast_to([0.0, 0, -1], origin.shape))
+    hit = np.isfinite(paths.first)
+    assert hit.any() and (paths.material <= paths.solid + 1e-3).all()
+    assert (paths.material[hit] > 0).mean() > 0.95
+    assert not shape.hollow or paths.material[hit].sum() < 0.95 * paths.solid[hit].sum()
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +71,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
         maps, _ = dataset.draw_view(ball, ShapeTracer(ball.solid), np.random.default_rng(seed))
         inside = maps[MASK] > 0.5
         sides.append(max(inside.any(0).sum(), inside.any(1).sum()))
+    # The exact frame leaves MARGIN on every side.
     framed = SIDE / (1 + 2 * MARGIN)
     assert np.mean(sides) == pytest.approx(framed, abs=2) and 0.6 < np.std(sides) < 5
 
@@ -78,6 +79,7 @@ def test_frames_are_those_of_prediction_and_a_little_off(ball):
 def test_stretching_the_rays_is_stretching_the_shape(ball):
     rng = np.random.default_rng(4)
     pose = dataset.draw_pose(rng, upright=True)
+    # The stretched shape itself, its normals turned outwards where the stretch mirrors.
     stretched = replace(ball.solid, vertices=ball.solid.vertices @ pose.stretch.T)
     normals = solids.smooth_normals(stretched.vertices, stretched.faces)
     stretched = replace(stretched, normals=normals * np.sign(np.linalg.det(pose.stretch)))
@@ -89,9 +91,10 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
     assert both.mean() > 0.3 and (np.isfinite(a.first) == np.isfinite(b.first)).mean() > 0.99
     np.testing.assert_allclose(a.first[both], b.first[both], atol=2e-3)
     np.testing.assert_allclose(a.solid[both], b.solid[both], atol=6e-3)
+    # Thin borders have steep normals, which the mesh's faces round off.
     inner = both & (a.solid > 0.3)
-    for one, two in ((normal_a, normal_b), (back_a, back_b)):
-        agreement = np.sum(one.reshape(-1, 3)[inner] * two.reshape(-1, 3)[inner], -1)
+    for first, second in ((normal_a, normal_b), (back_a, back_b)):
+        agreement = np.sum(first.reshape(-1, 3)[inner] * second.reshape(-1, 3)[inner], -1)
         assert np.median(agreement) > 0.999
 
 
@@ -101,6 +104,7 @@ def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
     first = dataset.load(tmp_path / "set")
     assert first["maps"].shape == (4, CHANNELS, SIDE, SIDE) and np.isfinite(first["maps"]).all()
     before = (tmp_path / "set" / "00001.npz").stat().st_mtime_ns
+    # One more shape: the others stay as they are.
     dataset.produce(tmp_path / "set", replace(plan, shapes=3))
     assert (tmp_path / "set" / "00001.npz").stat().st_mtime_ns == before
     assert len(dataset.load(tmp_path / "set")["maps"]) == 6

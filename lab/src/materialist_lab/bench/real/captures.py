@@ -44,6 +44,7 @@ def objects(place: Path) -> list[Path]:
 
 def object_photos(folder: Path, reading: Reading) -> Iterator[RealPhoto]:
     """An object under one lamp at a time; the truth is photometric stereo of all lamps together."""
+    # --- One directional light for each photo ---
     file = folder / "lights.json"
     try:
         (directions,) = json.loads(file.read_text("utf-8")).values()
@@ -57,6 +58,7 @@ def object_photos(folder: Path, reading: Reading) -> Iterator[RealPhoto]:
     def read(path: Path) -> Photo:
         return linear_photo(path, reading.size, OBJECT_FOV)
 
+    # --- Truth at the size of the photo; reads anew for each, which is cheap beside a fit ---
     for name, photo, other in views(files, envmaps, reading.lamps, read):
         height, width = photo.linear.shape[:2]
         albedo = resample.values(read_exr(folder / "albedo.exr"), (height, width))
@@ -85,6 +87,7 @@ def garages(place: Path) -> list[Path]:
 
 def garage_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
     """A garage and its depth by structured light."""
+    # Pixels that were not matched have no finite disparity.
     disparity = read_array(path.with_name(f"{GARAGE}_disp.npz"))
     known = np.isfinite(disparity) & (disparity > 0)
     distance = FOCAL * BASELINE / (np.where(known, disparity, 1) + OFFSET)

@@ -71,8 +71,10 @@ class RealBench(Benchmark):
             raise InputError(
                 "This benchmark needs photographs with measured truth; give --data DIR."
             )
+        # --- What is judged, and on what ---
         specs = names("predictor", self.predictor)
         sources = {spec: get_predictor(spec, device=self.device) for spec in specs}
+        # Layouts that are absent are named in the report.
         by_layout = located(data)
         if not any(by_layout.values()):
             places = ", ".join(_described(layout) for layout in LAYOUTS)
@@ -90,6 +92,7 @@ class RealBench(Benchmark):
     ) -> Iterator[Row]:
         """The rows of the photos of a layout; adds their sheets to the report."""
         reading = Reading(self.size, self.lamps)
+        # One photo at a time: whole sets do not fit into memory.
         photos = (real for item in items for real in layout.photos(item, reading))
         for count, real in enumerate(photos):
             shown: list[SheetRow] = []
@@ -104,10 +107,12 @@ class RealBench(Benchmark):
     ) -> Iterator[Row]:
         """The rows of a photo; adds the maps and pictures to `shown`."""
         photo = real.photo
+        # --- The photo itself as albedo and as the relit picture: what doing nothing gives ---
         untouched = albedo_figures(photo.linear, real) | light_figures(photo.linear, real)
         if untouched:
             yield {"method": "photo", **untouched}
         for spec, source in sources.items():
+            # --- The maps of a predictor ---
             prior, cost = timed(source.predict, photo, seed=self.seed)
             picture = None if shown else photo.linear
             shown.append(
@@ -116,6 +121,7 @@ class RealBench(Benchmark):
             yield {"method": spec, **map_figures(prior, real), "seconds": cost["seconds"]}
             if real.other is None or self.prior_only:
                 continue
+            # --- The inversion that begins with them, under another light ---
             scene, relit, seconds = self._relit(photo, prior, real.other.envmap)
             name = f"{spec}, fitted"
             shown.append(SheetRow(name, "relit", relit, scene.materials.albedo))

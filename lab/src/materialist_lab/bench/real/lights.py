@@ -40,6 +40,7 @@ def views(
 
 def farthest(envmaps: Sequence[Array], index: int) -> int:
     """The map whose light comes from the direction that is farthest from that of map `index`."""
+    # The smallest cosine is the largest angle; a map is not its own partner.
     directions = [mean_direction(envmap) for envmap in envmaps]
     cosines = [float(direction @ directions[index]) for direction in directions]
     cosines[index] = np.inf

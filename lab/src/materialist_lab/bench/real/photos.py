@@ -65,6 +65,7 @@ class RealPhoto:
 
 def with_depth(name: str, photo: Photo, depth: Array) -> RealPhoto:
     """A photo with a measured depth [h, w] of any size of its aspect; normals where the depth is smooth."""
+    # Resampled first: normals belong to the photo's own pixels.
     at_size = resample.depth(depth, photo.linear.shape[:2])
     normal = smooth_normals(at_size, photo.camera)
     return RealPhoto(name, photo, normal=normal, depth=at_size)
@@ -75,6 +76,7 @@ def linear_photo(path: Path, size: int, fov: float) -> Photo:
 
     fov: horizontal field of view, degrees. Raises InputError where there is no such file.
     """
+    # Averaged in linear light; never enlarged.
     linear = read_map(path)
     if max(linear.shape[:2]) > size:
         linear = resample.values(linear, resample.with_longer_side(linear.shape[:2], size))

@@ -36,6 +36,7 @@ def nyu(place: Path) -> list[Path]:
 def nyu_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
     """A room and its depth in millimetres."""
     measured = read_millimetres(_nyu_depth(path))
+    # The border holds no reliable depth.
     depth = np.zeros_like(measured)
     depth[NYU_CROP] = measured[NYU_CROP]
     name = f"{path.parent.name} {path.stem.removeprefix('rgb_')}"
@@ -57,6 +58,7 @@ def diode_photo(path: Path, reading: Reading) -> Iterator[RealPhoto]:
     """A photo and the depth of a laser scanner in metres."""
     depth = read_array(path.with_name(f"{path.stem}_depth.npy"))
     valid = read_array(path.with_name(f"{path.stem}_depth_mask.npy"))
+    # Stored with an axis of one channel.
     depth = depth.reshape(valid.shape)
     measured = np.where((valid > 0) & np.isfinite(depth), depth, 0).astype(np.float32)
     yield with_depth(path.stem, read_photo(path, size=reading.size, fov=DIODE_FOV), measured)
@@ -92,6 +94,7 @@ def wildrelight(place: Path) -> list[Path]:
 
 def wildrelight_photos(folder: Path, reading: Reading) -> Iterator[RealPhoto]:
     """A view at several times of day, each with the light around the camera."""
+    # One photo and one map for each time of day, in the same order.
     maps = sorted((folder / "envmap").glob("time*_envmap.exr"))
     files = [folder / "photo" / path.name.replace("_envmap", "_hdr") for path in maps]
     envmaps = [read_envmap(path) for path in maps]
@@ -109,6 +112,7 @@ def multi_illumination_photos(folder: Path, reading: Reading) -> Iterator[RealPh
     """A room with the flash in many directions, each with a mirror ball that shows the light."""
     balls = _by_direction(folder / "probes", "chrome")
     pictures = _by_direction(folder, "mip")
+    # Directions that have both a photo and a ball.
     directions = sorted(balls.keys() & pictures.keys())
     files = [pictures[k] for k in directions]
     envmaps = [ball_light(decode_photo(balls[k]).linear) for k in directions]

@@ -49,6 +49,7 @@ def sheet(real: RealPhoto, rows: Sequence[SheetRow]) -> Array:
 
     Albedos and pictures have the factor that their figures have; depths have one range.
     """
+    # The last row is the truth.
     target = rows[-1].picture
     lines = []
     for row, depth in zip(rows, _depths([row.depth for row in rows]), strict=True):
@@ -64,6 +65,7 @@ def sheet(real: RealPhoto, rows: Sequence[SheetRow]) -> Array:
 
 def _drawn(lines: Sequence[dict[str, Array | None]], aspect: float) -> Array:
     """[h, w, 3] uint8: pictures with their titles, a line under each other; aspect: height / width."""
+    # --- The grid ---
     tile = (WIDTH, max(1, round(WIDTH * aspect)))
     across = WIDTH + GAP
     down = tile[1] + CAPTION
@@ -71,6 +73,7 @@ def _drawn(lines: Sequence[dict[str, Array | None]], aspect: float) -> Array:
     image = Image.new("RGB", size, PAPER)
     draw = ImageDraw.Draw(image)
     font = ImageFont.load_default(TEXT)
+    # --- Tiles with their captions; empty places stay dark ---
     for row, line in enumerate(lines):
         for column, (title, pixels) in enumerate(line.items()):
             if pixels is None:
@@ -88,6 +91,7 @@ def _aligned(linear: Array | None, true: Array | None, inside: Array) -> Array |
     if linear is None:
         return None
     if true is not None:
+        # The scale of albedo and of another light is not known.
         scale = best_scale(np.minimum(linear, 1), np.minimum(true, 1), inside)
         linear = linear * np.float32(scale)
     return srgb_levels(linear)
@@ -100,6 +104,7 @@ def _depths(maps: Sequence[Array | None]) -> list[Array | None]:
         return [None for _ in maps]
     true = known[-1]
     factors = [_median_factor(depth, true) for depth in known]
+    # One picture for all: they share their range of colours.
     joined = np.concatenate(
         [depth * np.float32(f) for depth, f in zip(known, factors, strict=True)], 1
     )

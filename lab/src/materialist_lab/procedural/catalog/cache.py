@@ -73,11 +73,8 @@ class Listing:
 
 def cache_folder() -> Path:
     """Where caches lie unless another place is named."""
-    return (
-        Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-        / "materialist"
-        / "furniture"
-    )
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return cache / "materialist" / "furniture"
 
 
 def listing(
@@ -91,22 +88,25 @@ def listing(
     Raises InputError for a damaged archive, OutputError where the folder cannot be written.
     """
     folder = folder or cache_folder()
+    # Names and sizes tell whether the packages changed since; hashing them would take long.
     made_of = [[path.name, path.stat().st_size] for path in (*archives, *photographs)]
-    found = described(folder / LIST)
-    if found is None or found.get("version") != VERSION or found.get("made_of") != made_of:
-        found = _build(archives, folder, progress) | {"photographs": _shrink(photographs, folder)}
+    facts = described(folder / LIST)
+    if facts is None or facts.get("version") != VERSION or facts.get("made_of") != made_of:
+        facts = _build(archives, folder, progress) | {"photographs": _shrink(photographs, folder)}
+        # Written last: a cache that was stopped half way is built again.
         write_whole(
             folder / LIST,
-            json.dumps({"version": VERSION, "made_of": made_of, **found}, indent=1) + "\n",
+            json.dumps({"version": VERSION, "made_of": made_of, **facts}, indent=1) + "\n",
         )
+    # --- The keys of each role ---
     by_role: dict[str, list[str]] = {}
-    for key, role in found["roles"].items():
+    for key, role in facts["roles"].items():
         by_role.setdefault(role, []).append(key)
     textures = {
-        family: tuple((key, k) for key, k in places) for family, places in found["textures"].items()
+        family: tuple((key, k) for key, k in places) for family, places in facts["textures"].items()
     }
     roles = {role: tuple(sorted(keys)) for role, keys in by_role.items()}
-    return Listing(folder, roles, textures, tuple(found["photographs"]))
+    return Listing(folder, roles, textures, tuple(facts["photographs"]))
 
 
 def _build(archives: Sequence[Path], folder: Path, progress: Progress) -> dict[str, Any]:
@@ -119,6 +119,7 @@ def _build(archives: Sequence[Path], folder: Path, progress: Progress) -> dict[s
     textures: dict[str, list[tuple[str, int]]] = {}
     used: list[CatalogEntry] = []
     for done, (path, entry) in enumerate(every, 1):
+        # A model that cannot be used is noted with the reason, and the others go on.
         role = role_of(entry)
         try:
             if role is None:
@@ -127,6 +128,7 @@ def _build(archives: Sequence[Path], folder: Path, progress: Progress) -> dict[s
                 parts = read_catalog_model(file, entry)
             _store(folder, entry, role, parts)
             for k, (solid, look) in enumerate(zip(parts.solids, parts.looks)):
+                # Coordinates beyond the picture: it repeats, so it may cover other things too.
                 if look.picture and np.ptp(solid.uv, axis=0).min() > TILED:
                     textures.setdefault(look.family, []).append((entry.key, k))
             roles[entry.key] = role
@@ -143,6 +145,7 @@ def _shrink(photographs: Sequence[Path], folder: Path) -> list[str]:
     names = []
     for k, path in enumerate(photographs):
         pixels = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        # Smaller ones would be enlarged to a blur.
         if pixels is None or min(pixels.shape[:2]) < 256:
             continue
         scale = min(1.0, PHOTOGRAPH_SIDE / max(pixels.shape[:2]))
@@ -155,44 +158,46 @@ def _shrink(photographs: Sequence[Path], folder: Path) -> list[str]:
 
 @lru_cache(maxsize=64)
 def _photograph(path: Path) -> Array:
-    found = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if found is None:
+    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if picture is None:
         raise InputError(
             f"The photograph {path} cannot be read; delete the folder, and it will be made again."
         )
-    return np.ascontiguousarray(found[..., ::-1])
+    return np.ascontiguousarray(picture[..., ::-1])
 
 
 def _credits(used: Sequence[CatalogEntry]) -> str:
+    # The licences ask for these credits.
     head = (
         "3D models of Sweet Home 3D (http://www.sweethome3d.com), changed: stretched to size, decimated, repainted.\n"
         "BlendSwap-CC-0: CC0 1.0. KatorLegaz, Reallusion: CC-BY 3.0 United States. BlendSwap-CC-BY, Scopia: CC-BY 3.0\n"
         "(http://creativecommons.org/licenses/by/3.0/).\n\n"
     )
-    return head + "".join(f"{one.key}: {one.name}, by {one.creator or 'unknown'}\n" for one in used)
+    return head + "".join(
+        f"{entry.key}: {entry.name}, by {entry.creator or 'unknown'}\n" for entry in used
+    )
 
 
 def _store(folder: Path, entry: CatalogEntry, role: str, parts: ModelParts) -> None:
+    """Write one model: what is known of it as JSON, its solids as arrays, its pictures as JPEG."""
+    # --- What is known of it ---
     facts: dict[str, Any] = {
         "entry": asdict(entry),
         "role": role,
         "looks": [asdict(look) for look in parts.looks],
     }
     facts["places"] = [list(place) for place in level_places(parts.solids)]
+    # --- Solids, no finer than a scene needs them, and pictures ---
     arrays: dict[str, Array] = {"facts": np.array(json.dumps(facts))}
     for k, solid in enumerate(parts.solids):
-        arrays[f"vertices{k}"], arrays[f"uv{k}"] = (
-            solid.vertices.astype("f4"),
-            solid.uv.astype("f4"),
-        )
-        arrays[f"normals{k}"], arrays[f"faces{k}"] = (
-            solid.normals.astype("f2"),
-            solid.faces.astype("i4"),
-        )
+        arrays[f"vertices{k}"] = solid.vertices.astype("f4")
+        arrays[f"uv{k}"] = solid.uv.astype("f4")
+        arrays[f"normals{k}"] = solid.normals.astype("f2")
+        arrays[f"faces{k}"] = solid.faces.astype("i4")
+    # OpenCV has blue first.
+    quality = [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
     for name, pixels in parts.pictures.items():
-        packed = cv2.imencode(".jpg", pixels[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[
-            1
-        ]
+        _, packed = cv2.imencode(".jpg", pixels[..., ::-1], quality)
         arrays[f"picture {name}"] = packed.ravel()
     memory = io.BytesIO()
     np.savez(memory, **arrays)  # type: ignore[arg-type]
@@ -208,11 +213,15 @@ def _load(folder: Path, key: str) -> CatalogModel:
         raise InputError(
             f"The model {key} in {folder} cannot be read ({error}); delete the folder."
         ) from error
+    # --- The entry, with tuples where JSON has lists ---
     facts = json.loads(str(arrays["facts"]))
     entry = facts["entry"]
     lights = tuple(tuple(place) for place in entry.pop("lights"))
     entry |= {name: tuple(entry[name]) for name in ("size", "turn")}
-    looks = tuple(CatalogLook(**{**one, "colour": tuple(one["colour"])}) for one in facts["looks"])
+    looks = tuple(
+        CatalogLook(**{**look, "colour": tuple(look["colour"])}) for look in facts["looks"]
+    )
+    # --- Pictures and solids ---
     pictures = {
         name.removeprefix("picture "): ColourPicture(as_roots(_decoded(packed)))
         for name, packed in arrays.items()
@@ -233,7 +242,7 @@ def _load(folder: Path, key: str) -> CatalogModel:
         solids,
         looks,
         tuple(pictures.get(look.picture) for look in looks),
-        tuple(LevelPlace(*one) for one in facts["places"]),
+        tuple(LevelPlace(*place) for place in facts["places"]),
     )
 
 

@@ -23,9 +23,9 @@ def creased(vertices: Array, faces: Array, angle: float) -> tuple[Array, Array, 
     count = len(corner_face)
     at = sparse.csr_matrix((np.ones(count, np.int8), (np.arange(count), corner_place)))
     pairs = (at @ at.T).tocoo()
-    own = corner_face[pairs.row]
+    first_face = corner_face[pairs.row]
     other = corner_face[pairs.col]
-    cosine = np.einsum("pc,pc->p", direction[own], direction[other])
+    cosine = np.einsum("pc,pc->p", direction[first_face], direction[other])
     weight = np.sign(cosine) * (np.abs(cosine) > np.cos(angle))
     total = [np.bincount(pairs.row, weight * flat[other, k], count) for k in range(3)]
     normals = unit(np.stack(total, -1))

@@ -12,13 +12,13 @@ CREASE = 0.9
 
 def decimated(solid: Solid, share: float) -> Solid:
     """The solid with about that share of its faces; leaves and thin parts lose whole faces."""
-    wanted = max(64, int(len(solid.faces) * share))
+    max_faces = max(64, int(len(solid.faces) * share))
     area = np.linalg.norm(face_normals(solid.vertices, solid.faces), axis=-1)
     cell = 0.7 * float(np.sqrt(np.median(area)))
     coarse = solid
     for _ in range(16):
         coarse = _merged(solid, cell)
-        if len(coarse.faces) <= wanted:
+        if len(coarse.faces) <= max_faces:
             break
         cell *= 1.4
     # Vertices of different texture at one place lie apart by less than a cell: they meet again for their normals.

@@ -74,11 +74,14 @@ def catalog_look(
 ) -> CatalogLook:
     """The look of a material by its name and the entries of its MTL, as trimesh gives them."""
     family = _family(name)
+    # MTL: d is opacity, kd and ks diffuse and specular colour, ns the exponent of highlights.
     opacity = _number(mtl.get("d"), 1.0)
     kd = np.clip(np.asarray(mtl.get("kd", (0.6, 0.6, 0.6)), float)[:3], 0, 1)
     ks = float(np.max(np.asarray(mtl.get("ks", (0, 0, 0)), float)[:3], initial=0.0))
     exponent = min(max(_number(mtl.get("ns"), 0.0), 0.0), 1000.0)
+    # The usual match of Phong and microfacets: alpha^2 = 2 / (n + 2), roughness = sqrt(alpha).
     shine = (2 / (exponent + 2)) ** 0.25
+    # No highlight at all: matt, whatever the exponent says.
     if ks < 0.02:
         shine = max(shine, 0.75)
     colour = mean or tuple(srgb_to_linear(kd).tolist())
@@ -86,6 +89,7 @@ def catalog_look(
 
 
 def _family(name: str) -> str:
+    # The first family that fits: "painted metal" is paint.
     plain = name.lower()
     return next((family for family, pattern in _COMPILED if pattern.search(plain)), "other")
 

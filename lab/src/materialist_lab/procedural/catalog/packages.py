@@ -47,11 +47,11 @@ def missing(furniture: Path | None = None) -> str:
 
     furniture: folder of catalogues, that of the package by default.
     """
-    there = (
+    packages = (
         ("3D models (sweethome3d-furniture)", archives(furniture)),
         ("photographs", photographs()),
     )
-    lacks = [name for name, found in there if not found]
+    lacks = [name for name, installed in packages if not installed]
     if not lacks:
         return ""
     return f"Pictures are made without {' and '.join(lacks)}; to have them: {INSTALL}"

@@ -55,14 +55,16 @@ def read_catalog_model(
     solids: list[Solid] = []
     looks: list[CatalogLook] = []
     pictures: dict[str, Array] = {}
+    # Areas, in the file's units: of glass, of holes, of everything.
     clear = 0.0
     holed = 0.0
     whole = 0.0
     for piece in pieces:
         area = float(piece.area)
         whole += area
-        found, painted = _material(piece, entry, pictures, s)
-        if found.clear:
+        look, painted = _material(piece, entry, pictures, s)
+        # Glass is left out: the tracer knows opaque surfaces only.
+        if look.clear:
             clear += area
             continue
         solid = _solid(piece, s)
@@ -71,17 +73,24 @@ def read_catalog_model(
             holed += mixed
         if len(solid.faces):
             solids.append(solid)
-            looks.append(found)
+            looks.append(look)
+    # --- What cannot be used ---
     if clear > s.glass * whole:
         raise InputError("it is of glass")
     if not solids or whole <= 0:
         raise InputError("it has no faces")
     if holed > s.holes * whole:
         raise InputError("its picture has holes")
+    # --- Size, number of faces, texture coordinates where there is no picture ---
     solids = _fitted(_lighter(solids, s), entry)
     textured = [bool(look.picture) for look in looks]
     return ModelParts(
-        [one if t else from_the_sides(one) for one, t in zip(solids, textured)], looks, pictures
+        [
+            solid if has_picture else from_the_sides(solid)
+            for solid, has_picture in zip(solids, textured)
+        ],
+        looks,
+        pictures,
     )
 
 
@@ -96,6 +105,7 @@ def _pieces(file: zipfile.ZipFile, entry: CatalogEntry) -> list[trimesh.Trimesh]
         loaded = trimesh.load(
             io.BytesIO(data), file_type="obj", resolver=resolver, process=False, group_material=True
         )
+    # Readers of OBJ raise anything on files that somebody else wrote.
     except Exception as error:
         raise InputError(f"it cannot be read ({type(error).__name__}: {error})") from error
     meshes = list(loaded.geometry.values()) if isinstance(loaded, trimesh.Scene) else [loaded]
@@ -121,6 +131,7 @@ def _material(
     name = str(getattr(material, "name", "") or "")
     if image is None or uv is None:
         return catalog_look(name, mtl, "", None), None
+    # --- The picture, shrunk; pieces that share one share it here, too ---
     small = image.convert("RGBA")
     small.thumbnail((s.picture, s.picture), Image.Resampling.BOX)
     pixels = np.asarray(small)
@@ -129,6 +140,7 @@ def _material(
         (k for k, known in pictures.items() if np.array_equal(known, pixels[..., :3])), None
     )
     pictures[same or key] = np.ascontiguousarray(pixels[..., :3])
+    # --- Its mean colour, for the look ---
     opacity = pixels[..., 3] / 255.0
     linear = (pixels[..., :3][opacity > 0.5] / 255.0) ** 2.2
     mean = tuple(linear.mean(0).tolist()) if len(linear) else (0.5, 0.5, 0.5)
@@ -140,9 +152,10 @@ def _solid(piece: trimesh.Trimesh, s: ReadingSettings) -> Solid:
     vertices = np.asarray(piece.vertices, float)
     faces = np.asarray(piece.faces, np.int32)
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
+    # Faces without area have no normal.
     faces = faces[area > 1e-14 * max(float(np.ptp(vertices, axis=0).max()), 1e-9) ** 2]
-    found = getattr(piece.visual, "uv", None)
-    uv = None if found is None else np.nan_to_num(np.asarray(found, float))
+    stored_uv = getattr(piece.visual, "uv", None)
+    uv = None if stored_uv is None else np.nan_to_num(np.asarray(stored_uv, float))
     if "vertex_normals" in piece._cache.cache:
         normals = unit(np.nan_to_num(np.asarray(piece.vertex_normals, float)))
     else:
@@ -191,16 +204,21 @@ def _fitted(solids: list[Solid], entry: CatalogEntry) -> list[Solid]:
     """The solids turned and stretched to the size of the entry."""
     turn = np.array(entry.turn).reshape(3, 3) if len(entry.turn) == 9 else np.eye(3)
     solids = [
-        replace(one, vertices=one.vertices @ turn.T, normals=one.normals @ turn.T) for one in solids
+        replace(solid, vertices=solid.vertices @ turn.T, normals=solid.normals @ turn.T)
+        for solid in solids
     ]
+    # Only vertices that faces use tell the size.
     used = joined(solids)
     corners = used.vertices[used.faces.ravel()]
     low = corners.min(0)
     high = corners.max(0)
     scale = np.array(entry.size) / np.maximum(high - low, 1e-9)
+    # A flat model keeps its thickness in proportion.
     scale = np.where(high - low < 1e-6 * (high - low).max(), np.median(scale), scale)
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     return [
-        replace(one, vertices=(one.vertices - base) * scale, normals=unit(one.normals / scale))
-        for one in solids
+        replace(
+            solid, vertices=(solid.vertices - base) * scale, normals=unit(solid.normals / scale)
+        )
+        for solid in solids
     ]

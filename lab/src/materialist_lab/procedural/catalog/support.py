@@ -8,11 +8,11 @@ from materialist.types import Array
 from materialist_lab.procedural.objects.shapes import Solid, face_normals
 
 LEVEL = 0.995
-"""Least upward part of the unit normal of a level face."""
-LEAST_SIDE = 0.1
+"""Smallest y of the unit normal of a level face."""
+MIN_SIDE = 0.1
 """Metres; smaller places are left out."""
 FILLED = 0.72
-"""Least share of a rectangle that level faces must cover."""
+"""Smallest share of a rectangle that level faces must cover."""
 STEP = 0.012
 """Metres of height that faces of one place may differ by."""
 MARGIN = 0.005
@@ -36,22 +36,25 @@ def level_places(solids: list[Solid]) -> list[LevelPlace]:
     centres, areas, corners = _level_faces(solids)
     if not len(centres):
         return []
+    # --- Faces of about one height are one group: sorted, a group ends at a step ---
     order = np.argsort(centres)
     centres = centres[order]
     areas = areas[order]
     corners = corners[order]
     groups = np.split(np.arange(len(centres)), np.flatnonzero(np.diff(centres) > STEP) + 1)
+    # --- The rectangle of each group, and what is above it ---
     everything = np.concatenate([solid.vertices[solid.faces] for solid in solids])
     low = everything.min(1)
     high = everything.max(1)
-    found = [_place(corners[g], areas[g]) for g in groups]
-    return [_with_clearance(place, low, high) for place in found if place is not None]
+    places = [_place(corners[g], areas[g]) for g in groups]
+    return [_with_clearance(place, low, high) for place in places if place is not None]
 
 
 def _level_faces(solids: list[Solid]) -> tuple[Array, Array, Array]:
     """(height [F], area [F], corners [F, 3, 3]) of the faces that look straight up by their shading normals."""
     kept = []
     for solid in solids:
+        # By the geometry level, and by the shading normals the upper side.
         flat = face_normals(solid.vertices, solid.faces)
         length = np.linalg.norm(flat, axis=-1)
         upward = np.abs(flat[:, 1]) > LEVEL * np.maximum(length, 1e-12)
@@ -64,13 +67,13 @@ def _level_faces(solids: list[Solid]) -> tuple[Array, Array, Array]:
 
 def _place(corners: Array, areas: Array) -> LevelPlace | None:
     """The rectangle around faces of one height, where they fill it."""
-    if areas.sum() < LEAST_SIDE**2:
+    if areas.sum() < MIN_SIDE**2:
         return None
     # A few far faces must not stretch it: the outermost hundredth of the area is left out.
     middle = corners.mean(1)
     low = corners[..., [0, 2]].min((0, 1))
     high = corners[..., [0, 2]].max((0, 1))
-    if areas.sum() / max(np.prod(high - low), 1e-9) < FILLED or (high - low).min() < LEAST_SIDE:
+    if areas.sum() / max(np.prod(high - low), 1e-9) < FILLED or (high - low).min() < MIN_SIDE:
         return None
     height = float(np.average(middle[:, 1], weights=areas))
     return LevelPlace(height, float(low[0]), float(high[0]), float(low[1]), float(high[1]), 10.0)

@@ -48,25 +48,28 @@ def centred(solid: Solid) -> Solid:
 def _profile(rng: np.random.Generator, points: int, low: float = 0.25) -> Array:
     """[40, 2] smooth outline (radius, height) through random radii at even heights, height 0 to 1."""
     y = np.linspace(0, 1, 40)
-    radius = PchipInterpolator(np.linspace(0, 1, points + 2), rng.uniform(low, 1, points + 2))(y)
+    knots = np.linspace(0, 1, points + 2)
+    radius = PchipInterpolator(knots, rng.uniform(low, 1, points + 2))(y)
     return np.stack([radius * rng.uniform(0.18, 0.55), y], -1)
 
 
 def _turned(outline: Array) -> Solid:
     """Surface of revolution of an outline [P, 2], closed at both ends."""
-    closed = np.concatenate([[[1e-4, outline[0, 1]]], outline, [[1e-4, outline[-1, 1]]]])
-    return shapes.lathe(closed, 56)
+    bottom = [[1e-4, outline[0, 1]]]
+    top = [[1e-4, outline[-1, 1]]]
+    return shapes.lathe(np.concatenate([bottom, outline, top]), 56)
 
 
 def _body(rng: np.random.Generator) -> Solid:
     """Solid of revolution: balusters, chess men, drops, bulbs; some with round ends."""
     outline = _profile(rng, int(rng.integers(1, 7)), 0.12)
     if rng.random() < 0.6:
+        # A square root towards the ends, as of an ellipse.
         t = outline[:, 1]
         ends = rng.uniform(0.02, 0.5, 2)
-        outline[:, 0] *= (
-            np.sqrt(np.clip(t / ends[0], 0, 1) * np.clip((1 - t) / ends[1], 0, 1)) + 1e-3
-        )
+        lower = np.clip(t / ends[0], 0, 1)
+        upper = np.clip((1 - t) / ends[1], 0, 1)
+        outline[:, 0] *= np.sqrt(lower * upper) + 1e-3
     return _turned(outline)
 
 
@@ -74,6 +77,7 @@ def _wall(rng: np.random.Generator, outline: Array) -> Solid:
     """An open vessel with that outside [P, 2], its wall 3 to 14 % of its width."""
     wall = outline[:, 0].max() * rng.uniform(0.06, 0.28)
     inner = np.stack([np.maximum(outline[:, 0] - wall, 0.012), outline[:, 1]], -1)
+    # The floor is thinner or thicker than the wall; the inside is walked downwards.
     inner = inner[outline[:, 1] > wall * rng.uniform(0.6, 2.0)][::-1]
     lip = (outline[-1] + inner[0]) / 2 + [0, 0.3 * wall]
     return _turned(np.concatenate([outline, [lip], inner]))
@@ -87,7 +91,9 @@ def _cup(rng: np.random.Generator) -> Solid:
     """Tumblers, cups and bowls: the outline only widens, or hardly narrows; some with a round bottom."""
     y = np.linspace(0, 1, 40)
     foot = rng.uniform(0.5, 1.05)
-    radius = (foot + (1 - foot) * y ** rng.uniform(0.3, 2.2)) * rng.uniform(0.3, 1.1)
+    bulge = y ** rng.uniform(0.3, 2.2)
+    radius = (foot + (1 - foot) * bulge) * rng.uniform(0.3, 1.1)
+    # A round bottom.
     if rng.random() < 0.4:
         radius = radius * np.clip(y / rng.uniform(0.1, 0.5), 0.02, 1) ** 0.5
     return _wall(rng, np.stack([radius, y], -1))
@@ -96,14 +102,16 @@ def _cup(rng: np.random.Generator) -> Solid:
 def _mug(rng: np.random.Generator) -> Solid:
     """A cup with a handle: a bent tube that ends in the wall."""
     solid = _cup(rng)
+    # Most of an ellipse whose ends lie within the wall.
     width = np.abs(solid.vertices[:, 0]).max()
     t = np.linspace(-1.3, 1.3, 24)
     reach = width * rng.uniform(0.3, 0.6)
     high = rng.uniform(0.2, 0.35)
-    line = np.stack(
-        [width * 0.9 + reach * np.cos(t), rng.uniform(0.45, 0.55) + high * np.sin(t), 0 * t], -1
-    )
-    return shapes.joined([solid, shapes.tube(line, width * rng.uniform(0.06, 0.14), 12)])
+    x = width * 0.9 + reach * np.cos(t)
+    y = rng.uniform(0.45, 0.55) + high * np.sin(t)
+    line = np.stack([x, y, 0 * t], -1)
+    handle = shapes.tube(line, width * rng.uniform(0.06, 0.14), 12)
+    return shapes.joined([solid, handle])
 
 
 def _goblet(rng: np.random.Generator) -> Solid:
@@ -111,29 +119,32 @@ def _goblet(rng: np.random.Generator) -> Solid:
     foot, stem, bowl, rise, wall = rng.uniform(
         [0.2, 0.025, 0.2, 0.3, 0.015], [0.32, 0.06, 0.38, 0.55, 0.04]
     )
+    # The bowl widens as a sine; past its quarter it narrows again.
     y = np.linspace(0, 1, 24)
-    curve = np.sin(np.pi / 2 * np.clip(y * rng.uniform(1.0, 1.4), 0, 1.35)) ** rng.uniform(0.5, 0.9)
+    quarter = np.clip(y * rng.uniform(1.0, 1.4), 0, 1.35)
+    curve = np.sin(np.pi / 2 * quarter) ** rng.uniform(0.5, 0.9)
     cup = np.stack([np.maximum(bowl * curve, stem), rise + (1 - rise) * y], -1)
+    # (radius, height) of foot and stem, then the outside of the bowl and its inside downwards.
     outline = [[foot, 0], [foot, 0.02], [stem * 1.5, 0.06], [stem, 0.12], [stem, rise - 0.03]]
-    return _turned(
-        np.concatenate([outline, cup, np.maximum(cup[6:][::-1] - [wall, 0], [0.005, 0])])
-    )
+    inner = np.maximum(cup[6:][::-1] - [wall, 0], [0.005, 0])
+    return _turned(np.concatenate([outline, cup, inner]))
 
 
 def _bottle(rng: np.random.Generator) -> Solid:
     """Closed bottle or jar: shoulder and neck, with a cavity."""
     body, neck, shoulder, start = rng.uniform([0.14, 0.04, 0.45, 0.03], [0.3, 0.1, 0.8, 0.1])
+    # A smooth step from the body to the neck, and a rounded bottom edge.
     y = np.linspace(0, 1, 48)
     blend = np.clip((y - shoulder) / rng.uniform(0.05, 0.25), 0, 1)
     radius = body + (neck - body) * (3 * blend**2 - 2 * blend**3)
     radius = radius * np.sqrt(np.clip(0.5 + y / start * 0.5, 0, 1))
+    # The cavity ends a wall's thickness from every outside; its faces look into it.
     wall = body * rng.uniform(0.06, 0.2)
     keep = (y > wall) & (y < 1 - wall) & (radius > 1.3 * wall)
     inside = _turned(np.stack([radius - wall, y], -1)[keep])
+    cavity = replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)
     outside = _turned(np.stack([radius, y], -1))
-    return shapes.joined(
-        [outside, replace(inside, faces=inside.faces[:, ::-1], normals=-inside.normals)]
-    )
+    return shapes.joined([outside, cavity])
 
 
 def _superquadric(rng: np.random.Generator) -> Solid:
@@ -155,12 +166,12 @@ def _frustum(rng: np.random.Generator) -> Solid:
     profile = np.array([(1e-3, 0), (low, 0), (high, 1), (1e-3, 1)])
     solid = shapes.lathe(profile, int(rng.choice([3, 4, 4, 5, 6, 48])))
     vertices = solid.vertices * [1, 1, deep]
-    corners = vertices[solid.faces]
+    # Flat faces: each gets corners of its own, with its own normal.
+    corners = vertices[solid.faces].reshape(-1, 3)
     flat = unit(shapes.face_normals(vertices, solid.faces))
-    own = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
-    return Solid(
-        corners.reshape(-1, 3), own, np.repeat(flat, 3, 0), np.zeros((solid.faces.size, 2))
-    )
+    corner_faces = np.arange(solid.faces.size, dtype=np.int32).reshape(-1, 3)
+    uv = np.zeros((solid.faces.size, 2))
+    return Solid(corners, corner_faces, np.repeat(flat, 3, 0), uv)
 
 
 def _blob(rng: np.random.Generator) -> Solid:
@@ -192,19 +203,24 @@ def _twisted(rng: np.random.Generator) -> Solid:
 
 def _stick(rng: np.random.Generator) -> Solid:
     """Bars, tubes, cones, hooks: round along a bent line."""
+    # A spline through four steps of a random walk.
     t = np.linspace(0, 1, 28)
     knots = np.linspace(0, 1, 4)
-    line = CubicSpline(knots, np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0))(t)
+    walk = np.cumsum(rng.normal(size=(4, 3)) * [0.4, 0.6, 0.4], axis=0)
+    line = CubicSpline(knots, walk)(t)
     radius = np.interp(t, [0, rng.uniform(0.2, 0.8), 1], rng.uniform(0.06, 0.3, 3))
-    radius[[0, -1]] = 1e-3
-    return shapes.tube(line, radius * np.linalg.norm(line[-1] - line[0]).clip(0.5), 20)
+    radius[[0, -1]] = 1e-3  # nearly closed ends
+    length = np.linalg.norm(line[-1] - line[0]).clip(0.5)
+    return shapes.tube(line, radius * length, 20)
 
 
 def creature(rng: np.random.Generator) -> Solid:
     """Trunk, head, limbs and tail that melt into each other, mostly alike on the left and on the right, skin rough."""
+    # --- Trunk; a limb is (start, end, radius at the start, radius at the end) ---
     build = rng.uniform(0.12, 0.3, 3) * [1, rng.uniform(1, 1.9), 1]
     thick = build.min()
     limbs = [(build * [0, -0.5, 0], build * [0, 0.5, 0], thick, thick)]
+    # --- Neck, head, ears ---
     neck = np.array([0, 1, rng.uniform(-0.3, 1.2)]) * build * rng.uniform(0.9, 1.3)
     if rng.random() < 0.8:
         head = rng.uniform(0.08, 0.2)
@@ -215,19 +231,24 @@ def creature(rng: np.random.Generator) -> Solid:
             for side in (-1, 1)
             if rng.random() < 0.5
         ]
+    # --- Limbs and tails, mostly in pairs ---
     for _ in range(int(rng.integers(1, 5))):
         start = rng.uniform([0, -0.8, -0.8], 0.8) * build
         end = start + rng.uniform([0.0, -0.45, -0.3], [0.35, 0.25, 0.35])
         first, last = rng.uniform(0.03, 0.11, 2)
         sides = (-1, 1) if rng.random() < 0.75 else (1,)
         limbs += [(start * [side, 1, 1], end * [side, 1, 1], first, last) for side in sides]
+    # --- How they melt together, the skin, and where it is cut off to stand ---
     melt = rng.uniform(0.015, 0.07)
     skin = shapes.lumps(rng, rng.uniform(0, 0.018), rng.uniform(2, 8))
     foot = -build[1] - rng.uniform(0, 0.1)
 
     def field(p: Array) -> Array:
+        """[...] about the distance of points [..., 3] from the surface, negative inside."""
         total = _limb(p, *limbs[0])
-        for limb in limbs[1:]:  # rounded over where they meet (Quilez's polynomial smooth minimum)
+        # Rounded over where they meet: Quilez's polynomial smooth minimum,
+        # min(a, b) = b + (a - b) h - k h (1 - h) with h = clip(1/2 + (b - a) / 2k, 0, 1), k = melt.
+        for limb in limbs[1:]:
             other = _limb(p, *limb)
             share = np.clip(0.5 + 0.5 * (other - total) / melt, 0, 1)
             total = other + (total - other) * share - melt * share * (1 - share)
@@ -238,15 +259,18 @@ def creature(rng: np.random.Generator) -> Solid:
 
 def _limb(p: Array, start: Array, end: Array, first: float, last: float) -> Array:
     """[...] about the distance of points [..., 3] from a capsule that goes from one radius to another."""
+    # t is the share of the axis at the nearest point of it.
     along = end - start
     t = np.clip((p - start) @ along / max(float(along @ along), 1e-9), 0, 1)
-    return np.linalg.norm(p - start - t[..., None] * along, axis=-1) - (first + t * (last - first))
+    distance = np.linalg.norm(p - start - t[..., None] * along, axis=-1)
+    return distance - (first + t * (last - first))
 
 
 def level_set(field: Callable[[Array], Array], reach: float, points: int = 72) -> Solid:
     """The zero of a function of points [..., 3], negative inside, within a box of that half side about the origin."""
     axis = np.linspace(-reach, reach, points)
     values = field(np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1))
+    # Outside at the border of the box, so that the surface closes.
     closed = np.pad(values[1:-1, 1:-1, 1:-1], 1, constant_values=1e-3)
     vertices, faces, *_ = marching_cubes(closed, 0.0, spacing=(axis[1] - axis[0],) * 3)
     vertices = vertices.astype(np.float64) - reach

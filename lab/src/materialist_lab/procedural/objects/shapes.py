@@ -29,6 +29,7 @@ def box(size: Array) -> Solid:
     for axis in range(3):
         u = np.eye(3)[(axis + 1) % 3]
         v = np.eye(3)[(axis + 2) % 3]
+        # Turning one edge round with the sign keeps right x up pointing outwards.
         for sign in (-1, 1):
             corner = (sign * (np.eye(3)[axis] - u) - v) / 2
             sides.append(panel(corner * size, sign * u * size, v * size, (1, 1)))
@@ -57,9 +58,9 @@ def lathe(profile: Array, n: int = 96) -> Solid:
     phi = np.linspace(0, 2 * np.pi, n + 1)
     radius = profile[:, :1]
     height = profile[:, 1:]
-    return _grid(
-        np.stack(np.broadcast_arrays(radius * np.cos(phi), height, radius * np.sin(phi)), axis=-1)
-    )
+    x = radius * np.cos(phi)
+    z = radius * np.sin(phi)
+    return _grid(np.stack(np.broadcast_arrays(x, height, z), axis=-1))
 
 
 def capsule(radius: float, length: float) -> Solid:
@@ -72,15 +73,17 @@ def capsule(radius: float, length: float) -> Solid:
 
 def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Solid:
     """Open vase, cup or bowl: a smooth wall through `control` [K, 2] (radius, height), with an inside and a rim."""
+    # A monotone cubic through the control points never overshoots them.
     height = np.linspace(control[0, 1], control[-1, 1], rows)
     radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
     inner = np.maximum(radius - thickness, np.minimum(0.02, radius / 2))
+    # The inside begins above the bottom, which is as thick as the wall.
     keep = height > thickness
+    # The rim is a half circle from the outside to the inside.
     t = np.linspace(0, np.pi, 8)[1:-1, None]
-    rim = np.concatenate([np.cos(t), np.sin(t)], -1) * thickness / 2 + [
-        radius[-1] - thickness / 2,
-        height[-1],
-    ]
+    middle = [radius[-1] - thickness / 2, height[-1]]
+    rim = np.concatenate([np.cos(t), np.sin(t)], -1) * thickness / 2 + middle
+    # The outline, walked from the middle of the bottom over the outside to the middle of the floor.
     outside = np.stack([radius, height], -1)
     inside = np.stack([inner, height], -1)[keep][::-1]
     bottom = np.stack([np.linspace(0, radius[0], 6), np.zeros(6)], -1)[:-1]
@@ -100,6 +103,7 @@ def load(path: Path) -> Solid:
 
     Raises InputError when it is damaged, or has no faces or no size.
     """
+    # Mitsuba needs a variant before it reads anything.
     setup()
     try:
         params = mi.traverse(mi.load_dict({"type": "ply", "filename": str(path)}))
@@ -114,19 +118,20 @@ def load(path: Path) -> Solid:
         raise InputError(
             f"The mesh {path} has no faces, or no size; mend it, or take it out of the folder."
         )
+    # On the ground, its longest side 1.
     low = vertices.min(0)
     high = vertices.max(0)
-    vertices = (vertices - [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]) / (
-        high - low
-    ).max()
+    base = [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]
+    vertices = (vertices - base) / (high - low).max()
     normals = _exact_normals(vertices, faces)
     # Each face gets corners of its own, so that the texture can close around the axis without a seam.
     corners = vertices[faces]  # [F, 3, 3]
     u = np.arctan2(corners[..., 2], corners[..., 0]) / (2 * np.pi) + 0.5
+    # A face across the seam: its small u belong to the next turn.
     u = np.where((np.ptp(u, axis=1, keepdims=True) > 0.5) & (u < 0.5), u + 1, u)
     uv = np.stack([u, corners[..., 1]], -1).reshape(-1, 2)
-    own = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
-    return Solid(corners.reshape(-1, 3), own, normals[faces].reshape(-1, 3), uv)
+    corner_faces = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
+    return Solid(corners.reshape(-1, 3), corner_faces, normals[faces].reshape(-1, 3), uv)
 
 
 def placed(
@@ -141,12 +146,12 @@ def _grid(points: Array) -> Solid:
     n, m = points.shape[:2]
     faces = grid_faces(n, m)
     vertices = points.reshape(-1, 3).astype(np.float64)
+    # The triangles at poles have no area, and so no normal.
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
-    faces = faces[area > 1e-12]  # the triangles at poles that have no area
+    faces = faces[area > 1e-12]
     u, v = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n))
-    return Solid(
-        vertices, faces, _exact_normals(vertices, faces), np.stack([2 * u, v], -1).reshape(-1, 2)
-    )
+    uv = np.stack([2 * u, v], -1).reshape(-1, 2)
+    return Solid(vertices, faces, _exact_normals(vertices, faces), uv)
 
 
 def grid_faces(n: int, m: int, flip: bool = False) -> Array:
@@ -156,9 +161,9 @@ def grid_faces(n: int, m: int, flip: bool = False) -> Array:
     b = index[1:, :-1]
     c = index[1:, 1:]
     d = index[:-1, 1:]
-    faces = np.concatenate(
-        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
-    )
+    lower = np.stack([a, b, c], -1).reshape(-1, 3)
+    upper = np.stack([a, c, d], -1).reshape(-1, 3)
+    faces = np.concatenate([lower, upper])
     return (faces[:, ::-1] if flip else faces).astype(np.int32)
 
 
@@ -170,13 +175,14 @@ def face_normals(vertices: Array, faces: Array) -> Array:
 
 def _exact_normals(vertices: Array, faces: Array) -> Array:
     """[V, 3] area-weighted unit normals, shared by vertices at one place (seams and poles stay invisible)."""
+    # Vertices that agree to a millionth of the mesh's size are one place.
     scale = np.ptp(vertices, axis=0).max()
-    _, place = np.unique(
-        np.round(vertices / scale * 1e6).astype(np.int64), axis=0, return_inverse=True
-    )
+    keys = np.round(vertices / scale * 1e6).astype(np.int64)
+    _, place = np.unique(keys, axis=0, return_inverse=True)
+    place = place.reshape(-1)
     flat = np.tile(face_normals(vertices, faces), (3, 1))
-    corners = place.reshape(-1)[faces].T.ravel()
-    return vertex_normals(corners, flat)[place.reshape(-1)]
+    corners = place[faces].T.ravel()
+    return vertex_normals(corners, flat)[place]
 
 
 def vertex_normals(corners: Array, normals: Array) -> Array:
@@ -192,26 +198,29 @@ def slab(size: ArrayLike, radius: float = 0.0) -> Solid:
     radius = float(min(radius, 0.95 * half.min()))
     # Towards the edge the grid crowds as tan, so that the arc it is pushed onto has even steps.
     bend = radius * np.tan(np.linspace(0, np.pi / 4, 4)) if radius > 0 else np.zeros(1)
-    lines = [np.concatenate([-tips[::-1], tips]) for tips in (h - radius + bend for h in half)]
+    # Positions of the grid along each axis: `bend` crowds at both ends.
+    lines = []
+    for h in half:
+        tips = h - radius + bend
+        lines.append(np.concatenate([-tips[::-1], tips]))
     sides = []
     for axis, u, v in ((0, 2, 1), (1, 0, 2), (2, 0, 1)):  # v is the vertical of upright sides
         a, b = np.meshgrid(lines[u], lines[v], indexing="ij")
         for sign in (-1.0, 1.0):
             p = np.empty((*a.shape, 3))
-            p[..., axis], p[..., u], p[..., v] = sign * half[axis], a, b
+            p[..., axis] = sign * half[axis]
+            p[..., u] = a
+            p[..., v] = b
+            # Edges are round where the box is a smaller one, `inner`, grown by a ball.
             inner = np.clip(p, -(half - radius), half - radius)
             normal = p - inner if radius > 0 else np.eye(3)[axis] * sign + np.zeros_like(p)
             normal = (normal / np.linalg.norm(normal, axis=-1, keepdims=True)).reshape(-1, 3)
+            vertices = inner.reshape(-1, 3) + radius * normal
+            # Faces must look outwards, whichever way (u, v, axis) turns.
             mirrored = np.linalg.det(np.eye(3)[[u, v, axis]]) * sign < 0
+            faces = grid_faces(len(a), a.shape[1], mirrored)
             uv = np.stack([a, b], -1).reshape(-1, 2)
-            sides.append(
-                Solid(
-                    inner.reshape(-1, 3) + radius * normal,
-                    grid_faces(len(a), a.shape[1], mirrored),
-                    normal,
-                    uv,
-                )
-            )
+            sides.append(Solid(vertices, faces, normal, uv))
     return moved(joined(sides), (0, half[1], 0))
 
 
@@ -224,21 +233,18 @@ def sheet(origin: ArrayLike, right: ArrayLike, up: ArrayLike, n: int = 1) -> Sol
     vertices = np.asarray(origin) + a[..., None] * right + b[..., None] * up
     normal = np.cross(right, up)
     normal = np.broadcast_to(normal / np.linalg.norm(normal), vertices.shape)
+    # Texture coordinates in metres.
     uv = np.stack([a * np.linalg.norm(right), b * np.linalg.norm(up)], -1)
-    return Solid(
-        vertices.reshape(-1, 3),
-        grid_faces(n + 1, n + 1),
-        normal.reshape(-1, 3).copy(),
-        uv.reshape(-1, 2),
-    )
+    faces = grid_faces(n + 1, n + 1)
+    return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3).copy(), uv.reshape(-1, 2))
 
 
 def warped(solid: Solid, function) -> Solid:
     """The solid with its vertices [V, 3] sent through `function`, and new smooth normals."""
     vertices = function(solid.vertices)
-    return replace(
-        solid, vertices=vertices, normals=smooth_normals(vertices, solid.faces, solid.vertices)
-    )
+    # Seams stay closed: vertices share a normal where they lay together before.
+    normals = smooth_normals(vertices, solid.faces, solid.vertices)
+    return replace(solid, vertices=vertices, normals=normals)
 
 
 def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -> Array:
@@ -248,15 +254,16 @@ def smooth_normals(vertices: Array, faces: Array, places: Array | None = None) -
     """
     places = vertices if places is None else places
     scale = max(float(np.ptp(places, axis=0).max()), 1e-9)
+    # Three rounded coordinates in one integer, of 21 bits each: sorting one column is fast.
     keys = np.round(places / scale * 1e5).astype(np.int64) @ np.array([1, 2**21, 2**42])
     _, place = np.unique(keys, return_inverse=True)
-    return vertex_normals(
-        place[faces].ravel(), np.repeat(face_normals(vertices, faces), 3, axis=0)
-    )[place]
+    flat = np.repeat(face_normals(vertices, faces), 3, axis=0)
+    return vertex_normals(place[faces].ravel(), flat)[place]
 
 
 def lumps(rng: np.random.Generator, amount: float, waves: float, count: int = 6):
     """A function [..., 3] -> [...] of smooth noise with about that amplitude and that many waves a metre."""
+    # A sum of sines of random direction, length and phase; 1 / sqrt(count) keeps its power.
     wave = rng.normal(size=(count, 3)) * waves * 2 * np.pi / np.sqrt(3)
     phase = rng.uniform(0, 2 * np.pi, count)
     weight = rng.uniform(0.4, 1, count) * amount / np.sqrt(count)
@@ -272,6 +279,7 @@ def ball(n: int = 48) -> Solid:
 
 def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 48) -> Solid:
     """Smooth lumpy body of about extent `size` [3] standing on y = 0: stones, fruit, bread, bushes."""
+    # Large lumps and, on them, finer ones.
     bump = lumps(rng, roughness, 0.35)
     fine = lumps(rng, roughness * 0.35, 1.2)
     half = np.asarray(size, float) / 2
@@ -294,9 +302,10 @@ def disc(radius: float) -> Solid:
 def drum(radius: float, height: float, top: float | None = None) -> Solid:
     """A cylinder about the Y axis, its middle at the origin; or a cone, whose upper radius is `top`."""
     h = height / 2
-    return lathe(
-        np.array([(1e-3, -h), (radius, -h), (radius if top is None else top, h), (1e-3, h)]), 24
-    )
+    upper = radius if top is None else top
+    # (radius, height); the caps leave a hole of a millimetre around the axis.
+    profile = np.array([(1e-3, -h), (radius, -h), (upper, h), (1e-3, h)])
+    return lathe(profile, 24)
 
 
 def torus(major: float, minor: float, n: int) -> Solid:
@@ -309,11 +318,18 @@ def torus(major: float, minor: float, n: int) -> Solid:
 def strip(line: ArrayLike, width: float, flip: bool = False) -> Solid:
     """A band of that width along Z over a line [P, 3] in the plane of X and Y; texture coordinates in metres."""
     line = np.asarray(line, float)
-    vertices = (line[:, None] + [[0, 0, -width / 2], [0, 0, width / 2]]).reshape(-1, 3)
-    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=-1))])
-    uv = np.stack(np.broadcast_arrays([0, width], along[:, None]), -1).reshape(-1, 2)
+    edges = [[0, 0, -width / 2], [0, 0, width / 2]]
+    vertices = (line[:, None] + edges).reshape(-1, 3)
+    along = _lengths(line)[:, None]
+    uv = np.stack(np.broadcast_arrays([0, width], along), -1).reshape(-1, 2)
     faces = grid_faces(len(line), 2, flip)
     return Solid(vertices, faces, smooth_normals(vertices, faces), uv)
+
+
+def _lengths(line: Array) -> Array:
+    """[P] lengths along a line [P, 3] from its first point."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=-1)
+    return np.concatenate([[0], np.cumsum(steps)])
 
 
 def grounded(solid: Solid) -> Solid:
@@ -329,17 +345,18 @@ def metric(solid: Solid, width: float, height: float) -> Solid:
 def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     """Round tube along points [P, 3] with one radius or [P] radii; open ends."""
     line = np.asarray(points, float)
+    # A frame at every point: along the line, and two directions across it.
     along = unit(np.gradient(line, axis=0))
-    side = unit(
-        np.cross(along, np.where(np.abs(along[:, 1:2]) > 0.9, [[1.0, 0, 0]], [[0, 1.0, 0]]))
-    )
+    steep = np.abs(along[:, 1:2]) > 0.9
+    side = unit(np.cross(along, np.where(steep, [[1.0, 0, 0]], [[0, 1.0, 0]])))
     other = np.cross(along, side)
+    # Circles in these frames.
     phi = np.linspace(0, 2 * np.pi, n + 1)[None, :, None]
     normal = np.cos(phi) * side[:, None] + np.sin(phi) * other[:, None]
     width = np.broadcast_to(np.asarray(radius, float), len(line))
     vertices = line[:, None] + width[:, None, None] * normal
-    length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=-1))])
-    uv = np.stack(np.broadcast_arrays(phi[..., 0] * width.mean(), length[:, None]), -1)
+    around = phi[..., 0] * width.mean()
+    uv = np.stack(np.broadcast_arrays(around, _lengths(line)[:, None]), -1)
     faces = grid_faces(len(line), n + 1, flip=True)
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
@@ -350,36 +367,35 @@ def leaves(
     """Bent leaves of six triangles each, from roots [N, 3] along unit directions [N, 3]."""
     n = len(roots)
     directions = unit(directions)
-    side = unit(np.cross(directions, np.array([0, 1, 0]) + rng.normal(scale=0.3, size=(n, 3))))
+    up = np.array([0, 1, 0]) + rng.normal(scale=0.3, size=(n, 3))
+    side = unit(np.cross(directions, up))
     size = (length * rng.uniform(0.6, 1.2, n))[:, None]
+    # Pairs of points at both sides of a spine that sinks with the square of its length:
+    # (share of the length, share of the width).
     rows = []
     for t, w in ((0.0, 0.1), (0.35, 1.0), (0.7, 0.8), (1.0, 0.05)):
-        spine = roots + directions * size * t + np.array([0, -1, 0]) * size * 0.35 * t * t
-        rows += [
-            spine - side * width / 2 * w * size / length,
-            spine + side * width / 2 * w * size / length,
-        ]
+        sag = np.array([0, -1, 0]) * size * 0.35 * t * t
+        spine = roots + directions * size * t + sag
+        half_width = side * width / 2 * w * size / length
+        rows += [spine - half_width, spine + half_width]
     vertices = np.stack(rows, 1)  # [N, 8, 3]
-    one = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
-    faces = (one[None] + 8 * np.arange(n)[:, None, None]).reshape(-1, 3).astype(np.int32)
     flat = vertices.reshape(-1, 3)
-    uv = np.tile(
-        np.stack([np.tile([0, width], 4), np.repeat([0, 0.35, 0.7, 1], 2) * length], -1), (n, 1)
-    )
-    return Solid(
-        flat,
-        faces,
-        smooth_normals(flat, faces, flat + np.repeat(np.arange(n), 8)[:, None] * 1e3),
-        uv,
-    )
+    leaf_faces = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
+    first_vertex = 8 * np.arange(n)
+    faces = (leaf_faces[None] + first_vertex[:, None, None]).reshape(-1, 3).astype(np.int32)
+    # One leaf's coordinates for all; leaves that touch must not share normals.
+    across = np.tile([0, width], 4)
+    down = np.repeat([0, 0.35, 0.7, 1], 2) * length
+    uv = np.tile(np.stack([across, down], -1), (n, 1))
+    apart = flat + np.repeat(np.arange(n), 8)[:, None] * 1e3
+    return Solid(flat, faces, smooth_normals(flat, faces, apart), uv)
 
 
 def joined(parts: list[Solid]) -> Solid:
     """Several solids as one."""
     vertices, faces = joined_faces(parts)
-    normals, uv = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("normals", "uv")
-    )
+    normals = np.concatenate([part.normals for part in parts])
+    uv = np.concatenate([part.uv for part in parts])
     return Solid(vertices, faces, normals, uv)
 
 
@@ -393,12 +409,12 @@ def moved(
     """The solid scaled, tipped about X, turned about Y (radians) and moved by `at` [3]."""
     c = np.cos(turn)
     s = np.sin(turn)
-    ct = np.cos(tip)
-    st = np.sin(tip)
-    rotation = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.array(
-        [[1, 0, 0], [0, ct, -st], [0, st, ct]]
-    )
+    about_y = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    c = np.cos(tip)
+    s = np.sin(tip)
+    about_x = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    rotation = about_y @ about_x
     vertices = solid.vertices @ rotation.T * scale + np.asarray(at, float)
-    return replace(
-        solid, vertices=vertices, normals=solid.normals @ rotation.T, uv=solid.uv * scale
-    )
+    normals = solid.normals @ rotation.T
+    # Texture coordinates are metres: they grow with the solid.
+    return replace(solid, vertices=vertices, normals=normals, uv=solid.uv * scale)

@@ -21,20 +21,26 @@ def thing(rng: np.random.Generator, size: float, meshes: Meshes = (), share: flo
 
 def captured(rng: np.random.Generator, size: float, meshes: Meshes) -> Parts:
     """A mesh from a file in any material, its longest side `size`."""
+    # The texture wraps once around, about 0.6 times the height wide.
     solid = s.metric(s.load(meshes[rng.integers(len(meshes))]), np.pi * 0.6, 1)
+    # Some lie on their front or back.
     tip = rng.choice([0, 0, 0, np.pi / 2, -np.pi / 2]) if rng.random() < 0.3 else 0.0
-    return [ScenePart(s.grounded(s.moved(solid, tip=tip, scale=size)), m.any_object(rng))]
+    standing = s.grounded(s.moved(solid, tip=tip, scale=size))
+    return [ScenePart(standing, m.any_object(rng))]
 
 
 def _box(rng, size) -> Parts:
+    """A box, at times printed like a package."""
     extent = size * rng.uniform([0.4, 0.3, 0.4], [1.3, 1.0, 1.3])
     look = m.printed(rng, extent[0], extent[1]) if rng.random() < 0.3 else m.any_object(rng)
-    return [block(extent, (0, 0, 0), look, float(rng.choice([0, 0.02, 0.08])) * size)]
+    rounding = float(rng.choice([0, 0.02, 0.08])) * size
+    return [block(extent, (0, 0, 0), look, rounding)]
 
 
 def _superquadric(rng, size) -> Parts:
     """Balls, eggs, rounded boxes, drums, diamonds."""
-    extent, (e1, e2) = size * rng.uniform(0.5, 1.1, 3), rng.uniform(0.2, 1.4, 2)
+    extent = size * rng.uniform(0.5, 1.1, 3)
+    e1, e2 = rng.uniform(0.2, 1.4, 2)
     if rng.random() < 0.4:  # a ball
         extent = np.full(3, extent[0])
         e1 = 1
@@ -45,12 +51,8 @@ def _superquadric(rng, size) -> Parts:
 
 def _blob(rng, size) -> Parts:
     """Fruit, bread, stones, folded soft things."""
-    return [
-        ScenePart(
-            s.blob(rng, size * rng.uniform(0.5, 1.0, 3), rng.uniform(0.03, 0.3), 40),
-            m.any_object(rng),
-        )
-    ]
+    body = s.blob(rng, size * rng.uniform(0.5, 1.0, 3), rng.uniform(0.03, 0.3), 40)
+    return [ScenePart(body, m.any_object(rng))]
 
 
 def vase(rng, size) -> Parts:
@@ -60,24 +62,31 @@ def vase(rng, size) -> Parts:
     widths = rng.uniform(0.4, 1.0, len(heights))
     control = np.stack([widths * radius, heights * size], -1)
     parts = [ScenePart(s.pot(control, 0.04 * size), m.any_object(rng))]
+    # Twigs begin within the vase and spread no wider than its mouth.
     if rng.random() < 0.35:
-        parts += _twigs(rng, size * 0.7, size * rng.uniform(0.7, 1.5), widths[-1] * radius * 0.6)
+        mouth = widths[-1] * radius
+        parts += _twigs(rng, size * 0.7, size * rng.uniform(0.7, 1.5), mouth * 0.6)
     return parts
 
 
 def _twigs(rng, base, length, spread) -> Parts:
+    """Leafy twigs of about that length which begin at the height `base`, within `spread` of the axis."""
     stem = m.foliage(rng)
     leaf = m.foliage(rng)
     parts = []
     t = np.linspace(0, 1, 6)[:, None]
     for _ in range(int(rng.integers(3, 9))):
-        lean, (x, z) = rng.normal(size=2) * 0.35, rng.uniform(-spread, spread, 2)
-        line = [x, base, z] + length * (t * [lean[0], 1, lean[1]] + t**2 * [lean[0], -0.2, 0])
+        lean = rng.normal(size=2) * 0.35
+        x, z = rng.uniform(-spread, spread, 2)
+        # A parabola: the twig bends down towards its end.
+        bend = t * [lean[0], 1, lean[1]] + t**2 * [lean[0], -0.2, 0]
+        line = [x, base, z] + length * bend
         parts.append(rod(line, 0.008 * length, stem, 5))
         count = int(rng.integers(4, 12))
         roots = line[rng.integers(2, 6, count)]
         way = rng.normal((0, 0.5, 0), 1, (count, 3))
-        parts.append(ScenePart(s.leaves(rng, roots, way, 0.25 * length, 0.09 * length), leaf))
+        leaves = s.leaves(rng, roots, way, 0.25 * length, 0.09 * length)
+        parts.append(ScenePart(leaves, leaf))
     return parts
 
 
@@ -85,19 +94,24 @@ def _cup(rng, size) -> Parts:
     """Cup or mug with a handle and a drink in it."""
     radius = size * rng.uniform(0.4, 0.6)
     look = m.ceramic(rng)
-    control = np.array([(0.65, 0), (0.85, 0.2), (1, 0.6), (1.02, 1)]) ** [
-        rng.uniform(0.3, 1.3),
-        1,
-    ] * [radius, size]
+    # (radius, height) of the wall; the exponent makes it straight or bellied.
+    outline = np.array([(0.65, 0), (0.85, 0.2), (1, 0.6), (1.02, 1)])
+    belly = rng.uniform(0.3, 1.3)
+    control = outline ** [belly, 1] * [radius, size]
+    # The handle is half an ellipse that begins and ends within the wall.
     phi = np.linspace(-np.pi / 2, np.pi / 2, 12)
-    loop = np.stack(
-        [np.cos(phi) * 0.35 * size + radius * 0.9, (np.sin(phi) * 0.3 + 0.5) * size, 0 * phi], -1
-    )
-    drink = m.uniform(
-        m.hsv(rng.uniform(0.03, 0.12), rng.uniform(0.2, 0.9), rng.uniform(0.1, 0.8)), 0.08
-    )
-    level = ScenePart(s.moved(s.disc(radius * 0.9), (0, size * rng.uniform(0.6, 0.85), 0)), drink)
-    return [ScenePart(s.pot(control, 0.05 * size), look), rod(loop, 0.05 * size, look, 7), level]
+    x = np.cos(phi) * 0.35 * size + radius * 0.9
+    y = (np.sin(phi) * 0.3 + 0.5) * size
+    loop = np.stack([x, y, 0 * phi], -1)
+    # Coffee, tea, milk: a shiny disc.
+    colour = m.hsv(rng.uniform(0.03, 0.12), rng.uniform(0.2, 0.9), rng.uniform(0.1, 0.8))
+    drink = m.uniform(colour, 0.08)
+    surface = s.moved(s.disc(radius * 0.9), (0, size * rng.uniform(0.6, 0.85), 0))
+    return [
+        ScenePart(s.pot(control, 0.05 * size), look),
+        rod(loop, 0.05 * size, look, 7),
+        ScenePart(surface, drink),
+    ]
 
 
 def _bowl(rng, size) -> Parts:
@@ -105,22 +119,25 @@ def _bowl(rng, size) -> Parts:
     r = size * rng.uniform(0.6, 1.0)
     height = size * rng.uniform(0.15, 0.6)
     t = np.linspace(0, 1, 6)
-    control = np.stack([r * (0.4 + 0.6 * t ** rng.uniform(0.3, 0.8)), height * t], -1)
+    radius = r * (0.4 + 0.6 * t ** rng.uniform(0.3, 0.8))
+    control = np.stack([radius, height * t], -1)
     parts = [ScenePart(s.pot(control, 0.03 * size), m.any_object(rng))]
+    # Fruit, mostly of one kind.
     food = m.any_object(rng)
     for _ in range(int(rng.integers(2, 8)) if rng.random() < 0.5 else 0):
         piece = s.blob(rng, size * rng.uniform(0.25, 0.45, 3), 0.08, 24)
         place = rng.uniform([-0.4, 0.15, -0.4], [0.4, 0.45, 0.4]) * [r, height, r]
-        parts.append(
-            ScenePart(s.moved(piece, place), food if rng.random() < 0.6 else m.any_object(rng))
-        )
+        look = food if rng.random() < 0.6 else m.any_object(rng)
+        parts.append(ScenePart(s.moved(piece, place), look))
     return parts
 
 
 def _bottle(rng, size) -> Parts:
+    """An opaque bottle, mostly with a label."""
     r = size * rng.uniform(0.12, 0.2)
     neck = rng.uniform(0.3, 0.5)
     shoulder = rng.uniform(0.5, 0.75)
+    # (radius, height) as shares: bottom, body, shoulder, neck, lip.
     profile = np.array(
         [
             (1e-3, 0),
@@ -136,6 +153,7 @@ def _bottle(rng, size) -> Parts:
     ) * [r, size]
     look = m.plastic(rng) if rng.random() < 0.7 else m.metal(rng)
     parts = [ScenePart(s.metric(s.lathe(profile, 40), np.pi * r, size), look)]
+    # The label is a band a hair outside the body.
     if rng.random() < 0.7:
         low, high = rng.uniform([0.05, 0.5], [0.25, 0.95]) * shoulder * size
         band = s.lathe(np.array([(1.012 * r, low), (1.012 * r, high)]), 40)
@@ -145,62 +163,60 @@ def _bottle(rng, size) -> Parts:
 
 
 def _books(rng, size) -> Parts:
+    """A pile of books: pages between two covers."""
     parts = []
     top = 0.0
     paper = m.uniform(m.hsv(0.12, 0.12, 0.9), 0.8, grain=0.2)
     for _ in range(int(rng.integers(1, 6))):
-        w, h, d = extent = size * rng.uniform([0.7, 0.06, 0.5], [1.1, 0.2, 0.8])
+        extent = size * rng.uniform([0.7, 0.06, 0.5], [1.1, 0.2, 0.8])
+        w, h, d = extent
         turn = rng.normal() * 0.25
         cover = m.printed(rng, w, d) if rng.random() < 0.6 else m.plastic(rng)
-        parts.append(block(extent * [0.97, 0.8, 0.97], (0, top + 0.1 * h, 0), paper, turn=turn))
-        parts += [block((w, 0.1 * h, d), (0, y, 0), cover, turn=turn) for y in (top, top + 0.9 * h)]
+        # The pages are a little smaller than their covers.
+        pages = extent * [0.97, 0.8, 0.97]
+        parts.append(block(pages, (0, top + 0.1 * h, 0), paper, turn=turn))
+        for y in (top, top + 0.9 * h):
+            parts.append(block((w, 0.1 * h, d), (0, y, 0), cover, turn=turn))
         top += h
     return parts
 
 
 def plant(rng, size) -> Parts:
+    """A potted plant: long blades from the soil, or leaves around a stem."""
     pot = size * rng.uniform(0.25, 0.4)
     leaf = m.foliage(rng)
     n = int(rng.integers(20, 120))
     control = np.array([(0.75, 0), (0.9, 0.5), (1, 1)]) * [pot * 0.5, pot]
     height = size - pot
-    soil = ScenePart(
-        s.moved(s.disc(pot * 0.46), (0, 0.85 * pot, 0)),
-        m.uniform(m.hsv(0.07, 0.5, 0.25), 0.9, grain=0.8),
-    )
+    earth = m.uniform(m.hsv(0.07, 0.5, 0.25), 0.9, grain=0.8)
+    soil = ScenePart(s.moved(s.disc(pot * 0.46), (0, 0.85 * pot, 0)), earth)
     parts = [ScenePart(s.pot(control, 0.05 * pot), m.any_object(rng)), soil]
-    if rng.random() < 0.4:  # blades from the soil
+    # --- Blades from the soil ---
+    if rng.random() < 0.4:
         roots = rng.normal(size=(n, 3)) * [pot * 0.12, 0, pot * 0.12] + [0, pot * 0.85, 0]
         way = rng.normal(size=(n, 3)) * [0.5, 0, 0.5] + [0, 1, 0]
-        return [
-            *parts,
-            ScenePart(
-                s.leaves(rng, roots, way, height * 1.1, height * rng.uniform(0.04, 0.12)), leaf
-            ),
-        ]
+        width = height * rng.uniform(0.04, 0.12)
+        blades = s.leaves(rng, roots, way, height * 1.1, width)
+        return [*parts, ScenePart(blades, leaf)]
+    # --- Leaves around a stem; the crown is widest at half its height, t ---
     t = rng.random(n)
     angle = rng.uniform(0, 2 * np.pi, n)
     out = rng.uniform(0, 0.35, n) * height * np.sin(np.pi * (0.2 + 0.7 * t))
-    roots = np.stack([out * np.cos(angle), pot * 0.9 + t * height * 0.8, out * np.sin(angle)], -1)
+    up = pot * 0.9 + t * height * 0.8
+    roots = np.stack([out * np.cos(angle), up, out * np.sin(angle)], -1)
     way = np.stack([np.cos(angle), rng.uniform(0, 1.2, n), np.sin(angle)], -1)
     length = height * rng.uniform(0.2, 0.4)
-    leaves = ScenePart(s.leaves(rng, roots, way, length, length * rng.uniform(0.25, 0.6)), leaf)
-    return [
-        *parts,
-        rod([(0, 0.8 * pot, 0), (0, pot + 0.8 * height, 0)], 0.015 * size, m.wood(rng), 6),
-        leaves,
-    ]
+    leaves = s.leaves(rng, roots, way, length, length * rng.uniform(0.25, 0.6))
+    axis = [(0, 0.8 * pot, 0), (0, pot + 0.8 * height, 0)]
+    return [*parts, rod(axis, 0.015 * size, m.wood(rng), 6), ScenePart(leaves, leaf)]
 
 
 def _ring(rng, size) -> Parts:
     """Ring, wheel, roll of tape, lying or standing."""
     major = size * rng.uniform(0.3, 0.5)
     solid = s.torus(major, major * rng.uniform(0.12, 0.4), 16)
-    return [
-        ScenePart(
-            s.grounded(s.moved(solid, tip=float(rng.choice([0, np.pi / 2])))), m.any_object(rng)
-        )
-    ]
+    tip = float(rng.choice([0, np.pi / 2]))
+    return [ScenePart(s.grounded(s.moved(solid, tip=tip)), m.any_object(rng))]
 
 
 def _stacked(rng, size) -> Parts:
@@ -211,28 +227,29 @@ def _stacked(rng, size) -> Parts:
     for _ in range(int(rng.integers(2, 6))):
         height = size * rng.uniform(0.1, 0.4)
         r = size * rng.uniform(0.06, 0.25)
+        # All three are made, whichever is taken: the random numbers of a seed stay in their places.
         kind = rng.integers(3)
+        cone = s.drum(r, height, r * rng.uniform(0.5, 1))
         solid = (
-            s.grounded(s.metric(s.drum(r, height, r * rng.uniform(0.5, 1)), np.pi * r, height)),
+            s.grounded(s.metric(cone, np.pi * r, height)),
             s.grounded(s.moved(s.ball(32), scale=height / 2)),
             s.slab((2 * r, height, 2 * r), 0.1 * r),
         )[kind]
-        parts.append(
-            ScenePart(
-                s.moved(solid, (0, top, 0)), look if rng.random() < 0.6 else m.any_object(rng)
-            )
-        )
+        material = look if rng.random() < 0.6 else m.any_object(rng)
+        parts.append(ScenePart(s.moved(solid, (0, top, 0)), material))
+        # A little overlap, so that no gap shows.
         top += height * 0.97
     return parts
 
 
 def cushion(rng, size) -> Parts:
-    base = s.superquadric(size * np.array([1, rng.uniform(0.7, 1), 0.3]), 0.35, 0.35, 24)
+    """A lumpy cushion that leans back."""
+    extent = size * np.array([1, rng.uniform(0.7, 1), 0.3])
+    base = s.superquadric(extent, 0.35, 0.35, 24)
     bump = s.lumps(rng, 0.05 * size, 2 / size)
     solid = s.warped(base, lambda p: p + bump(p)[:, None] * [0, 0, 1])
-    return [
-        ScenePart(s.moved(s.metric(solid, size, size), tip=-rng.uniform(0.1, 0.5)), m.fabric(rng))
-    ]
+    leaning = s.moved(s.metric(solid, size, size), tip=-rng.uniform(0.1, 0.5))
+    return [ScenePart(leaning, m.fabric(rng))]
 
 
 KINDS = (
@@ -262,14 +279,16 @@ def scattered(
     taken: list[tuple[float, float, float]] = []
     parts: Parts = []
     for _ in range(count):
-        one = thing(rng, float(np.exp(rng.uniform(*np.log(sizes)))), meshes, share)
+        item = thing(rng, float(np.exp(rng.uniform(*np.log(sizes)))), meshes, share)
+        # The circle around it on the ground.
         radius = max(
-            float(np.hypot(p.solid.vertices[:, 0], p.solid.vertices[:, 2]).max()) for p in one
+            float(np.hypot(p.solid.vertices[:, 0], p.solid.vertices[:, 2]).max()) for p in item
         )
+        # A dozen tries at a free place; a thing that fits nowhere is left out.
         for _ in range(12):
             x, z = rng.uniform(-1, 1, 2) * np.maximum(np.array(half) - 0.6 * radius, 0.01)
             if all(np.hypot(x - a, z - b) > 0.85 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
-                parts += placed(one, (x, 0, z), rng.uniform(0, 2 * np.pi))
+                parts += placed(item, (x, 0, z), rng.uniform(0, 2 * np.pi))
                 break
     return parts

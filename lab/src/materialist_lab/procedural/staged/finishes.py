@@ -76,12 +76,13 @@ RELIEFS: dict[str, tuple[ReliefRange, ...]] = {
 
 def relief_of(rng: np.random.Generator, family: str, scale: float = 1.0) -> Relief | None:
     """Relief that suits a family, its size times `scale`; often none."""
-    for one in RELIEFS.get(family, ()):
-        if rng.random() < one.share:
-            size = scale * float(np.exp(rng.uniform(*np.log(one.size))))
+    for choice in RELIEFS.get(family, ()):
+        if rng.random() < choice.share:
+            size = scale * float(np.exp(rng.uniform(*np.log(choice.size))))
             stretch = np.exp(rng.normal(0, 0.25, 3)) if rng.random() < 0.5 else np.ones(3)
             x, y, z = (size * stretch).tolist()
-            return Relief(str(rng.choice(one.kinds.split())), (x, y, z), rng.uniform(*one.slope))
+            kind = str(rng.choice(choice.kinds.split()))
+            return Relief(kind, (x, y, z), rng.uniform(*choice.slope))
     return None
 
 
@@ -93,52 +94,57 @@ class Style:
     """[3] on colours."""
     gloss: float
     """Added to roughness."""
-    own: bool
+    has_own_finish: bool
     """Whether plain surfaces get finishes of our own."""
     bumpy: float
     """Probability of relief."""
 
 
 def style(rng: np.random.Generator) -> Style:
+    """A random variant; all surfaces of one instance share it."""
     even = np.exp(rng.normal(0, 0.3)) if rng.random() < 0.6 else 1.0
     tint = np.exp(rng.normal(0, 0.25, 3)) if rng.random() < 0.3 else np.ones(3)
-    return Style(
-        even * tint, rng.normal(0, 0.08), rng.random() < 0.6, rng.choice([0.0, 1.0], p=[0.3, 0.7])
-    )
+    gloss = rng.normal(0, 0.08)
+    has_own_finish = rng.random() < 0.6
+    return Style(even * tint, gloss, has_own_finish, rng.choice([0.0, 1.0], p=[0.3, 0.7]))
 
 
 def finish(
     rng: np.random.Generator,
     look: CatalogLook,
     picture: ColourPicture | None,
-    one: Style,
+    variant: Style,
     stock: Stock,
 ) -> Material:
     """The material of one surface of a model."""
+    # --- Roughness and relief ---
     family = look.family
     if family == "mirror":
         return m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
+    # The catalogue's shine is a hint only: most comes from the family's range.
     low, high = ROUGHNESS[family]
-    rough = 0.75 * rng.uniform(low, high) + 0.25 * np.clip(look.shine, low, high) + one.gloss
+    rough = 0.75 * rng.uniform(low, high) + 0.25 * np.clip(look.shine, low, high) + variant.gloss
     rough = float(np.clip(rough, 0.06, 1.0))
-    relief = relief_of(rng, family) if rng.random() < one.bumpy else None
+    relief = relief_of(rng, family) if rng.random() < variant.bumpy else None
+    # --- A picture of the model's own, a finish of ours, or one colour ---
     if picture is not None:
-        return replace(pictured(picture, one.gain, rough), relief=relief)
-    if one.own and rng.random() < 0.7:
-        made = _own(rng, family, stock)
-        if made is not None:
-            return replace(made, relief=relief)
+        return replace(pictured(picture, variant.gain, rough), relief=relief)
+    if variant.has_own_finish and rng.random() < 0.7:
+        material = _own_finish(rng, family, stock)
+        if material is not None:
+            return replace(material, relief=relief)
     metallic = 0.0
-    colour = np.clip(np.array(look.colour) * one.gain, 0.015, 0.85)
+    colour = np.clip(np.array(look.colour) * variant.gain, 0.015, 0.85)
     if family == "metal":
         metallic, colour = _metal(rng, colour)
-    made = m.uniform(_triple(colour), rough, metallic, grain=rng.uniform(0, 0.15))
+    material = m.uniform(_triple(colour), rough, metallic, grain=rng.uniform(0, 0.15))
     second = float(np.clip(rough + rng.uniform(0, 0.15), 0.06, 1))
-    return replace(made, roughness=(rough, second), repeat=(0.6, 0.6), relief=relief)
+    return replace(material, roughness=(rough, second), repeat=(0.6, 0.6), relief=relief)
 
 
 def pictured(picture: ColourPicture, gain: Array, rough: float, metallic: float = 0.0) -> Material:
     """A material whose picture lies by the texture coordinates of a model: v points up."""
+    # The picture is the albedo; the colour is a factor on it.
     colour = _triple(np.clip(gain, 0.3, 1.4))
     return Material(
         0,
@@ -156,31 +162,34 @@ def covered(rng: np.random.Generator, picture: ColourPicture, size: float, famil
     """A material whose picture repeats every `size` metres, on surfaces with texture coordinates in metres."""
     h, w = picture.pixels.shape[:2]
     rough = rng.uniform(*ROUGHNESS[family])
-    made = pictured(picture, np.exp(rng.normal(0, 0.2)) * np.ones(3), rough)
+    material = pictured(picture, np.exp(rng.normal(0, 0.2)) * np.ones(3), rough)
     turn = rng.choice([0, np.pi / 2]) if rng.random() < 0.3 else 0.0
     relief = relief_of(rng, family)
-    return replace(made, repeat=(size, -size * h / w), turn=turn, offset=None, relief=relief)
+    return replace(material, repeat=(size, -size * h / w), turn=turn, offset=None, relief=relief)
 
 
-def _own(rng: np.random.Generator, family: str, stock: Stock) -> Material | None:
+def _own_finish(rng: np.random.Generator, family: str, stock: Stock) -> Material | None:
     """A finish of ours, or a picture from another model; None for families that stay as they are."""
     if family not in OUR_FINISHES or (family == "other" and rng.random() < 0.6):
         return None
+    # A picture of the same family, of another model.
     if rng.random() < 0.5 and family != "ceramic":
         picture = stock.texture(rng, family)
         if picture is not None:
             return covered(rng, picture, rng.uniform(0.3, 1.2), family)
     makers = OUR_FINISHES[family]
-    made = makers[rng.integers(len(makers))](rng)
-    return replace(made, emboss=rng.uniform(0, EMBOSS.get(family, 0.0)))
+    material = makers[rng.integers(len(makers))](rng)
+    return replace(material, emboss=rng.uniform(0, EMBOSS.get(family, 0.0)))
 
 
 def _metal(rng: np.random.Generator, colour: Array) -> tuple[float, Array]:
     """(metallic, colour) of what the catalogue calls a metal: painted where its colour is none of a metal."""
+    # No metal is green or blue: that is paint.
     saturation = float(np.ptp(colour) / max(colour.max(), 1e-6))
     warm = colour[0] >= colour[1] >= colour[2]
     if (saturation > 0.35 and not warm) or rng.random() < 0.12:
         return 0.0, colour
+    # Grey says metal, not which: silver, steel or iron.
     if saturation < 0.2:
         colour = np.array(m.METALS[rng.choice([0, 1, 1, 5])]) * rng.uniform(0.8, 1.0)
     return 1.0, np.clip(colour / colour.max() * rng.uniform(0.5, 0.95), 0.02, 0.95)

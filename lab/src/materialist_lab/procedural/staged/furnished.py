@@ -43,6 +43,7 @@ def furnished_room(rng: np.random.Generator, stock: Stock) -> World:
     """A furnished room seen by somebody who stands or sits in it."""
     size = rng.uniform([2.8, 3.2, 2.35], [6.5, 7.5, 3.2])
     standing = rooms.Furniture(size)
+    # The group at a table stands first: it needs the most room.
     group = _group(rng, stock) if rng.random() < 0.75 else []
     if group:
         x, z = rng.uniform(-0.25, [0.25, 0.15]) * size[:2]
@@ -61,6 +62,7 @@ def some_pieces(
     roles: tuple[str, ...] = ("sofa", "storage", "shelf", "thing"),
 ) -> list[Parts]:
     """That many models of the roles, with things on them."""
+    # One clutter for all: a room is tidy or is not.
     clutter = rng.uniform(0, 8)
     models = [stock.model(rng, str(rng.choice(roles)), high=3.2) for _ in range(count)]
     return [furnished_piece(rng, model, stock, clutter) for model in models if model is not None]
@@ -76,15 +78,12 @@ def furnished_world(
 ) -> World:
     """The room around its furniture: walls, floor, windows, what hangs there, rugs and lamps."""
     parts, portals, envmap = rooms.shell(rng, size, stock.captures, _on_wall(stock))
-    parts = (
-        _recovered(rng, parts, stock)
-        + furniture
-        + _rug(rng, stock, size)
-        + _from_ceiling(rng, stock, size)
-    )
+    parts = _recovered(rng, parts, stock) + furniture
+    parts = parts + _rug(rng, stock, size) + _from_ceiling(rng, stock, size)
     parts += rooms.lamps(rng, size, portals, envmap)
+    # The view through the windows: a photograph, or the envmap.
     backdrop = None
-    if portals and rng.random() < 0.5:  # the view through the windows
+    if portals and rng.random() < 0.5:
         backdrop = backdrop_of(rng, stock, float(envmap.mean()), 0.5)
     return World(parts, envmap, view, portals, kind, backdrop)
 
@@ -99,18 +98,20 @@ def _group(rng: np.random.Generator, stock: Stock) -> Parts:
     chair = stock.model(rng, "chair" if height > 0.6 else "sofa", high=2.4)
     if chair is None:
         return parts
-    one = piece(rng, chair, stock)
+    seat = piece(rng, chair, stock)
     wide = chair.entry.size[0]
     deep = chair.entry.size[2]
+    # A sofa behind a low table, with room for knees.
     if height <= 0.6:
-        return parts + placed(one, (0, 0, -depth / 2 - deep / 2 - 0.35))
+        return parts + placed(seat, (0, 0, -depth / 2 - deep / 2 - 0.35))
+    # Up to three chairs at each long side, pushed in more or less, some missing.
     for side in (-1, 1):
         count = int(min(max(width // (wide + 0.1), 0), 3))
         for x in (np.arange(count) + 0.5) * width / max(count, 1) - width / 2:
             if rng.random() < 0.85:
                 out = depth / 2 + deep * rng.uniform(0.05, 0.6)
                 turn = (0.0 if side < 0 else np.pi) + rng.normal(0, 0.15)
-                parts = parts + placed(_copy(one), (x, 0, side * out), turn)
+                parts = parts + placed(_copy(seat), (x, 0, side * out), turn)
     return parts
 
 
@@ -137,10 +138,11 @@ def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
     hanging = wall or paper
     on_wall = covered(rng, hanging, rng.uniform(0.5, 1.6), "paint") if hanging else None
     if on_wall:
-        on_wall = replace(
-            on_wall, offset=tuple(rng.random(2).tolist())
-        )  # one for all pieces of the walls
-    made = []
+        # One offset for all pieces of the walls: the pattern runs on across them.
+        on_wall = replace(on_wall, offset=tuple(rng.random(2).tolist()))
+    # Sheets of four vertices that belong to nothing are the room itself: level ones at
+    # the bottom the floor, upright ones its walls.
+    recovered = []
     for part in parts:
         flat = part.thing is None and len(part.solid.vertices) == 4
         level = flat and abs(float(part.solid.normals[0, 1])) > 0.9
@@ -150,12 +152,13 @@ def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
             material = on_floor or replace(material, emboss=rng.uniform(0, 0.004))
         elif flat and not level:
             material = on_wall or replace(material, relief=plaster, emboss=rng.uniform(0, 0.004))
-        made.append(ScenePart(part.solid, material, part.thing))
-    return made
+        recovered.append(ScenePart(part.solid, material, part.thing))
+    return recovered
 
 
 def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     """A rug from the catalogue, one of ours, or one printed with a picture."""
+    # Half of the rooms have none.
     if rng.random() < 0.5:
         return []
     model = stock.model(rng, "rug", high=3.0) if rng.random() < 0.4 else None
@@ -169,9 +172,8 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     if picture is not None:
         rug = replace(pictured(picture, np.ones(3), 0.9), repeat=(wide, deep), offset=(0.5, 0.5))
     fibre = Relief("grain", (0.12,) * 3, rng.uniform(0.1, 0.5))
-    return placed(
-        [block((wide, 0.012, deep), (0, 0, 0), replace(rug, relief=fibre), 0.004)], at, turn
-    )
+    flat = block((wide, 0.012, deep), (0, 0, 0), replace(rug, relief=fibre), 0.004)
+    return placed([flat], at, turn)
 
 
 def _on_wall(stock: Stock) -> rooms.Hangings:
@@ -192,14 +194,15 @@ def _on_wall(stock: Stock) -> rooms.Hangings:
 
 
 def _hung_model(rng: np.random.Generator, stock: Stock, wall: walls.RoomWall) -> Parts:
+    """A model that hangs on walls, at the height that the catalogue gives; nothing where it does not fit."""
     model = stock.model(rng, "wall", high=1.5)
     if model is None or model.entry.elevation + model.entry.size[1] > wall.height:
         return []
     at = wall.free(rng, model.entry.size[0] + 0.05)
     if at is None:
         return []
-    one = piece(rng, model, stock, lit=rng.random() < 0.5)
-    return moved(one, (at, model.entry.elevation, 0.002 - bounds(one)[0][2]))
+    hung = piece(rng, model, stock, lit=rng.random() < 0.5)
+    return moved(hung, (at, model.entry.elevation, 0.002 - bounds(hung)[0][2]))
 
 
 def _from_ceiling(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
@@ -207,11 +210,10 @@ def _from_ceiling(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     model = stock.model(rng, "ceiling", high=1.5) if rng.random() < 0.35 else None
     if model is None:
         return []
-    at = rng.uniform(-0.25, 0.2, 2) * size[:2]
-    return placed(
-        piece(rng, model, stock, lit=rng.random() < 0.7),
-        (at[0], size[2] - model.entry.size[1], at[1]),
-    )
+    x, z = rng.uniform(-0.25, 0.2, 2) * size[:2]
+    # Its upper end at the ceiling.
+    lamp = piece(rng, model, stock, lit=rng.random() < 0.7)
+    return placed(lamp, (x, size[2] - model.entry.size[1], z))
 
 
 def _photograph(rng: np.random.Generator, stock: Stock, at: float, width: float) -> Parts:
@@ -222,17 +224,12 @@ def _photograph(rng: np.random.Generator, stock: Stock, at: float, width: float)
         return []
     bottom = max(rng.uniform(1.3, 1.7) - height / 2, 0.7)
     left = at - width / 2
-    print_ = replace(
-        pictured(
-            picture,
-            np.ones(3) * rng.uniform(0.8, 1.1),
-            float(rng.choice([0.08, rng.uniform(0.3, 0.9)])),
-        ),
-        repeat=(width, -height),
-        offset=(0.0, 0.0),
-    )
+    # Behind glass, or matt paper.
+    gain = np.ones(3) * rng.uniform(0.8, 1.1)
+    rough = float(rng.choice([0.08, rng.uniform(0.3, 0.9)]))
+    paper = replace(pictured(picture, gain, rough), repeat=(width, -height), offset=(0.0, 0.0))
     sheet = s.sheet((left, bottom, 0.014), (width, 0, 0), (0, height, 0))
-    parts = [ScenePart(sheet, print_)]
+    parts = [ScenePart(sheet, paper)]
     if rng.random() < 0.75:
         look = m.wood(rng) if rng.random() < 0.5 else m.one_of(rng, m.metal, m.lacquer)
         opening = walls.Opening(left, left + width, bottom, bottom + height)

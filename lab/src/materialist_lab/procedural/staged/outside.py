@@ -31,6 +31,7 @@ THINGS = (
 def outside(rng: np.random.Generator, stock: Stock) -> World:
     """Things on open ground, at times before houses or a photograph, under a sky."""
     parts = [_ground(rng, stock)]
+    # --- Behind: houses, a wall, or open land, perhaps with a photograph as the backdrop ---
     behind = rng.random()
     at = -rng.uniform(6, 16)
     if behind < 0.45:
@@ -39,6 +40,7 @@ def outside(rng: np.random.Generator, stock: Stock) -> World:
     elif behind < 0.6:
         parts += placed(street.wall(rng, 40.0), (0, 0, at))
     parts += _standing(rng, stock, int(rng.integers(3, 13)), at + 0.5 if behind < 0.6 else -9.0)
+    # --- The camera: crouching now and then, else standing ---
     height = rng.uniform(0.5, 1.0) if rng.random() < 0.25 else rng.uniform(1.3, 2.2)
     eye = np.array([rng.normal() * 0.8, height, rng.uniform(4, 8)])
     target = np.array([rng.normal() * 1.2, rng.uniform(0.2, 1.6), -rng.uniform(1, 5)])
@@ -49,6 +51,7 @@ def outside(rng: np.random.Generator, stock: Stock) -> World:
 
 
 def _ground(rng: np.random.Generator, stock: Stock) -> ScenePart:
+    # A photographed ground at times, else one of ours.
     sheet = s.sheet((-GROUND, 0, GROUND), (2 * GROUND, 0, 0), (0, 0, -2 * GROUND), 12)
     picture = stock.texture(rng, "stone") if rng.random() < 0.3 else None
     if picture is not None:
@@ -65,14 +68,14 @@ def _standing(rng: np.random.Generator, stock: Stock, count: int, back: float) -
         model = stock.model(rng, str(rng.choice(THINGS)))
         if model is None:
             continue
-        one = piece(rng, model, stock)
-        low, high = bounds(one)
+        item = piece(rng, model, stock)
+        low, high = bounds(item)
         radius = float(np.hypot(*(high - low)[[0, 2]]) / 2)
         for _ in range(10):
             x = rng.uniform(-4.5, 4.5)
             z = rng.uniform(back + radius, max(3.0 - radius, back + radius))
             if all(np.hypot(x - a, z - b) > 0.8 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
-                parts += placed(one, (x, 0, z), rng.uniform(0, 2 * np.pi))
+                parts += placed(item, (x, 0, z), rng.uniform(0, 2 * np.pi))
                 break
     return parts

@@ -23,7 +23,7 @@ def piece(
     rng: np.random.Generator, model: CatalogModel, stock: Stock, *, lit: bool = False
 ) -> Parts:
     """A model as one thing at the origin, in materials of its own. lit: its lamps shine."""
-    one = style(rng)
+    variant = style(rng)
     finished: dict[tuple[object, ...], m.Material] = {}
     parts: Parts = []
     glow = np.exp(rng.uniform(*np.log(GLOW))) * np.array(
@@ -37,7 +37,7 @@ def piece(
         if key not in finished:
             shines = lit and look.family == "bulb"
             finished[key] = (
-                m.light(rng, tuple(glow)) if shines else finish(rng, look, picture, one, stock)
+                m.light(rng, tuple(glow)) if shines else finish(rng, look, picture, variant, stock)
             )
         parts.append(ScenePart(solid, finished[key]))
     if lit and not any(look.family == "bulb" for look in model.looks):
@@ -59,14 +59,15 @@ def _screen(rng: np.random.Generator, solid: s.Solid, stock: Stock) -> m.Materia
         return m.uniform((0.02, 0.02, 0.025), 0.08)
     shown = pictured(picture, np.ones(3), 0.15)
     glow = rng.uniform(0.5, 3.0) if rng.random() < 0.5 else 0.0
-    offset = float(-low[0] / width), float(high[1] / height)
-    return replace(
-        shown, repeat=(float(width), float(-height)), offset=offset, emission=(glow, glow, glow)
-    )
+    # The picture fits the range of the screen's texture coordinates once, its upper edge up.
+    repeat = (float(width), float(-height))
+    offset = (float(-low[0] / width), float(high[1] / height))
+    return replace(shown, repeat=repeat, offset=offset, emission=(glow, glow, glow))
 
 
 def small_thing(rng: np.random.Generator, stock: Stock, high: float, tall: float = 1.0) -> Parts:
     """Something to stand on a table or shelf, not longer than `high` nor taller than `tall` metres."""
+    # Procedural now and then, else a model.
     if rng.random() < 0.15:
         parts = things.thing(rng, rng.uniform(0.08, min(0.3, high)), stock.meshes, 0.5)
         return parts if bounds(parts)[1][1] <= tall else []
@@ -88,17 +89,19 @@ def laid(
     taken: list[tuple[float, float, float]] = []
     parts: Parts = []
     for _ in range(count):
-        one = small_thing(rng, stock, min(0.62, 1.8 * float(half.min())), place.clearance * 0.95)
-        if not one:
+        item = small_thing(rng, stock, min(0.62, 1.8 * float(half.min())), place.clearance * 0.95)
+        if not item:
             continue
-        low, high = bounds(one)
+        # The circle around its box, of which it fills about three quarters.
+        low, high = bounds(item)
         radius = float(np.hypot(*(high - low)[[0, 2]]) / 2)
         room = np.maximum(half - 0.72 * radius, 0.0) * (1 - crowd * 0.6)
+        # A few tries at a free place; a thing that fits nowhere is left out.
         for _ in range(14):
             x, z = middle + rng.uniform(-1, 1, 2) * room
             if all(np.hypot(x - a, z - b) > 0.74 * (radius + r) for a, b, r in taken):
                 taken.append((x, z, radius))
-                centred = placed(one, -(low + high) / 2 * [1, 0, 1])
+                centred = placed(item, -(low + high) / 2 * [1, 0, 1])
                 parts += placed(centred, (x, place.height, z), _turn(rng))
                 break
     return parts
@@ -115,6 +118,7 @@ def furnished_piece(
     """A model with things on its level places, about `clutter` a square metre and place at least."""
     parts = piece(rng, model, stock, lit=model.role == "lamp" and rng.random() < 0.6)
     for place in model.places:
+        # Poisson counts: some places stay empty, some are crowded.
         area = (place.right - place.left) * (place.front - place.back)
         if place.clearance > 0.12 and place.height > 0.2 and rng.random() < 0.8:
             parts += laid(rng, place, int(min(rng.poisson(clutter * max(area, 0.25)), 7)), stock)
@@ -122,13 +126,17 @@ def furnished_piece(
 
 
 def backdrop_of(
-    rng: np.random.Generator, stock: Stock, level: float, least: float, blur: float = 0.0
+    rng: np.random.Generator, stock: Stock, level: float, min_share: float, blur: float = 0.0
 ) -> Array | None:
-    """[h, w, 3] linear radiance about `level` of a part of a photograph, at least `least` of its shorter side, blurred
-    by `blur` pixels of 256; None where there is none."""
-    part = stock.crop(rng, 1.0, 256, least)
+    """[h, w, 3] linear radiance of a part of a photograph, about `level`; None where there is no photograph.
+
+    The part is at least `min_share` of the shorter side. It is blurred by `blur` pixels of 256.
+    """
+    part = stock.crop(rng, 1.0, 256, min_share)
     if part is None:
         return None
     linear = (as_roots(part) / 255.0).astype(np.float32) ** 2
     soft = cv2.GaussianBlur(linear, (0, 0), blur) if blur > 0 else linear
-    return soft * np.float32(level * np.exp(rng.normal(0, 0.5)) / max(float(soft.mean()), 1e-3))
+    # Its mean about the level of the light, a stop up or down.
+    mean = max(float(soft.mean()), 1e-3)
+    return soft * np.float32(level * np.exp(rng.normal(0, 0.5)) / mean)

@@ -33,15 +33,17 @@ def sculpture(rng: np.random.Generator, stock: Stock) -> Parts:
         (0.1 if stock.meshes else 0.0, _captured),
     )
     solid = m.pick(rng, makers)(rng, stock)
-    family = str(
-        rng.choice(["stone", "stone", "ceramic", "ceramic", "wood", "metal", "paint", "leather"])
-    )
+    families = ["stone", "stone", "ceramic", "ceramic", "wood", "metal", "paint", "leather"]
+    family = str(rng.choice(families))
+    # No texture coordinates of their own: the texture is projected along the axes.
     solid = from_the_sides(_standing(rng, solid))
     return one_thing([ScenePart(solid, _material(rng, family, stock))])
 
 
 def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material:
+    """A picture of a surface or of anything, grey stone, or a finish of the family."""
     draw = rng.random()
+    # --- Pictures, where there are any ---
     if draw < 0.3:
         picture = stock.texture(rng, family) or stock.repeating(rng)
         if picture is not None:
@@ -50,11 +52,11 @@ def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material
         picture = stock.repeating(rng)
         if picture is not None:
             return covered(rng, picture, rng.uniform(0.15, 0.6), family)
+    # --- Warm grey, or a finish ---
     if draw < 0.55:
         grey = rng.uniform(0.2, 0.8)
-        made = m.uniform(
-            (grey, grey * rng.uniform(0.9, 1), grey * rng.uniform(0.75, 1)), rng.uniform(0.4, 0.95)
-        )
+        colour = (grey, grey * rng.uniform(0.9, 1), grey * rng.uniform(0.75, 1))
+        material = m.uniform(colour, rng.uniform(0.4, 0.95))
     else:
         makers: dict[str, m.Maker] = {
             "stone": m.stone,
@@ -62,12 +64,12 @@ def _material(rng: np.random.Generator, family: str, stock: Stock) -> m.Material
             "wood": m.wood,
             "metal": m.metal,
         }
-        made = makers.get(family, m.lacquer)(rng)
+        material = makers.get(family, m.lacquer)(rng)
+    # Finishes are made for furniture; a sculpture is smaller.
     shrink = rng.uniform(0.2, 0.6)
-    repeat = (made.repeat[0] * shrink, made.repeat[1] * shrink)
-    return replace(
-        made, repeat=repeat, relief=relief_of(rng, family, 0.7), emboss=rng.uniform(0, 0.001)
-    )
+    repeat = (material.repeat[0] * shrink, material.repeat[1] * shrink)
+    noise = relief_of(rng, family, 0.7)
+    return replace(material, repeat=repeat, relief=noise, emboss=rng.uniform(0, 0.001))
 
 
 def _displaced(rng: np.random.Generator, solid: Solid, amount: float) -> Solid:
@@ -85,6 +87,7 @@ def _displaced(rng: np.random.Generator, solid: Solid, amount: float) -> Solid:
 
 
 def _depth(rng: np.random.Generator, low: float, high: float) -> float:
+    """Log-uniform between the two."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -92,6 +95,7 @@ def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
     """A boulder, a nut, a head of coral: a ball pressed flat here and there."""
     ball = trimesh.creation.icosphere(subdivisions=6)
     vertices = np.asarray(ball.vertices, float)
+    # Each press moves what stands over a plane nine tenths of the way back to it.
     for _ in range(int(rng.integers(0, 8))):
         axis = rng.normal(size=3)
         axis /= np.linalg.norm(axis)
@@ -106,6 +110,7 @@ def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
 
 def _body(rng: np.random.Generator, stock: Stock) -> Solid:
     """Balls and limbs melted into each other: animals, figures, toys, roots."""
+    # --- A grid around the skeleton ---
     ends, radii = _skeleton(rng)
     low = (ends - radii[:, None, None]).min((0, 1)) - 0.1
     high = (ends + radii[:, None, None]).max((0, 1)) + 0.1
@@ -113,6 +118,7 @@ def _body(rng: np.random.Generator, stock: Stock) -> Solid:
     counts = np.maximum(((high - low) / step).astype(int) + 2, 8)
     axes = [low[k] + step * np.arange(counts[k]) for k in range(3)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).astype(np.float32)
+    # --- The sum of exp(-k d) over the limbs, d the distance from each: their smooth union at 1 ---
     field = np.zeros(points.shape[:3], np.float32)
     soft = np.float32(rng.uniform(14, 40))
     for (a, b), radius in zip(ends.astype(np.float32), radii.astype(np.float32)):
@@ -127,6 +133,7 @@ def _body(rng: np.random.Generator, stock: Stock) -> Solid:
 
 
 def _of(vertices: Array, faces: Array) -> Solid:
+    """The solid with smooth normals, without texture coordinates."""
     return Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
 
 
@@ -134,11 +141,13 @@ def _skeleton(rng: np.random.Generator) -> tuple[Array, Array]:
     """([n, 2, 3] ends, [n] radii) of a trunk with limbs, often the same on both sides."""
     ends = []
     radii = []
+    # --- The trunk, mostly upright ---
     trunk = rng.uniform(0.15, 0.4)
     along = rng.normal(size=3) * [0.5, 1.0, 0.5]
     along *= rng.uniform(0.2, 1.0) / np.linalg.norm(along)
     ends.append((-along / 2, along / 2))
     radii.append(trunk)
+    # --- Limbs of two segments, from the trunk over a tip to a bend ---
     mirrored = rng.random() < 0.65
     for _ in range(int(rng.integers(1, 7))):
         root = rng.uniform(-0.5, 0.5) * along + rng.normal(size=3) * 0.12
@@ -165,15 +174,13 @@ def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
         height = gaussian_filter(grey, 1.5) * rng.uniform(0.05, 0.2)
     else:
         block = rng.uniform(0.4, 1.5)
-        places = np.concatenate(
-            [sheet.vertices[:, :2] / block, np.full((rows * rows, 1), rng.random())], -1
-        )
+        # A random plane through a block of solid noise.
+        plane = np.full((rows * rows, 1), rng.random())
+        places = np.concatenate([sheet.vertices[:, :2] / block, plane], -1)
         kind = str(rng.choice(["carved", "carved", "ridges", "hammered", "folds", "rough"]))
-        height = (
-            relief.height(kind, places + rng.random(3)).reshape(rows, rows)
-            * block
-            * _depth(rng, 0.01, 0.05)
-        )
+        noise = relief.height(kind, places + rng.random(3)).reshape(rows, rows)
+        height = noise * block * _depth(rng, 0.01, 0.05)
+    # --- The outline, square or a coin, and a rim ---
     t = np.linspace(-1, 1, rows)
     edge = np.maximum(np.abs(t)[:, None], np.abs(t)[None])
     if rng.random() < 0.4:
@@ -181,9 +188,9 @@ def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
         height = np.where(edge < 1, height, -0.1)
     rim = np.clip((edge - rng.uniform(0.8, 0.95)) * 20, 0, 1) * (edge < 1)
     height = height + rim * rng.uniform(-0.04, 0.05)
-    solid = _of(
-        sheet.vertices + np.stack([0 * height, 0 * height, height], -1).reshape(-1, 3), sheet.faces
-    )
+    # --- The front, on a slab ---
+    raised = np.stack([0 * height, 0 * height, height], -1).reshape(-1, 3)
+    solid = _of(sheet.vertices + raised, sheet.faces)
     back = s.slab((1.0, float(np.ptp(sheet.vertices[:, 1])), 0.12))
     return s.joined([solid, s.moved(back, (0, 0, -0.18))])
 
@@ -194,9 +201,11 @@ def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
     columns = 260
     levels = np.linspace(0, 1, int(rng.integers(4, 8)))
     radius = np.interp(np.linspace(0, 1, rows), levels, rng.uniform(0.12, 0.5, len(levels)))
+    # Smoothed by a running mean of 25 rows.
     radius = np.convolve(np.pad(radius, 12, mode="edge"), np.ones(25) / 25, "valid")
     up = np.linspace(0, rng.uniform(0.7, 1.3), rows)
     phi = np.linspace(0, 2 * np.pi, columns)
+    # Flutes around it, twisted along its height; none in half of them.
     flutes = rng.choice([0, int(rng.integers(3, 24))])
     wave = np.cos(flutes * (phi[None] + rng.normal() * up[:, None])) * rng.uniform(0.0, 0.12)
     r = radius[:, None] * (1 + wave)
@@ -211,9 +220,10 @@ def _captured(rng: np.random.Generator, stock: Stock) -> Solid:
     """A mesh from a file, weathered."""
     solid = s.load(stock.meshes[rng.integers(len(stock.meshes))])
     smooth = _of(solid.vertices, solid.faces)
-    return (
-        smooth if len(smooth.faces) < 4000 else _displaced(rng, smooth, _depth(rng, 0.0003, 0.003))
-    )
+    # A coarse mesh has no vertices to show weathering with.
+    if len(smooth.faces) < 4000:
+        return smooth
+    return _displaced(rng, smooth, _depth(rng, 0.0003, 0.003))
 
 
 def _standing(rng: np.random.Generator, solid: Solid) -> Solid:

@@ -47,6 +47,7 @@ SUBJECTS = (
 
 def single(rng: np.random.Generator, stock: Stock) -> World:
     """A thing or a sculpture under a hard lamp in the dark, or in soft light."""
+    # --- The camera: mostly a long lens, so far away that the thing fills the picture ---
     parts = _subject(rng, stock)
     low, high = bounds(parts)
     size = float(np.linalg.norm(high - low))
@@ -59,11 +60,13 @@ def single(rng: np.random.Generator, stock: Stock) -> World:
     around = orbit(target, distance, turn, up, fov)
     view = look(around.position, target, fov, rng.normal() * 0.05)
     view = through_lens(rng, view, distance, 0.2)
+    # --- Light ---
     to_camera = (around.position - target) / distance
     hard = rng.random() < 0.65
     envmap = (
         studio_light.hard_lamps(rng, to_camera) if hard else studio_light.soft_light(rng, stock)
     )
+    # --- Ground or backdrop; from below, a ground would hide the thing ---
     ground = m.pick(rng, ((0.45, "none"), (0.25, "sweep"), (0.3, "flat")))
     if up < np.radians(4):
         ground = "none"
@@ -76,20 +79,19 @@ def single(rng: np.random.Generator, stock: Stock) -> World:
 
 
 def _subject(rng: np.random.Generator, stock: Stock) -> Parts:
+    """A sculpture, a few things together, or a model."""
     draw = rng.random()
     if draw < 0.45:
         return sculpture(rng, stock)
-    if draw < 0.6:  # a few things together
-        parts = laid(
-            rng,
-            LevelPlace(0.0, -0.3, 0.3, -0.2, 0.2, 10.0),
-            int(rng.integers(2, 6)),
-            stock,
-            crowd=1.0,
-        )
+    # Stocks without models have sculptures in their place.
+    if draw < 0.6:
+        place = LevelPlace(0.0, -0.3, 0.3, -0.2, 0.2, 10.0)
+        parts = laid(rng, place, int(rng.integers(2, 6)), stock, crowd=1.0)
         return parts or sculpture(rng, stock)
     model = stock.model(rng, str(rng.choice(SUBJECTS)))
-    return sculpture(rng, stock) if model is None else placed(piece(rng, model, stock), (0, 0, 0))
+    if model is None:
+        return sculpture(rng, stock)
+    return placed(piece(rng, model, stock), (0, 0, 0))
 
 
 def _ground(
@@ -103,6 +105,7 @@ def _ground(
     if kind == "flat":
         sheet = s.sheet((-half, y, half), (2 * half, 0, 0), (0, 0, -2 * half), 1)
         return [ScenePart(sheet, material)]
+    # A quarter circle between the level part and the upright one, turned to face the camera.
     t = np.linspace(0, np.pi / 2, 20)
     start = rng.uniform(0.7, 1.6) * reach
     bend = rng.uniform(0.4, 1.2) * reach
@@ -115,13 +118,12 @@ def _ground(
 def _cloth(rng: np.random.Generator, stock: Stock, reach: float) -> m.Material:
     """Paper, cloth, wood, stone, or a glossy dark plate."""
     draw = rng.random()
+    # Black, grey or white; glossy or matt.
     if draw < 0.4:
-        grey = float(
-            rng.choice([rng.uniform(0.02, 0.08), rng.uniform(0.1, 0.5), rng.uniform(0.6, 0.88)])
-        )
-        return m.uniform(
-            (grey,) * 3, float(rng.choice([rng.uniform(0.06, 0.25), rng.uniform(0.4, 1.0)]))
-        )
+        greys = [rng.uniform(0.02, 0.08), rng.uniform(0.1, 0.5), rng.uniform(0.6, 0.88)]
+        grey = float(rng.choice(greys))
+        rough = float(rng.choice([rng.uniform(0.06, 0.25), rng.uniform(0.4, 1.0)]))
+        return m.uniform((grey,) * 3, rough)
     if draw < 0.7:
         family = str(rng.choice(["wood", "cloth", "stone"]))
         picture = stock.texture(rng, family)
@@ -139,6 +141,7 @@ def _backdrop(rng: np.random.Generator, stock: Stock, level: float, black: float
         return np.full((4, 4, 3), level * float(np.exp(rng.normal(0.5, 0.5))), np.float32)
     blur = float(np.exp(rng.uniform(np.log(1.5), np.log(16))))
     picture = backdrop_of(rng, stock, level, 0.3, blur)
-    return (
-        np.full((4, 4, 3), level * rng.uniform(0.05, 1), np.float32) if picture is None else picture
-    )
+    # Grey without photographs.
+    if picture is None:
+        return np.full((4, 4, 3), level * rng.uniform(0.05, 1), np.float32)
+    return picture

@@ -14,11 +14,11 @@ from materialist_lab.procedural.materials import ColourPicture
 from materialist_lab.procedural.objects.things import Meshes
 
 SMALLEST_CROP = 0.2
-"""Of a photograph's shorter side."""
+"""Smallest height of a crop as a share of the largest one that fits into the photograph."""
 HELD_OUT_EVERY = 10
 """One model and photograph in so many is never trained on."""
-FEWEST_TEXTURES = 4
-"""Of a family, or all its things would look alike."""
+MIN_TEXTURES = 4
+"""Pictures that a family must have: with fewer, all its things would look alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +32,7 @@ class Stock:
     captures: tuple[Path, ...] = ()
 
     def _is_mine(self, name: str) -> bool:
+        # A checksum of the name: the same on every machine, whatever else is installed.
         return (crc32(name.encode()) % HELD_OUT_EVERY == 0) == self.held_out
 
     def _mine(self, names: tuple[str, ...]) -> list[str]:
@@ -42,6 +43,7 @@ class Stock:
     ) -> CatalogModel | None:
         """A model of one of the roles whose longest side is between two lengths, metres; None where there is none."""
         keys = [key for role in roles for key in self._mine(self.listing.models.get(role, ()))]
+        # A dozen tries: the sizes of all models are not known before they are loaded.
         for _ in range(12 if keys else 0):
             model = self.listing.model(keys[rng.integers(len(keys))])
             if low <= max(model.entry.size) <= high:
@@ -50,10 +52,11 @@ class Stock:
 
     def texture(self, rng: np.random.Generator, family: str) -> ColourPicture | None:
         """A picture that repeats, of a surface of that family of materials; None where there is none."""
+        # Only of models that this stock may use.
         places = [
             place for place in self.listing.textures.get(family, ()) if self._is_mine(place[0])
         ]
-        if len(places) < FEWEST_TEXTURES:
+        if len(places) < MIN_TEXTURES:
             return None
         key, solid = places[rng.integers(len(places))]
         return self.listing.model(key).pictures[solid]
@@ -64,26 +67,27 @@ class Stock:
         return self.listing.photograph(names[rng.integers(len(names))]) if names else None
 
     def crop(
-        self, rng: np.random.Generator, aspect: float, side: int, least: float = SMALLEST_CROP
+        self, rng: np.random.Generator, aspect: float, side: int, min_share: float = SMALLEST_CROP
     ) -> Array | None:
         """[h, w, 3] uint8 sRGB, its longer side `side` pixels: a part of a photograph of that width over height."""
         whole = self.photograph(rng)
         if whole is None:
             return None
         h, w = whole.shape[:2]
-        most = min(h, w / aspect)
-        height = most * rng.uniform(least, 1.0)
+        # --- A random part of that shape, mirrored in half of the cases ---
+        max_height = min(h, w / aspect)
+        height = max_height * rng.uniform(min_share, 1.0)
         width = height * aspect
         top = rng.uniform(0, h - height)
         left = rng.uniform(0, w - width)
         part = whole[int(top) : int(top + height) + 1, int(left) : int(left + width) + 1]
         if rng.random() < 0.5:
             part = part[:, ::-1]
+        # --- Its size; averaged where it shrinks ---
         scale = side / max(part.shape[:2])
         size = max(4, round(part.shape[1] * scale)), max(4, round(part.shape[0] * scale))
-        return cv2.resize(
-            part, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-        )
+        interpolation = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+        return cv2.resize(part, size, interpolation=interpolation)
 
     def printed(self, rng: np.random.Generator, aspect: float) -> ColourPicture | None:
         """A part of a photograph as a picture of that width over height."""

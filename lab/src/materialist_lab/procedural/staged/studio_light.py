@@ -23,18 +23,21 @@ def hard_lamps(rng: np.random.Generator, to_camera: Array) -> Array:
     for k in range(count):
         axis = _around(rng, to_camera, 75.0)
         width = np.radians(np.exp(rng.uniform(np.log(0.8), np.log(8.0))))
+        # A Gaussian spot; by its width squared, all lamps give about the same irradiance.
         spot = np.exp(-((np.arccos(np.clip(d @ axis, -1, 1)) / width) ** 2))[..., None]
         power = 1.0 if k == 0 else rng.uniform(0.05, 0.8)
         total = total + spot * power / width**2 * _colour(rng)
+    # The scale is free, since the picture is exposed later.
     return (total / max(float(luminance(total).max()), 1e-9) * 300).astype(np.float32)
 
 
-def _around(rng: np.random.Generator, axis: Array, most: float) -> Array:
+def _around(rng: np.random.Generator, axis: Array, max_degrees: float) -> Array:
     """[3] unit: a direction at most that many degrees from an axis, evenly spread over the cap, not from far below."""
+    # Rejection from the sphere is even over the cap.
     for _ in range(40):
         d = rng.normal(size=3)
         d /= np.linalg.norm(d)
-        if d @ axis > np.cos(np.radians(most)) and d[1] > -0.3:
+        if d @ axis > np.cos(np.radians(max_degrees)) and d[1] > -0.3:
             return d
     return axis
 

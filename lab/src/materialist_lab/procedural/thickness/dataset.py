@@ -88,7 +88,7 @@ def load(folder: Path) -> dict[str, Array]:
     return {name: np.concatenate([p[name] for p in parts]) for name in ("maps", "target", "hollow")}
 
 
-LEAST_PIXELS = 0.02
+MIN_COVERED = 0.02
 """Part of the window that an object must cover; thinner views are drawn anew."""
 SIDES = (24, 160)
 """Pixels on a side of the picture from which the window is cut."""
@@ -118,6 +118,7 @@ def draw_view(
     solid and hollow thickness in units of the object's size, and the normal of the last surface in the frame of
     `crop.to_window`.
     """
+    # --- A pose in which the object is large enough in the window ---
     while True:
         pose = draw_pose(rng, upright=shape.upright, plain=exact)
         vertices = shape.solid.vertices @ pose.stretch.T @ pose.to_camera.T + pose.centre
@@ -126,32 +127,33 @@ def draw_view(
             if exact
             else _cut(rng, tracer, pose, vertices)
         )
-        if view.inside.mean() >= LEAST_PIXELS:
+        if view.inside.mean() >= MIN_COVERED:
             break
+    # --- The truth along the rays of the window ---
     paths, _, back = look(tracer, pose, view.rays)
-    there = np.isfinite(paths.first).reshape(SIDE, SIDE)
+    hit = np.isfinite(paths.first).reshape(SIDE, SIDE)
 
     def picture(x):
-        return np.where(there, x.reshape(SIDE, SIDE), 0).astype(np.float32)
+        return np.where(hit, x.reshape(SIDE, SIDE), 0).astype(np.float32)
 
-    target = (
-        np.stack([picture(paths.solid), picture(paths.material)])
-        * np.linalg.norm(view.rays, axis=-1)
-        / view.size
-    )
-    back = np.moveaxis(np.where(there[..., None], back @ to_window(view.rays).T, 0), -1, 0)
+    # Lengths are in units of the rays, which are not of length 1.
+    lengths = np.stack([picture(paths.solid), picture(paths.material)])
+    target = lengths * np.linalg.norm(view.rays, axis=-1) / view.size
+    back = np.moveaxis(np.where(hit[..., None], back @ to_window(view.rays).T, 0), -1, 0)
     target = np.concatenate([np.minimum(target, 8), back]).astype(np.float16)
     return refraction_features(view).astype(np.float16), target
 
 
 def _cut(rng: np.random.Generator, tracer: ShapeTracer, pose: CameraPose, vertices: Array) -> View:
     """A window of a larger or smaller picture, with maps as imperfect as predicted ones."""
+    # The picture first, with a margin around the object.
     side = round(float(np.exp(rng.uniform(*np.log(SIDES)))))
     seen = _imperfect(
         rng, _seen(rng, tracer, pose, window_rays(vertices, side, rng.uniform(0.05, 0.15)))
     )
     if not seen.inside.any():
         return seen
+    # At prediction the window follows a mask that is a little off.
     larger = float(np.exp(rng.normal(0, OFF[0])))
     aside = rng.normal(0, OFF[1], 2)
     window = Window.around(seen.inside).moved(larger, float(aside[0]), float(aside[1]))
@@ -169,9 +171,11 @@ def _seen(rng: np.random.Generator, tracer: ShapeTracer, pose: CameraPose, rays:
 
 def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -> CameraPose:
     """A camera that looks at the shape, from above if it stands; `plain` leaves the shape in its own form."""
+    # --- The shape: stretched and sheared ---
     stretch = np.eye(3)
     if not plain:
         stretch = np.diag(np.exp(rng.normal(0, 0.25, 3))) + rng.normal(0, 0.08, (3, 3))
+    # --- The camera around it ---
     turn = rng.uniform(0, 2 * np.pi)
     tilt = np.radians(rng.uniform(-5, 55)) if upright else np.arcsin(rng.uniform(-0.5, 0.95))
     roll = rng.normal(0, 0.06)
@@ -183,6 +187,7 @@ def draw_pose(rng: np.random.Generator, *, upright: bool, plain: bool = False) -
 
 def window_rays(vertices: Array, side: int = SIDE, margin: float = MARGIN) -> Array:
     """[S, S, 3] float32 rays through a square window around the shape [V, 3] in the camera frame, S = `side`."""
+    # The square around the projected vertices, with a margin.
     place = vertices[:, :2] / -vertices[:, 2:]
     low = place.min(0)
     high = place.max(0)
@@ -190,11 +195,9 @@ def window_rays(vertices: Array, side: int = SIDE, margin: float = MARGIN) -> Ar
     x = (np.arange(side) + 0.5) / side * 2 - 1
     centre = (low + high) / 2
     rays = np.empty((side, side, 3), np.float32)
-    rays[..., 0], rays[..., 1], rays[..., 2] = (
-        centre[0] + half * x[None, :],
-        centre[1] - half * x[:, None],
-        -1,
-    )
+    rays[..., 0] = centre[0] + half * x[None, :]
+    rays[..., 1] = centre[1] - half * x[:, None]
+    rays[..., 2] = -1
     return rays
 
 
@@ -219,12 +222,13 @@ def look(tracer: ShapeTracer, pose: CameraPose, rays: Array) -> tuple[Paths, Arr
 
 def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -> Array:
     """[S, S, 3] float32 linear in [0, 1]: the shape in some colour, plain or with waves through it."""
+    # --- Colour ---
     albedo = rng.uniform(0.1, 0.9, 3) * rng.uniform(0.4, 1)
     if rng.random() < 0.3:
-        wave = np.sin(point @ rng.normal(size=3) * rng.uniform(5, 40) + rng.uniform(0, 6))[
-            ..., None
-        ]
+        phase = point @ rng.normal(size=3) * rng.uniform(5, 40) + rng.uniform(0, 6)
+        wave = np.sin(phase)[..., None]
         albedo = albedo * np.clip(1 + wave * rng.uniform(0.1, 1.5), 0.3, 1.6)
+    # --- Light: an ambient gradient, and one or two distant lamps ---
     up = rng.normal(size=3) * [0.4, 0.2, 0.4] + [0, 1, 0.3]
     light = rng.uniform(0.15, 0.6) * (1 + 0.6 * (normal @ (up / np.linalg.norm(up))))[..., None]
     view = unit(-rays)
@@ -232,9 +236,9 @@ def _photo(rng: np.random.Generator, normal: Array, rays: Array, point: Array) -
     for _ in range(int(rng.integers(1, 3))):
         towards = unit(rng.normal(size=3) + np.array([0, 0.7, 0.7]))
         colour = rng.uniform(0.7, 1.0, 3) * rng.uniform(0.2, 0.9)
-        highlight = gloss * np.clip(np.sum(normal * unit(towards + view), -1), 0, 1) ** rng.uniform(
-            20, 200
-        )
+        # Blinn and Phong: (n . h)^s, h half way between light and viewer.
+        cosine = np.clip(np.sum(normal * unit(towards + view), -1), 0, 1)
+        highlight = gloss * cosine ** rng.uniform(20, 200)
         light = light + colour * (np.clip(normal @ towards, 0, None) + highlight)[..., None]
     noise = rng.normal(0, rng.uniform(0, 0.02), normal.shape)
     return np.clip(albedo * light + noise, 0, 1).astype(np.float32)
@@ -247,22 +251,25 @@ def _imperfect(rng: np.random.Generator, view: View) -> View:
     inside = view.inside
     if not inside.any():
         return view
+    # Of the photo nothing changes: its noise is drawn with it.
     size = view.size
     middle = float(np.median(view.depth[inside]))
     side = len(inside)
+    # Depth: the wrong scale, and slow waves.
     if rng.random() < 0.6:
         depth = middle + (depth - middle) * rng.uniform(0.85, 1.15)
         depth = depth + size * rng.uniform(0, 0.05) * _smooth_noise(rng, 1, side)[..., 0]
     if rng.random() < 0.6:
+        # Normals: slow waves, and smoothing.
         normal = normal + rng.uniform(0, 0.3) * _smooth_noise(rng, 3, side)
     if rng.random() < 0.4:
         sigma = rng.uniform(0.5, 2.0) * max(side / SIDE, 0.5)
         blurred = cv2.GaussianBlur(normal * inside[..., None], (0, 0), sigma)
         normal = np.where(inside[..., None], blurred, normal)
     if rng.random() < 0.35:
-        kernel = np.ones(
-            (2 * int(rng.integers(1, max(2, round(2 * side / SIDE)) + 1)) + 1,) * 2, np.uint8
-        )
+        # The mask: too small.
+        radius = int(rng.integers(1, max(2, round(2 * side / SIDE)) + 1))
+        kernel = np.ones((2 * radius + 1,) * 2, np.uint8)
         smaller = cv2.erode(inside.astype(np.uint8), kernel, borderValue=0) > 0
         inside = smaller if smaller.sum() > 0.5 * inside.sum() else inside
     return View(

@@ -108,8 +108,9 @@ class ShapeTracer:
         """Distance [n] (inf for none), face [n] and place in it [n, 2] (0 for none) of every ray's nearest surface."""
         start, way = (mi.Vector3f(*(floats(mi, c) for c in x.T)) for x in (origin, direction))
         ray = mi.Ray3f(mi.Point3f(start), way)
-        found = self._scene.ray_intersect_preliminary(ray, coherent=False)
-        hit = found.is_valid()  # where nothing is hit, Mitsuba leaves face and place unwritten
-        face = dr.select(hit, found.prim_index, 0)
-        uv = dr.select(hit, found.prim_uv, 0)
-        return np.array(found.t, np.float64), np.array(face), np.array(uv, np.float64).T
+        preliminary = self._scene.ray_intersect_preliminary(ray, coherent=False)
+        # Where nothing is hit, Mitsuba leaves face and place unwritten.
+        hit = preliminary.is_valid()
+        face = dr.select(hit, preliminary.prim_index, 0)
+        uv = dr.select(hit, preliminary.prim_uv, 0)
+        return np.array(preliminary.t, np.float64), np.array(face), np.array(uv, np.float64).T
