@@ -13,7 +13,7 @@ def stop_requests() -> Iterator[list[int]]:
 
     Outside of the main thread nothing is noted.
     """
-    found = list[int]()
+    signals = list[int]()
     before = dict[int, Any]()
 
     def restore() -> None:
@@ -22,7 +22,7 @@ def stop_requests() -> Iterator[list[int]]:
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
     def note(number: int, _: Any) -> None:
-        found.append(number)
+        signals.append(number)
         restore()
 
     if threading.current_thread() is threading.main_thread():
@@ -30,6 +30,6 @@ def stop_requests() -> Iterator[list[int]]:
             {number: signal.signal(number, note) for number in (signal.SIGTERM, signal.SIGINT)}
         )
     try:
-        yield found
+        yield signals
     finally:
         restore()

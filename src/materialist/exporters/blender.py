@@ -127,14 +127,14 @@ def _look(part: Part) -> dict:
 
 def find_blender(named: str | None) -> list[str] | None:
     """The start of a command that runs a script in Blender, or None. Raises SetupError where `named` is no program."""
-    found = shutil.which(named or "blender")
-    if found is None and named is not None:
+    program = shutil.which(named or "blender")
+    if program is None and named is not None:
         raise SetupError(
             f"There is no program {named}; give the path of blender, or of a Python that has bpy."
         )
-    if found is None:
+    if program is None:
         return [sys.executable] if importlib.util.find_spec("bpy") else None
-    return [found]
+    return [program]
 
 
 def _command(program: list[str], script: Path, output: Path, options: list[str]) -> list[str]:

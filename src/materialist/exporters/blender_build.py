@@ -74,10 +74,10 @@ def add_meshes(scene, facts, additive) -> None:
 
 def material(name, look, additive):
     """Material of a part: its maps; glass over them, and what it gives off."""
-    made = bpy.data.materials.new(name)
-    made.use_nodes = True
-    nodes = made.node_tree.nodes
-    links = made.node_tree.links
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    nodes = material.node_tree.nodes
+    links = material.node_tree.links
     nodes.clear()
     output = nodes.new("ShaderNodeOutputMaterial")
     output.location = (600, 0)
@@ -94,7 +94,7 @@ def material(name, look, additive):
         source = add_texture(nodes, look, key, (-700, 300 - 300 * row))
         for socket in sockets:
             links.new(source, socket)
-    return made
+    return material
 
 
 def added(nodes, links, one, other):

@@ -42,7 +42,7 @@ _LAMPS = "KHR_lights_punctual"
 
 def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
     """One self-contained file."""
-    made = trimesh.Scene()
+    scene_graph = trimesh.Scene()
     for part in parts:
         mesh = part.mesh
         visual = trimesh.visual.TextureVisuals(
@@ -51,9 +51,11 @@ def glb_bytes(scene: Scene, parts: list[Part]) -> bytes:
         body = trimesh.Trimesh(
             mesh.vertices, mesh.faces, vertex_normals=mesh.normals, visual=visual, process=False
         )
-        made.add_geometry(body, part.name, part.name)
+        scene_graph.add_geometry(body, part.name, part.name)
     return export_glb(
-        made, include_normals=True, tree_postprocessor=lambda tree: _complete(tree, scene, parts)
+        scene_graph,
+        include_normals=True,
+        tree_postprocessor=lambda tree: _complete(tree, scene, parts),
     )
 
 
@@ -115,17 +117,19 @@ def _light(lamp: Lamp) -> dict:
 def _extensions(part: Part) -> dict[str, dict]:
     """Of the material of a body: glow and glass, whose base colour tints what passes, see `passing`."""
     surface = part.surface
-    found = {}
+    extensions = {}
     if surface is not None and max(surface.emission) > 0:
-        found["KHR_materials_emissive_strength"] = {
+        extensions["KHR_materials_emissive_strength"] = {
             "emissiveStrength": float(max(surface.emission))
         }
     if surface is not None and surface.transmission > 0:
-        found["KHR_materials_transmission"] = {"transmissionFactor": float(surface.transmission)}
-        found["KHR_materials_ior"] = {"ior": float(surface.ior)}
+        extensions["KHR_materials_transmission"] = {
+            "transmissionFactor": float(surface.transmission)
+        }
+        extensions["KHR_materials_ior"] = {"ior": float(surface.ior)}
         if (thick := _thickness(part)) > 0:
-            found["KHR_materials_volume"] = {"thicknessFactor": thick}
-    return found
+            extensions["KHR_materials_volume"] = {"thicknessFactor": thick}
+    return extensions
 
 
 def _camera(camera: Camera, parts: list[Part]) -> dict:

@@ -83,7 +83,7 @@ def _description(mi, scene: Scene, parts: list[Part], own: bool) -> dict:
 def _bsdf(part: Part, own: bool) -> dict:
     """The renderer's material. Both sides shade alike: `principled` needs a wrapper for that, which our own plugin must
     not have, since it would take what leans away from the eye for a back."""
-    how = ("nearest", "clamp") if part.surface is None else ("bilinear", "repeat")
+    sampling = ("nearest", "clamp") if part.surface is None else ("bilinear", "repeat")
     opaque: dict = {"type": PLUGIN}
     for name, key in MAPS.items():
         file = f"{part.name}_{key}.exr"
@@ -91,8 +91,8 @@ def _bsdf(part: Part, own: bool) -> dict:
             "type": "bitmap",
             "filename": file,
             "raw": True,
-            "filter_type": how[0],
-            "wrap_mode": how[1],
+            "filter_type": sampling[0],
+            "wrap_mode": sampling[1],
         }
     bsdf = opaque if part.surface is None else body_bsdf(part.surface, opaque)
     if own:

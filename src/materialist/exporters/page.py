@@ -128,17 +128,17 @@ def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
 def _vertices(part: Part) -> Array:
     """[V] records of one part; in those of a body, or of a constant part, is the colour."""
     mesh = part.mesh
-    made = np.zeros(len(mesh.vertices), _VERTEX)
-    made["position"] = mesh.vertices
-    made["normal"][:, :3] = np.round(np.clip(mesh.normals, -1, 1) * 127)
-    made["uv"] = np.round(np.clip(mesh.uv, 0, 1) * 65535)
+    vertices = np.zeros(len(mesh.vertices), _VERTEX)
+    vertices["position"] = mesh.vertices
+    vertices["normal"][:, :3] = np.round(np.clip(mesh.normals, -1, 1) * 127)
+    vertices["uv"] = np.round(np.clip(mesh.uv, 0, 1) * 65535)
     if part.constant or part.surface is not None:
         albedo = part.materials.albedo  # of a body it repeats
         height, width = albedo.shape[:2]
         column, row = np.floor(mesh.uv * (width, height)).astype(int).T
-        made["colour"][:, :3] = srgb_levels(albedo[row % height, column % width])
-        made["colour"][:, 3] = 255
-    return made
+        vertices["colour"][:, :3] = srgb_levels(albedo[row % height, column % width])
+        vertices["colour"][:, 3] = 255
+    return vertices
 
 
 def _deflated(array: Array) -> str:

@@ -56,21 +56,21 @@ def export(
         InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
         SetupError: the extra for the format is missing, or `blender` does not work.
     """
-    wanted = ExportOptions.given(options, **values)
+    settings = ExportOptions.given(options, **values)
     path = Path(path)
-    to = check_format(path, wanted.to)
-    most = wanted.max_triangles
+    to = check_format(path, settings.to)
+    most = settings.max_triangles
     flags = [
         f"--{name.replace('_', '-')}"
         for name in ("shadow_catcher", "fitted_material")
-        if getattr(wanted, name)
+        if getattr(settings, name)
     ]
-    if to != "blend" and (wanted.blender is not None or flags):
+    if to != "blend" and (settings.blender is not None or flags):
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and most is None:
         most = PAGE_TRIANGLES
     ensure_writable(path, force, EXPORT if path.suffix.lower() not in SUFFIX.values() else None)
-    carries = wanted.residual and to != "html"
+    carries = settings.residual and to != "html"
     if carries:
         scene = replace(scene, materials=with_residual(scene))
     bodies = body_parts(scene)
@@ -78,7 +78,7 @@ def export(
     if to == "blend":
         from materialist.exporters.blender import export_blend
 
-        made = export_blend(path, scene, parts, force, blender=wanted.blender, options=flags)
+        files = export_blend(path, scene, parts, force, blender=settings.blender, options=flags)
     else:
         writers: dict[str, Callable[..., Exported]] = {
             "glb": _glb,
@@ -86,12 +86,12 @@ def export(
             "mitsuba": _mitsuba,
             "html": _html,
         }
-        made = writers[to](path, scene, parts, force)
+        files = writers[to](path, scene, parts, force)
     words = advice(scene)
     notes = [words[key] for key in ADVICE.get(to, ())]
     if carries:
         notes.append(CARRIED)
-    return replace(made, notes=(*made.notes, *notes, *_losses(scene, bodies, to)))
+    return replace(files, notes=(*files.notes, *notes, *_losses(scene, bodies, to)))
 
 
 def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:

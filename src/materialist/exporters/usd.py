@@ -73,11 +73,11 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
 
     def shader(name: str, kind: str, **inputs: Any) -> Any:
         """A node and its inputs, each (type, value)."""
-        made = UsdShade.Shader.Define(stage, f"{path}/{name}")
-        made.CreateIdAttr(kind)
+        shader = UsdShade.Shader.Define(stage, f"{path}/{name}")
+        shader.CreateIdAttr(kind)
         for socket, (type_, value) in inputs.items():
-            made.CreateInput(socket, type_).Set(value)
-        return made
+            shader.CreateInput(socket, type_).Set(value)
+        return shader
 
     body = part.surface
     m = one_roughness(part)

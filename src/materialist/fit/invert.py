@@ -49,8 +49,8 @@ class FitSetup:
     """Paths a pixel of the re-rendering; None: those of the settings."""
 
     def __post_init__(self) -> None:
-        given = self.settings.completion if self.completion == "auto" else self.completion
-        object.__setattr__(self, "completion", given)
+        completion = self.settings.completion if self.completion == "auto" else self.completion
+        object.__setattr__(self, "completion", completion)
 
 
 @dataclass

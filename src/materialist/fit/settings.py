@@ -193,7 +193,7 @@ def preset(name: str, *, hdr: bool = False) -> FitSettings:
     settings = PRESETS[name]
     if not hdr:
         return settings
-    how = {"encoding": "log1p"} if settings is PAPER else {"white": HDR_CLIP}
-    light = replace(settings.light, **how)
-    materials = replace(settings.materials, **how)
+    comparison = {"encoding": "log1p"} if settings is PAPER else {"white": HDR_CLIP}
+    light = replace(settings.light, **comparison)
+    materials = replace(settings.materials, **comparison)
     return replace(settings, light=light, materials=materials)

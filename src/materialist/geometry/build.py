@@ -50,17 +50,17 @@ def build_geometry(
 
 def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geometry:
     """The geometry of other maps, built as the scene's own: as its provenance says, else as its mesh looks."""
-    told = scene.provenance
+    provenance = scene.provenance
     completion = "planes" if (scene.geometry.mesh.face_plane >= 0).any() else "none"
-    if told.get("completion") in COMPLETIONS:
-        completion = told["completion"]
+    if provenance.get("completion") in COMPLETIONS:
+        completion = provenance["completion"]
     return build_geometry(
         depth,
         normal,
         camera,
-        tau=float(told.get("tau", 6.0)),
+        tau=float(provenance.get("tau", 6.0)),
         completion=completion,
-        seed=int(told.get("seed", 0) or 0),
+        seed=int(provenance.get("seed", 0) or 0),
     )
 
 

@@ -84,10 +84,10 @@ def complete(
     )  # [H, W] smallest inverse depth of each pixel's front faces
     for sheet in sheets:
         stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
-        found = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
+        patches = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
         if walls or sheet.plane.normal[1] >= SETTINGS.upward:
-            found.append(_beyond_frame(sheet, stops, camera))  # [T, 3, 3]
-        parts += [_patch(sheet, corners, camera) for corners in found if len(corners)]
+            patches.append(_beyond_frame(sheet, stops, camera))  # [T, 3, 3]
+        parts += [_patch(sheet, corners, camera) for corners in patches if len(corners)]
     # Faces keep their order.
     vertices, faces = joined_faces(parts)
     names = ("normals", "uv", "face_pixel", "face_plane")
@@ -100,7 +100,7 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
     surface = depth > 0
     points = unproject(depth, camera).astype(np.float64)
     radius = float(np.median(np.linalg.norm(points[surface], axis=-1)))
-    found = []
+    patches = []
     for index, plane in enumerate(planes):
         others = points[surface & ~plane.mask]
         bounding = (
@@ -121,8 +121,8 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
         if plane.normal[1] < SETTINGS.upward:
             half = min(half, SETTINGS.wall_reach * _size(own))
             behind = min(behind, SETTINGS.wall_behind * _size(own))
-        found.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, half, behind))
-    return found
+        patches.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, half, behind))
+    return patches
 
 
 def _size(points: Array) -> float:

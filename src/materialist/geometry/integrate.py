@@ -57,21 +57,23 @@ def integrated(depth: Array, normal: Array, rays: Array) -> Array:
     data = np.log(depth[surface].astype(np.float64))
     pull = np.full(len(data), (SETTINGS.length * max(depth.shape)) ** -2)
     scale = SETTINGS.steep * spacing(rays)
-    found = data
+    log_depth = data
     for _ in range(SETTINGS.rounds):
-        found = grid.solved(grid.weights(found, scale), pull, data, found)
-    found = _without_strays(grid, found, pull, data, spacing(rays))
+        log_depth = grid.solved(grid.weights(log_depth, scale), pull, data, log_depth)
+    log_depth = _without_strays(grid, log_depth, pull, data, spacing(rays))
     result = np.zeros(depth.shape, np.float32)
-    result[surface] = np.exp(found)
+    result[surface] = np.exp(log_depth)
     return result
 
 
-def _without_strays(grid: "_Grid", found: Array, pull: Array, data: Array, angle: float) -> Array:
+def _without_strays(
+    grid: "_Grid", log_depth: Array, pull: Array, data: Array, angle: float
+) -> Array:
     """[N] log depth whose strays, as the blurred rim of a thing, follow a neighbour in place of their own depth.
 
     found, pull, data: [N] as in `_Grid.solved`. angle: of a pixel, radians.
     """
-    gap = np.abs(grid.step @ found - grid.demanded)
+    gap = np.abs(grid.step @ log_depth - grid.demanded)
     least = SETTINGS.least * len(data)
     linked = gap < SETTINGS.parted * angle
     pairs = grid.first, grid.second
@@ -81,9 +83,9 @@ def _without_strays(grid: "_Grid", found: Array, pull: Array, data: Array, angle
     pull = np.where(stray, SETTINGS.stray_pull * pull, pull)
     within = region[grid.first] == region[grid.second]
     for _ in range(SETTINGS.last_rounds):
-        weight = np.where(joined & ~linked, 1, grid.weights(found, SETTINGS.steep * angle))
-        found = grid.solved(np.where(within, weight, 0), pull, data, found)
-    return found
+        weight = np.where(joined & ~linked, 1, grid.weights(log_depth, SETTINGS.steep * angle))
+        log_depth = grid.solved(np.where(within, weight, 0), pull, data, log_depth)
+    return log_depth
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ class _Grid:
         """
         strength = weight * self.facing**2
         system = (self.step.T @ diags(strength) @ self.step + diags(pull)).tocsr()
-        wanted = self.step.T @ (strength * self.demanded) + pull * data
+        right_side = self.step.T @ (strength * self.demanded) + pull * data
         coarse = splu((self.block.T @ system @ self.block).tocsc())
         inverse = 1 / system.diagonal()
 
@@ -150,9 +152,9 @@ class _Grid:
 
         near = LinearOperator(system.shape, precondition, dtype=np.float64)
         options = {"rtol": 0.0, "maxiter": SETTINGS.iterations, "M": near}
-        limit = SETTINGS.tolerance * float(np.linalg.norm(wanted - system @ data))
-        found, _ = cg(system, wanted, start, atol=limit, **options)
-        return found
+        limit = SETTINGS.tolerance * float(np.linalg.norm(right_side - system @ data))
+        log_depth, _ = cg(system, right_side, start, atol=limit, **options)
+        return log_depth
 
 
 def _change(normal: Array, near: Array, far: Array) -> Array:

@@ -74,13 +74,13 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
     thin = np.s_[stride // 2 :: stride, stride // 2 :: stride]
     small = _Maps(rays[thin], normal[thin].astype(np.float64), depth[thin])
     rng = np.random.default_rng(seed)
-    found: list[_Fit] = []
+    fits: list[_Fit] = []
     free = small.depth > 0  # [h, w]
     least = SETTINGS.least * free.sum()
     for _ in range(
         2 * SETTINGS.most
     ):  # some of the candidates are unsound and only use up their pixels
-        if len(found) == SETTINGS.most or free.sum() < max(3.0, least):
+        if len(fits) == SETTINGS.most or free.sum() < max(3.0, least):
             break
         fit = _best_fit(small, free, rng)
         if fit is None:
@@ -90,9 +90,9 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
             break
         flat = np.median(small.normal[grown] @ fit.facing) > SETTINGS.flat
         if flat and unit(-fit.coefficients) @ fit.facing > SETTINGS.like_geometry:
-            found.append(fit)
+            fits.append(fit)
         free &= ~grown
-    return _label(_Maps(rays, normal.astype(np.float64), depth), found)
+    return _label(_Maps(rays, normal.astype(np.float64), depth), fits)
 
 
 def upright(normal: Array, plane: Array) -> Array | None:
@@ -211,19 +211,19 @@ def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
     return core | binary_propagation(core & calm, mask=calm)
 
 
-def _label(maps: _Maps, found: list[_Fit]) -> list[Plane]:
+def _label(maps: _Maps, fits: list[_Fit]) -> list[Plane]:
     """Give every pixel to the closest plane that reaches it, drop specks and planes that shrank too far."""
     surface = maps.depth > 0
     nearest = np.full(surface.shape, np.inf)  # [H, W] relative depth error of the closest plane
     label = np.full(surface.shape, -1)
-    for k, fit in enumerate(found):
+    for k, fit in enumerate(fits):
         error = np.where(_region(maps, surface, fit), np.abs(maps.error(fit)), np.inf)
         label = np.where(error < nearest, k, label)
         nearest = np.minimum(nearest, error)
     planes = []
     # pixels of the largest patch that is chance
     speck = int(np.ceil(SETTINGS.speck * surface.size)) - 1
-    for k, fit in enumerate(found):
+    for k, fit in enumerate(fits):
         mask = remove_small_objects(label == k, max_size=speck)
         if mask.sum() < SETTINGS.least * surface.sum():
             continue

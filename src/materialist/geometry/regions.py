@@ -47,12 +47,12 @@ def _targets(
 
     A small one goes to one larger than itself, never in circles.
     """
-    own = np.concatenate(ends)
+    owners = np.concatenate(ends)
     other = np.concatenate(ends[::-1])
     step = np.tile(step, 2)
-    larger = (size[other] > size[own]) | ((size[other] == size[own]) & (other > own))
-    border = (own != other) & (size[own] < least) & larger
-    key, place = np.unique(own[border] * len(size) + other[border], return_inverse=True)
+    larger = (size[other] > size[owners]) | ((size[other] == size[owners]) & (other > owners))
+    border = (owners != other) & (size[owners] < least) & larger
+    key, place = np.unique(owners[border] * len(size) + other[border], return_inverse=True)
     mean = np.bincount(place, step[border], len(key)) / np.bincount(place, minlength=len(key))
     order = np.argsort(-mean, kind="stable")  # the last one written is the nearest
     small = key[order] // len(size)

@@ -29,17 +29,17 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     # Numbers near 1 keep the sums exact.
     mean = values[known].mean()
     spread = max(float(values[known].std()), 1e-30)
-    own = np.where(known, (values - mean) / spread, 0)
+    scaled = np.where(known, (values - mean) / spread, 0)
     inside = known.astype(np.float64)
     moments = np.stack(
         [np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2
     )  # [H, W, 3, 3]
     # A window without a spread in some direction says that the map is level along it.
     moments = moments + np.diag([1e-9, 1e-6, 1e-6]) + np.eye(3) * ~known[..., None, None]
-    found = np.linalg.solve(moments, np.stack([total(own, a) for a in basis], -1)[..., None])[
+    solution = np.linalg.solve(moments, np.stack([total(scaled, a) for a in basis], -1)[..., None])[
         ..., 0
     ]
-    return found[..., 1] * spread, found[..., 2] * spread
+    return solution[..., 1] * spread, solution[..., 2] * spread
 
 
 def continued(values: Array, known: Array) -> Array:

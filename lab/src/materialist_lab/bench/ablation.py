@@ -80,9 +80,9 @@ class AblationBench(Benchmark):
     spp: int = option(128, "Paths a pixel of pictures that are compared.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
-        wanted = names("tables", self.tables, TABLES)
+        chosen_tables = names("tables", self.tables, TABLES)
         for photo in self._real(data) if self.photos else self._synthetic(data):
-            for name in wanted:
+            for name in chosen_tables:
                 for row in TABLES[name](photo):
                     yield {**row, "sample": photo.photo.path}
 
@@ -159,8 +159,8 @@ class _Photo:
         with torch.no_grad():
             maps = model()
             render(maps)
-        found = replaced(self.prior.materials, engine.pixels, maps)
-        picture = fitting.render(found, state.envmap, self.bench.spp, self.bench.seed + 1)
+        materials = replaced(self.prior.materials, engine.pixels, maps)
+        picture = fitting.render(materials, state.envmap, self.bench.spp, self.bench.seed + 1)
         loss = min(seen) if blind else seen[-1]
         return {
             **self.against_photo(method, picture),
@@ -240,9 +240,13 @@ def _fov(photo: _Photo) -> Iterator[Row]:
             continue
         seen = replace(sample, photo=replace(photo.photo, camera=camera))
         scene = true_scene(seen, completion="planes", seed=bench.seed)
-        how: dict[str, Any] = {"spp": bench.spp, "seed": bench.seed + 1, "device": bench.device}
-        row = photo.against_photo(name, rendered(scene, **how))
-        relit = rendered(replace(scene, envmap=other), **how)
+        rendering: dict[str, Any] = {
+            "spp": bench.spp,
+            "seed": bench.seed + 1,
+            "device": bench.device,
+        }
+        row = photo.against_photo(name, rendered(scene, **rendering))
+        relit = rendered(replace(scene, envmap=other), **rendering)
         truth = sample.scene.render(other, spp=bench.spp, seed=bench.seed + 3)
         yield {**row, "relit_psnr": metrics.psnr(relit, truth)}
 

@@ -55,8 +55,12 @@ class ExportBench(Benchmark):
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         with tempfile.TemporaryDirectory(prefix="materialist-bench-") as temporary:
             case = photo_case(self, data, self.photo, Path(temporary), self.size)
-            how: dict[str, Any] = {"predictor": case.predictor, "fov": case.fov, "size": self.size}
-            scene = pipeline.invert(case.photo, seed=self.seed, device=self.device, **how)
+            inversion: dict[str, Any] = {
+                "predictor": case.predictor,
+                "fov": case.fov,
+                "size": self.size,
+            }
+            scene = pipeline.invert(case.photo, seed=self.seed, device=self.device, **inversion)
             ours = pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 1)
             photo = scene.photo.linear
             exported = self._pictures(scene, Path(temporary) / "exported", residual=True)
@@ -97,8 +101,8 @@ class ExportBench(Benchmark):
             write_mitsuba(folder / to, lit, [_part(*told) for told in read(folder / name)])
             yield f"{to} in Mitsuba, principled", rendered(folder / to / "scene.xml")
         if program := find_blender(self.blender or None):
-            made = export(scene, folder / "blend", to="blend", residual=residual)
-            script = made.path / "build.py"
+            files = export(scene, folder / "blend", to="blend", residual=residual)
+            script = files.path / "build.py"
             for name, flags in (("Principled", []), ("--fitted-material", ["--fitted-material"])):
                 asked = ["--render", str(folder / "cycles.exr"), "--samples", str(self.spp), *flags]
                 run_script(program, script, folder / "scene.blend", asked)

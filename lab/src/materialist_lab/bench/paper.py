@@ -80,13 +80,18 @@ class Table:
         means: dict[str, dict[str, float]] = row.get("means", {})
         for label, paper, methods in self.lines:
             if paper:
-                told = [*paper, *[None] * len(self.columns)][: len(self.columns)]
-                yield [str(label), "published", *("–" if x is None else f"{x:g}" for x in told), ""]
+                entry = [*paper, *[None] * len(self.columns)][: len(self.columns)]
+                yield [
+                    str(label),
+                    "published",
+                    *("–" if x is None else f"{x:g}" for x in entry),
+                    "",
+                ]
             for method in filter(means.__contains__, methods):
-                found = [means[method].get(key) for key in self.columns]
+                figures = [means[method].get(key) for key in self.columns]
                 cells = (
                     "–" if x is None else f"{x:.{columns[k].digits}f}"
-                    for k, x in zip(self.columns, found)
+                    for k, x in zip(self.columns, figures)
                 )
                 yield [str(label), method, *cells, str(means[method]["samples"])]
 
@@ -97,8 +102,8 @@ def published() -> tuple[dict[str, Measure], list[Table]]:
     content = yaml.safe_load(
         (files("materialist_lab.bench") / "assets" / "paper.yaml").read_text("utf-8")
     )
-    measures = {name: Measure(**told) for name, told in content["measures"].items()}
-    return measures, [Table(**told) for told in content["tables"]]
+    measures = {name: Measure(**entry) for name, entry in content["measures"].items()}
+    return measures, [Table(**entry) for entry in content["tables"]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,13 +125,13 @@ class PaperBench(OperationOptions):
     def run(self, data: Path | None, output: Path) -> None:
         """Measure one row after the other; a row that cannot be says why. Raises InputError, OutputError."""
         measures, tables = published()
-        wanted = names("measures", self.only or ",".join(measures), measures)
+        chosen = names("measures", self.only or ",".join(measures), measures)
         make_folder(output / "rows")
         there = (output / "rows").glob("*.json") if self.resume else ()
         rows: dict[str, dict[str, Any]] = {
             path.stem: json.loads(path.read_text("utf-8")) for path in there
         }
-        for name in wanted:
+        for name in chosen:
             try:
                 rows[name] = self._row(name, measures[name], data, output, rows.get(name, {}))
             except MaterialistError as error:
@@ -210,7 +215,7 @@ def write_page(
                 "picture": picture,
             }
         )
-    told = {
+    entry = {
         "parts": parts,
         "cores": os.cpu_count(),
         "commit": commit(),
@@ -219,7 +224,7 @@ def write_page(
     assets = files("materialist_lab.bench") / "assets"
     for kind in ("html", "md"):
         page = Environment(autoescape=kind == "html", trim_blocks=True, lstrip_blocks=True)
-        text = page.from_string((assets / f"paper.{kind}").read_text("utf-8")).render(told)
+        text = page.from_string((assets / f"paper.{kind}").read_text("utf-8")).render(entry)
         write_whole(output / f"report.{kind}", text)
 
 
