@@ -105,9 +105,8 @@ class Material:
 
 def hsv(h: float, s: float, v: float) -> Colour:
     """Linear colour of hue, saturation and value given in sRGB, as people name colours; kept within [0.02, 0.92]."""
-    saturation = min(max(s, 0), 1)
-    value = min(max(v, 0), 1)
-    srgb = np.array(colorsys.hsv_to_rgb(h % 1, saturation, value))
+    s, v = np.clip([s, v], 0, 1).tolist()
+    srgb = np.array(colorsys.hsv_to_rgb(h % 1, s, v))
     # No real surface is darker than soot or brighter than fresh snow.
     return tuple(np.clip(srgb**2.2, 0.02, 0.92).tolist())
 
@@ -426,7 +425,6 @@ def light(rng: np.random.Generator, radiance: Colour) -> Material:
 
 
 Maker = Callable[[np.random.Generator], Material]
-# (share, maker) of what movable things are made of.
 OBJECTS: tuple[tuple[float, Maker], ...] = (
     (0.2, ceramic),
     (0.2, plastic),
