@@ -19,7 +19,7 @@ def group(name: str, help: str, app: typer.Typer | None = None, **settings: Any)
         name=name,
         help=help,
         no_args_is_help=True,
-        add_completion=False,
+        add_completion=app is None,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         **settings,
