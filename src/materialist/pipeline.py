@@ -130,7 +130,7 @@ def invert(
         spp=choices.spp,
     )
     lap("setup")
-    best = fitting.invert(fit_setup, progress=progress, found=tell, stop=stop or never)
+    best = fitting.invert(fit_setup, progress=progress, on_stage=tell, stop=stop or never)
 
     # --- The scene, with where everything came from ---
     report = _report(picture, prior, best, (*stages, *best.stages), start)

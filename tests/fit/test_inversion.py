@@ -185,7 +185,7 @@ def test_a_result_has_two_independent_halves(room):
     setup = replace(
         room.setup(PAPER.at_most(3), room.truth), completion="none", spp=4, device="cpu"
     )
-    result = invert(setup, found=told.__setitem__)
+    result = invert(setup, on_stage=told.__setitem__)
     assert result.spp == 4 and not np.array_equal(*result.halves)
     np.testing.assert_allclose(result.rerender, np.mean(result.halves, 0), rtol=1e-6)
     assert told["light"] is result.envmap and told["materials"] is result.materials

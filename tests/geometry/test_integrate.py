@@ -21,9 +21,9 @@ def _plane(normal, offset=-3.0):
     return depth, np.broadcast_to(normal, RAYS.shape).astype(np.float32)
 
 
-def _log_error(found, true):
+def _log_error(depth, true):
     """[H, W] error of log depth after one factor."""
-    error = np.log(found / true)
+    error = np.log(depth / true)
     return error - np.median(error)
 
 
@@ -45,18 +45,18 @@ def test_a_tilted_plane_that_the_depth_bends_comes_back(normal):
     rows, columns = np.indices(true.shape)
     wrong = true * np.exp(0.1 * np.sin(columns / 8) * np.sin(rows / 8))
     assert _angle(wrong, normals) > 15
-    found = integrated(wrong, normals, RAYS)
-    assert _angle(found, normals) < 4
-    assert np.std(_log_error(found, true)) < 0.3 * np.std(_log_error(wrong, true))
+    depth = integrated(wrong, normals, RAYS)
+    assert _angle(depth, normals) < 4
+    assert np.std(_log_error(depth, true)) < 0.3 * np.std(_log_error(wrong, true))
 
 
 @pytest.mark.parametrize("normal", [(0.3, 0.2, 1), (-0.4, 0, 1)])
 def test_a_plane_that_the_depth_leans_otherwise_over_the_whole_picture_is_a_compromise(normal):
     true, normals = _plane(normal)
     wrong, _ = _plane((0.05, -0.1, 1))
-    found = integrated(wrong, normals, RAYS)
-    assert _angle(found, normals) < 0.5 * _angle(wrong, normals)
-    assert np.abs(_log_error(found, true)).max() < 0.6 * np.abs(_log_error(wrong, true)).max()
+    depth = integrated(wrong, normals, RAYS)
+    assert _angle(depth, normals) < 0.5 * _angle(wrong, normals)
+    assert np.abs(_log_error(depth, true)).max() < 0.6 * np.abs(_log_error(wrong, true)).max()
 
 
 def test_texture_that_is_printed_onto_a_plane_is_gone():
@@ -70,12 +70,12 @@ def test_a_sphere_comes_back_from_a_flat_disc_before_a_wall():
     ball = np.isfinite(sphere)
     true = np.where(ball, sphere, 9.0)
     normals = np.where(ball[..., None], normal, [0, 0, 1]).astype(np.float32)
-    found = integrated(np.where(ball, 5.0, 9.0), normals, RAYS)
-    assert _angle(np.where(ball, found, 0), normals) < 2
+    depth = integrated(np.where(ball, 5.0, 9.0), normals, RAYS)
+    assert _angle(np.where(ball, depth, 0), normals) < 2
     middle = ball & ((normals * unit(RAYS)).sum(-1) < -0.5)
-    error = np.log(found / true)
+    error = np.log(depth / true)
     assert np.std(error[middle]) < 0.3 * np.std(np.log(5.0 / true)[middle])
-    np.testing.assert_allclose(found[~ball], 9.0, rtol=0.02)
+    np.testing.assert_allclose(depth[~ball], 9.0, rtol=0.02)
 
 
 @pytest.mark.parametrize("near", [2.0, 2.7])
@@ -89,8 +89,8 @@ def test_the_step_of_a_painted_edge_that_ends_on_the_surface_is_closed():
     true, normals = _plane((0.1, 0.3, 1))
     stepped = true.copy()
     stepped[:, 30:60] *= 1 + 0.01 * np.clip((40 - np.arange(72)) / 10, 0, 1)[:, None]
-    found = integrated(stepped, normals, RAYS)
-    assert np.abs(_log_error(found, true)).max() < 0.3 * np.abs(_log_error(stepped, true)).max()
+    depth = integrated(stepped, normals, RAYS)
+    assert np.abs(_log_error(depth, true)).max() < 0.3 * np.abs(_log_error(stepped, true)).max()
 
 
 def test_the_blurred_rim_of_a_thing_joins_one_of_its_sides():
@@ -98,16 +98,16 @@ def test_the_blurred_rim_of_a_thing_joins_one_of_its_sides():
     true[20:23, 30:60] = 2.0
     blurred = true.copy()
     blurred[20:23, [29, 60]] = 2.4
-    found = integrated(blurred, normals, RAYS)
-    rim = found[20:23, [29, 60]]
+    depth = integrated(blurred, normals, RAYS)
+    rim = depth[20:23, [29, 60]]
     assert (np.minimum(np.abs(rim - 2), np.abs(rim - 3)) < 0.05).all()
 
 
 def test_sky_and_tiny_surfaces_stay():
     true, normals = _plane((0.2, 0, 1))
     true[:20] = 0
-    found = integrated(true, normals, RAYS)
-    assert (found[:20] == 0).all() and (found[20:] > 0).all()
+    depth = integrated(true, normals, RAYS)
+    assert (depth[:20] == 0).all() and (depth[20:] > 0).all()
     speck = np.zeros_like(true)
     speck[4, 5:8] = 2
     np.testing.assert_array_equal(integrated(speck, normals, RAYS), speck.astype(np.float32))

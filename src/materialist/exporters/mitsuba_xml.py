@@ -66,7 +66,7 @@ def _xml(mi, description: dict, depth: int) -> str:
 def _description(mi, scene: Scene, parts: list[Part], own: bool) -> dict:
     """The scene as `mi.load_dict` takes it."""
     eye = sensor(scene.camera, look_along(mi))
-    found: dict = {
+    description: dict = {
         "type": "scene",
         "embree_use_robust_intersections": True,
         "integrator": {"type": "path", "max_depth": path_depth(scene)},
@@ -74,10 +74,14 @@ def _description(mi, scene: Scene, parts: list[Part], own: bool) -> dict:
         "light": {"type": "envmap", "filename": "envmap_mitsuba.exr", "to_world": half_turn(mi)},
     }
     for part in parts:
-        found[part.name] = {"type": "ply", "filename": f"{part.name}.ply", "bsdf": _bsdf(part, own)}
+        description[part.name] = {
+            "type": "ply",
+            "filename": f"{part.name}.ply",
+            "bsdf": _bsdf(part, own),
+        }
         if part.surface is not None and (emitter := body_emitter(part.surface)):
-            found[part.name]["emitter"] = emitter
-    return found | {f"lamp{k}": sphere(lamp) for k, lamp in enumerate(scene.lamps)}
+            description[part.name]["emitter"] = emitter
+    return description | {f"lamp{k}": sphere(lamp) for k, lamp in enumerate(scene.lamps)}
 
 
 def _bsdf(part: Part, own: bool) -> dict:

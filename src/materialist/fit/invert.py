@@ -282,12 +282,12 @@ def invert(
     setup: FitSetup,
     *,
     progress: Progress | None = None,
-    found: Callable[[str, Any], Any] = lambda *_: None,
+    on_stage: Callable[[str, Any], Any] = lambda *_: None,
     stop: Stop = never,
 ) -> FitResult:
     """Geometry, light, materials and the path-traced re-rendering of one photo.
 
-    found: called as found("light", [h, 2h, 3]) and found("materials", Materials) as soon as each is there.
+    on_stage: called as on_stage("light", [h, 2h, 3]) and on_stage("materials", Materials) as soon as each is there.
     """
     fit = prepare(setup, progress, stop)
     stages = list(fit.stages)
@@ -298,8 +298,8 @@ def invert(
     stopped = stop()
     stages += state.stages
     materials = fit.materials(state)
-    found("light", state.envmap)
-    found("materials", materials)
+    on_stage("light", state.envmap)
+    on_stage("materials", materials)
     if progress is not None:
         progress("rerender", 0, 1)
     settings = setup.settings

@@ -69,13 +69,13 @@ class GeometryBench(Benchmark):
             built: dict[str, Any] = {"tau": self.tau, "completion": "none"}
             geometry, cost = timed(build_geometry, maps.depth, maps.normal, photo.camera, **built)
             surface = maps.depth > 0
-            found = surface_normals(geometry.mesh, surface)
+            mesh_normals = surface_normals(geometry.mesh, surface)
             piece = pieces(geometry.mesh, surface)
-            figures = agreement(found, maps.normal, surface) | connection(piece)
+            figures = agreement(mesh_normals, maps.normal, surface) | connection(piece)
             pictures = (
                 photo.linear,
                 shown(maps.normal, surface),
-                shown(found, surface),
+                shown(mesh_normals, surface),
                 coloured(piece),
             )
             report.sheet.append(strip(*(lowered(picture) for picture in pictures)))
@@ -89,8 +89,8 @@ class GeometryBench(Benchmark):
 
 def photo_files(folder: Path) -> list[Path]:
     """The pictures of a folder and of its folders, without masks (`NAME_mask.png`)."""
-    found = (path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
-    return sorted(path for path in found if not path.stem.endswith("_mask"))
+    pictures = (path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
+    return sorted(path for path in pictures if not path.stem.endswith("_mask"))
 
 
 def surface_normals(mesh: Mesh, surface: Array) -> Array:
@@ -115,14 +115,14 @@ def pieces(mesh: Mesh, surface: Array) -> Array:
     links = coo_matrix((np.ones(len(ends[0]), np.int8), ends), (len(point), len(point)))
     _, piece = connected_components(links, directed=False)
     _, number = np.unique(piece[corner[: 2 * int(surface.sum()) : 2, 0]], return_inverse=True)
-    found = np.full(surface.shape, -1)
-    found[surface] = number.ravel()
-    return found
+    piece = np.full(surface.shape, -1)
+    piece[surface] = number.ravel()
+    return piece
 
 
-def agreement(found: Array, normal: Array, surface: Array) -> dict[str, float]:
+def agreement(mesh_normals: Array, normal: Array, surface: Array) -> dict[str, float]:
     """Median angles between normals [H, W, 3] over a surface [H, W] bool; `level` where there is such a thing."""
-    cosine = np.clip((found * normal).sum(-1), -1, 1)
+    cosine = np.clip((mesh_normals * normal).sum(-1), -1, 1)
     angle = np.degrees(np.arccos(cosine))
     figures = {"angle": float(np.median(angle[surface]))}
     level = surface & (normal[..., 1] > LEVEL)
