@@ -41,6 +41,7 @@ _EXTRAS = {
     "imageio-ffmpeg": ("video", "films"),
     "usd-core": ("usd", "export to USD"),
     "ray": ("ray", "batches on a cluster"),
+    "aiohttp": ("http", "photos behind https"),
     "transformers": ("hub", "hub predictors"),
     "diffusers": ("hub", "Marigold predictor"),
 }
