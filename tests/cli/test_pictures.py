@@ -54,7 +54,7 @@ def test_edit_writes_the_photo_with_only_the_block_changed(done, folder, tmp_pat
     scene = folder / "a.scene"
     out = tmp_path / "out.exr"
     options = "--value -0.5 --roughness +0.2 --spp 4 --seed 2"
-    told = done(
+    outcome = done(
         "edit",
         scene,
         "--mask",
@@ -65,14 +65,14 @@ def test_edit_writes_the_photo_with_only_the_block_changed(done, folder, tmp_pat
         "--save",
         tmp_path / "b.scene",
     )
-    assert told["image"] == str(out) and told["edits"][0]["roughness"] == "+0.2"
+    assert outcome["image"] == str(out) and outcome["edits"][0]["roughness"] == "+0.2"
     picture = read_exr(out)
     photo = load_scene(scene).photo.original
     np.testing.assert_array_equal(picture[:8], photo[:8])
     assert (picture[MASK] < photo[MASK]).all()
     saved = load_scene(tmp_path / "b.scene")
     np.testing.assert_array_equal(saved.photo.original, picture)
-    assert saved.provenance["edits"] == told["edits"]
+    assert saved.provenance["edits"] == outcome["edits"]
 
 
 def test_a_no_op_png_has_the_bytes_of_the_photo_and_a_full_render_has_not(done, folder, tmp_path):
@@ -178,10 +178,10 @@ def test_a_film_is_judged_by_the_frame_that_changes_most(
         return (photo * np.float32(one) for _, one in zip(film, (1, factor, 1)))
 
     monkeypatch.setattr("materialist.edits.composite.composite.pictures", made)
-    told = done(
+    outcome = done(
         "relight", folder / "a.scene", "--rotate", 360, "--frames", 3, "-o", tmp_path / "turn"
     )
-    assert str(told["warnings"]).count("of 255 levels") == notes
+    assert str(outcome["warnings"]).count("of 255 levels") == notes
 
 
 def test_select_writes_a_mask_that_edit_reads(done, folder, tmp_path):
@@ -222,10 +222,10 @@ def test_glass_is_written_saved_and_loaded_again(done, folder, tmp_path):
     np.testing.assert_array_equal(scene.photo.original, picture)
     (body,) = scene.bodies
     assert body.surface.ior == pytest.approx(1.4) and body.surface.tint[1] == pytest.approx(1)
-    told = done(
+    outcome = done(
         "apply", folder / "a.scene", folder / "glass.yaml", "--spp", 4, "-o", tmp_path / "1.exr"
     )
-    assert told["edits"][-1]["hollow"] is True
+    assert outcome["edits"][-1]["hollow"] is True
 
 
 def test_remove_with_a_background_shows_it(done, folder, tmp_path):
@@ -247,7 +247,7 @@ def test_remove_with_a_background_shows_it(done, folder, tmp_path):
 def test_insert_writes_picture_and_scene(done, folder, tmp_path):
     scene = folder / "floor.scene"
     out = tmp_path / "out.exr"
-    told = done(
+    outcome = done(
         "insert",
         scene,
         folder / "box.ply",
@@ -264,7 +264,7 @@ def test_insert_writes_picture_and_scene(done, folder, tmp_path):
         "--save",
         tmp_path / "b.scene",
     )
-    assert [edit["at"] for edit in told["edits"]] == [[12, 28], [36, 28]]
+    assert [edit["at"] for edit in outcome["edits"]] == [[12, 28], [36, 28]]
     picture = read_exr(out)
     photo = load_scene(scene).photo.original
     assert np.abs(picture - photo).max(-1).sum() > 10
@@ -275,7 +275,7 @@ def test_insert_writes_picture_and_scene(done, folder, tmp_path):
 @pytest.mark.slow
 def test_drop_films_into_a_folder(done, folder, tmp_path):
     pytest.importorskip("mujoco")
-    told = done(
+    outcome = done(
         "drop",
         folder / "floor.scene",
         folder / "box.ply",
@@ -297,11 +297,11 @@ def test_drop_films_into_a_folder(done, folder, tmp_path):
         tmp_path / "end.scene",
     )
     frames = sorted((tmp_path / "film").glob("*.png"))
-    assert len(frames) == told["frames"] == 3
+    assert len(frames) == outcome["frames"] == 3
     first, last = (np.asarray(Image.open(f)).astype(float) for f in (frames[0], frames[-1]))
     assert np.abs(first - last).max() > 20
     assert len(load_scene(tmp_path / "end.scene").bodies) == 1
-    told = done(
+    outcome = done(
         "drop",
         folder / "floor.scene",
         folder / "box.ply",
@@ -316,7 +316,7 @@ def test_drop_films_into_a_folder(done, folder, tmp_path):
         "-o",
         tmp_path / "turned",
     )
-    assert [edit.get("rotate") for edit in told["edits"]] == [None, 90]
+    assert [edit.get("rotate") for edit in outcome["edits"]] == [None, 90]
 
 
 EDIT = ("edit", "a.scene")

@@ -62,9 +62,9 @@ def test_a_missing_extra_names_the_one_that_brings_it(monkeypatch):
         raise doctor.PackageNotFoundError(name)
 
     monkeypatch.setattr(doctor, "version", nothing)
-    found = {name: doctor._package(name, *what) for name, what in doctor._EXTRAS.items()}
-    assert set(found) == set(packages), "every package of an extra is looked for, and no other"
-    for name, finding in found.items():
+    findings = {name: doctor._package(name, *what) for name, what in doctor._EXTRAS.items()}
+    assert set(findings) == set(packages), "every package of an extra is looked for, and no other"
+    for name, finding in findings.items():
         assert finding.state == "missing"
         assert name in finding.remedy
 
