@@ -96,6 +96,11 @@ def documented(kind: "type[OperationOptions]") -> Callable[[Function], Function]
 class OperationOptions:
     operation: ClassVar[str]
 
+    @property
+    def only_in_photo(self) -> bool:
+        """Whether the result is a picture in the photo, which no rendering of the scene shows."""
+        return False
+
     def __init_subclass__(cls) -> None:
         """The docstring of the class lists its options."""
         if cls.__doc__:

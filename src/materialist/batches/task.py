@@ -149,13 +149,9 @@ def _edited(
     task: PhotoTask, edits: Path, scene: Scene, report: Progress
 ) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
-    from materialist.edits.core.notes import (
-        effect_notes,
-        mean_change,
-        noise_notes,
-        warnings_since,
-    )
+    from materialist.edits.core.notes import mean_change, noise_notes, warnings_since
     from materialist.edits.recipe import apply
+    from materialist.edits.registry import effect_notes
 
     report("edit", 0, 1)
     seed = task.options["seed"]

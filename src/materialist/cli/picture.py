@@ -21,15 +21,6 @@ def chosen_region(scene: Any, region: Place, device: str) -> Any:
     )
 
 
-def opened_region(
-    scene: Path, output: Path, region: Place, rendering: Rendering
-) -> tuple[Any, Any]:
-    """(the scene, [H, W] bool region that is edited), once the output is known to be writable."""
-    check_before(output, rendering)
-    loaded = mt.load_scene(scene)
-    return loaded, chosen_region(loaded, region, rendering.device)
-
-
 def check_before(output: Path, rendering: Rendering, *, video: bool = False) -> None:
     """Everything about the output that can be wrong, before the work starts.
 
@@ -200,9 +191,9 @@ def finish_command(
 ) -> None:
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
-    from materialist.edits.core.notes import effect_notes, mean_change, noise_notes, warnings_since
+    from materialist.edits.core.notes import mean_change, noise_notes, warnings_since
+    from materialist.edits.registry import effect_notes
 
-    # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
     # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
     save = rendering.save
     grainy = noise_notes(rendering.denoise is not False)
@@ -211,7 +202,6 @@ def finish_command(
         warnings += effect_notes(
             scene, edited, mean_change(scene, picture) if change is None else change
         )
-    # --- The edited scene, whose photo is the picture ---
     # --- The edited scene, whose photo is the picture ---
     if save is not None:
         saved = developed(scene, edited, picture, seed=rendering.seed, device=rendering.device)

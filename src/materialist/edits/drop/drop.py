@@ -11,6 +11,7 @@ import numpy as np
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
+from materialist.edits.drop.options import Drop, DropKeywords
 from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, load_library
 from materialist.edits.insert.insert import Support, moved_body, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
@@ -18,9 +19,7 @@ from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
-from materialist.keywords import DropKeywords
 from materialist.option_kinds import documented, parse_numbers, several
-from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
 

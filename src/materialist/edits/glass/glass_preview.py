@@ -7,9 +7,9 @@ from materialist.edits.composite.layers import without_fireflies
 from materialist.edits.composite.native_layer import spread_known
 from materialist.edits.core.renderer import EditRenderer, denoised, photo_sky
 from materialist.edits.glass.glass import glass, glass_surface
+from materialist.edits.glass.options import Glass
 from materialist.errors import InputError
 from materialist.geometry.silhouette import area, window
-from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
 
 MAX_PATHS = 600_000

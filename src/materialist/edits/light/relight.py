@@ -13,13 +13,12 @@ from materialist.color import CLIPPED, LUMINANCE, luminance
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
+from materialist.edits.light.options import Relight, RelightKeywords
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
-from materialist.keywords import RelightKeywords
 from materialist.option_kinds import documented
-from materialist.options import Relight
 from materialist.render.envmap import check_envmap, is_peaked
 from materialist.types import Array, Lamp, Scene
 

@@ -11,12 +11,11 @@ from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
+from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
 from materialist.geometry.planes import axes
 from materialist.io.photo import decode_photo
-from materialist.keywords import MaterialKeywords
 from materialist.option_kinds import documented
-from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
 
 

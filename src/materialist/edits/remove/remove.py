@@ -12,12 +12,11 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import picture_behind
 from materialist.edits.remove.behind import behind
 from materialist.edits.remove.hole import evidence_notes, make_hole
+from materialist.edits.remove.options import Removal, RemovalKeywords
 from materialist.geometry.build import rebuilt
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import window
-from materialist.keywords import RemovalKeywords
 from materialist.option_kinds import documented
-from materialist.options import Removal
 from materialist.predict import resample
 from materialist.types import Array, Materials, Photo, Scene
 
