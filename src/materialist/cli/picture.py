@@ -83,17 +83,7 @@ def write_result(
 ) -> None:
     start = time.monotonic()
     with stage_progress(quiet=rendering.as_json) as progress:
-        picture = mt.composite(
-            scene,
-            edited,
-            spp=rendering.spp,
-            seed=rendering.seed,
-            full_render=rendering.full_render,
-            upscale=rendering.upscale,
-            denoise=rendering.denoise is not False,
-            device=rendering.device,
-            progress=progress,
-        )
+        picture = mt.composite(scene, edited, progress=progress, **rendering.compositing)
     notes = write_picture(output, picture, scene, edited, rendering)
     facts = {"image": str(output), "spp": rendering.spp, "seconds": time.monotonic() - start}
     finish_command(
@@ -150,14 +140,9 @@ def write_film(
         composites = pictures(
             scene,
             kept("scene", film),
-            spp=rendering.spp,
-            seed=rendering.seed,
-            denoise=rendering.denoise is not False,
-            device=rendering.device,
-            full_render=rendering.full_render,
-            upscale=rendering.upscale,
             progress=progress,
             count=frames,
+            **rendering.compositing,
         )
         write_frames(output, kept("picture", composites), fps=fps, force=rendering.force)
     facts = {
