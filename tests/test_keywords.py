@@ -88,9 +88,9 @@ def test_a_misspelt_keyword_is_named_with_the_one_that_is_meant():
     with pytest.raises(
         InputError, match=r"edit has no option 'ruoghness'; .* Do you mean 'roughness'\?"
     ):
-        mt.MaterialEdit.given(ruoghness=1)
+        mt.MaterialEdit.merged(ruoghness=1)
     with pytest.raises(InputError, match=r"no option 'qqq'; it takes .*feather\.$"):
-        mt.MaterialEdit.given(qqq=1)
+        mt.MaterialEdit.merged(qqq=1)
 
 
 @pytest.mark.slow

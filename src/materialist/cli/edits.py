@@ -101,13 +101,13 @@ def operation_command(operation: Operation) -> Callable[..., None]:
 
     # The parameters of the shared command, with the options of this operation.
     shared = inspect.signature(command).parameters.values()
-    own = [
+    parameters = [
         entry.replace(annotation=operation.options) if entry.name == "options" else entry
         for entry in shared
         if entry.name != "operation"
     ]
-    of_operation.__signature__ = inspect.Signature(own)  # type: ignore[attr-defined]
-    of_operation.__annotations__ = {entry.name: entry.annotation for entry in own}
+    of_operation.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    of_operation.__annotations__ = {entry.name: entry.annotation for entry in parameters}
     of_operation.__doc__ = operation.about
     return of_operation
 

@@ -69,7 +69,7 @@ def drop(
         InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
             missing.
     """
-    options = Drop.given(options, **values)
+    options = Drop.merged(options, **values)
     # --- Options and places, before anything is computed ---
     if not 2 <= frames <= MAX_FRAMES:
         raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
@@ -107,7 +107,7 @@ def settle(
         InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
         SetupError: mujoco or coacd is missing.
     """
-    falling = _prepared(scene, meshes, at, Drop.given(options, **values))
+    falling = _prepared(scene, meshes, at, Drop.merged(options, **values))
     poses, gone, rests = _rested(falling)
     names = falling.facts["meshes"]
     if len(gone) == len(names):

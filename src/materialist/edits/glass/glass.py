@@ -47,7 +47,7 @@ def glass(
     fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
     Raises InputError for an option out of its range, or a mask that cannot be used; WeightsError without weights.
     """
-    options = Glass.given(options, **values)
+    options = Glass.merged(options, **values)
     region = checked_region(scene, mask) > 0.5
     removed = remove(scene, mask, options, fitted=fitted)
     # --- The thickness of each object under the mask ---

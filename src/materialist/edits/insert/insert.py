@@ -71,7 +71,7 @@ def insert(
     Raises InputError for a place outside the photo, on the sky, or so near that the mesh would reach behind the
     camera; a mesh that cannot be used; a number out of its range.
     """
-    options = Insertion.given(options, **values)
+    options = Insertion.merged(options, **values)
     model = repainted(
         mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=options.up), options.material
     )

@@ -54,7 +54,7 @@ def relight(
     Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
     notes: list[str] = []
-    changes = resolved(scene, Relight.given(options, **values), notes)
+    changes = resolved(scene, Relight.merged(options, **values), notes)
     if isinstance(changes.rotate, tuple):
         raise InputError(
             f"The rotation is {'..'.join(map('{:g}'.format, changes.rotate))}; one picture has one number."
@@ -275,7 +275,7 @@ def moving_light(
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
     film = [scene] * count if isinstance(scene, Scene) else scene
     notes: list[str] = []
-    changes = resolved(film[0], Relight.given(options, **values), notes)
+    changes = resolved(film[0], Relight.merged(options, **values), notes)
     lamps = changes.lamps
     first, last = changes.rotate if isinstance(changes.rotate, tuple) else (0.0, changes.rotate)
     if not (first or last) and len(suns) < 2 and len(lamps) < 2:

@@ -36,7 +36,7 @@ def edit(
     options, values: see `options.MaterialEdit`; `values` are fields of it, as in `edit(scene, mask, hue=120)`.
     Raises InputError for a mask of another size or empty, or a value out of its range.
     """
-    changes = MaterialEdit.given(options, **values)
+    changes = MaterialEdit.merged(options, **values)
     weight = reshaped(checked_region(scene, mask), changes.grow, changes.feather) * (
         scene.depth > 0
     )

@@ -43,7 +43,7 @@ def remove(
     Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
     of the photo; a background of another aspect. SetupError, WeightsError: a library or model that is not there.
     """
-    options = Removal.given(options, **values)
+    options = Removal.merged(options, **values)
     fitted = fitted or scene
     photographed = replace(scene, bodies=fitted.bodies)
     bodies = (
