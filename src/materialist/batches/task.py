@@ -151,7 +151,7 @@ def _edited(
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
     from materialist.edits.core.notes import mean_change, noise_notes, warnings_since
     from materialist.edits.recipe import apply
-    from materialist.edits.registry import effect_notes
+    from materialist.edits.registry import picture_notes
 
     report("edit", 0, 1)
     seed = task.options["seed"]
@@ -169,7 +169,7 @@ def _edited(
     change = mean_change(scene, picture)
     notes = [
         *warnings_since(scene, edited),
-        *effect_notes(scene, edited, change),
+        *picture_notes(scene, edited, change),
         *noise_notes(),
         *written,
     ]

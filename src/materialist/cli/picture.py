@@ -177,14 +177,14 @@ def finish_command(
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
     from materialist.edits.core.notes import mean_change, noise_notes, warnings_since
-    from materialist.edits.registry import effect_notes
+    from materialist.edits.registry import picture_notes
 
     # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
     save = rendering.save
     grainy = noise_notes(rendering.denoise is not False)
     warnings = [*warnings_since(scene, edited), *grainy, *notes]
     if not rendering.full_render:
-        warnings += effect_notes(
+        warnings += picture_notes(
             scene, edited, mean_change(scene, picture) if change is None else change
         )
     # --- The edited scene, whose photo is the picture ---

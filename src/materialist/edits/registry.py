@@ -21,13 +21,12 @@ OPERATIONS: dict[str, Operation] = {
 """By name, in the order of the help."""
 
 
-def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
-    """What the edits say of a picture, or of a film's most changed frame, that has no more than that `mean_change`."""
-    from materialist.edits.core.notes import LITTLE
-
-    if change >= LITTLE:
-        return []
+def picture_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
+    """What the edits between two scenes say of their picture, or of a film's most changed frame; see `mean_change`."""
     new = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
     kinds = {facts["kind"] for facts in new}
-    notes = (operation.faint for operation in OPERATIONS.values() if operation.kind in kinds)
-    return [note.format(levels=255 * change) for note in notes if note]
+    notes: list[str] = []
+    for operation in OPERATIONS.values():
+        if operation.notes is not None and operation.kind in kinds:
+            notes += operation.notes(scene, edited, change)
+    return notes

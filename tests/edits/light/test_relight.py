@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from edit_scenes import flat_scene
 
-from materialist.edits.core.notes import mean_change
+from materialist.edits.core.notes import effect_notes, mean_change
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light import presets
 from materialist.edits.light.relight import (
@@ -20,7 +20,6 @@ from materialist.edits.light.relight import (
     with_sun,
 )
 from materialist.edits.material.material import edit
-from materialist.edits.registry import effect_notes
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.types import Materials

@@ -133,7 +133,7 @@ def _developed(
     lit = labels["mask"] if world.backdrop is not None else None
     gain = exposure(image, rng, lit) * balance(shading, rng)
     if world.backdrop is not None:
-        image = before(world.backdrop, image, covered)
+        image = over_backdrop(world.backdrop, image, covered)
     image = image * gain
     # --- Defocus ---
     view = world.view
@@ -209,7 +209,7 @@ def _mean_normal(probe: dict[str, Array], same: Array) -> Array:
     return mean * (same.sum(-1, keepdims=True) > 0)
 
 
-def before(backdrop: Array, image: Array, covered: Array) -> Array:
+def over_backdrop(backdrop: Array, image: Array, covered: Array) -> Array:
     """The image [H, W, 3] with a backdrop [h, w, 3] where its surfaces do not cover the pixels [H, W]."""
     h, w = covered.shape
     behind = cv2.resize(backdrop, (w, h), interpolation=cv2.INTER_LINEAR)

@@ -50,6 +50,18 @@ def mean_change(scene: Scene, picture: Array) -> float:
     return float(np.abs(after - before).mean())
 
 
+def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
+    """What to say of another light whose picture, or most changed frame, has no more than that `mean_change`."""
+    asked = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
+    if change >= LITTLE or not any(step["kind"] == "light" for step in asked):
+        return []
+    return [
+        f"The new light changes the picture by {255 * change:.1f} of 255 levels in the mean: the light that was found "
+        "is nearly even, or the new one does not reach what the photo shows. A lamp, a stronger or lower sun, or a "
+        "smaller ambient shows more."
+    ]
+
+
 def noise_notes(denoise: bool = True) -> list[str]:
     """What to say of a picture that was to be denoised, where the denoiser cannot be loaded."""
     from materialist.render.denoise import denoiser_problem

@@ -77,8 +77,8 @@ class Operation:
     """Options without which nothing would change: one of them at least is to be given."""
     summary: Callable[[Scene], str] | None = None
     """What the command says of the edited scene."""
-    faint: str = ""
-    """Note where the picture hardly changes; {levels} is its mean change in levels of 8 bits."""
+    notes: Callable[[Scene, Scene, float], list[str]] | None = None
+    """notes(scene, edited, change): what to say of a picture, by its `core.notes.mean_change`."""
 
     @property
     def name(self) -> str:

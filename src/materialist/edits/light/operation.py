@@ -10,17 +10,17 @@ from materialist.edits.light.options import Relight
 if TYPE_CHECKING:
     from materialist.types import Array, Scene
 
-FAINT = (
-    "The new light changes the picture by {levels:.1f} of 255 levels in the mean: the light that was found is nearly "
-    "even, or the new one does not reach what the photo shows. A lamp, a stronger or lower sun, or a smaller ambient "
-    "shows more."
-)
-
 
 def _apply(scene: Scene, lights: Array | None, options: Any, fitted: Scene) -> Scene:
     from materialist.edits.light.relight import relight
 
     return relight(scene, options, lights=lights, fitted=fitted)
+
+
+def _notes(scene: Scene, edited: Scene, change: float) -> list[str]:
+    from materialist.edits.core.notes import effect_notes
+
+    return effect_notes(scene, edited, change)
 
 
 RELIGHT = Operation(
@@ -32,5 +32,5 @@ RELIGHT = Operation(
     label="Light",
     preview=PreviewMode.SHADED,
     needed=("envmap", "rotate", "sun", "lamps", "ambient", "dim"),
-    faint=FAINT,
+    notes=_notes,
 )
