@@ -16,8 +16,9 @@ from materialist.predict.weights import load_weights, metadata, read_state, writ
 
 STRIDE = 32
 """Sides of the input of a network are multiples of this."""
-SHARED = "encoder."
-"""Prefix of the tensors of the shared image encoder (`predict.efficientnet`), which a network's file does not hold."""
+SHARED = ("encoder.", "encoder_patches.")
+"""Prefixes of the tensors of the shared image encoders (`predict.efficientnet`, `predict.patches`), which a network's
+file does not hold."""
 
 
 @dataclass(frozen=True)

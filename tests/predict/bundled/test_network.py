@@ -57,6 +57,38 @@ def test_the_spread_teaches_its_own_head_alone():
     assert moved == {"spread"}
 
 
+def test_features_of_patches_begin_by_telling_nothing(network, tmp_path):
+    with_patches = BundledNetwork(replace(TINY, patches="dinov2-vits14")).eval()
+    with_patches.load_state_dict(network.state_dict(), strict=False)
+    image = torch.rand(1, 3, 64, 96)
+    rays = torch.zeros(1, 2, 64, 96)
+    with torch.no_grad():
+        plain = network(image, rays)
+        untrained = with_patches(image, rays)
+        torch.nn.init.normal_(with_patches.patch_terms[1].weight, std=0.1)
+        changed = with_patches(image, rays)
+    for name, values in plain.items():
+        torch.testing.assert_close(untrained[name], values)
+    assert (changed["normal"] - plain["normal"]).abs().max() > 1e-3
+    # The file holds what was learnt here, and not the transformer.
+    with_patches.save(tmp_path / "patches.safetensors", {})
+    stored = load_file(tmp_path / "patches.safetensors")
+    assert not any(name.startswith("encoder_patches.") for name in stored)
+    again, _ = BundledNetwork.load(tmp_path / "patches.safetensors")
+    with torch.no_grad():
+        torch.testing.assert_close(
+            again(image, rays)["normal"], changed["normal"], atol=2e-2, rtol=0
+        )
+
+
+def test_the_transformer_does_not_learn_with_the_network():
+    network = BundledNetwork(replace(TINY, patches="dinov2-vits14"))
+    network(torch.rand(1, 3, 32, 32), torch.zeros(1, 2, 32, 32))["depth"].square().sum().backward()
+    moved = {name.partition(".")[0] for name, p in network.named_parameters() if p.grad is not None}
+    assert "patch_terms" in moved
+    assert "encoder_patches" not in moved
+
+
 @pytest.mark.parametrize("size", [(32, 32), (45, 61), (97, 33), (7, 150)])
 def test_any_size(file, size):
     prediction = BundledPredictor(file).predict(made_photo(*size))

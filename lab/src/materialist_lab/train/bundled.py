@@ -20,12 +20,12 @@ RECIPE = Recipe(
     side=256,
     batch=8,
     rate=1e-3,
-    warm_up=300,
+    warm_up=50,
     last_rate=0.02,
     ema=0.999,
     growth=((0.3, 128), (0.75, 192)),
 )
-ARCHITECTURE = BundledArchitecture(encoder="lite2", light=16, spread=True)
+ARCHITECTURE = BundledArchitecture(encoder="lite2", patches="dinov2-vits14", light=16, spread=True)
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class BundledLoss:
 class BundledTask(MapsTask):
     """The network that ships in the package."""
 
-    new_parts = ("spread.",)
+    new_parts = ("spread.", "patch_terms.")
     notes: tuple[str, ...] = (
         "Albedo is compared by L1, L2, gradients at four scales, and after one factor a picture; there is no LPIPS: "
         "its backbone is not part of this project.",

@@ -21,6 +21,8 @@ from materialist.predict.network import (
     StoredNetwork,
     group_norm,
 )
+from materialist.predict.patches import CHANNELS as PATCH_CHANNELS
+from materialist.predict.patches import shipped_patches
 
 CHANNELS = {"albedo": 3, "roughness": 1, "metallic": 1, "normal": 3, "depth": 1, "mask": 1}
 """Maps that the network answers with, and their channels."""
@@ -30,6 +32,8 @@ FIRST_SPREAD = -2.3
 """Natural logarithm of the error that an untrained network expects: a tenth."""
 ALBEDO_SLOPE = 4.0
 """With it, sigmoid(slope * (encoded - 0.5)) is about the encoded photo itself."""
+PATCH_DROPOUT = 0.1
+"""Share of the transformer's channels that a step of training does not see, so that none is relied on alone."""
 LOG_FLOOR = 2.0**-7
 """Radiance below which the logarithmic input no longer tells pixels apart."""
 
@@ -50,6 +54,8 @@ class BundledArchitecture(Architecture):
     """Channels at 1/2."""
     encoder: str = ""
     """Variant of EfficientNet-Lite (`predict.efficientnet`) whose features are read beside the photo; "" for none."""
+    patches: str = ""
+    """Vision transformer (`predict.patches`) whose features are read as well; "" for none."""
     light: int = 0
     """Rows of the map of the light that it answers with as well; 0 for none."""
     spread: bool = False
@@ -93,6 +99,10 @@ class BundledNetwork(StoredNetwork):
             self.encoder = shipped(a.encoder)
             # A key of the stored weights, as all names of modules: renaming it would make them unreadable.
             self.told = zero_convolutions(self.encoder.channels, w)
+        if a.patches:
+            self.encoder_patches = shipped_patches(a.patches)
+            self.patch_dropout = nn.Dropout2d(PATCH_DROPOUT)
+            self.patch_terms = zero_convolutions([PATCH_CHANNELS] * 3, w[1:])
         if a.light:
             self.light = LightHead(a.light, w[2])
         if a.spread:
@@ -143,12 +153,25 @@ class BundledNetwork(StoredNetwork):
         return maps
 
     def _encoder_terms(self, image: Tensor) -> list[Tensor | float]:
-        """What the classifier's features add at each level; nothing where there is no encoder."""
-        if not self.architecture.encoder:
-            return [0.0] * 4
-        with torch.no_grad():
-            features = [unit_power(level) for level in self.encoder(srgb(image))]
-        return [convolution(level) for convolution, level in zip(self.told, features, strict=True)]
+        """What the features learnt from photographs add at each level; nothing where there is no encoder."""
+        terms: list[Tensor | float] = [0.0] * 4
+        picture = srgb(image)
+        if self.architecture.encoder:
+            with torch.no_grad():
+                features = [unit_power(level) for level in self.encoder(picture)]
+            terms = [
+                convolution(level) for convolution, level in zip(self.told, features, strict=True)
+            ]
+        if self.architecture.patches:
+            with torch.no_grad():
+                patches = self.encoder_patches(picture)
+            patches = self.patch_dropout(patches)
+            for k, convolution in enumerate(self.patch_terms, 1):
+                size = [side >> (k + 2) for side in picture.shape[-2:]]
+                # Projected before it is enlarged: a tenth of the work.
+                term = F.interpolate(convolution(patches), size, mode="bilinear")
+                terms[k] = terms[k] + term
+        return terms
 
     def _context(self, x: Tensor, rays: Tensor) -> Tensor:
         """Attention over the coarsest level [B, C, h, w]; each cell knows its place by its ray."""
