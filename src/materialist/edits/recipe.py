@@ -15,19 +15,6 @@ from materialist.option_kinds import OFF, ON, beside, declarations, parse_number
 from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
 
-KEYS = {
-    name: (
-        *operation.target.keys,
-        *(
-            key
-            for key, (declared, _) in declarations(operation.options).items()
-            if declared.written
-        ),
-    )
-    for name, operation in OPERATIONS.items()
-}
-"""Kind of step -> what it may say."""
-
 
 @dataclass(frozen=True)
 class Step:
@@ -110,26 +97,25 @@ def _loader() -> Any:
 
 
 def _step(entry: Any, number: int, path: Path) -> Step:
-    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KEYS:
+    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in OPERATIONS:
         said = (
             f"'{next(iter(entry))}'"
             if isinstance(entry, dict) and len(entry) == 1
             else "not one kind of edit"
         )
-        known = ", ".join(KEYS)
+        known = ", ".join(OPERATIONS)
         raise InputError(
             f"Step {number} of {path} is {said}; it must be one of {known} with its options below it."
         )
     # --- The step's options: only those that its kind has ---
     kind, options = next(iter(entry.items()))
+    keys = OPERATIONS[kind].keys
     if not isinstance(options, dict):
-        raise InputError(
-            f"Step {number} of {path} has no options; give some of {', '.join(KEYS[kind])}."
-        )
-    unknown = sorted(set(options) - {*KEYS[kind], "skip"})
+        raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(keys)}.")
+    unknown = sorted(set(options) - {*keys, "skip"})
     if unknown:
         raise InputError(
-            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KEYS[kind])}."
+            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(keys)}."
         )
     if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
         raise InputError(
