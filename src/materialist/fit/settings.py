@@ -84,6 +84,7 @@ class MaterialSettings:
     loss: Loss = "l1+l2"
     white: float = math.inf
     step_pixels: int = 0  # pixels that a step with cached transport compares, drawn anew; 0: all
+    strip_pixels: int = 0  # of `maps`, pixels that are differentiated at once; 0: all
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -164,6 +165,7 @@ DEFAULT = FitSettings(
         white=CLIPPED,
         delta=1.0,
         weights=(0.7, 1.0, 1.0),
+        strip_pixels=2**18,
         stages=(
             MaterialStage(
                 ("albedo",),
