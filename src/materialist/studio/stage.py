@@ -12,7 +12,7 @@ from materialist.errors import MaterialistError
 from materialist.io import display
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import EditList
-from materialist.studio.live_preview import LIVE
+from materialist.studio.live_preview import is_shaded
 from materialist.studio.selection import Selection, data_url
 from materialist.studio.session import Session
 from materialist.studio.tasks import before_of
@@ -107,7 +107,7 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
     panes = [step for step in steps if glass.is_traced(step)]
     sketched = (
         "; objects are sketched"
-        if any(s.kind not in LIVE and s not in panes for s in steps)
+        if any(not is_shaded(step) and step not in panes for step in steps)
         else ""
     )
     if not steps:

@@ -20,7 +20,7 @@ from materialist import metrics, pipeline
 from materialist.edits.composite.composite import composite, pictures
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
-from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.core.renderer import EditRenderer, RenderOptions
 from materialist.edits.drop.drop import drop
 from materialist.edits.glass.glass import glass
 from materialist.edits.insert.insert import insert
@@ -154,7 +154,7 @@ class EditBench(Benchmark):
             scene, mask, {"material": lambda: changes[0], "light": lambda: turns[0]}, sample
         )
         layers = render_layers(
-            EditRenderer(scene, device=self.device), changes[0], spp=16, seed=self.seed
+            EditRenderer(scene, device=self.device), changes[0], RenderOptions(seed=self.seed)
         )
         # --- Into a large photo, with grain as cameras have it ---
         side = (self.large, self.large)

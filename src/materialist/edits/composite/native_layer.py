@@ -7,7 +7,13 @@ import cv2
 import numpy as np
 
 from materialist.edits.composite.upsample import matte
-from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, path_depth
+from materialist.edits.core.renderer import (
+    EditRenderer,
+    RenderOptions,
+    denoised,
+    is_relit,
+    path_depth,
+)
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import area, grown, window
@@ -47,7 +53,7 @@ class NativeLayer:
 
 
 def native_layer(
-    renderer: EditRenderer, edited: Scene, *, spp: int, seed: int, clean: bool
+    renderer: EditRenderer, edited: Scene, options: RenderOptions
 ) -> NativeLayer | None:
     """Trace the bodies and lamps that are new in `edited` at native size; None where the camera sees none of them.
 
@@ -86,16 +92,18 @@ def native_layer(
     size, part = _traced_size(native, there)
     has_glass = any(body and is_transparent(body.surface) for body in chosen.values())
     max_factor = SETTINGS.max_path_factor * (1 + has_glass)
-    budget = int(SETTINGS.path_budget * spp * small.size / area(part))
-    paths = max(SETTINGS.min_paths, min(max_factor * spp, budget))
+    budget = int(SETTINGS.path_budget * options.spp * small.size / area(part))
+    paths = max(SETTINGS.min_paths, min(max_factor * options.spp, budget))
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
-    picture = radiance(target, size, part, spp=paths, seed=seed, max_depth=depth, names=names)
+    picture = radiance(
+        target, size, part, spp=paths, seed=options.seed, max_depth=depth, names=names
+    )
     # Where most of a pixel's body is hidden, too few paths met it: its neighbours' radiance is taken.
     hidden = (sight.share < alone.share / 2).astype(np.float32)
     few = _resized(hidden, picture.shape[:2])[..., None] > 0
     picture = spread_known(np.where(few, 0, picture))
-    if clean:
+    if options.denoise:
         guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
         picture = spread_known(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
 

@@ -13,13 +13,12 @@ from materialist.color import CLIPPED, LUMINANCE, luminance
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.core.surfaces import triple
+from materialist.edits.light.options import Relight, RelightKeywords
 from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
-from materialist.keywords import RelightKeywords
 from materialist.option_kinds import documented
-from materialist.options import Relight
 from materialist.render.envmap import check_envmap, is_peaked
 from materialist.types import Array, Lamp, Scene
 
@@ -55,7 +54,7 @@ def relight(
     Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
     notes: list[str] = []
-    changes = resolved(scene, Relight.given(options, **values), notes)
+    changes = resolved(scene, Relight.merged(options, **values), notes)
     if isinstance(changes.rotate, tuple):
         raise InputError(
             f"The rotation is {'..'.join(map('{:g}'.format, changes.rotate))}; one picture has one number."
@@ -276,7 +275,7 @@ def moving_light(
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
     film = [scene] * count if isinstance(scene, Scene) else scene
     notes: list[str] = []
-    changes = resolved(film[0], Relight.given(options, **values), notes)
+    changes = resolved(film[0], Relight.merged(options, **values), notes)
     lamps = changes.lamps
     first, last = changes.rotate if isinstance(changes.rotate, tuple) else (0.0, changes.rotate)
     if not (first or last) and len(suns) < 2 and len(lamps) < 2:
