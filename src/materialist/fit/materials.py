@@ -17,7 +17,7 @@ from materialist.fit.fields import (
     Rows,
     Unified,
 )
-from materialist.fit.losses import consistency, rendering_loss, residual
+from materialist.fit.losses import consistency, encode, rendering_loss, residual
 from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera, Progress
@@ -69,6 +69,9 @@ def fit_materials(
     """
     results = []
     draw = _pixel_draw(len(photo), settings.step_pixels, seed)
+    # Powers take most of a step, and these do not change.
+    encoded_photo = encode(photo, settings.encoding)
+    encoded_albedo = encode(prior[:, :3], settings.encoding)
     strips = field.rows if isinstance(field, MaterialMaps) and not settings.step_pixels else []
     for stage in settings.stages:
         held = {
@@ -82,8 +85,15 @@ def fit_materials(
                 1,
             )
             radiance = problem(values, rows)
-            error = residual(radiance, photo[rows], settings.encoding, white=settings.white)
-            return rendering_loss(error, settings.loss) + consistency(values, prior[rows], settings)
+            error = residual(
+                radiance,
+                photo[rows],
+                settings.encoding,
+                white=settings.white,
+                encoded=encoded_photo[rows],
+            )
+            change = consistency(values, prior[rows], settings, encoded=encoded_albedo[rows])
+            return rendering_loss(error, settings.loss) + change
 
         def loss(_: int, held=held) -> Iterator[torch.Tensor]:
             for rows in strips or [draw()]:
