@@ -1,7 +1,7 @@
 """Memory is kept while photos are inverted, and given back."""
 
-import psutil
 import numpy as np
+import psutil
 
 from materialist.memory import kept_memory
 

@@ -305,8 +305,7 @@ def invert(
         progress("rerender", 0, 1)
     settings = setup.settings
     pixels = setup.photo.linear.shape[0] * setup.photo.linear.shape[1]
-    fewer = min(1.0, settings.rerender_pixels / pixels)
-    each = max(1, (setup.spp or max(8, round(settings.rerender_spp * fewer))) // 2)
+    each = max(1, (setup.spp or settings.rerender_paths(pixels)) // 2)
     first, second = timed(
         stages,
         "rerender",

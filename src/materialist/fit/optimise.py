@@ -85,7 +85,8 @@ def optimise(
 ) -> StageResult:
     """Minimise the sum of `loss(step)` over the tensors `parameters` in place.
 
-    Its parts are differentiated one after another, so that a generator of them needs the memory of one. It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
+    Its parts are differentiated one after another, so that a generator of them needs the memory of one.
+    It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
     """
     if progress is not None:
         progress(name, 0, schedule.max_steps)  # a step may take a minute

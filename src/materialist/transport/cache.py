@@ -47,7 +47,7 @@ class CacheSettings:
     """Of `specular_samples`, by roughness level: a narrow lobe needs fewer."""
     full_pixels: int = 2**20  # pixels of a picture from which a pixel has fewer rays; derived: time
 
-    def at_size(self, pixels: int) -> "CacheSettings":
+    def at_size(self, pixels: int) -> CacheSettings:
         """For a picture of so many pixels: a large one has as many rays in all as one of `full_pixels`."""
         fewer = min(1.0, self.full_pixels / pixels)
         diffuse, specular = (
