@@ -24,6 +24,7 @@ NOUNS = {
     "buffers",
     "forks",
     "threads",
+    "memory",
     "install",
     "records",
     "stopping",

@@ -11,6 +11,7 @@ from materialist.edits.registry import OPERATIONS
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole
+from materialist.io.text import read_text
 from materialist.option_kinds import OFF, ON, beside, declarations, parse_numbers, several
 from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
@@ -48,8 +49,12 @@ def read_recipe(path: str | Path) -> list[Step]:
     try:
         if path.stat().st_size > 1_000_000:
             raise InputError(f"{path} is larger than 1 MB; a list of edits is a short text.")
-        content = yaml.load(path.read_text("utf-8"), Loader=_loader())
-    except (OSError, UnicodeDecodeError) as error:
+        content = yaml.load(read_text(path), Loader=_loader())
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"The list of edits {path} is not text in UTF-8; save it as UTF-8."
+        ) from error
+    except OSError as error:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
