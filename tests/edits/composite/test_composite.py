@@ -24,7 +24,7 @@ from materialist.edits.composite.composite import (
 from materialist.edits.composite.into_photo import SETTINGS, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.native_layer import NativeLayer
-from materialist.edits.composite.upsample import matte
+from materialist.edits.composite.matte import matte
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit

@@ -6,7 +6,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.edits.composite.upsample import matte
+from materialist.edits.composite.matte import matte
 from materialist.edits.core.renderer import EditRenderer, denoised, is_relit, path_depth
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
