@@ -11,7 +11,9 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial.transform import Rotation
 
 from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edits.composite.matte import matte, unmixed
 from materialist.edits.insert.meshes import read_model
+from materialist.geometry.silhouette import disc
 from materialist.io.photo import read_photo
 from materialist.render.pixels import first_hits
 from materialist.render.scene import seen_shape
@@ -26,6 +28,10 @@ LENS = 0.7
 """Standard deviation of the blur of lens and sensor, native pixels."""
 NOISE = 0.01
 """Standard deviation of the sensor's noise, sRGB-encoded."""
+BORDER = 8
+"""Native pixels on both sides of a border within which a matte is judged."""
+PAINT = (0.35, 0.8, 1.3)
+"""Factors on the colour of a thing that is painted anew."""
 TOLERANCE = 2.0
 """Native pixels within which two borders agree."""
 
@@ -46,6 +52,27 @@ class KnownComposite:
         """[H, W] bool: pixels of working size that are mostly of the thing."""
         size = self.photo.linear.shape[1::-1]
         return np.asarray(cv2.resize(self.share, size, interpolation=cv2.INTER_AREA)) > 0.5
+
+    def errors(self, mask: Array) -> dict[str, float]:
+        """How far the matte of a mask [H, W] bool, and the thing painted anew by it, are from the truth."""
+        picture = self.photo.original
+        share = matte(mask, picture)
+        mixed = ((self.share > 0.001) & (self.share < 0.999)).astype(np.uint8)
+        near = cv2.dilate(mixed, disc(BORDER)) > 0
+        # --- The thing in another paint: its own colour times PAINT, the rest as it is ---
+        paint = np.array(PAINT, np.float32) - 1
+        scale = picture.shape[1] / mask.shape[1]
+        front, _ = unmixed(share, picture, max(1.0, scale))
+        painted = picture + share[..., None] * front * paint
+        truth = picture + self.share[..., None] * self.colour * paint
+        away = linear_to_srgb(np.maximum(painted, 0)) - linear_to_srgb(np.maximum(truth, 0))
+        wrong = share - self.share
+        return {
+            "border": boundary_f(share > 0.5, self.share > 0.5),
+            "sad": float(np.abs(wrong).sum()) / 1000,
+            "mse": 1000 * float((wrong[near] ** 2).mean()),
+            "fringe": 255 * float(np.sqrt((away[near] ** 2).mean())),
+        }
 
 
 def known_composites(

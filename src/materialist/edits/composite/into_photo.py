@@ -61,7 +61,8 @@ def into_photo(
     bodies = layers.native.picture[box]
     bodies = bodies if photo.hdr else np.where(share < 1, np.minimum(bodies, 1), bodies)
     here = picture[box]
-    picture[box] = np.where(share > 0, share * bodies + (1 - share) * here, here)
+    mixed = np.maximum(share * bodies + (1 - share) * here, 0)
+    picture[box] = np.where(share > 0, mixed, here)
     return picture
 
 

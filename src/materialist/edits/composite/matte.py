@@ -43,7 +43,7 @@ SETTINGS = MatteSettings()
 RIM = 8
 """Pixels by which a mask is continued beyond the picture; derived: more than the distances that count."""
 STAIRS = 0.5
-"""Standard deviation of the Gaussian that takes the steps of pixels out of a border, where those are enlarged; by eye."""
+"""Standard deviation, pixels, of the Gaussian that takes steps out of a border that is enlarged; by eye."""
 
 
 def matte(mask: Array, large: Array) -> Array:
