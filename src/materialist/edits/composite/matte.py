@@ -56,7 +56,7 @@ def matte(mask: Array, large: Array) -> Array:
     """
     height, width = large.shape[:2]
     scale = max(height / mask.shape[0], width / mask.shape[1])
-    distance = _signed_distance(mask, STAIRS * min(scale - 1, 1))
+    distance = _signed_distance(mask, STAIRS * (scale > 1))
     if mask.all() or not mask.any():
         return np.full((height, width), float(mask.all()), np.float32)
     size = (width, height)
@@ -171,7 +171,7 @@ def _moved(distance: Array, encoded: Array, scale: float) -> Array:
     _, trust = _place(seen, inside, outside, SETTINGS.near * fine)
     trust = cv2.GaussianBlur(trust.astype(np.float32), (0, 0), max(fine / 4, 0.5))
     moved = (
-        _signed_distance(members, STAIRS * min(fine - 1, 1)) / fine
+        _signed_distance(members, STAIRS * (fine > 1)) / fine
         if members.any() and not members.all()
         else field
     )
