@@ -37,8 +37,8 @@ from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import Box
 from materialist.types import Array, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row
-from materialist_lab.bench.borders import boundary_f, known_composites
 from materialist_lab.bench.edits import scene_of, true_scene
+from materialist_lab.bench.real.borders import boundary_f, known_composites
 from materialist_lab.bench.report import Column, Report
 from materialist_lab.procedural.arrangements import arrangement
 from materialist_lab.procedural.synthetic import make_sample

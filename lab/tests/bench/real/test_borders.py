@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from materialist.types import Camera, Photo
-from materialist_lab.bench.borders import KnownComposite, boundary_f
 from materialist_lab.bench.edit import stray
+from materialist_lab.bench.real.borders import KnownComposite, boundary_f
 
 
 def test_a_border_counts_within_two_pixels():
