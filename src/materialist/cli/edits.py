@@ -68,7 +68,7 @@ def select_command(
     import numpy as np
 
     from materialist.color import srgb_to_linear
-    from materialist.edits.composite.upsample import matte
+    from materialist.edits.composite.matte import matte
     from materialist.io.image import ensure_image_writable, write_image
 
     if output.suffix.lower() != ".png":
