@@ -96,7 +96,9 @@ def fit_materials(
             return rendering_loss(error, settings.loss) + change
 
         def loss(_: int, held=held) -> Iterator[torch.Tensor]:
-            for rows in strips or [draw()]:
+            if not strips:
+                yield part(draw(), held)
+            for rows in strips:
                 # The loss is a mean: that of a strip counts by its share of the pixels.
                 share = (rows.stop - rows.start) / len(photo) if len(strips) > 1 else 1.0
                 yield share * part(rows, held)

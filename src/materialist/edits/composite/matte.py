@@ -15,7 +15,7 @@ from materialist.types import Array
 
 @dataclass(frozen=True)
 class MatteSettings:
-    """Lengths in working pixels unless said otherwise; tuned by eye and on six composites."""
+    """Lengths in working pixels unless said otherwise; tuned by eye and on three composites."""
 
     tile: int = 48  # side of the parts in which a matte is made; derived: memory
 
