@@ -10,6 +10,8 @@ from materialist.types import Array, Scene
 
 LITTLE = 5 / 255
 """Mean change of a picture (sRGB-encoded) below which another light is hardly seen."""
+REACHED = 0.05
+"""Share of the photo's surfaces from which on a sun is seen."""
 MEASURED = 2_000_000
 """Pixels that a mean change is measured on."""
 PICTURED = "Glass of the two-interface model is a picture in the photo: "
@@ -53,12 +55,31 @@ def mean_change(scene: Scene, picture: Array) -> float:
 def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
     """What to say of another light whose picture, or most changed frame, has no more than that `mean_change`."""
     asked = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
+    suns = [step["sun"] for step in asked if step["kind"] == "light" and "sun" in step]
+    if suns and (notes := sun_notes(edited, *suns[-1])):
+        return notes
     if change >= LITTLE or not any(step["kind"] == "light" for step in asked):
         return []
     return [
         f"The new light changes the picture by {255 * change:.1f} of 255 levels in the mean: the light that was found "
         "is nearly even, or the new one does not reach what the photo shows. A lamp, a stronger or lower sun, or a "
         "smaller ambient shows more."
+    ]
+
+
+def sun_notes(scene: Scene, azimuth: float, elevation: float) -> list[str]:
+    """What to say of a sun that hardly reaches what the photo shows."""
+    from materialist.edits.core.reach import best_sun, sun_reach
+
+    facing, lit = sun_reach(scene, azimuth, elevation)
+    if lit >= REACHED:
+        return []
+    away = f"{1 - facing:.0%} faces away from it" if facing < 1 - REACHED else ""
+    hidden = "walls or things of the photo stand before the rest" if facing >= REACHED else ""
+    best, share = best_sun(scene)
+    return [
+        f"The sun reaches {lit:.0%} of what the photo shows: {' and '.join(filter(None, (away, hidden)))}. "
+        f"From {best[0]:g},{best[1]:g} it would reach {share:.0%}."
     ]
 
 
