@@ -7,7 +7,7 @@ import numpy as np
 from skimage.graph import MCP_Geometric
 
 from materialist.color import linear_to_srgb
-from materialist.edits.composite.upsample import GuidedUpsample, matte
+from materialist.edits.composite.upsample import GuidedUpsample, strips
 from materialist.geometry.silhouette import grown
 from materialist.types import Array, Photo
 
@@ -26,15 +26,14 @@ SETTINGS = GlowSettings()
 def light_share(seen: Array, photo: Photo) -> Array:
     """[H0, W0] float32 in [0, 1]: how much of each pixel of the photo is a light, from where it is seen [H, W] bool.
 
-    At edges of the photo it ends there, as `matte` has it. Where an overexposed wall or a halo goes on beyond it,
-    the light fades, so that a dimmed light has no outline that the photo does not have.
+    At edges of the photo the light ends. Where an overexposed wall or a halo goes on beyond it, it fades, so that a
+    dimmed light has no outline that the photo does not have.
     """
-    share = matte(seen, photo.original)
     fading = glow(seen, photo.linear)[..., None]
     upsample = GuidedUpsample(photo.linear, photo.original)
     everywhere = np.ones(seen.shape, bool)
-    large = upsample(fading, everywhere, slice(0, len(share)))[..., 0]
-    return np.maximum(share, large)
+    parts = strips(len(photo.original))
+    return np.concatenate([upsample(fading, everywhere, rows)[..., 0] for rows in parts])
 
 
 def glow(seen: Array, photo: Array) -> Array:

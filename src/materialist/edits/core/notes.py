@@ -10,8 +10,10 @@ from materialist.types import Array, Scene
 
 LITTLE = 5 / 255
 """Mean change of a picture (sRGB-encoded) below which another light is hardly seen."""
-REACHED = 0.05
-"""Share of the photo's surfaces from which on a sun is seen."""
+REACHED = 1 / 3
+"""Share of the photo's surfaces below which the command says why a sun reaches no more."""
+MENTIONED = 0.05
+"""Share of them from which on a cause of that is named."""
 MEASURED = 2_000_000
 """Pixels that a mean change is measured on."""
 PICTURED = "Glass of the two-interface model is a picture in the photo: "
@@ -68,18 +70,21 @@ def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
 
 
 def sun_notes(scene: Scene, azimuth: float, elevation: float) -> list[str]:
-    """What to say of a sun that hardly reaches what the photo shows."""
-    from materialist.edits.core.reach import best_sun, sun_reach
+    """What to say of a sun that reaches little of what the photo shows."""
+    from materialist.edits.core.reach import better_sun, sun_reach
 
     facing, lit = sun_reach(scene, azimuth, elevation)
     if lit >= REACHED:
         return []
-    away = f"{1 - facing:.0%} faces away from it" if facing < 1 - REACHED else ""
-    hidden = "walls or things of the photo stand before the rest" if facing >= REACHED else ""
-    best, share = best_sun(scene)
+    causes = {
+        "of it faces away from the sun": 1 - facing,
+        "lies behind walls or things of the photo": facing - lit,
+    }
+    reasons = [f"{share:.0%} {cause}" for cause, share in causes.items() if share >= MENTIONED]
+    better, share = better_sun(scene, azimuth, elevation)
     return [
-        f"The sun reaches {lit:.0%} of what the photo shows: {' and '.join(filter(None, (away, hidden)))}. "
-        f"From {best[0]:g},{best[1]:g} it would reach {share:.0%}."
+        f"The sun reaches {lit:.0%} of what the photo shows, and the rest is darker than before: "
+        f"{' and '.join(reasons)}. From {better[0]:g},{better[1]:g} it would reach {share:.0%}."
     ]
 
 

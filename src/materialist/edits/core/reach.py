@@ -14,7 +14,9 @@ LIFT = 1e-3
 """Start of a ray before its surface, share of the depth (derived: grid of the mesh)."""
 ELEVATIONS = (20, 45, 70)
 AZIMUTHS = tuple(range(-150, 181, 30))
-"""Directions, degrees, among which the best sun is looked for."""
+"""Directions, degrees, among which a better sun is looked for."""
+MUCH = 0.7
+"""Share of what the best of them lights from which one is good enough."""
 
 
 def sun_reach(scene: Scene, azimuth: float, elevation: float) -> tuple[float, float]:
@@ -22,13 +24,16 @@ def sun_reach(scene: Scene, azimuth: float, elevation: float) -> tuple[float, fl
     return _reach(_setup(scene), direction_of(azimuth, elevation))
 
 
-def best_sun(scene: Scene) -> tuple[tuple[float, float], float]:
-    """(azimuth and elevation in degrees, share) of the sun that lights most of the photo's surfaces."""
+def better_sun(scene: Scene, azimuth: float, elevation: float) -> tuple[tuple[float, float], float]:
+    """(azimuth and elevation in degrees, share) of the nearest sun that lights much of what the photo shows."""
     traced = _setup(scene)
-    places = [(azimuth, elevation) for azimuth in AZIMUTHS for elevation in ELEVATIONS]
-    shares = [_reach(traced, direction_of(*place))[1] for place in places]
-    best = int(np.argmax(shares))
-    return places[best], shares[best]
+    places = [(float(az), float(el)) for az in AZIMUTHS for el in ELEVATIONS]
+    directions = np.array([direction_of(*place) for place in places])
+    shares = np.array([_reach(traced, direction)[1] for direction in directions])
+    cosine = directions @ direction_of(azimuth, elevation)
+    cosine[shares < MUCH * shares.max()] = -np.inf
+    best = int(np.argmax(cosine))
+    return places[best], float(shares[best])
 
 
 def _setup(scene: Scene) -> tuple[Any, Array, Array]:
