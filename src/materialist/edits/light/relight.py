@@ -30,12 +30,10 @@ class AddedLightSettings:
 
     max_map_rows: int = 256  # derived: memory
     min_sun_radius: float = 6.0  # degrees: hard shadows show each step of the depth; 5 photos
-    # On a clear day a surface that faces the sun gets four fifths of its light from it. With power 1
-    # the old light keeps a third, and a surface that the sun meets at 45 degrees its brightness.
-    sun_irradiance: float = (
-        4 / 3
-    )  # at power 1, in irradiances of surfaces by the old light; derived
-    sky_loss: float = 2.0  # that of the old light is divided by 1 + power times this; derived
+    # With power 1 the old light keeps half, and what faces the sun gets 2.5 times that half from it.
+    # Less shows no shadows, more makes an overcast sky a thunderstorm's; 8 photos.
+    sun_irradiance: float = 1.25  # at power 1, in irradiances of surfaces by the old light
+    sky_loss: float = 1.0  # the old light is divided by 1 + power times this
     normals: int = 256  # of surfaces whose irradiance is compared; derived: time
     lamp_unit: float = 0.25  # share of the median depth at which power 1 shows white as white
     lamp_radius: float = 0.015  # share of the median depth; tuned by eye
@@ -55,8 +53,8 @@ def relight(
     """The scene under other light; geometry, materials and photo are shared. Steps happen in the order of `Relight`.
 
     Dimmed lights become surfaces that glow and stay where they are, whatever happens to the light from around. A sun
-    takes the place of most of the old light, as on a clear day, so that its shadows are seen: it replaces the brightest
-    spot of the map (see `with_sun`), and surfaces keep 1 / (1 + 2 `sun_power`) of the rest. `ambient` leaves it alone.
+    takes the place of much of the old light, so that its shadows are seen: it replaces the brightest
+    spot of the map (see `with_sun`), and surfaces keep 1 / (1 + `sun_power`) of the rest. `ambient` leaves it alone.
 
     options, values: see `options.Relight`; `values` are fields of it, as in `relight(scene, rotate=90)`.
     fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
