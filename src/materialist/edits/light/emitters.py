@@ -31,10 +31,10 @@ class EmitterSettings:
     # Which pixels are of an emitter.
     clipped: float = 0.97  # least channel from which a pixel's radiance is unknown; derived: 8 bits
     min_hdr_ratio: float = 4.0  # to the median radiance of an HDR photo
-    max_rim: float = 0.6  # share of `clipped` from which pixels beside it always belong to it
+    min_rim: float = 0.6  # share of `clipped` from which pixels beside it always belong to it
     rim_ratio: float = 2.5  # to the median radiance of the photo; from there on they do, too
-    max_rim_reach: float = 0.08  # how far beside it, share of the longer side
-    max_bright_reach: float = 0.015  # likewise, in a photo as bright as its lights
+    max_outshining_reach: float = 0.08  # how far beside it, share of the longer side
+    max_rim_reach: float = 0.015  # likewise, in a photo as bright as its lights
     gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; likewise
     max_upward: float = 0.7  # mean Y of the normals; above, a surface reflects or lies in the sun
     min_area: float = 0.001  # share of the picture; less is a highlight
@@ -68,8 +68,8 @@ def visible_lights(scene: Scene) -> list[Array]:
     if not bright.any():
         return []
     # --- Grown over the bright pixels beside them, and gaps closed ---
-    near = _beside(bright, SETTINGS.max_bright_reach) & (value >= SETTINGS.max_rim * threshold)
-    near |= _beside(bright, SETTINGS.max_rim_reach) & _outshining(photo, surface)
+    near = _beside(bright, SETTINGS.max_rim_reach) & (value >= SETTINGS.min_rim * threshold)
+    near |= _beside(bright, SETTINGS.max_outshining_reach) & _outshining(photo, surface)
     grown = ndimage.binary_propagation(bright, mask=near & surface)
     gap = disc(round(SETTINGS.gap * longer))
     closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, gap) > 0
