@@ -8,7 +8,7 @@ from skimage.graph import MCP_Geometric
 
 from materialist.color import linear_to_srgb
 from materialist.edits.composite.upsample import GuidedUpsample, strips
-from materialist.geometry.silhouette import grown
+from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Photo
 
 
@@ -29,11 +29,16 @@ def light_share(seen: Array, photo: Photo) -> Array:
     At edges of the photo the light ends. Where an overexposed wall or a halo goes on beyond it, it fades, so that a
     dimmed light has no outline that the photo does not have.
     """
-    fading = glow(seen, photo.linear)[..., None]
+    fading = glow(seen, photo.linear)
     upsample = GuidedUpsample(photo.linear, photo.original)
     everywhere = np.ones(seen.shape, bool)
-    parts = strips(len(photo.original))
-    return np.concatenate([upsample(fading, everywhere, rows)[..., 0] for rows in parts])
+    share = np.zeros(photo.original.shape[:2], np.float32)
+    if not seen.any():
+        return share
+    box, columns = window(fading > 0, share.shape, 3)  # the reach of `GuidedUpsample`
+    for rows in strips(box.stop, start=box.start):
+        share[rows, columns] = upsample(fading[..., None], everywhere, rows, columns)[..., 0]
+    return share
 
 
 def glow(seen: Array, photo: Array) -> Array:
