@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from materialist.edits.composite.glow import light_share
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.matte import SETTINGS as MATTE
 from materialist.edits.composite.matte import matte, unmixed
@@ -239,9 +240,9 @@ def in_photo(picture: Array, photo: Photo, seen: Array, emitters: dict) -> Array
     dim = float(emitters["dim"])
     if dim == 1 or not seen.any():
         return picture
-    share = matte(seen, photo.original)
+    share = light_share(seen, photo)
     picture = picture.copy()
-    box = window(seen, picture.shape[:2], 4)
+    box = window(share > 0)
     share = share[box][..., None]
     original = photo.original[box]
     here = picture[box]
