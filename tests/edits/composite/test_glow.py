@@ -6,7 +6,7 @@ import numpy as np
 from edit_scenes import flat_scene
 
 from materialist.edits.composite.glow import glow, light_share
-from materialist.edits.composite.upsample import matte
+from materialist.edits.composite.matte import matte
 
 LIGHT = np.zeros((80, 120), bool)
 LIGHT[30:50, 40:80] = True

@@ -30,14 +30,13 @@ def light_share(seen: Array, photo: Photo) -> Array:
     dimmed light has no outline that the photo does not have.
     """
     fading = glow(seen, photo.linear)
-    upsample = GuidedUpsample(photo.linear, photo.original)
-    everywhere = np.ones(seen.shape, bool)
     share = np.zeros(photo.original.shape[:2], np.float32)
     if not seen.any():
         return share
+    upsample = GuidedUpsample(fading[..., None], photo.linear, share.shape)
     box, columns = window(fading > 0, share.shape, 3)  # the reach of `GuidedUpsample`
     for rows in strips(box.stop, start=box.start):
-        share[rows, columns] = upsample(fading[..., None], everywhere, rows, columns)[..., 0]
+        share[rows, columns] = upsample(rows, columns, photo.original[rows, columns])[..., 0]
     return share
 
 

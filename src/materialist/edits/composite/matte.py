@@ -188,10 +188,10 @@ def _signed_distance(mask: Array, stairs: float) -> Array:
         for side in (framed, 1 - framed)
     )
     # Pixel centres lie half a pixel from the border between pixels.
-    signed = np.where(framed > 0, inside - 0.5, 0.5 - outside).astype(np.float32)
+    signed: Array = np.where(framed > 0, inside - 0.5, 0.5 - outside).astype(np.float32)
     if stairs > 0:
         signed = cv2.GaussianBlur(signed, (0, 0), stairs, borderType=cv2.BORDER_REFLECT)
-    return np.asarray(signed)[RIM:-RIM, RIM:-RIM]
+    return signed[RIM:-RIM, RIM:-RIM]
 
 
 def _ramp(values: Array, low: float, high: float) -> Array:
