@@ -11,7 +11,7 @@ from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
+from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
@@ -20,7 +20,17 @@ from materialist.darkroom.channel import channel
 from materialist.darkroom.desk import Desk, Desks
 from materialist.darkroom.door import CHANNEL, UPLOAD, Door
 from materialist.darkroom.endpoint import got, guarded, posted
-from materialist.darkroom.state import about, map_jpeg, native_jpeg, photo_jpeg, report_of, state
+from materialist.darkroom.state import (
+    about,
+    example_file,
+    light_jpeg,
+    map_jpeg,
+    native_jpeg,
+    photo_jpeg,
+    report_of,
+    state,
+    working_jpeg,
+)
 from materialist.studio.studio import Studio
 
 SWEEP = 10.0
@@ -106,7 +116,9 @@ def _routes(desks: Desks) -> list[Any]:
         "/api/state": _state,
         "/api/projects": lambda desk, request: _json(opening.listed(desk)),
         "/api/report": lambda desk, request: _json(report_of(desk)),
-        "/api/photo": lambda desk, request: _jpeg(native_jpeg(desk)),
+        "/api/photo": _photo,
+        "/api/light/{name}": lambda desk, request: _jpeg(light_jpeg(request.path_params["name"])),
+        "/api/example/{name}": _example,
         "/api/map/{name}": lambda desk, request: _jpeg(map_jpeg(desk, request.path_params["name"])),
         "/api/picture/{project}/{name}": _picture,
         "/api/file/{file}": taking.download,
@@ -121,14 +133,17 @@ def _routes(desks: Desks) -> list[Any]:
         Route(UPLOAD, guarded(studio, upload), methods=["POST"]),
         WebSocketRoute(CHANNEL, socket),
         Route("/favicon.svg", _favicon),
-        _assets(),
+        Mount("/assets", _Assets(directory=STATIC / "assets", check_dir=False)),
     ]
 
 
-def _assets() -> Any:
-    from starlette.routing import Mount
+class _Assets(StaticFiles):
+    """The built files. Their names stay the same, so a browser asks whether they have changed."""
 
-    return Mount("/assets", StaticFiles(directory=STATIC / "assets", check_dir=False))
+    def file_response(self, *arguments: Any, **options: Any) -> Response:
+        response = super().file_response(*arguments, **options)
+        response.headers["cache-control"] = "no-cache"
+        return response
 
 
 async def _page(request: Request) -> Response:
@@ -144,9 +159,19 @@ async def _favicon(request: Request) -> Response:
 
 
 def _state(desk: Desk, request: Request) -> Response:
-    """What the page shows; `wait=1` once the preview is there, else at once."""
+    """What the page shows; the photo without its edits while the preview is still being built."""
     live = desk.session.live
     return _json(state(desk, with_edits=live is None or live.ready))
+
+
+def _photo(desk: Desk, request: Request) -> Response:
+    """The open photo; `working=1` at working size."""
+    return _jpeg((working_jpeg if "working" in request.query_params else native_jpeg)(desk))
+
+
+def _example(desk: Desk, request: Request) -> Response:
+    file = example_file(desk.studio, request.path_params["name"])
+    return _jpeg(photo_jpeg(str(file), file.stat().st_mtime, 320))
 
 
 def _picture(desk: Desk, request: Request) -> Response:

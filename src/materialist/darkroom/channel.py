@@ -34,7 +34,7 @@ async def channel(desks: Desks, socket: WebSocket) -> None:
         pass  # the page went while something was being sent
     finally:
         heard.cancel()
-        with suppress(RuntimeError):
+        with suppress(RuntimeError, WebSocketDisconnect):  # it may be closed already
             await socket.close()
 
 

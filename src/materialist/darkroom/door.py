@@ -42,7 +42,6 @@ class Door(Gate):
             f"style-src 'self' {_style_of_login()}; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
         ),
         "cross-origin-opener-policy": "same-origin",
-        "referrer-policy": "no-referrer",
     }
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:

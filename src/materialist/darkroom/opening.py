@@ -13,9 +13,8 @@ from starlette.responses import JSONResponse, Response
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk, Desks, Followed, found_file
 from materialist.darkroom.endpoint import desk_of
-from materialist.darkroom.state import project_facts, state
+from materialist.darkroom.state import example_file, project_facts, state
 from materialist.errors import InputError
-from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS
 from materialist.studio.access.gate import promised_size
@@ -94,11 +93,11 @@ def _source(desk: Desk, body: bodies.Start) -> Path:
     person = desk.session.person
     if body.file is not None:
         return studio.files.path(person, body.file)
-    if body.example == "start" and isinstance(studio.start, Path):
-        return studio.start
-    if body.example not in EXAMPLES:
+    if body.example is None:
         raise InputError("Drop a photo first, or choose an example.")
-    file = example_path(body.example)
+    file = example_file(studio, body.example)
+    if body.example == "start":
+        return file
     return Path(studio.public_copy(person, file, f"{body.example}{file.suffix}"))
 
 

@@ -1,6 +1,6 @@
 """What a page of the darkroom shows, as one JSON object, and the outline of a region."""
 
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from materialist.edits.select import sam
 from materialist.errors import InputError
 from materialist.io import display
 from materialist.io.decode import SUFFIXES
-from materialist.io.photo import EXAMPLES
+from materialist.io.photo import EXAMPLES, example_path
 from materialist.option_kinds import declarations
 from materialist.options import InvertOptions
 from materialist.studio import SETTINGS, objects, uploads
@@ -170,7 +170,8 @@ def photo_jpeg(path: str, changed: float, longest: int) -> bytes:
     changed: when the file was written; another time makes the picture anew.
     """
     picture = cv2.imread(path, cv2.IMREAD_COLOR_RGB)
-    assert picture is not None, path
+    if picture is None:
+        raise InputError("That picture has no thumbnail.")
     scale = min(1.0, longest / max(picture.shape[:2]))
     if scale < 1:
         picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
@@ -184,6 +185,29 @@ def native_jpeg(desk: Desk) -> bytes:
     if scale < 1:
         photo = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     return display.encoded(srgb_levels(np.asarray(photo)), "JPEG", quality=93)
+
+
+def working_jpeg(desk: Desk) -> bytes:
+    """The open photo at working size, encoded as its edits are: where nothing was changed the two are equal."""
+    photo = srgb_levels(desk.session.scene.photo.linear)
+    return display.encoded(photo, "JPEG", quality=SETTINGS.jpeg_quality)
+
+
+@cache
+def light_jpeg(name: str) -> bytes:
+    """A computed environment as a small picture. Raises InputError for another name."""
+    if name not in presets.LIGHTS:
+        raise InputError(f"There is no light {name!r}.")
+    return display.encoded(display.light(presets.preset_light(name, 64)), "JPEG", quality=88)
+
+
+def example_file(studio: Studio, name: str) -> Path:
+    """The photo of an example, or that of the command line. Raises InputError for another name."""
+    if name == "start" and isinstance(studio.start, Path):
+        return studio.start
+    if name not in EXAMPLES:
+        raise InputError(f"There is no example {name!r}; choose one of the list.")
+    return example_path(name)
 
 
 def map_jpeg(desk: Desk, name: str) -> bytes:
