@@ -9,31 +9,31 @@ interface SliderProps {
   low: number;
   high: number;
   step: number;
-  /** What a double click goes back to. */
-  start?: number;
   unit?: string;
-  /** null: back to the start. */
-  changed: (value: number | null, live: boolean) => void;
+  /** null: back to the start. Resolves when the server has answered. */
+  changed: (value: number | null) => Promise<void> | void;
 }
 
-export function Slider({ id, label, value, low, high, step, start, unit, changed }: SliderProps) {
-  // While it is held the control leads, and the server follows.
+export function Slider({ id, label, value, low, high, step, unit, changed }: SliderProps) {
+  // Until the server has answered the control leads: it must not jump back meanwhile.
   const [held, setHeld] = useState<number | null>(null);
+  const asked = useRef(0);
   const [typed, setTyped] = useState<string | null>(null);
   const range = useRef<HTMLInputElement>(null);
   const shown = held ?? value;
   const share = ((Math.min(Math.max(shown, low), high) - low) / (high - low)) * 100;
   useLayoutEffect(() => range.current!.style.setProperty("--share", `${share}%`), [share]);
-  const reset = () => {
-    setHeld(null);
-    changed(null, false);
+  const send = (number: number | null) => {
+    const mine = ++asked.current;
+    setHeld(number);
+    void Promise.resolve(changed(number)).then(() => mine === asked.current && setHeld(null));
   };
   const commit = () => {
     if (typed === null) return;
     const number = Number(typed.replace(",", "."));
     // An empty box is no error: the option goes back to where it began.
-    if (typed.trim() === "") reset();
-    else if (Number.isFinite(number)) changed(Math.min(Math.max(number, low), high), false);
+    if (typed.trim() === "") send(null);
+    else if (Number.isFinite(number)) send(Math.min(Math.max(number, low), high));
     setTyped(null);
   };
   const digits = step < 0.01 ? 3 : step < 1 ? 2 : 0;
@@ -48,16 +48,8 @@ export function Slider({ id, label, value, low, high, step, start, unit, changed
           max={high}
           step={step}
           value={shown}
-          onInput={(event) => {
-            const number = Number(event.currentTarget.value);
-            setHeld(number);
-            changed(number, true);
-          }}
-          onChange={(event) => {
-            setHeld(null);
-            changed(Number(event.currentTarget.value), false);
-          }}
-          onDblClick={reset}
+          onInput={(event) => send(Number(event.currentTarget.value))}
+          onDblClick={() => send(null)}
         />
       </label>
       <input

@@ -152,10 +152,10 @@ export function lampsOf(options: Record<string, unknown>): number[][] {
 }
 
 /** Change one lamp, or take it away (null). */
-export function setLamp(index: number, lamp: number[] | null): void {
+export function setLamp(index: number, lamp: number[] | null): Promise<void> {
   const lamps = lampsOf(optionsOf(view.state, "relight"));
   const after = lamps.flatMap((one, place) => (place !== index ? [one] : lamp ? [lamp] : []));
-  void change("lamps", { lamps: after }, "lamps");
+  return change("lamps", { lamps: after }, "lamps");
 }
 
 function Thing({ unit, toPlace }: { unit: number; toPlace: (event: PointerEvent) => Point }) {

@@ -14,6 +14,7 @@ export interface View {
   state: State | null;
   jobs: Job[];
   glass: News["glass"];
+  fine: boolean;
   online: boolean;
   tool: Tool;
   mode: Mode;
@@ -43,6 +44,7 @@ export const view: View = {
   state: null,
   jobs: [],
   glass: null,
+  fine: true,
   online: true,
   tool: "click",
   mode: "new",
@@ -193,10 +195,11 @@ function hear(news: News): void {
     const known = view.jobs.find((one) => one.number === job.number);
     if (known && known.state !== job.state) ended(job);
   }
-  set({ jobs: news.jobs, glass: news.glass });
+  const finer = news.fine && !view.fine && state?.steps.some((step) => step.on);
+  set({ jobs: news.jobs, glass: news.glass, fine: news.fine });
   if (!state || running) return;
   const ready = news.ready && !state.ready && state.project;
-  if (news.revision > state.revision || ready || traced) void refresh();
+  if (news.revision > state.revision || ready || traced || finer) void refresh();
 }
 
 function ended(job: Job): void {

@@ -72,6 +72,8 @@ export interface Job {
 export interface News {
   revision: number;
   ready: boolean;
+  /** Whether live pictures have all their rays by now. */
+  fine: boolean;
   jobs: Job[];
   glass: { waiting: boolean; words: string; bad: boolean } | null;
 }

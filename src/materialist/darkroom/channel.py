@@ -29,7 +29,8 @@ async def channel(desks: Desks, socket: WebSocket) -> None:
     await socket.accept()
     heard = asyncio.create_task(_until_closed(socket))
     try:
-        await _tell(desk, socket, heard)
+        with desk.at_work():
+            await _tell(desk, socket, heard)
     except (WebSocketDisconnect, RuntimeError):
         pass  # the page went while something was being sent
     finally:
@@ -49,7 +50,6 @@ async def _tell(desk: Desk, socket: WebSocket, heard: "asyncio.Task[None]") -> N
     said = 0.0
     while not heard.done() and not desk.session.left:
         now = time.monotonic()
-        desk.session.seen = now  # an open page is not forgotten
         current = news(desk)
         if current != last or now - said > BEAT:
             await socket.send_json(current)
@@ -67,6 +67,7 @@ def news(desk: Desk) -> dict[str, Any]:
     return {
         "revision": desk.revision,
         "ready": live is not None and live.ready,
+        "fine": live is not None and live.fine,
         "jobs": desk.shown_jobs(),
         "glass": state
         and {

@@ -5,7 +5,8 @@ import threading
 import time
 import traceback
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -54,6 +55,7 @@ class Desk:
         """The photo that is being taken apart, and is opened when that is done."""
         self.followed: list[Followed] = []
         self._numbers = 0
+        self._at_work = 0
         self._pointed: OrderedDict[tuple[int, int], Array] = OrderedDict()
         self._scene: object = None
         self._lock = threading.Lock()
@@ -63,6 +65,20 @@ class Desk:
         """Let the page, and others of the same session, ask for what is shown."""
         with self._lock:
             self.revision += 1
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """While a request, or the channel, is at work the page is open, however long it takes."""
+        with self._lock:
+            self._at_work += 1
+            self.session.beats = True
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._at_work -= 1
+                self.session.beats = self._at_work > 0
+                self.session.seen = time.monotonic()
 
     # Jobs
 

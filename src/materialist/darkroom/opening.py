@@ -151,7 +151,10 @@ def listed(desk: Desk) -> list[State]:
 
 
 def rename(desk: Desk, body: bodies.Renamed) -> list[State]:
-    desk.studio.work.rename(_own(desk, body.project), body.title)
+    renamed = desk.studio.work.rename(_own(desk, body.project), body.title)
+    session = desk.session
+    if session.project is not None and session.project.folder == renamed.folder:
+        session.project = renamed
     return listed(desk)
 
 
@@ -161,7 +164,8 @@ def discard(desk: Desk, body: bodies.Named) -> list[State]:
     job = _running(desk, project)
     if job is not None:
         desk.studio.jobs.stop(job)
-    if desk.session.project == project:
+    opened = desk.session.project
+    if opened is not None and opened.folder == project.folder:
         desk.session.close()
         desk.changed()
     desk.studio.work.discard(project)

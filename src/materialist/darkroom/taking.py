@@ -103,7 +103,9 @@ def _traced(desk: Desk, kind: str | None) -> None:
 
     def keep(entry: Followed) -> None:
         # Another photo may have been opened meanwhile, or the page closed.
-        if entry.job.state != DONE or session.project != project or session.left:
+        opened = session.project
+        elsewhere = opened is None or opened.folder != project.folder or session.left
+        if entry.job.state != DONE or elsewhere:
             picture.remove()
             return
         before = session.final

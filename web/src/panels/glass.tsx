@@ -3,8 +3,8 @@ import { change, optionsOf, useView } from "../store";
 import { t } from "../strings";
 import { number } from "./material";
 
-function glass(options: Record<string, string | number | null>, key = ""): void {
-  void change("set", { kind: "glass", options }, key);
+function glass(options: Record<string, string | number | null>, key = ""): Promise<void> {
+  return change("set", { kind: "glass", options }, key);
 }
 
 export function Glass() {

@@ -9,8 +9,8 @@ import { number } from "./material";
 
 type Options = Record<string, string | number | number[] | null>;
 
-function light(options: Options, key = ""): void {
-  void change("set", { kind: "relight", options, coarse: !!key }, key);
+function light(options: Options, key = ""): Promise<void> {
+  return change("set", { kind: "relight", options, coarse: !!key }, key);
 }
 
 export function Light() {

@@ -68,7 +68,7 @@ function Plain() {
     const given = options[name];
     return given !== undefined && !"+-".includes(given[0]!) ? Number(given) : (fitted?.[name] ?? 0.5);
   };
-  const slide = (name: string) => (value: number | null) => void edit({ [name]: value }, name);
+  const slide = (name: string) => (value: number | null) => edit({ [name]: value }, name);
   const colour = /^#[0-9a-f]{6}$/i.test(options.albedo ?? "") ? options.albedo! : (fitted?.colour ?? "#808080");
   // A picked colour appears as it was picked: nothing turns or fades it.
   const pick = (value: string) =>

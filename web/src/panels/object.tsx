@@ -3,8 +3,8 @@ import { change, optionsOf, set, useFile, useView } from "../store";
 import { t } from "../strings";
 import { number } from "./material";
 
-function thing(options: Record<string, string | number | null>, key = ""): void {
-  void change("set", { kind: "insert", options }, key);
+function thing(options: Record<string, string | number | null>, key = ""): Promise<void> {
+  return change("set", { kind: "insert", options }, key);
 }
 
 export function Things() {
@@ -70,7 +70,7 @@ function Fall() {
   const height = number(options.height, 1.5);
   return (
     <>
-      <Slider id="height" label={t.height} low={0} high={5} step={0.1} value={height} changed={(value) => void change("fall", { height: value ?? 1.5 }, "fall", t.falling)} />
+      <Slider id="height" label={t.height} low={0} high={5} step={0.1} value={height} changed={(value) => change("fall", { height: value ?? 1.5 }, "fall", t.falling)} />
       <button class="wide" id="rest" onClick={() => void change("fall", { height }, "", t.falling)}>
         {t.fall}
       </button>
