@@ -1,5 +1,5 @@
 // The page: bar above, tools over the picture's edge, panel beside, edits below.
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { Bar } from "./bar";
 import { HelpSheet } from "./help";
 import { Icon } from "./icons";
@@ -18,6 +18,13 @@ import { TakeSheet } from "./taking";
 import { Tools } from "./tools";
 
 const PANELS: Panel[] = ["material", "light", "object", "look"];
+const HOMES: Record<string, Panel> = {
+  edit: "material",
+  glass: "material",
+  relight: "light",
+  insert: "object",
+  drop: "object",
+};
 
 export function App() {
   const { state, panel, sheet, message, note, online } = useView();
@@ -26,13 +33,16 @@ export function App() {
   useEffect(() => {
     document.title = state?.project ? `${state.project.title} · ${t.title}` : t.title;
   }, [state?.project?.title]);
-  // A chosen edit shows its panel.
+  // An edit that is chosen, or made, shows its panel; after a reload the panel stays as it was.
   const step = state?.current == null ? undefined : state.steps[state.current];
-  const kind = step?.kind;
+  const chosen = step ? `${step.kind} ${state!.current}` : "";
+  const before = useRef<string | null>(null);
   useEffect(() => {
-    const home: Record<string, Panel> = { edit: "material", glass: "material", relight: "light", insert: "object", drop: "object" };
-    if (kind && home[kind]) set({ panel: home[kind] });
-  }, [kind, state?.current]);
+    if (!state) return;
+    const home = step && HOMES[step.kind];
+    if (before.current !== null && home) set({ panel: home });
+    before.current = chosen;
+  }, [chosen, !state]);
   const usable = !!state?.project;
   return (
     <div class={`app ${usable ? "" : "without"}`}>
@@ -121,7 +131,7 @@ function useDrops(): boolean {
       const file = event.clipboardData?.files[0];
       if (file && view.about) void openFile(file);
     };
-    const pairs = { dragenter: enter, dragleave: leave, dragover: hover, drop, paste } as Record<string, EventListener | any>;
+    const pairs = { dragenter: enter, dragleave: leave, dragover: hover, drop, paste } as unknown as Record<string, EventListener>;
     for (const [name, listener] of Object.entries(pairs)) window.addEventListener(name, listener);
     return () => {
       for (const [name, listener] of Object.entries(pairs)) window.removeEventListener(name, listener);

@@ -16,7 +16,7 @@ interface Props {
 }
 
 export function Marks({ box, hover, gesture, ring, cursor, toPlace }: Props) {
-  const { state, tool, brush, before } = useView();
+  const { state, tool, brush, before, panel } = useView();
   const svg = useRef<SVGSVGElement>(null);
   const { width, height, region } = state!.stage;
   useLayoutEffect(() => {
@@ -32,7 +32,7 @@ export function Marks({ box, hover, gesture, ring, cursor, toPlace }: Props) {
   const path = gesture?.path ?? [];
   const [first, last] = [path[0], path[path.length - 1]];
   return (
-    <svg ref={svg} class={`marks ${before ? "hidden" : ""}`} viewBox={`0 0 ${width} ${height}`} preserveAspectRatio="none">
+    <svg ref={svg} class={`marks ${before ? "hidden" : ""} ${panel === "material" ? "" : "faint"}`} viewBox={`0 0 ${width} ${height}`} preserveAspectRatio="none">
       {hover && <path class="hover" d={hover} fill-rule="evenodd" />}
       {region && (
         <>
@@ -95,7 +95,7 @@ function Handle({ at, unit, kind, label, moved, toPlace }: HandleProps) {
   return (
     <g
       class={`handle ${kind}`}
-      tabIndex={0}
+      tabindex={0}
       role="button"
       aria-label={label}
       onPointerDown={(event) => {

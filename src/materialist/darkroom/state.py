@@ -74,7 +74,8 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
 
 
 def project_facts(project: Project | None) -> dict[str, Any] | None:
-    return project and {"name": project.name, "title": project.title}
+    """What a page shows of a project; None for none."""
+    return None if project is None else {"name": project.name, "title": project.title}
 
 
 def _fitted(desk: Desk, mask: Array | None) -> dict[str, Any] | None:

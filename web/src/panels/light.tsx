@@ -24,7 +24,7 @@ export function Light() {
       <Group title={t.environment}>
         <div class="lights" role="radiogroup" aria-label={t.environment}>
           <button role="radio" aria-checked={!chosen} onClick={() => void change("light", { name: null })}>
-            <i class="own" />
+            <img src={address(`picture/${state?.project?.name}/photo`)} alt="" />
             <span>{t.ownLight}</span>
           </button>
           {about?.lights.map((name) => (
@@ -141,7 +141,7 @@ function SunPad({ azimuth, elevation, moved }: { azimuth: number; elevation: num
       ref={pad}
       class="sunpad"
       viewBox="-50 -50 100 100"
-      tabIndex={0}
+      tabindex={0}
       role="application"
       aria-label={t.sunPad}
       onPointerDown={(event) => {
