@@ -36,7 +36,7 @@ from materialist.studio.studio import Studio
 SWEEP = 10.0
 """Seconds between two looks for pages that were closed."""
 STATIC = Path(str(files("materialist.darkroom") / "static"))
-_POSTED: dict[str, tuple[type[bodies.Body], Any]] = {
+_POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
     # Photos.
     "start": (bodies.Start, opening.start),
     "open": (bodies.Named, opening.open_project),
@@ -52,7 +52,7 @@ _POSTED: dict[str, tuple[type[bodies.Body], Any]] = {
     "set": (bodies.Options, editing.set_options),
     "use": (bodies.File, editing.use_file),
     "light": (bodies.Chosen, editing.choose_light),
-    "lamp": (bodies.Lamp, editing.add_lamp),
+    "lamp": (bodies.NewLamp, editing.add_lamp),
     "lamps": (bodies.Lamps, editing.set_lamps),
     "object": (bodies.Chosen, editing.choose_object),
     "place": (bodies.Put, editing.put_object),
@@ -60,7 +60,7 @@ _POSTED: dict[str, tuple[type[bodies.Body], Any]] = {
     # The list.
     "act": (bodies.Act, editing.act),
     "undo": (bodies.Undo, editing.undo),
-    "load": (bodies.Recipe, taking.load),
+    "load": (bodies.LoadedList, taking.load),
     # Taking away.
     "final": (bodies.Nothing, taking.render),
     "take": (bodies.Take, taking.take),

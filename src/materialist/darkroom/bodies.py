@@ -13,15 +13,15 @@ Value = bool | Number | Annotated[str, Field(max_length=60)] | list[Number] | No
 """Of an option; None clears it."""
 
 
-class Body(BaseModel):
+class RequestBody(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class Nothing(Body):
+class Nothing(RequestBody):
     """No body at all, or an empty object."""
 
 
-class Start(Body):
+class Start(RequestBody):
     """A photo to be taken apart: an upload by its id, or an example by its name."""
 
     file: Name | None = None
@@ -31,7 +31,7 @@ class Start(Body):
     fov: Annotated[str, Field(max_length=10)] = "auto"
 
 
-class Named(Body):
+class Named(RequestBody):
     project: Name
 
 
@@ -39,11 +39,11 @@ class Renamed(Named):
     title: Annotated[str, Field(min_length=1, max_length=60)]
 
 
-class Numbered(Body):
+class Numbered(RequestBody):
     number: int
 
 
-class Pick(Body):
+class Pick(RequestBody):
     tool: Literal["click", "box", "brush"]
     mode: Literal["new", "add", "remove"] = "new"
     at: Annotated[list[Number], Field(max_length=4)] = []
@@ -52,11 +52,11 @@ class Pick(Body):
     method: Literal["network", "sam2"] = "network"
 
 
-class Pointed(Body):
+class Pointed(RequestBody):
     at: Place
 
 
-class Options(Body):
+class Options(RequestBody):
     """Options of an edit over the selection, or of the light, or of an object."""
 
     kind: Literal["edit", "glass", "remove", "relight", "insert"]
@@ -64,27 +64,27 @@ class Options(Body):
     coarse: bool = False
 
 
-class File(Body):
+class File(RequestBody):
     """An upload that an edit uses."""
 
     option: Literal["texture", "envmap", "mesh"]
     file: Name
 
 
-class Chosen(Body):
+class Chosen(RequestBody):
     """Something that the studio computes: an environment, or an object of the library."""
 
     name: Name | None
 
 
-class Lamp(Body):
+class NewLamp(RequestBody):
     at: Place
     kelvin: Annotated[float, Field(ge=1000, le=20_000)] = 2700.0
     power: Annotated[float, Field(ge=0, le=100)] = 1.0
     before: Annotated[float, Field(gt=0, lt=1)] = 0.75
 
 
-class Lamps(Body):
+class Lamps(RequestBody):
     """All lamps: [x, y, depth, kelvin, power] each."""
 
     lamps: Annotated[
@@ -93,28 +93,28 @@ class Lamps(Body):
     coarse: bool = False
 
 
-class Put(Body):
+class Put(RequestBody):
     at: Place
 
 
-class Fall(Body):
+class Fall(RequestBody):
     height: Annotated[float, Field(ge=0, le=100)] = 1.5
 
 
-class Act(Body):
+class Act(RequestBody):
     action: Literal["toggle", "up", "down", "remove", "choose"]
     index: Annotated[int, Field(ge=0, le=1000)]
 
 
-class Undo(Body):
+class Undo(RequestBody):
     again: bool = False
 
 
-class Take(Body):
+class Take(RequestBody):
     kind: Name
 
 
-class Recipe(Body):
+class LoadedList(RequestBody):
     file: Name
 
 

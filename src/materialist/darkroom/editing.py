@@ -99,7 +99,7 @@ def choose_light(desk: Desk, body: bodies.Chosen) -> State:
     return state(desk)
 
 
-def add_lamp(desk: Desk, body: bodies.Lamp) -> State:
+def add_lamp(desk: Desk, body: bodies.NewLamp) -> State:
     place_lamp(desk.session, *body.at, body.kelvin, body.power, body.before)
     return state(desk)
 

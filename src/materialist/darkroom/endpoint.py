@@ -10,13 +10,13 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from materialist.darkroom.bodies import Body, complaint
+from materialist.darkroom.bodies import RequestBody, complaint
 from materialist.darkroom.desk import Desk, Desks
 from materialist.darkroom.door import PAGE_HEADER
 from materialist.errors import MaterialistError
 from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
-Kind = TypeVar("Kind", bound=Body)
+Kind = TypeVar("Kind", bound=RequestBody)
 Answerer = Callable[[Request], Awaitable[Response]]
 
 

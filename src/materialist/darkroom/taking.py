@@ -65,7 +65,7 @@ def take(desk: Desk, body: bodies.Take) -> dict[str, Any]:
     return {}
 
 
-def load(desk: Desk, body: bodies.Recipe) -> dict[str, Any]:
+def load(desk: Desk, body: bodies.LoadedList) -> dict[str, Any]:
     """Put the steps of an uploaded list in place of the edits."""
     desk.session.read_edits(desk.studio.files.path(desk.session.person, body.file))
     return state(desk)
