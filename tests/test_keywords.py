@@ -1,6 +1,7 @@
 """Keywords that type checkers know: those of the options, no more and no fewer."""
 
 import inspect
+import sys
 from dataclasses import fields
 
 import pytest
@@ -8,15 +9,25 @@ import pytest
 import materialist as mt
 from materialist import keywords, options
 from materialist.batches.options import BatchOptions
+from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 
+KEYWORDS = {
+    name: taken
+    for module in (
+        keywords,
+        *(sys.modules[kind.options.__module__] for kind in OPERATIONS.values()),
+    )
+    for name, taken in vars(module).items()
+    if name.endswith("Keywords")
+}
 PAIRS = {
-    "MaterialKeywords": options.MaterialEdit,
-    "RemovalKeywords": options.Removal,
-    "GlassKeywords": options.Glass,
-    "RelightKeywords": options.Relight,
-    "InsertionKeywords": options.Insertion,
-    "DropKeywords": options.Drop,
+    "MaterialKeywords": mt.MaterialEdit,
+    "RemovalKeywords": mt.Removal,
+    "GlassKeywords": mt.Glass,
+    "RelightKeywords": mt.Relight,
+    "InsertionKeywords": mt.Insertion,
+    "DropKeywords": mt.Drop,
     "InvertKeywords": options.InvertOptions,
     "ExportKeywords": options.ExportOptions,
 }
@@ -36,9 +47,7 @@ FUNCTIONS = (
 
 @pytest.mark.parametrize("name", PAIRS)
 def test_each_has_the_fields_of_its_options(name):
-    assert set(getattr(keywords, name).__annotations__) == {
-        field.name for field in fields(PAIRS[name])
-    }
+    assert set(KEYWORDS[name].__annotations__) == {field.name for field in fields(PAIRS[name])}
 
 
 def test_a_batch_takes_its_own_and_those_of_inversions():
@@ -79,9 +88,9 @@ def test_a_misspelt_keyword_is_named_with_the_one_that_is_meant():
     with pytest.raises(
         InputError, match=r"edit has no option 'ruoghness'; .* Do you mean 'roughness'\?"
     ):
-        options.MaterialEdit.given(ruoghness=1)
+        mt.MaterialEdit.merged(ruoghness=1)
     with pytest.raises(InputError, match=r"no option 'qqq'; it takes .*feather\.$"):
-        options.MaterialEdit.given(qqq=1)
+        mt.MaterialEdit.merged(qqq=1)
 
 
 @pytest.mark.slow

@@ -16,16 +16,16 @@ ALL = (MaterialEdit, Removal, Glass, Relight, Insertion, Drop, InvertOptions, Ex
 
 @pytest.mark.parametrize("kind", ALL)
 def test_defaults_pass_their_own_checks_and_every_field_is_declared(kind):
-    assert kind.given() == kind() and all("option" in field.metadata for field in fields(kind))
+    assert kind.merged() == kind() and all("option" in field.metadata for field in fields(kind))
     with pytest.raises(
         InputError, match=rf"^{kind.operation} has no option 'colour'; it takes \w+, "
     ):
-        kind.given(colour="red")
+        kind.merged(colour="red")
 
 
 def test_given_values_replace_those_of_the_options():
     base = Glass(ior=1.3, tint="#ff8000")
-    got = Glass.given(base, transmission=0.9)
+    got = Glass.merged(base, transmission=0.9)
     assert (got.ior, got.transmission, got.seed) == (1.3, 0.9, 0)
     assert (
         got.tint == base.tint == pytest.approx(tuple(srgb_to_linear(np.float32([1, 128 / 255, 0]))))

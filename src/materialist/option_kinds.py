@@ -96,6 +96,11 @@ def documented(kind: "type[OperationOptions]") -> Callable[[Function], Function]
 class OperationOptions:
     operation: ClassVar[str]
 
+    @property
+    def only_in_photo(self) -> bool:
+        """Whether the result is a picture in the photo, which no rendering of the scene shows."""
+        return False
+
     def __init_subclass__(cls) -> None:
         """The docstring of the class lists its options."""
         if cls.__doc__:
@@ -109,7 +114,7 @@ class OperationOptions:
                 object.__setattr__(self, name, declared.checked(name, value))
 
     @classmethod
-    def given(cls, options: Self | None = None, **values: Any) -> Self:
+    def merged(cls, options: Self | None = None, **values: Any) -> Self:
         """`options`, or the defaults, with these values instead. Raises InputError for a name that is no option."""
         known = declarations(cls)
         for name in values:
@@ -150,7 +155,7 @@ class OperationOptions:
             # Files are named relative to the list of edits that names them.
             if declared.kind == "file" and values[name] not in declared.choices:
                 values[name] = beside(folder, name, values[name])
-        return cls.given(cls(**defaults), **values)
+        return cls.merged(cls(**defaults), **values)
 
 
 def declarations(kind: type[OperationOptions]) -> dict[str, tuple[Option, Any]]:

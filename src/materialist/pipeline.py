@@ -17,11 +17,12 @@ from materialist import __version__, metrics
 from materialist.color import CLIPPED, linear_to_srgb
 from materialist.errors import InputError
 from materialist.forks import check_process
-from materialist.io.given import PhotoInput, photo_of
 from materialist.io.image import read_mask
 from materialist.io.out.residual import shading_residual
 from materialist.io.photo import HDR_CLIP, exposed
+from materialist.io.photo_input import PhotoInput, photo_of
 from materialist.keywords import InvertKeywords
+from materialist.memory import kept_memory
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
@@ -37,6 +38,7 @@ MIN_DEPTH = 0.05
 
 @documented(InvertOptions)
 @fixed_threads()
+@kept_memory()
 def invert(
     photo: PhotoInput,
     options: InvertOptions | None = None,
@@ -74,7 +76,7 @@ def invert(
         last = now
 
     # --- Read the photo, at working size ---
-    choices = InvertOptions.given(options, **values)
+    choices = InvertOptions.merged(options, **values)
     preset = "paper" if choices.engine == "path" else choices.preset
     tick = progress or (lambda *_: None)
     tell = on_stage or (lambda *_: None)

@@ -16,11 +16,14 @@ from PIL import Image
 
 from materialist import __version__
 from materialist.cli import app
+from materialist.edits.drop.options import Drop
+from materialist.edits.glass.options import Glass
+from materialist.edits.light.options import Relight
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.io.exr import read_exr
 from materialist.io.package import load_scene
 from materialist.option_kinds import declarations
-from materialist.options import Drop, ExportOptions, Glass, InvertOptions, Relight
+from materialist.options import ExportOptions, InvertOptions
 
 
 @pytest.fixture

@@ -349,7 +349,7 @@ DROP = ("drop", "floor.scene")
             "out.png",
             "--upscale says nothing without --full-render",
         ),
-        (RELIGHT, "out.png", "No light"),
+        (RELIGHT, "out.png", "Nothing to change; give --envmap"),
         ((*RELIGHT, "--sun", "10,100"), "out.png", "elevation is 100"),
         ((*TURN, "--frames", "4"), "out.png", ".mp4"),
         ((*RELIGHT, "--rotate", "1..9"), "out.png", "one picture has one number"),

@@ -9,11 +9,11 @@ from made_meshes import extent, floor_scene
 
 from materialist.edits.drop.drop import drop, settle
 from materialist.edits.drop.ground import Field, blocks
+from materialist.edits.drop.options import Drop
 from materialist.edits.drop.physics import SETTINGS, Pose, RigidBody, convex_pieces, fall
 from materialist.edits.insert.insert import insert
 from materialist.edits.recipe import apply, read_recipe, write_recipe
 from materialist.errors import InputError
-from materialist.options import Drop
 
 pytest.importorskip("mujoco")
 

@@ -9,7 +9,7 @@ from geometry_scenes import ball
 from materialist.bsdf.dielectric import fresnel_dielectric, masking
 from materialist.camera import pixel_rays
 from materialist.edits.glass import two_interface as ti
-from materialist.options import Glass
+from materialist.edits.glass.options import Glass
 from materialist.types import Camera
 
 CAMERA = Camera(48, 40, 40)

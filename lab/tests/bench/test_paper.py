@@ -17,7 +17,7 @@ def test_every_measure_has_a_table_and_options_that_its_benchmark_takes():
     assert {table.measure for table in TABLES if table.measure} == set(MEASURES)
     for measure in MEASURES.values():
         for size in (measure.quick, measure.full):
-            benchmark_class(measure.bench).given(**measure.options | size)
+            benchmark_class(measure.bench).merged(**measure.options | size)
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.title)
@@ -63,7 +63,7 @@ def stubs(monkeypatch):
 
         there = benchmark_class(name)
         return SimpleNamespace(
-            columns=there.columns, given=lambda **options: SimpleNamespace(run=run)
+            columns=there.columns, merged=lambda **options: SimpleNamespace(run=run)
         )
 
     monkeypatch.setattr(paper, "benchmark_class", stub)

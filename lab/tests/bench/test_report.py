@@ -137,9 +137,9 @@ def test_what_cannot_be_is_told_before_anything_is_written(
 
 def test_options_are_brought_to_the_kind_that_is_taken():
     """A whole number may be written with a point, and a name may read as a number."""
-    bench = SelectBench.given(scenes="3", size="64.0", loose="0.5", device="cpu")
+    bench = SelectBench.merged(scenes="3", size="64.0", loose="0.5", device="cpu")
     assert (bench.scenes, bench.size, bench.loose) == (3, 64, 0.5) and isinstance(bench.size, int)
-    assert GlassBench.given(iors=1.5, shapes="3") == GlassBench(iors="1.5", shapes=3)
+    assert GlassBench.merged(iors=1.5, shapes="3") == GlassBench(iors="1.5", shapes=3)
 
 
 def test_a_run_that_is_stopped_leaves_the_rows_that_were_measured(tmp_path, monkeypatch):

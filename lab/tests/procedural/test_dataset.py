@@ -127,7 +127,7 @@ def test_no_held_out_scene_is_one_of_the_training_set_with_its_seed():
         ({"spp": 0}, "spp is 0"),
         ({"seed": -1}, "-1"),
         ({"split": "dev"}, "'dev'"),
-        ({"only": "castle"}, "'castle'.*outdoor"),
+        ({"only": "castle"}, "'castle'.*outside"),
         ({"meshes": Path("/nowhere")}, "/nowhere"),
     ],
 )

@@ -137,7 +137,7 @@ def test_a_backdrop_shows_only_where_no_surface_is():
     covered = np.zeros((8, 8), np.float32)
     # Covered above, half covered in one row, open below.
     covered[:4], covered[4] = 1, 0.5
-    shown = sample.before(np.full((4, 4, 3), 2.0, np.float32), image, covered)
+    shown = sample.over_backdrop(np.full((4, 4, 3), 2.0, np.float32), image, covered)
     np.testing.assert_allclose(shown[:4], 0.5)
     np.testing.assert_allclose(shown[5:], 2.0)
     assert (shown[4] > 0.9).all() and (shown[4] < 2).all()

@@ -40,7 +40,7 @@ def test_it_leaves_weights_that_score_as_it_said_and_begin_another_run(views, tm
     file = tmp_path / "run" / checkpoint.WEIGHTS
     network, facts = RefractionNet.load(file)
     assert facts["step"] == 1 and facts["recipe"]["batch"] == 2
-    assert mean_errors(network, dataset.load(views))["solid"] == pytest.approx(
+    assert mean_errors(network, dataset.load_views(views))["solid"] == pytest.approx(
         figures["solid"], rel=1e-2
     )
     again = made_runs.trainer(made_runs.refraction(views, init=file), tmp_path / "second", steps=1)

@@ -19,7 +19,7 @@ from materialist.predict.registry import parsed
 
 def check_options(options: dict[str, Any]) -> None:
     """Refuse options that would fail every photo in the same way. Raises InputError."""
-    InvertOptions.given(**options)
+    InvertOptions.merged(**options)
     for part in ("predictor", *MAPS):
         if options.get(part) is not None:
             parsed(str(options[part]))

@@ -149,13 +149,9 @@ def _edited(
     task: PhotoTask, edits: Path, scene: Scene, report: Progress
 ) -> tuple[Array, list[str]]:
     """[H0, W0, 3] the composite, which is also written, and the warnings of the edits."""
-    from materialist.edits.core.notes import (
-        effect_notes,
-        mean_change,
-        noise_notes,
-        warnings_since,
-    )
+    from materialist.edits.core.notes import mean_change, noise_notes, warnings_since
     from materialist.edits.recipe import apply
+    from materialist.edits.registry import picture_notes
 
     report("edit", 0, 1)
     seed = task.options["seed"]
@@ -173,7 +169,7 @@ def _edited(
     change = mean_change(scene, picture)
     notes = [
         *warnings_since(scene, edited),
-        *effect_notes(scene, edited, change),
+        *picture_notes(scene, edited, change),
         *noise_notes(),
         *written,
     ]

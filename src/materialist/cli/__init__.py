@@ -9,6 +9,7 @@ import typer
 from materialist.cli import batch, edits, plugins, scenes, setup, studio
 from materialist.cli.generate import add_command, group
 from materialist.cli.outcome import run_to_exit_code
+from materialist.edits.registry import OPERATIONS
 
 ABOUT = "Physically based editing of a single photograph, by inverse rendering."
 MODELS = "List, download and verify networks from a model hub; no other command ever downloads."
@@ -18,13 +19,11 @@ COMMANDS: dict[str, Callable[..., Any]] = {
     "export": scenes.export_command,
     "doctor": setup.doctor,
     "select": edits.select_command,
-    "edit": edits.edit_command,
-    "glass": edits.glass_command,
-    "remove": edits.remove_command,
-    "insert": edits.insert_command,
-    "apply": edits.apply_command,
+    **{name: edits.operation_command(operation) for name, operation in OPERATIONS.items()},
+    # These two make films as well.
     "relight": edits.relight_command,
     "drop": edits.drop_command,
+    "apply": edits.apply_command,
     "batch": batch.batch_command,
     "studio": studio.studio_command,
 }

@@ -1,5 +1,6 @@
 """`materialist select`, `edit`, `glass`, `remove`, `insert`, `apply`, `relight` and `drop`: pictures and films."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,13 +21,16 @@ from materialist.cli.outcome import report_success
 from materialist.cli.picture import (
     check_before,
     chosen_region,
-    opened_region,
     write_film,
     write_result,
 )
+from materialist.edits.core.operation import Operation, Placement, Target
+from materialist.edits.drop.operation import DROP
+from materialist.edits.drop.options import Drop
+from materialist.edits.light.operation import RELIGHT
+from materialist.edits.light.options import Relight
 from materialist.errors import InputError
-from materialist.option_kinds import option, parse_numbers
-from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
+from materialist.option_kinds import declarations, option, parse_numbers
 
 MESH_FILES = "OBJ, PLY, STL, glTF or GLB."
 FPS = 24
@@ -64,7 +68,7 @@ def select_command(
     import numpy as np
 
     from materialist.color import srgb_to_linear
-    from materialist.edits.composite.upsample import matte
+    from materialist.edits.composite.matte import matte
     from materialist.io.image import ensure_image_writable, write_image
 
     if output.suffix.lower() != ".png":
@@ -87,78 +91,77 @@ def select_command(
     )
 
 
-def edit_command(
-    scene: SceneArgument,
-    output: PictureOutput,
-    region: Region,
-    options: MaterialEdit,
+def operation_command(operation: Operation) -> Callable[..., None]:
+    """The command of an operation that acts on a region or on places, for `generate.add_command`."""
+    make = _place_command if operation.target is Target.PLACE else _region_command
+    command = make(operation)
+    command.__annotations__["options"] = operation.options
+    command.__doc__ = operation.about
+    return command
+
+
+def _region_command(operation: Operation) -> Callable[..., None]:
+    def command(
+        scene: SceneArgument,
+        output: PictureOutput,
+        region: Region,
+        options: Any,
+        rendering: Rendering,
+    ) -> None:
+        check_needed(operation, options)
+        if options.only_in_photo and rendering.full_render:
+            from materialist.edits.core.notes import PICTURED
+
+            raise InputError(
+                f"{PICTURED}--full-render would not show it; take --model closed, or leave that out."
+            )
+        check_before(output, rendering)
+        loaded = mt.load_scene(scene)
+        mask = chosen_region(loaded, region, rendering.device)
+        write_operation(operation, loaded, mask, options, output, rendering)
+
+    return command
+
+
+def _place_command(operation: Operation) -> Callable[..., None]:
+    def command(
+        scene: SceneArgument,
+        mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
+        output: PictureOutput,
+        at: At,
+        options: Any,
+        rendering: Rendering,
+    ) -> None:
+        from materialist.edits.insert.meshes import read_model
+
+        check_before(output, rendering)
+        places = tuple(parse_numbers(text, 2, "--at") for text in at)
+        placement = Placement((read_model(mesh, up=options.up),), places)
+        write_operation(operation, mt.load_scene(scene), placement, options, output, rendering)
+
+    return command
+
+
+def check_needed(operation: Operation, options: Any) -> None:
+    """Raise InputError where the options of a command change nothing."""
+    if operation.needed and options == type(options)():
+        known = declarations(operation.options)
+        flags = [known[name][0].spells(name)[0] for name in operation.needed]
+        raise InputError(f"Nothing to change; give {', '.join(flags)}.")
+
+
+def write_operation(
+    operation: Operation,
+    scene: Any,
+    target: Any,
+    options: Any,
+    output: Path,
     rendering: Rendering,
 ) -> None:
-    """Change the material of a region, and get the photo back with only that changed."""
-    if options == MaterialEdit():
-        raise InputError(
-            "Nothing to change; give --hue, --saturation, --value, --albedo, --roughness or the like."
-        )
-    loaded, mask = opened_region(scene, output, region, rendering)
-    lines = [f"{int(mask.sum())} pixels edited, {float(mask.mean()):.0%} of the photo."]
-    write_result("edit", loaded, mt.edit(loaded, mask, options), output, rendering, lines=lines)
-
-
-def glass_command(
-    scene: SceneArgument,
-    output: PictureOutput,
-    region: Region,
-    options: Glass,
-    rendering: Rendering,
-) -> None:
-    """Turn an object to glass: what is behind it is continued, and seen through it."""
-    from materialist.edits.core.notes import PICTURED
-
-    if options.model == "two-interface" and rendering.full_render:
-        raise InputError(
-            f"{PICTURED}--full-render would not show it; take --model closed, or leave that out."
-        )
-    loaded, mask = opened_region(scene, output, region, rendering)
-    edited = mt.glass(loaded, mask, options)
-    source = edited.provenance["edits"][-1]["thickness"]
-    lines = [f"{int(mask.sum())} pixels are glass; thickness: {source}."]
-    write_result("glass", loaded, edited, output, rendering, lines=lines)
-
-
-def remove_command(
-    scene: SceneArgument,
-    output: PictureOutput,
-    region: Region,
-    options: Removal,
-    rendering: Rendering,
-) -> None:
-    """Take an object out of the photo, with its shadow and its reflections."""
-    loaded, mask = opened_region(scene, output, region, rendering)
-    lines = [f"{int(mask.sum())} pixels taken away."]
-    write_result("remove", loaded, mt.remove(loaded, mask, options), output, rendering, lines=lines)
-
-
-def insert_command(
-    scene: SceneArgument,
-    mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
-    output: PictureOutput,
-    at: At,
-    options: Insertion,
-    rendering: Rendering,
-) -> None:
-    """Put a mesh into the photo: it stands on what is there, casts its shadow and is reflected."""
-    from materialist.edits.insert.meshes import read_model
-
-    check_before(output, rendering)
-    places = [parse_numbers(text, 2, "--at") for text in at]
-    model = read_model(mesh, up=options.up)
-    loaded = edited = mt.load_scene(scene)
-    # One after the other: the last stands on what the first ones are.
-    for x, y in places:
-        edited = mt.insert(edited, model, (x, y), options)
-    longest = edited.provenance["edits"][-1]["size"]
-    lines = [f"{model.name}: longest side {longest:.3g} scene units."]
-    write_result("insert", loaded, edited, output, rendering, lines=lines)
+    """Apply an operation to a scene, write the picture, and report."""
+    edited = operation.apply(scene, target, options, scene)
+    lines = [operation.summary(edited)] if operation.summary else []
+    write_result(operation.name, scene, edited, output, rendering, lines=lines)
 
 
 def apply_command(
@@ -200,10 +203,8 @@ def relight_command(
     """Show the photo under other light."""
     # In a film several suns are stations; one picture has one.
     suns = options.sun
-    if options == MovingLight() and frames is None:
-        raise InputError(
-            "No light to change; give --envmap, --rotate, --sun, --lamp, --ambient or --dim."
-        )
+    if frames is None:
+        check_needed(RELIGHT, options)
     # --- Options that say nothing, or contradict each other ---
     alone = [("--fps", "--frames")] if fps != FPS and frames is None else []
     alone += [(flag, "--dim") for flag in lights.named if options.dim is None]
@@ -226,15 +227,14 @@ def relight_command(
     check_before(output, rendering, video=frames is not None)
     loaded = mt.load_scene(scene)
     marked = chosen_region(loaded, lights, rendering.device) if lights.named else None
-    changes = Relight(**{**vars(options), "sun": None, "lights": marked})
-    if frames is not None:
-        from materialist.edits.light.relight import moving_light
-
-        film = moving_light(loaded, frames, changes, suns=suns)
-        write_film("relight", loaded, film, output, rendering, frames=frames, fps=fps)
+    changes = Relight(**{**vars(options), "sun": suns[0] if len(suns) == 1 else None})
+    if frames is None:
+        write_operation(RELIGHT, loaded, marked, changes, output, rendering)
         return
-    edited = mt.relight(loaded, changes, sun=suns[0] if suns else None)
-    write_result("relight", loaded, edited, output, rendering)
+    from materialist.edits.light.relight import moving_light
+
+    film = moving_light(loaded, frames, changes, suns=suns, sun=None, lights=marked)
+    write_film(RELIGHT.name, loaded, film, output, rendering, frames=frames, fps=fps)
 
 
 def drop_command(
@@ -265,4 +265,4 @@ def drop_command(
     loaded = mt.load_scene(scene)
     film: Any = mt.drop(loaded, models, places, options, frames=frames, fps=fps)
     film = film if rotate is None else moving_light(film, frames, light)
-    write_film("drop", loaded, film, output, rendering, frames=frames, fps=fps)
+    write_film(DROP.name, loaded, film, output, rendering, frames=frames, fps=fps)

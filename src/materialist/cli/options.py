@@ -162,3 +162,11 @@ class Rendering(PictureFile):
     save: Path | None = option(
         None, "Write the edited scene as well.", kind="file", metavar="SCENE2"
     )
+
+    @property
+    def compositing(self) -> dict[str, Any]:
+        """Keywords of `composite`."""
+        names = ("spp", "seed", "full_render", "upscale", "device")
+        return {name: getattr(self, name) for name in names} | {
+            "denoise": self.denoise is not False
+        }

@@ -21,15 +21,6 @@ def chosen_region(scene: Any, region: Place, device: str) -> Any:
     )
 
 
-def opened_region(
-    scene: Path, output: Path, region: Place, rendering: Rendering
-) -> tuple[Any, Any]:
-    """(the scene, [H, W] bool region that is edited), once the output is known to be writable."""
-    check_before(output, rendering)
-    loaded = mt.load_scene(scene)
-    return loaded, chosen_region(loaded, region, rendering.device)
-
-
 def check_before(output: Path, rendering: Rendering, *, video: bool = False) -> None:
     """Everything about the output that can be wrong, before the work starts.
 
@@ -92,17 +83,7 @@ def write_result(
 ) -> None:
     start = time.monotonic()
     with stage_progress(quiet=rendering.as_json) as progress:
-        picture = mt.composite(
-            scene,
-            edited,
-            spp=rendering.spp,
-            seed=rendering.seed,
-            full_render=rendering.full_render,
-            upscale=rendering.upscale,
-            denoise=rendering.denoise is not False,
-            device=rendering.device,
-            progress=progress,
-        )
+        picture = mt.composite(scene, edited, progress=progress, **rendering.compositing)
     notes = write_picture(output, picture, scene, edited, rendering)
     facts = {"image": str(output), "spp": rendering.spp, "seconds": time.monotonic() - start}
     finish_command(
@@ -159,14 +140,9 @@ def write_film(
         composites = pictures(
             scene,
             kept("scene", film),
-            spp=rendering.spp,
-            seed=rendering.seed,
-            denoise=rendering.denoise is not False,
-            device=rendering.device,
-            full_render=rendering.full_render,
-            upscale=rendering.upscale,
             progress=progress,
             count=frames,
+            **rendering.compositing,
         )
         write_frames(output, kept("picture", composites), fps=fps, force=rendering.force)
     facts = {
@@ -200,18 +176,17 @@ def finish_command(
 ) -> None:
     """Save the edited scene where that is asked, and report its warnings before the last of the lines."""
     from materialist.edits.composite.composite import developed
-    from materialist.edits.core.notes import effect_notes, mean_change, noise_notes, warnings_since
+    from materialist.edits.core.notes import mean_change, noise_notes, warnings_since
+    from materialist.edits.registry import picture_notes
 
-    # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
     # --- Warnings: of the edits, of the denoiser, of a light that changes next to nothing ---
     save = rendering.save
     grainy = noise_notes(rendering.denoise is not False)
     warnings = [*warnings_since(scene, edited), *grainy, *notes]
     if not rendering.full_render:
-        warnings += effect_notes(
+        warnings += picture_notes(
             scene, edited, mean_change(scene, picture) if change is None else change
         )
-    # --- The edited scene, whose photo is the picture ---
     # --- The edited scene, whose photo is the picture ---
     if save is not None:
         saved = developed(scene, edited, picture, seed=rendering.seed, device=rendering.device)

@@ -6,7 +6,7 @@ from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
 from materialist.darkroom.state import outline, settable, state
 from materialist.edits.light import presets
-from materialist.edits.recipe import OPTIONS
+from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.option_kinds import declarations
 from materialist.studio import objects, uploads
@@ -58,7 +58,7 @@ def _text(kind: str, name: str, value: Any) -> Any:
     if name not in settable(kind) | (FILES if value is None else set()):
         raise InputError(f"'{name}' of {kind} cannot be set in this way.")
     # The default is left out of the list: it says nothing.
-    if value is None or value == declarations(OPTIONS[kind])[name][1]:
+    if value is None or value == declarations(OPERATIONS[kind].options)[name][1]:
         return None
     if isinstance(value, bool):
         return str(value).lower()

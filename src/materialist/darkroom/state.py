@@ -11,7 +11,7 @@ from materialist import __version__
 from materialist.color import srgb_levels
 from materialist.darkroom.desk import Desk
 from materialist.edits.light import presets
-from materialist.edits.recipe import OPTIONS
+from materialist.edits.registry import OPERATIONS
 from materialist.edits.select import sam
 from materialist.errors import InputError
 from materialist.io import display
@@ -117,7 +117,7 @@ def about(studio: Studio, person: str) -> dict[str, Any]:
     """What does not change while a page is open: ranges of options, and what there is to choose from."""
     return {
         "version": __version__,
-        "options": {kind: _ranges(kind) for kind in OPTIONS},
+        "options": {kind: _ranges(kind) for kind in OPERATIONS},
         "examples": _examples(studio),
         "sizes": SIZES,
         "predictors": PREDICTORS,
@@ -144,7 +144,7 @@ def _examples(studio: Studio) -> list[list[str]]:
 def _ranges(kind: str) -> dict[str, dict[str, Any]]:
     """Name of an option -> its default, and its range where it has one."""
     ranges: dict[str, dict[str, Any]] = {}
-    for name, (declared, default) in declarations(OPTIONS[kind]).items():
+    for name, (declared, default) in declarations(OPERATIONS[kind].options).items():
         facts: dict[str, Any] = {"default": default, "help": declared.help}
         if np.isfinite(declared.low):
             facts["low"] = declared.low
@@ -159,7 +159,7 @@ def settable(kind: str) -> set[str]:
     plain = ("number", "shift", "colour", "switch", "word", "span", "numbers", "paint")
     return {
         name
-        for name, (declared, _) in declarations(OPTIONS[kind]).items()
+        for name, (declared, _) in declarations(OPERATIONS[kind].options).items()
         if declared.kind in plain and declared.written
     }
 

@@ -6,44 +6,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from materialist.edits.drop.drop import settle
-from materialist.edits.glass.glass import glass
-from materialist.edits.insert.insert import insert
-from materialist.edits.light.relight import relight
-from materialist.edits.material.material import edit
-from materialist.edits.remove.remove import remove
+from materialist.edits.core.operation import PLACE, Operation, Placement, Target
+from materialist.edits.registry import OPERATIONS
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole
-from materialist.option_kinds import (
-    OFF,
-    ON,
-    OperationOptions,
-    beside,
-    declarations,
-    parse_numbers,
-    several,
-)
-from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight, Removal
+from materialist.io.text import read_text
+from materialist.option_kinds import OFF, ON, beside, declarations, parse_numbers, several
 from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
-
-OPTIONS: dict[str, type[OperationOptions]] = {
-    kind.operation: kind for kind in (MaterialEdit, Relight, Insertion, Drop, Glass, Removal)
-}
-"""Kind of step -> its options."""
-REGION = ("mask", "click", "box", "with")
-PLACE = ("mesh", "at")
-WHERE = {"insert": PLACE, "drop": PLACE}
-"""Kind of step -> what says where it acts; a region for the others."""
-KINDS = {
-    name: (
-        *WHERE.get(name, REGION),
-        *(key for key, (declared, _) in declarations(kind).items() if declared.written),
-    )
-    for name, kind in OPTIONS.items()
-}
-"""Kind of step -> what it may say."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +22,18 @@ class Step:
     """One edit."""
 
     kind: str
-    """One of KINDS."""
+    """The name of its operation."""
     options: dict[str, Any] = field(default_factory=dict)
-    """As in the file: texts, lists of texts, lists of lists."""
+    """What it says, as in the file: texts, lists of texts, lists of lists."""
     folder: Path = Path(".")
     """What file names in it are relative to."""
     seed: int = field(default=0, compare=False)
     """Where the step names none of its own."""
     device: str = field(default="auto", compare=False)
+
+    @property
+    def operation(self) -> Operation:
+        return OPERATIONS[self.kind]
 
     @property
     def skipped(self) -> bool:
@@ -74,8 +49,12 @@ def read_recipe(path: str | Path) -> list[Step]:
     try:
         if path.stat().st_size > 1_000_000:
             raise InputError(f"{path} is larger than 1 MB; a list of edits is a short text.")
-        content = yaml.load(path.read_text("utf-8"), Loader=_loader())
-    except (OSError, UnicodeDecodeError) as error:
+        content = yaml.load(read_text(path), Loader=_loader())
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"The list of edits {path} is not text in UTF-8; save it as UTF-8."
+        ) from error
+    except OSError as error:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
@@ -123,26 +102,25 @@ def _loader() -> Any:
 
 
 def _step(entry: Any, number: int, path: Path) -> Step:
-    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KINDS:
+    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in OPERATIONS:
         said = (
             f"'{next(iter(entry))}'"
             if isinstance(entry, dict) and len(entry) == 1
             else "not one kind of edit"
         )
-        known = ", ".join(KINDS)
+        known = ", ".join(OPERATIONS)
         raise InputError(
             f"Step {number} of {path} is {said}; it must be one of {known} with its options below it."
         )
     # --- The step's options: only those that its kind has ---
     kind, options = next(iter(entry.items()))
+    keys = OPERATIONS[kind].keys
     if not isinstance(options, dict):
-        raise InputError(
-            f"Step {number} of {path} has no options; give some of {', '.join(KINDS[kind])}."
-        )
-    unknown = sorted(set(options) - {*KINDS[kind], "skip"})
+        raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(keys)}.")
+    unknown = sorted(set(options) - {*keys, "skip"})
     if unknown:
         raise InputError(
-            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KINDS[kind])}."
+            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(keys)}."
         )
     if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
         raise InputError(
@@ -153,7 +131,7 @@ def _step(entry: Any, number: int, path: Path) -> Step:
 
 def with_files(step: Step, use: Callable[[str, Any], Any]) -> Step:
     """The step with `use(option, value)` in place of each file that it names; words such as `auto` stay."""
-    known = declarations(OPTIONS[step.kind])
+    known = declarations(step.operation.options)
     files = {name: declared for name, (declared, _) in known.items() if declared.kind == "file"}
     words = {name: declared.choices for name, declared in files.items()}
     words |= {"mask": (), "mesh": ()}
@@ -209,12 +187,43 @@ def apply(
         if step.skipped:
             continue
         try:
-            edited = _MAKERS.get(step.kind, _in_region)(
-                scene, edited, replace(step, seed=seed, device=device)
-            )
+            edited = _applied(scene, edited, replace(step, seed=seed, device=device))
         except InputError as error:
             raise InputError(f"Step {number} ({step.kind}): {error}") from error
     return edited
+
+
+def _applied(scene: Scene, edited: Scene, step: Step) -> Scene:
+    """The scene so far after one more step; `scene` is the original one."""
+    target = _target(scene, edited, step)
+    return step.operation.apply(edited, target, options_of(step), scene)
+
+
+def _target(scene: Scene, edited: Scene, step: Step) -> Any:
+    """What a step acts on: a `Placement`, a region, or None for the light as a whole. Raises InputError."""
+    operation = step.operation
+    if operation.target is Target.PLACE:
+        return _placement(step)
+    if operation.target is Target.REGION:
+        return _left(scene, edited, region_of(scene, step))
+    if not step.options:
+        raise InputError(f"A {step.kind} changes nothing; give {', '.join(operation.needed)}.")
+    marked = any(key in step.options for key in operation.target.keys)
+    return region_of(scene, step) if marked else None
+
+
+def _placement(step: Step) -> Placement:
+    for name in PLACE:
+        if name not in step.options:
+            raise InputError(
+                f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}."
+            )
+    meshes = _listed(step.options["mesh"])
+    places = several(step.options["at"])
+    return Placement(
+        tuple(beside(step.folder, "mesh", mesh) for mesh in meshes),
+        tuple(parse_numbers(place, 2, "at") for place in places),
+    )
 
 
 def region_of(scene: Scene, step: Step) -> Array:
@@ -242,57 +251,12 @@ def _left(scene: Scene, edited: Scene, region: Array) -> Array:
 
 def options_of(step: Step) -> Any:
     """The dataclass of the step's options, of what it says beside its region or place. Raises InputError."""
-    kind = OPTIONS[step.kind]
+    kind = step.operation.options
     known = declarations(kind)
     shared = {name: getattr(step, name) for name in ("seed", "device") if name in known}
     # Region and place are read elsewhere.
-    said = {name: value for name, value in step.options.items() if name in known}
-    return kind.read(said, folder=step.folder, **shared)
-
-
-def _relight(scene: Scene, edited: Scene, step: Step) -> Scene:
-    if not step.options:
-        raise InputError(
-            "A relight changes nothing; give envmap, rotate, sun, lamps, ambient or dim."
-        )
-    region = [name for name in REGION if name in step.options]
-    if region and "dim" not in step.options:
-        raise InputError(
-            f"relight: {region[0]} says which lights are dimmed; give dim, too, or leave it out."
-        )
-    options = options_of(step)
-    return relight(edited, options, lights=region_of(scene, step) if region else None, fitted=scene)
-
-
-def _put(scene: Scene, edited: Scene, step: Step) -> Scene:
-    """Meshes at places: inserted one by one, or dropped together."""
-    for name in PLACE:
-        if name not in step.options:
-            raise InputError(
-                f"The {step.kind} needs its {name}, as in {step.kind}: {{mesh: mug.glb, at: [310, 220]}}."
-            )
-    options = options_of(step)
-    mesh = step.options["mesh"]
-    places: list[Any] = [parse_numbers(pair, 2, "at") for pair in several(step.options["at"])]
-    if step.kind == "drop":
-        files = [beside(step.folder, "mesh", name) for name in _listed(mesh)]
-        return settle(edited, files, places, options)
-    for place in places:
-        edited = insert(edited, beside(step.folder, "mesh", mesh), place, options)
-    return edited
-
-
-def _in_region(scene: Scene, edited: Scene, step: Step) -> Scene:
-    """Edits of a region: material, glass, removal."""
-    region = _left(scene, edited, region_of(scene, step))
-    options = options_of(step)
-    if step.kind == "edit":
-        return edit(edited, region, options)
-    return (glass if step.kind == "glass" else remove)(edited, region, options, fitted=scene)
-
-
-_MAKERS = {"relight": _relight, "insert": _put, "drop": _put}
-"""Kind of step -> (original scene, scene so far, step) -> scene; `_in_region` for the others."""
+    named = {name: value for name, value in step.options.items() if name in known}
+    return kind.read(named, folder=step.folder, **shared)
 
 
 def _listed(value: Any) -> list[Any]:

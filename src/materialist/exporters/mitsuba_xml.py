@@ -40,8 +40,8 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
                 write_exr(
                     folder / f"{part.name}_{key}.exr", at_least_2x2(getattr(part.materials, key))
                 )
-    for name, own in FILES.items():
-        text = _xml(mi, _description(mi, scene, parts, own), path_depth(scene))
+    for name, uses_plugin in FILES.items():
+        text = _xml(mi, _description(mi, scene, parts, uses_plugin), path_depth(scene))
         words = advice(scene)
         (folder / name).write_text(
             f"{text}\n<!-- {words['scale']} {words['colour']} -->\n", "utf-8"
@@ -63,7 +63,7 @@ def _xml(mi, description: dict, depth: int) -> str:
     return text.replace("<default", f'<default name="max_depth" value="{depth}"/>\n    <default', 1)
 
 
-def _description(mi, scene: Scene, parts: list[Part], own: bool) -> dict:
+def _description(mi, scene: Scene, parts: list[Part], uses_plugin: bool) -> dict:
     """The scene as `mi.load_dict` takes it."""
     eye = sensor(scene.camera, look_along(mi))
     description: dict = {
@@ -77,14 +77,14 @@ def _description(mi, scene: Scene, parts: list[Part], own: bool) -> dict:
         description[part.name] = {
             "type": "ply",
             "filename": f"{part.name}.ply",
-            "bsdf": _bsdf(part, own),
+            "bsdf": _bsdf(part, uses_plugin),
         }
         if part.surface is not None and (emitter := body_emitter(part.surface)):
             description[part.name]["emitter"] = emitter
     return description | {f"lamp{k}": sphere(lamp) for k, lamp in enumerate(scene.lamps)}
 
 
-def _bsdf(part: Part, own: bool) -> dict:
+def _bsdf(part: Part, uses_plugin: bool) -> dict:
     """The renderer's material. Both sides shade alike: `principled` needs a wrapper for that, which our own plugin must
     not have, since it would take what leans away from the eye for a back."""
     sampling = ("nearest", "clamp") if part.surface is None else ("bilinear", "repeat")
@@ -99,7 +99,7 @@ def _bsdf(part: Part, own: bool) -> dict:
             "wrap_mode": sampling[1],
         }
     bsdf = opaque if part.surface is None else body_bsdf(part.surface, opaque)
-    if own:
+    if uses_plugin:
         return bsdf
     bsdf = _standard(bsdf)
     return {"type": "twosided", "bsdf": bsdf} if bsdf["type"] == "principled" else bsdf

@@ -56,7 +56,7 @@ def export(
         InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
         SetupError: the extra for the format is missing, or `blender` does not work.
     """
-    settings = ExportOptions.given(options, **values)
+    settings = ExportOptions.merged(options, **values)
     path = Path(path)
     to = check_format(path, settings.to)
     most = settings.max_triangles

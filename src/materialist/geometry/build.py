@@ -66,21 +66,21 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
 
 def continued_as(geometry: Geometry, other: Geometry) -> Geometry:
     """The depth surface of one geometry with the continued planes of another, of the same picture size."""
-    own = geometry.mesh
+    near = geometry.mesh
     far = other.mesh
-    surface = own.face_plane == -1
+    surface = near.face_plane == -1
     planes = far.face_plane >= 0
 
     def both(a, b):
         return np.concatenate([a, b])
 
     mesh = Mesh(
-        vertices=both(own.vertices, far.vertices),
-        normals=both(own.normals, far.normals),
-        uv=both(own.uv, far.uv),
-        faces=both(own.faces[surface], far.faces[planes] + len(own.vertices)).astype(np.int32),
-        face_pixel=both(own.face_pixel[surface], far.face_pixel[planes]),
-        face_plane=both(own.face_plane[surface], far.face_plane[planes]),
+        vertices=both(near.vertices, far.vertices),
+        normals=both(near.normals, far.normals),
+        uv=both(near.uv, far.uv),
+        faces=both(near.faces[surface], far.faces[planes] + len(near.vertices)).astype(np.int32),
+        face_pixel=both(near.face_pixel[surface], far.face_pixel[planes]),
+        face_plane=both(near.face_plane[surface], far.face_plane[planes]),
     )
     return Geometry(_tidy(mesh), other.plane_label)
 
@@ -95,7 +95,7 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     mesh: whose first faces are two for each pixel with a surface, as of `depth_to_mesh`. depth: [H, W], 0 = none.
     normal: [H, W, 3] unit, camera frame.
     """
-    own = np.ascontiguousarray(normal[depth > 0], np.float32)  # [P, 3]
+    pixel_normal = np.ascontiguousarray(normal[depth > 0], np.float32)  # [P, 3]
     vertex = pixel_corners(mesh, depth > 0)[depth > 0].ravel()  # [4 P]
     order = np.argsort(vertex, kind="stable")
     sorted_vertex = vertex[order]
@@ -103,22 +103,29 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     place = np.empty_like(order)  # [4 P] which of its vertex's up to four pixels each one is
     place[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
     around = np.full((len(mesh.vertices), 4), -1)
-    around[vertex, place] = np.repeat(np.arange(len(own)), 4)  # [V, 4] pixels that meet in a vertex
+    around[vertex, place] = np.repeat(
+        np.arange(len(pixel_normal)), 4
+    )  # [V, 4] pixels that meet in a vertex
     cosine = np.cos(np.radians(CREASE))
     # Most vertices lie on no crease and stay as they are.
     flat = np.ones(len(around), bool)
     for i, j in combinations(range(4), 2):
         both = around[:, j] >= 0  # places are filled from the first
-        flat[both] &= np.einsum("nk,nk->n", own[around[both, i]], own[around[both, j]]) > cosine
+        flat[both] &= (
+            np.einsum("nk,nk->n", pixel_normal[around[both, i]], pixel_normal[around[both, j]])
+            > cosine
+        )
     corner = np.flatnonzero(~flat[vertex])  # [C] of pixels, at creases
     at, near = vertex[corner], around[vertex[corner]]  # [C], [C, 4]
-    alike = (near >= 0) & (np.einsum("njk,nk->nj", own[near], own[corner // 4]) > cosine)
+    alike = (near >= 0) & (
+        np.einsum("njk,nk->nj", pixel_normal[near], pixel_normal[corner // 4]) > cosine
+    )
     alike[np.arange(len(corner)), place[corner]] = True
     # Pixels with the same company share a vertex.
     key, first, number = np.unique(
         at * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True
     )
-    shading = np.where(alike[first][..., None], own[near[first]], 0).sum(
+    shading = np.where(alike[first][..., None], pixel_normal[near[first]], 0).sum(
         1, dtype=np.float64
     )  # [K, 3]
     new = vertex.copy()
@@ -131,7 +138,7 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
             normals=np.concatenate([mesh.normals, face_camera(shading, points)]),
             uv=np.concatenate([mesh.uv, mesh.uv[key // 16]]),
             faces=np.concatenate(
-                [new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(own) :]]
+                [new.reshape(-1, 4)[:, QUAD].reshape(-1, 3), mesh.faces[2 * len(pixel_normal) :]]
             ).astype(np.int32),
         )
     )

@@ -114,14 +114,14 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
             continue
         pixels = np.flatnonzero(plane.mask)
         pixels = pixels[:: max(1, len(pixels) // 20_000)]
-        own = points.reshape(-1, 3)[pixels]
-        own = own - (own @ plane.normal - plane.offset)[:, None] * plane.normal
+        flat = points.reshape(-1, 3)[pixels]
+        flat = flat - (flat @ plane.normal - plane.offset)[:, None] * plane.normal
         outdoors = np.mean(~surface) > SETTINGS.sky_share and plane.normal[1] > SETTINGS.upward
         half = behind = (SETTINGS.ground_extent if outdoors else SETTINGS.extent) * radius
         if plane.normal[1] < SETTINGS.upward:
-            half = min(half, SETTINGS.wall_reach * _size(own))
-            behind = min(behind, SETTINGS.wall_behind * _size(own))
-        patches.append(_Sheet(index, plane, own, pixels, bool(bounding), touches, half, behind))
+            half = min(half, SETTINGS.wall_reach * _size(flat))
+            behind = min(behind, SETTINGS.wall_behind * _size(flat))
+        patches.append(_Sheet(index, plane, flat, pixels, bool(bounding), touches, half, behind))
     return patches
 
 

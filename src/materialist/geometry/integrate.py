@@ -15,8 +15,9 @@ reweighted least squares, as in bilateral normal integration (Cao et al. 2022), 
 from dataclasses import dataclass
 
 import numpy as np
+import pyamg
 from scipy.sparse import coo_matrix, csr_matrix, diags
-from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.sparse.linalg import cg
 
 from materialist.camera import unit
 from materialist.geometry.regions import connected_regions, regions_without_strays
@@ -36,9 +37,9 @@ class IntegrationSettings:
     least: float = 0.0005  # share of the surface below which a region is a stray; by eye
     stray_pull: float = 1e-3  # part of the pull that is left to strays; so that they follow
     last_rounds: int = 2  # reweighted solves without strays
-    block: int = 4  # side of the blocks of the preconditioner's coarse grid, pixels
     tolerance: float = 1e-3  # residual at which a solve ends, share of its first one
-    iterations: int = 200  # most steps of a solve
+    iterations: int = 100  # most steps of a solve
+    coarsest: int = 500  # unknowns that multigrid solves directly
 
 
 SETTINGS = IntegrationSettings()
@@ -102,8 +103,6 @@ class _Grid:
     """[P] squared cosine of the view angle, mean of both."""
     step: csr_matrix
     """[P, N] differences, second - first."""
-    block: csr_matrix
-    """[N, B] which block of the coarse grid an unknown is in."""
 
     @staticmethod
     def of(surface: Array, normal: Array, rays: Array) -> "_Grid":
@@ -124,7 +123,7 @@ class _Grid:
         signs = np.repeat([-1.0, 1.0], count)
         shape = (count, int(surface.sum()))
         step = coo_matrix((signs, (rows, np.concatenate([first, second]))), shape).tocsr()
-        return _Grid(first, second, demanded, facing, step, _blocks(surface))
+        return _Grid(first, second, demanded, facing, step)
 
     def excess(self, values: Array) -> Array:
         """[P] change of log depth [N] that the normals do not explain, less where they face away."""
@@ -137,23 +136,25 @@ class _Grid:
     def solved(self, weight: Array, pull: Array, data: Array, start: Array) -> Array:
         """[N] the minimum of sum of weight (excess)^2 + sum of pull (u - data)^2, from `start`.
 
-        Conjugate gradients; the preconditioner joins the diagonal with a direct solve on blocks of pixels, which
-        carries far what neighbours alone would pass on step by step.
+        Conjugate gradients with algebraic multigrid as preconditioner, which carries far what neighbours alone would
+        pass on step by step, and knows no grid: steps and holes are weights of 0 to it.
         """
         strength = weight * self.facing**2
         system = (self.step.T @ diags(strength) @ self.step + diags(pull)).tocsr()
         right_side = self.step.T @ (strength * self.demanded) + pull * data
-        coarse = splu((self.block.T @ system @ self.block).tocsc())
-        inverse = 1 / system.diagonal()
-
-        def precondition(residual: Array) -> Array:
-            far = self.block @ coarse.solve(self.block.T @ residual)
-            return inverse * residual + far
-
-        near = LinearOperator(system.shape, precondition, dtype=np.float64)
-        options = {"rtol": 0.0, "maxiter": SETTINGS.iterations, "M": near}
+        multigrid = pyamg.ruge_stuben_solver(
+            system, max_coarse=SETTINGS.coarsest, coarse_solver="splu"
+        )
         limit = SETTINGS.tolerance * float(np.linalg.norm(right_side - system @ data))
-        log_depth, _ = cg(system, right_side, start, atol=limit, **options)
+        log_depth, _ = cg(
+            system,
+            right_side,
+            start,
+            rtol=0.0,
+            atol=limit,
+            maxiter=SETTINGS.iterations,
+            M=multigrid.aspreconditioner(),
+        )
         return log_depth
 
 
@@ -169,13 +170,3 @@ def _change(normal: Array, near: Array, far: Array) -> Array:
 def _cosine(normal: Array, ray: Array) -> Array:
     """[P] cosine of the view angle, at least `grazing`."""
     return np.maximum(-(normal * unit(ray)).sum(-1), SETTINGS.grazing)
-
-
-def _blocks(surface: Array) -> csr_matrix:
-    """[N, B] 1 where an unknown lies in a block of the coarse grid."""
-    rows, columns = np.nonzero(surface)
-    across = -(-surface.shape[1] // SETTINGS.block)
-    place = rows // SETTINGS.block * across + columns // SETTINGS.block
-    _, number = np.unique(place, return_inverse=True)
-    count = len(rows)
-    return coo_matrix((np.ones(count), (np.arange(count), number))).tocsr()

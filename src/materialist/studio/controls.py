@@ -10,9 +10,14 @@ import gradio as gr
 import numpy as np
 
 from materialist.color import srgb_levels
+from materialist.edits.core.operation import Target
+from materialist.edits.drop.options import Drop
+from materialist.edits.glass.options import Glass
+from materialist.edits.insert.options import Insertion
+from materialist.edits.light.options import Relight
+from materialist.edits.material.options import MaterialEdit
 from materialist.errors import InputError
 from materialist.option_kinds import ON, OperationOptions, declarations, parse_colour
-from materialist.options import Drop, Glass, Insertion, MaterialEdit, Relight
 from materialist.studio import objects
 from materialist.studio.lights import number_text
 from materialist.studio.session import Session
@@ -132,14 +137,15 @@ def control_values(session: Session) -> dict[str, Any]:
     step = session.edits.current_step
     light = session.edits.light
     # --- The options that each group of controls shows ---
-    kind, options = (step.kind, step.options) if step is not None else ("", {})
     options_by_kind: dict[type[OperationOptions], dict[str, Any]] = {
-        MaterialEdit: options if kind == "edit" else {},
-        Glass: options if kind == "glass" else {},
+        MaterialEdit: {},
+        Glass: {},
         Relight: session.edits.steps[light].options if light is not None else {},
     }
-    options_by_kind |= {Insertion: options} if kind in objects.KINDS else {}
-    options_by_kind |= {Drop: options} if kind == "drop" else {}
+    if step is not None:
+        options_by_kind[step.operation.options] = step.options
+        if step.operation.target is Target.PLACE:
+            options_by_kind[Insertion] = step.options
     values: dict[str, Any] = {}
     # A value that is not valid, as from a list made by hand, leaves its control as it is.
     for name, control in CONTROLS.items():

@@ -8,18 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from materialist.edits.core.operation import Target
 from materialist.edits.recipe import Step
 
-_WORDS = {
-    "edit": "Material",
-    "relight": "Light",
-    "glass": "Glass",
-    "insert": "Object",
-    "drop": "Fallen",
-    "remove": "Removed",
-}
-_PLAIN = {"remove": "the object", "glass": "clear"}
-"""Summary of a step without options."""
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness", "at", "seed", "gain")
 """Options that a summary leaves out: the picture shows them."""
 _NAMES = {
@@ -86,7 +77,7 @@ class EditList:
     @property
     def light(self) -> int | None:
         """The place of the light that its controls move: the current one, else the last that is switched on."""
-        places = [k for k, step in enumerate(self.steps) if step.kind == "relight"]
+        places = [k for k, step in enumerate(self.steps) if step.operation.target is Target.LIGHT]
         if self.current in places:
             return self.current
         return next((k for k in reversed(places) if not self.steps[k].skipped), None)
@@ -130,7 +121,7 @@ def step_summary(step: Step) -> str:
         f"{_NAMES.get(name, name.replace('_', ' '))} {_short(value)}".strip()
         for name, value in shown.items()
     ]
-    return f"{_WORDS.get(step.kind, step.kind)}: {', '.join(parts) or _PLAIN.get(step.kind, 'as it is')}"
+    return f"{step.operation.label}: {', '.join(parts) or step.operation.bare}"
 
 
 def _short(value: Any) -> str:

@@ -13,7 +13,8 @@ from typing import Any
 import psutil
 
 import materialist as mt
-from materialist.edits.recipe import REGION, Step, apply, options_of, region_of
+from materialist.edits.core.operation import REGION, PreviewMode
+from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
@@ -54,7 +55,8 @@ class GlassState:
 
 def is_traced(step: Step) -> bool:
     """Whether a step is glass that the worker traces: the paper's two-interface model is shown by other means."""
-    return step.kind == "glass" and str(step.options.get("model", "closed")) == "closed"
+    is_closed = str(step.options.get("model", "closed")) == "closed"
+    return step.operation.preview is PreviewMode.TRACED and is_closed
 
 
 class GlassClient:

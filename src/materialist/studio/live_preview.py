@@ -18,6 +18,7 @@ import numpy as np
 from materialist.camera import project
 from materialist.color import luminance
 from materialist.edits.core.notes import warned
+from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.errors import InputError
 from materialist.jobs.limited import Limits, run_limited
@@ -37,9 +38,6 @@ def _use_one_thread() -> None:
 
 _THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_use_one_thread)
 """The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
-LIVE = ("edit", "relight")
-"""Kinds of steps that the preview shades; the others are sketched."""
-
 _LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 
 
@@ -111,7 +109,8 @@ class LivePreview:
         """The scene `before` with the last of the steps. Raises InputError with the step's summary."""
         step = steps[-1]
         try:
-            if step.kind == "drop" and not step.skipped and self._package is not None:
+            is_slow = step.operation.preview is PreviewMode.SIMULATED
+            if is_slow and not step.skipped and self._package is not None:
                 return self._fallen(before, steps)
             return apply(self.scene, [step], onto=before)
         except InputError as error:
@@ -162,7 +161,7 @@ class LivePreview:
         # --- Shading: the cache knows only the geometry of the fit ---
         shaded = edited
         if edited.geometry is not self.scene.geometry:
-            shaded = self.edited(tuple(step for step in steps if step.kind in LIVE))
+            shaded = self.edited(tuple(step for step in steps if is_shaded(step)))
         picture = _THREAD.submit(preview.picture, shaded, coarse=coarse).result()
         # --- What was taken away is filled as in the photo ---
         if edited.photo is not self.scene.photo:
@@ -187,6 +186,11 @@ class LivePreview:
         # For whoever still waits for it.
         self._preview.set_exception(InputError("This photo was closed; open it again."))
         self._kept.clear()
+
+
+def is_shaded(step: Step) -> bool:
+    """Whether the preview shades a step; what the others add is sketched."""
+    return step.operation.preview is PreviewMode.SHADED
 
 
 def _build(scene: Scene, file: Path | None) -> Any:

@@ -5,13 +5,16 @@ from typing import Any
 
 from trimesh import creation, transformations
 
-from materialist.edits.recipe import KINDS as STEPS
+from materialist.edits.core.operation import Target
+from materialist.edits.drop.operation import DROP
+from materialist.edits.insert.operation import INSERT
 from materialist.edits.recipe import Step
+from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.io.atomic import whole_file
 from materialist.studio.session import Session
 
-KINDS = ("insert", "drop")
+KINDS = tuple(name for name, entry in OPERATIONS.items() if entry.target is Target.PLACE)
 _SHAPES: dict[str, tuple[str, dict[str, Any]]] = {
     "Ball": ("icosphere", {"subdivisions": 4, "radius": 0.5}),
     "Cube": ("box", {"extents": (1, 1, 1)}),
@@ -45,7 +48,7 @@ def place(session: Session, x: float, y: float) -> None:
         if session.current_kind not in KINDS:
             if "mesh" not in session.next_object:
                 raise InputError("Choose an object from the list, or upload one, first.")
-            edits = edits.add(Step("insert", session.next_object, session.workspace))
+            edits = edits.add(Step(INSERT.name, session.next_object, session.workspace))
         session.put(edits, at=at)
 
 
@@ -55,9 +58,8 @@ def set_object_option(session: Session, name: str, value: str | None) -> None:
         if name == "mesh":  # another object is a new one
             session.edits = session.edits.chosen(None)
         # A fallen object knows fewer options: it cannot be turned.
-        if session.current_kind == "insert" or (
-            session.current_kind == "drop" and name in STEPS["drop"]
-        ):
+        kind = session.current_kind
+        if kind in KINDS and name in OPERATIONS[kind].keys:
             session.put(session.edits, **{name: value})
         session.next_object = {
             k: v for k, v in {**session.next_object, name: value}.items() if v is not None
@@ -81,11 +83,9 @@ def let_fall(session: Session, height: float) -> list[str]:
         # Only what this fall adds is told.
         known = session.live.edited(session.edits.active).report.warnings
         step = session.edits.steps[index]
-        kept = {
-            name: value for name, value in step.options.items() if name in {*STEPS["drop"], "skip"}
-        }
+        kept = {name: value for name, value in step.options.items() if name in {*DROP.keys, "skip"}}
         options = {**kept, "height": f"{height:.3g}", "seed": str(session.falls)}
-        after = session.edits.put(index, replace(step, kind="drop", options=options))
+        after = session.edits.put(index, replace(step, kind=DROP.name, options=options))
         session.falls += 1
         session.change("fall", after)
         return [

@@ -6,6 +6,9 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.edits.glass.operation import GLASS
+from materialist.edits.light.operation import RELIGHT
+from materialist.edits.material.operation import EDIT
 from materialist.edits.select import sam
 from materialist.errors import InputError
 from materialist.studio import (
@@ -146,19 +149,13 @@ def _pick(
 def _act(session: Session, data: Any) -> Updates:
     """One of the buttons of the list; an edit that is chosen shows its tab."""
     session.act(str(data.get("what")), int(data.get("index", -1)))
-    tabs = {
-        "edit": "material",
-        "relight": "light",
-        "insert": "object",
-        "drop": "object",
-        "glass": "object",
-    }
-    kind = session.current_kind or ""
-    if data["what"] != "choose" or kind not in tabs:
+    kind = session.current_kind
+    if data["what"] != "choose" or kind is None:
         return {}
-    return {"tabs": gr.Tabs(selected=tabs[kind])} | (
-        {"glass_part": gr.update(open=True)} if kind == "glass" else {}
-    )
+    # What has no tab of its own is among the objects.
+    tab = {EDIT.name: "material", RELIGHT.name: "light"}.get(kind, "object")
+    updates = {"tabs": gr.Tabs(selected=tab)}
+    return updates | ({"glass_part": gr.update(open=True)} if kind == GLASS.name else {})
 
 
 def _stop(context: PageContext, session: Session) -> Iterator[Updates]:

@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import materialist as mt
-from materialist.edits.recipe import REGION, Step, region_of, write_recipe
+from materialist.edits.core.operation import REGION, PreviewMode, Target
+from materialist.edits.light.operation import RELIGHT
+from materialist.edits.recipe import Step, region_of, write_recipe
 from materialist.errors import InputError
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, uploads
@@ -183,11 +185,7 @@ class Session:
                 after = before.box(scene, pick["at"], mode, method)
             else:
                 after = before.brush(scene, pick["points"], pick["radius"], mode)
-            if (
-                after.mask is None
-                or mode not in (ADD, REMOVE)
-                or self.current_kind not in ("edit", "glass")
-            ):
+            if after.mask is None or mode not in (ADD, REMOVE) or not self._follows_selection():
                 self.remember("select")
                 self.edits = self.edits.chosen(None)
             else:  # the current edit grows or shrinks with its region, whatever that was given as
@@ -196,6 +194,13 @@ class Session:
                     **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)},
                 )
             self.selection = after
+
+    def _follows_selection(self) -> bool:
+        """Whether the current edit is one of a region that the preview shows soon enough."""
+        step = self.edits.current_step
+        if step is None or step.operation.target is not Target.REGION:
+            return False
+        return step.operation.preview in (PreviewMode.SHADED, PreviewMode.TRACED)
 
     def deselect(self) -> None:
         with self.lock:
@@ -228,7 +233,7 @@ class Session:
         with self.lock:
             _ = self.scene
             place = self.edits.light
-            new = Step("relight", {}, self.workspace)
+            new = Step(RELIGHT.name, {}, self.workspace)
             self.put(self.edits.add(new) if place is None else self.edits.chosen(place), **options)
 
     def put(self, edits: EditList, **options: Any) -> None:
@@ -241,7 +246,7 @@ class Session:
         assert index is not None and step is not None
         new = with_options(step, **options)
         # A light without options would be a step that does nothing.
-        empty = new.kind == "relight" and not {*new.options} - {"skip"}
+        empty = new.operation.target is Target.LIGHT and not {*new.options} - {"skip"}
         after = edits.without(index) if empty else edits.put(index, new)
         if after.steps != self.edits.steps:
             changed = [name for name in options if new.options.get(name) != step.options.get(name)]
@@ -328,7 +333,7 @@ class Session:
         step = self.edits.current_step
         if (
             step is not None
-            and step.kind in ("insert", "drop")
+            and step.operation.target is Target.PLACE
             and isinstance(step.options.get("mesh"), str)
         ):
             self.next_object = {

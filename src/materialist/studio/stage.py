@@ -14,7 +14,7 @@ from materialist.io import display
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import EditList, step_summary
-from materialist.studio.live_preview import LIVE
+from materialist.studio.live_preview import is_shaded
 from materialist.studio.selection import Selection, data_url
 from materialist.studio.session import EDITS, Session
 from materialist.studio.tasks import before_of
@@ -126,7 +126,7 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
     panes = [step for step in steps if glass.is_traced(step)]
     sketched = (
         "; objects are sketched"
-        if any(s.kind not in LIVE and s not in panes for s in steps)
+        if any(not is_shaded(step) and step not in panes for step in steps)
         else ""
     )
     if not steps:

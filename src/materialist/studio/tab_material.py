@@ -5,6 +5,7 @@ from pathlib import Path
 
 import gradio as gr
 
+from materialist.edits.material.operation import EDIT
 from materialist.io.decode import RAW_SUFFIXES, SUFFIXES
 from materialist.studio import uploads
 from materialist.studio.controls import file_field, hex_colour, slider
@@ -57,16 +58,16 @@ def wire(context: PageContext) -> None:
 
 
 def _clear(names: tuple[str, ...], session: Session) -> None:
-    session.set("edit", **dict.fromkeys(names))
+    session.set(EDIT.name, **dict.fromkeys(names))
 
 
 def _coloured(session: Session, value: str) -> None:
     # A colour and a texture exclude each other.
-    session.set("edit", texture=None, albedo=hex_colour(value))
+    session.set(EDIT.name, texture=None, albedo=hex_colour(value))
 
 
 def _textured(session: Session, file: Path) -> None:
     def use(name: str) -> None:
-        session.set("edit", albedo=None, texture=name)
+        session.set(EDIT.name, albedo=None, texture=name)
 
     uploads.used(session.workspace, file, "texture", session.allowance, use)

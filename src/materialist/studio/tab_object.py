@@ -7,6 +7,8 @@ from typing import Any
 
 import gradio as gr
 
+from materialist.edits.glass.operation import GLASS
+from materialist.edits.remove.operation import REMOVE
 from materialist.studio import objects, uploads
 from materialist.studio.controls import file_field, hex_colour, slider
 from materialist.studio.session import Session
@@ -77,7 +79,7 @@ def wire(context: PageContext) -> None:
     # Filling a hole takes seconds: in the queue, with a sign of work.
     slow: dict[str, Any] = {"queue": True, "trigger_mode": "once", "show_progress": "minimal"}
     context.live(parts["remove"].click, _remove, "shadow", **slow)
-    context.live(parts["glass"].click, partial(Session.set, kind="glass"), everything=True)
+    context.live(parts["glass"].click, partial(Session.set, kind=GLASS.name), everything=True)
     # The stage itself asks for this where its glass is still to come.
     context.long(parts["stage"].follow, partial(_follow, context), trigger_mode="always_last")
     context.long(parts["rest"].click, partial(_fall, context), "height")
@@ -103,7 +105,7 @@ def _made_of(session: Session, kind: str, colour: str) -> None:
 
 
 def _remove(session: Session, shadow: bool) -> None:
-    session.set("remove", shadow=None if shadow else "0")
+    session.set(REMOVE.name, shadow=None if shadow else "0")
 
 
 def _follow(context: PageContext, session: Session) -> Iterator[Updates]:

@@ -12,6 +12,7 @@ import numpy as np
 
 import materialist as mt
 from materialist.color import srgb_levels
+from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step
 from materialist.io import display
 from materialist.io.atomic import partial, write_whole
@@ -125,7 +126,7 @@ def fallen(report: Reporter, scene: str, steps: Steps) -> dict[str, Any]:
 
     loaded = mt.load_scene(scene)
     # A fall meets surfaces alone: colours and light are left out.
-    earlier = [step for step in steps[:-1] if step.kind in ("insert", "drop", "remove")]
+    earlier = [step for step in steps[:-1] if step.operation.preview is not PreviewMode.SHADED]
     before = apply(loaded, earlier)
     after = apply(loaded, [steps[-1]], onto=before)
     return {

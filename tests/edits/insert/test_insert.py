@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 from materialist.camera import project
 from materialist.edits.composite.composite import composite
 from materialist.edits.composite.native_layer import native_layer
-from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.core.renderer import EditRenderer, RenderOptions
 from materialist.edits.insert.insert import insert, picture_width, put, support_at
 from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
@@ -84,7 +84,7 @@ def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
     edited = insert(scene, box, (24.0, 26.0), material="0.1,0.1,0.6")
     out = composite(scene, edited, spp=8)
     assert out.shape == (36 * native, 48 * native, 3)
-    body = native_layer(EditRenderer(scene), edited, spp=8, seed=0, clean=False)
+    body = native_layer(EditRenderer(scene), edited, RenderOptions(8, denoise=False))
     alone = body.share > 0.999
     assert alone.any()
     blue = out[alone]
@@ -110,7 +110,7 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box, bump):
     geometry = build_geometry(depth, scene.normal, scene.camera, completion="none")
     scene = replace(scene, depth=depth, geometry=geometry)
     edited = replace(scene, bodies=bodies)
-    share = native_layer(EditRenderer(scene), edited, spp=2, seed=0, clean=False).share
+    share = native_layer(EditRenderer(scene), edited, RenderOptions(2, denoise=False)).share
     place, _ = project(edited.bodies[0].vertices.astype(np.float64), scene.camera)
     area = ConvexHull(place * 4).volume  # native pixels; a box is convex
     np.testing.assert_allclose(share.sum(), area, rtol=0.02)
@@ -126,7 +126,7 @@ def test_a_body_looks_as_in_the_plain_rendering(box):
     edited = insert(scene, box, (24.0, 26.0), material="0.5,0.5,0.5")
     studio = EditRenderer(scene)
     body = native_layer(
-        studio, edited, spp=64, seed=0, clean=False
+        studio, edited, RenderOptions(64, denoise=False)
     )  # before anything else is rendered
     plain = studio.pair(edited)[1](256, 3)
     inside = body.share > 0.999

@@ -45,7 +45,7 @@ def run(
     `options` are the fields of the benchmark's class, as values or as texts. Returns the folder. Raises InputError
     for an unknown name or option, OutputError when `output` holds something and `force` is not given.
     """
-    benchmark = benchmark_class(name).given(**options)
+    benchmark = benchmark_class(name).merged(**options)
     return run_benchmark(benchmark, output=output, data=data, force=force)
 
 

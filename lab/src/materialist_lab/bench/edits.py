@@ -12,13 +12,13 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.edits.core.surfaces import uniform_surface
 from materialist.edits.glass.glass import glass
+from materialist.edits.glass.options import Glass
 from materialist.edits.insert.insert import insert
 from materialist.edits.insert.meshes import MeshModel
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit, shifted_hsv
 from materialist.edits.remove.remove import remove
 from materialist.geometry.build import build_geometry
-from materialist.options import Glass
 from materialist.types import Array, Body, Photo, Prediction, Scene
 from materialist_lab.procedural.arrangements import Item
 from materialist_lab.procedural.objects import shapes

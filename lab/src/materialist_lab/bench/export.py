@@ -98,7 +98,7 @@ class ExportBench(Benchmark):
             export(scene, folder / name, to=to, residual=residual)
             (folder / to).mkdir()
             lit = replace(scene, envmap=read_envmap(folder / light))
-            write_mitsuba(folder / to, lit, [_part(*told) for told in read(folder / name)])
+            write_mitsuba(folder / to, lit, [_part(*entry) for entry in read(folder / name)])
             yield f"{to} in Mitsuba, principled", rendered(folder / to / "scene.xml")
         if program := find_blender(self.blender or None):
             files = export(scene, folder / "blend", to="blend", residual=residual)

@@ -11,12 +11,12 @@ import numpy as np
 
 from materialist.edits.core.renderer import denoised
 from materialist.edits.glass import two_interface as interfaces
+from materialist.edits.glass.options import Glass
 from materialist.edits.glass.thickness import object_thickness
 from materialist.edits.remove.patches import patched
 from materialist.edits.remove.remove import remove
 from materialist.geometry.build import build_geometry, part
 from materialist.geometry.silhouette import grown, window
-from materialist.options import Glass
 from materialist.predict.refraction.thickness import Thickness
 from materialist.solids.closed import closed_proxy
 from materialist.types import Array, Camera, Prediction, Scene

@@ -43,9 +43,9 @@ class Measure:
     folder: str = ""
     """The part of DIR that is given."""
 
-    def data(self, given: Path | None) -> Path | None:
+    def data(self, folder: Path | None) -> Path | None:
         """The folder that its benchmark is given, where it holds what that reads. Raises MaterialistError."""
-        if self.needs and (given is None or not (given / self.needs).exists()):
+        if self.needs and (folder is None or not (folder / self.needs).exists()):
             raise MaterialistError(f"Not run: it needs --data DIR with {self.needs}.")
         parts = (
             ()
@@ -54,8 +54,8 @@ class Measure:
             if self.options.get("photos")
             else ("meshes", "envmaps")
         )
-        there = given is not None and all((given / name).is_dir() for name in parts)
-        return given / self.folder if given is not None and there else None
+        there = folder is not None and all((folder / name).is_dir() for name in parts)
+        return folder / self.folder if folder is not None and there else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,7 +155,7 @@ class PaperBench(OperationOptions):
             return kept
         folder = output / "runs" / name
         make_folder(folder)
-        _, cost = timed(benchmark_class(measure.bench).given(**options).run, place, folder)
+        _, cost = timed(benchmark_class(measure.bench).merged(**options).run, place, folder)
         report = json.loads((folder / "report.json").read_text("utf-8"))
         row = {
             **key,

@@ -19,7 +19,7 @@ from materialist_lab.procedural.options import DataSetOptions
 from materialist_lab.procedural.sample import make_sample
 
 FORMAT = 1
-CONTENT = 11
+CONTENT = 12
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")

@@ -319,18 +319,6 @@ ceramic = Finish(
 )
 """Glazed pottery: white, coloured, decorated; matt clay now and then."""
 # --- Outdoors ---
-foliage = Finish(
-    "cloudy",
-    base=(
-        (0.8, (0.2, 0.38), (0.3, 0.8), (0.2, 0.65)),
-        (0.2, (0.02, 0.16), (0.3, 0.8), (0.2, 0.65)),
-    ),
-    second=(1, 0.5, 1.3),
-    third=(1, 1.0, 1.6),
-    grain=(0.2, 0.6),
-    roughness=((1, 0.35, 0.7),),
-    repeat=(0.1, 0.3),
-)
 """Leaves, fresh or autumnal."""
 paved = Finish(
     "speckle speckle bricks bricks cloudy tiling tiling",

@@ -8,7 +8,7 @@ from materialist.errors import InputError
 from materialist.option_kinds import OperationOptions, option
 from materialist_lab.procedural.catalog import packages
 
-TOY_KINDS = ("room", "table", "still-life", "outdoor")
+TOY_KINDS = ("room", "still-life")
 """Kinds of scenes of procedural things."""
 REAL_KINDS = ("furnished", "laid", "single", "outside")
 """Kinds of scenes of real things."""

@@ -1,4 +1,4 @@
-"""Rooms: walls, floor, ceiling, windows, lamps, furniture; and cameras that stand in them."""
+"""Rooms: walls, floor, ceiling, windows, lamps; and cameras that stand in them."""
 
 from collections.abc import Callable
 
@@ -7,8 +7,8 @@ import numpy as np
 from materialist.types import Array
 from materialist_lab.procedural import lights, walls, world
 from materialist_lab.procedural import materials as m
-from materialist_lab.procedural.objects import furniture as f
 from materialist_lab.procedural.objects import shapes as s
+from materialist_lab.procedural.objects import things
 from materialist_lab.procedural.objects.things import Meshes
 from materialist_lab.procedural.walls import RoomWall
 from materialist_lab.procedural.world import Parts, ScenePart, block, moved, placed, rod
@@ -18,62 +18,17 @@ Size = Array
 
 
 def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
-    """A furnished room seen by somebody who stands or sits in it."""
+    """A room with things on its floor, seen by somebody who stands or sits in it."""
     size = rng.uniform([2.6, 3.2, 2.3], [6.5, 8.0, 3.3])
     standing = Furniture(size)
-    standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 3, 9, meshes))
-    standing.in_the_middle(rng, _some(rng, f.IN_THE_MIDDLE, 1, 6, meshes))
-    return _world(rng, size, captures, standing.parts, view_of(rng, size, standing), "room")
-
-
-def table_top(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
-    """Things on a table, a sideboard or a kitchen top, seen from close by, with the room behind them."""
-    maker = m.pick(rng, f.TO_LOOK_ON)
-    piece = maker(rng, meshes)
-    low, high = world.bounds(piece)
-    top = world.bounds(piece[:1])[1][1]  # the first part is what things lie on
-    # The room is large enough for the piece.
-    size = rng.uniform([2.6, 3.0, 2.3], [5.0, 5.0, 3.0])
-    size[:2] = np.maximum(size[:2], (high - low)[[0, 2]] + 0.7)
-    at_wall = maker is not f.set_table or rng.random() < 0.5
-    x = rng.uniform(-0.3, 0.3)
-    z = -size[1] / 2 - low[2] + 0.03 if at_wall else rng.uniform(-0.3, 0.3)
-    standing = Furniture(size)
-    standing.add(placed(piece, (x, 0, z)))
-    standing.along_walls(rng, _some(rng, f.ALONG_WALLS, 2, 4, meshes))
-    # A camera on a sphere about the top, held within the walls.
-    target = np.array([x + rng.uniform(-0.4, 0.4) * high[0], top + rng.uniform(0.0, 0.15), z])
-    distance, up, turn, fov = rng.uniform(
-        [0.5, np.radians(8), -0.9, 28], [1.5, np.radians(60), 0.9, 60]
-    )
-    w, d, h = size
-    lowest = np.array([-w / 2 + 0.1, 0.2, -d / 2 + 0.2])
-    highest = np.array([w / 2 - 0.1, h - 0.2, d / 2 - 0.1])
-    eye = np.clip(world.orbit(target, distance, turn, up, fov).position, lowest, highest)
-    view = world.look(eye, target, fov, rng.normal() * 0.03)
-    return _world(rng, size, captures, standing.parts, view, "table")
-
-
-def _some(rng, kinds, low: int, high: int, meshes) -> list[Parts]:
-    """At least `low` and fewer than `high` pieces of these kinds."""
-    return [m.pick(rng, kinds)(rng, meshes) for _ in range(int(rng.integers(low, high)))]
-
-
-def _world(
-    rng, size: Size, captures, furniture: Parts, view: world.Viewpoint, kind: str
-) -> world.World:
-    w, d, _ = size
+    sizes = rng.uniform(0.3, 1.6, rng.integers(6, 16))
+    pieces = [things.thing(rng, size_of_thing, meshes) for size_of_thing in sizes]
+    # Large things stand by the walls as furniture does, small ones anywhere.
+    standing.along_walls(rng, [piece for piece, tall in zip(pieces, sizes > 0.8) if tall])
+    standing.in_the_middle(rng, [piece for piece, tall in zip(pieces, sizes > 0.8) if not tall])
     parts, portals, envmap = shell(rng, size, captures)
-    parts += furniture
-    # A rug near the middle of the floor.
-    if rng.random() < 0.5:
-        a = w * rng.uniform(0.3, 0.7)
-        b = d * rng.uniform(0.25, 0.6)
-        rug = m.rug(rng, a, b) if rng.random() < 0.7 else m.fabric(rng)
-        at = (rng.normal() * 0.3, 0, rng.normal() * 0.4)
-        parts.append(block((a, 0.012, b), at, rug, 0.004))
-    parts += lamps(rng, size, portals, envmap)
-    return world.World(parts, envmap, view, portals, kind)
+    parts += [*standing.parts, *lamps(rng, size, portals, envmap)]
+    return world.World(parts, envmap, view_of(rng, size, standing), portals, "room")
 
 
 def sides(size: Size) -> list[tuple[Array, float, float]]:

@@ -10,7 +10,7 @@ from materialist.render.denoise import denoise
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 from materialist_lab.data.samples import LIGHT_ROWS
-from materialist_lab.procedural import outdoors, packing, rooms
+from materialist_lab.procedural import packing, rooms
 from materialist_lab.procedural.defocus import defocused
 from materialist_lab.procedural.options import SPLITS, DataSetOptions
 from materialist_lab.procedural.staged.furnished import furnished_room
@@ -18,6 +18,7 @@ from materialist_lab.procedural.staged.laid import laid_table
 from materialist_lab.procedural.staged.outside import outside
 from materialist_lab.procedural.staged.single import single
 from materialist_lab.procedural.staged.stock import Stock, stock
+from materialist_lab.procedural.still_life import still_life
 from materialist_lab.procedural.tracer import CENTRE, SampleTracer
 from materialist_lab.procedural.world import World
 
@@ -30,10 +31,8 @@ LIGHT_HIDDEN = 0.1
 ATTEMPTS = 6
 """Largest number of worlds that are drawn until a camera sees enough; the last one is taken as it is."""
 MAKERS: dict[str, tuple[Callable[..., World], float]] = {
-    "room": (rooms.room, 0.38),
-    "table": (rooms.table_top, 0.22),
-    "still-life": (outdoors.still_life, 0.2),
-    "outdoor": (outdoors.outdoor, 0.2),
+    "room": (rooms.room, 0.6),
+    "still-life": (still_life, 0.4),
 }
 """Kind of scene -> its maker, and its share of the pictures of procedural things."""
 REAL_MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], float]] = {
@@ -43,7 +42,7 @@ REAL_MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], floa
     "outside": (outside, 0.1),
 }
 """Kind of scene -> its maker, and its share of the pictures of real things."""
-OPEN_KINDS = ("outdoor", "still life", "single", "outside")
+OPEN_KINDS = ("still life", "single", "outside")
 """Kinds of worlds under an open sky."""
 SINGLE_COVERS = (0.08, 0.92)
 """Smallest and largest share of a picture that a single thing may cover."""
@@ -134,7 +133,7 @@ def _developed(
     lit = labels["mask"] if world.backdrop is not None else None
     gain = exposure(image, rng, lit) * balance(shading, rng)
     if world.backdrop is not None:
-        image = before(world.backdrop, image, covered)
+        image = over_backdrop(world.backdrop, image, covered)
     image = image * gain
     # --- Defocus ---
     view = world.view
@@ -210,7 +209,7 @@ def _mean_normal(probe: dict[str, Array], same: Array) -> Array:
     return mean * (same.sum(-1, keepdims=True) > 0)
 
 
-def before(backdrop: Array, image: Array, covered: Array) -> Array:
+def over_backdrop(backdrop: Array, image: Array, covered: Array) -> Array:
     """The image [H, W, 3] with a backdrop [h, w, 3] where its surfaces do not cover the pixels [H, W]."""
     h, w = covered.shape
     behind = cv2.resize(backdrop, (w, h), interpolation=cv2.INTER_LINEAR)

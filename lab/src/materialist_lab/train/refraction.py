@@ -14,7 +14,7 @@ from materialist.errors import InputError
 from materialist.predict.refraction.crop import BACK_X, MASK, NORMAL_X, SIDE
 from materialist.predict.refraction.network import RefractionNet
 from materialist.types import Array
-from materialist_lab.procedural.thickness.dataset import load
+from materialist_lab.procedural.thickness.dataset import load_views
 from materialist_lab.procedural.thickness.errors import mean_errors
 from materialist_lab.train.task import Batch, Recipe, Task
 
@@ -55,8 +55,8 @@ class RefractionTask(Task):
                 f"The size of training pictures is {recipe.side}; views have {SIDE} pixels."
             )
         super().__init__(recipe, init)
-        self.views = load(views)
-        self.held_out = None if held_out is None else load(held_out)
+        self.views = load_views(views)
+        self.held_out = None if held_out is None else load_views(held_out)
 
     def count(self) -> int:
         return len(self.views["maps"])

@@ -101,15 +101,15 @@ def test_stretching_the_rays_is_stretching_the_shape(ball):
 def test_views_are_made_once_and_belong_to_their_plan(tmp_path):
     plan = dataset.ViewPlan(shapes=2, views=2)
     dataset.produce(tmp_path / "set", plan)
-    first = dataset.load(tmp_path / "set")
+    first = dataset.load_views(tmp_path / "set")
     assert first["maps"].shape == (4, CHANNELS, SIDE, SIDE) and np.isfinite(first["maps"]).all()
     before = (tmp_path / "set" / "00001.npz").stat().st_mtime_ns
     # One more shape: the others stay as they are.
     dataset.produce(tmp_path / "set", replace(plan, shapes=3))
     assert (tmp_path / "set" / "00001.npz").stat().st_mtime_ns == before
-    assert len(dataset.load(tmp_path / "set")["maps"]) == 6
+    assert len(dataset.load_views(tmp_path / "set")["maps"]) == 6
     assert np.array_equal(dataset.make_views(1, plan)["maps"], first["maps"][2:])
     with pytest.raises(InputError, match="was begun with"):
         dataset.produce(tmp_path / "set", replace(plan, seed=5))
     with pytest.raises(InputError, match="no views to learn from"):
-        dataset.load(tmp_path)
+        dataset.load_views(tmp_path)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -13,7 +12,7 @@ from materialist.edits.composite.disclosed import compared, without_traces
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured, warned
-from materialist.edits.core.renderer import EditRenderer, denoised, rendered
+from materialist.edits.core.renderer import EditRenderer, RenderOptions, denoised, rendered
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
 from materialist.io.out.colours import photo_colours
@@ -57,11 +56,8 @@ def composite(
     Raises InputError for `upscale` without `full_render`, or a result of it that is no larger picture; for
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
-    _check(upscale, full_render)
-    renderer = EditRenderer(
-        _base(scene, edited, spp, seed, full_render, denoise, device, progress), device=device
-    )
-    return _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale, progress)
+    options = RenderOptions(spp, seed, denoise, device, progress)
+    return _Compositor(scene, options, full_render, upscale).picture(edited)
 
 
 def pictures(
@@ -82,47 +78,74 @@ def pictures(
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
-    _check(upscale, full_render)
+    options = RenderOptions(spp, seed, denoise, device)
+    compositor = _Compositor(scene, options, full_render, upscale)
     tick = progress or (lambda *_: None)
     total = len(edits) if isinstance(edits, Sequence) else count or 0
     before: Scene | None = None
-    renderer = EditRenderer(scene, device=device)
     picture = scene.photo.original
     for k, edited in enumerate(edits):
         tick("frames", k, total)
         if edited is not before:
-            if before is None or not _same_base(scene, before, edited):
-                base = _base(scene, edited, spp, seed, full_render, denoise, device)
-                renderer = EditRenderer(base, device=device)
-            picture = _picture(renderer, scene, edited, spp, seed, full_render, denoise, upscale)
+            picture = compositor.picture(edited)
         before = edited
         yield picture
     tick("frames", total, total)
 
 
-def _check(upscale: Upscale | None, full_render: bool) -> None:
-    if upscale is not None and not full_render:
-        raise InputError(
-            "upscale goes with full_render=True; the composite has the photo's native size already."
-        )
+class _Compositor:
+    """Pictures of edits of one scene; what several edits are compared with is rendered once."""
 
+    def __init__(
+        self, scene: Scene, options: RenderOptions, full_render: bool, upscale: Upscale | None
+    ):
+        if upscale is not None and not full_render:
+            raise InputError(
+                "upscale goes with full_render=True; the composite has the photo's native size already."
+            )
+        self._scene = scene
+        self._options = options
+        self._full_render = full_render
+        self._upscale = upscale
+        self._last: Scene | None = None
+        self._renderer: EditRenderer | None = None
 
-def _base(
-    scene: Scene,
-    edited: Scene,
-    spp: int,
-    seed: int,
-    full_render: bool,
-    denoise: bool,
-    device: str,
-    progress=None,
-) -> Scene:
-    """What the edit is compared with."""
-    if full_render:
-        return compared(scene, edited)
-    return without_traces(
-        scene, edited, spp=spp, seed=seed, denoise=denoise, device=device, progress=progress
-    )
+    def picture(self, edited: Scene) -> Array:
+        """[H0, W0, 3] the edit in the photo; [H, W, 3] its plain rendering, or that enlarged."""
+        options = self._options
+        renderer = self._base(edited)
+        if self._full_render:
+            return self._plain(renderer, edited)
+        # The difference of two renderings, laid on the photo, with in-photo emitters that it dims.
+        layers = render_layers(renderer, edited, options)
+        dimmed = dimmed_emitters(self._scene, edited)
+        lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
+        return into_photo(renderer.scene.photo, layers, lights, options.progress)
+
+    def _base(self, edited: Scene) -> EditRenderer:
+        """The renderer of what the edit is compared with."""
+        last = self._last
+        self._last = edited
+        if self._renderer is None or last is None or not _same_base(self._scene, last, edited):
+            # As in the paper, a plain rendering needs no photo without the traces of the object.
+            if self._full_render:
+                base = compared(self._scene, edited)
+            else:
+                base = without_traces(self._scene, edited, self._options)
+            self._renderer = EditRenderer(base, device=self._options.device)
+        return self._renderer
+
+    def _plain(self, renderer: EditRenderer, edited: Scene) -> Array:
+        """[H, W, 3] the plain rendering, as in the paper; larger with `upscale`."""
+        options = self._options
+        if is_pictured(edited):
+            raise InputError(
+                f"{PICTURED}a full rendering would not show it; take the closed model, or the composite."
+            )
+        picture = renderer.pair(edited)[1](options.spp, options.seed)
+        if options.denoise:
+            picture = denoised(picture, *renderer.guides(edited))
+        return picture if self._upscale is None else _enlarged(picture, self._upscale)
 
 
 def _same_base(scene: Scene, first: Scene, second: Scene) -> bool:
@@ -135,35 +158,6 @@ def _same_base(scene: Scene, first: Scene, second: Scene) -> bool:
     return first.photo is scene.photo or (
         first.geometry is second.geometry and first.materials is second.materials
     )
-
-
-def _picture(
-    renderer: EditRenderer,
-    scene: Scene,
-    edited: Scene,
-    spp: int,
-    seed: int,
-    full_render: bool,
-    denoise: bool,
-    upscale: Upscale | None,
-    progress=None,
-) -> Array:
-    """[H0, W0, 3] the edit in the photo, with in-photo emitters that it dims; [H, W, 3] its plain rendering."""
-    # --- The plain rendering, as in the paper ---
-    if full_render:
-        if is_pictured(edited):
-            raise InputError(
-                f"{PICTURED}a full rendering would not show it; take the closed model, or the composite."
-            )
-        picture = renderer.pair(edited)[1](spp, seed)
-        picture = denoised(picture, *renderer.guides(edited)) if denoise else picture
-        return picture if upscale is None else _enlarged(picture, upscale)
-    # --- The composite: the difference of two renderings, laid on the photo ---
-    shared: dict[str, Any] = {"seed": seed, "clean": denoise, "progress": progress}
-    layers = render_layers(renderer, edited, spp=spp, **shared)
-    dimmed = dimmed_emitters(scene, edited)
-    lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
-    return into_photo(renderer.scene.photo, layers, lights, progress)
 
 
 def _enlarged(picture: Array, upscale: Upscale) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from materialist.edits.composite.into_photo import SETTINGS, into_photo, onto_working
 from materialist.edits.composite.layers import difference, inner
-from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.core.renderer import EditRenderer, RenderOptions
 from materialist.edits.core.surfaces import base_of
 from materialist.geometry.build import continued_as
 from materialist.geometry.membrane import membrane
@@ -52,36 +52,35 @@ def compared(scene: Scene, edited: Scene) -> Scene:
 def without_traces(
     scene: Scene,
     edited: Scene,
-    *,
-    spp: int,
-    seed: int,
-    denoise: bool,
-    device: str = "auto",
-    progress=None,
+    options: RenderOptions,
 ) -> Scene:
     """`compared`, and its photo changes around the hole as the rendering does when the object goes.
 
     Its shadow and its reflection go, and the light that it shed on other things. Filled pixels, which are like their
-    surroundings, change by the factor of the surroundings. spp, seed, denoise, device, progress: as of `composite`.
+    surroundings, change by the factor of the surroundings.
     """
     base = compared(scene, edited)
     if base.photo is scene.photo:
         return base
-    # --- What the renderings say: the scene with the object, and without it ---
     # --- What the renderings say: the scene with the object, and without it ---
     hole = _disclosed(scene, edited)
     photo = base.photo
     # Planes that the rest of the picture suggests when the object is gone were there before.
     before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
     guides = (
-        [(shown.materials.albedo, shown.normal) for shown in (before, base)] if denoise else None
+        [(shown.materials.albedo, shown.normal) for shown in (before, base)]
+        if options.denoise
+        else None
     )
-    pair = EditRenderer(before, device=device).pair(base)
-    tick = None if progress is None else lambda _, done, total: progress("shadow", done, total)
+    pair = EditRenderer(before, device=options.device).pair(base)
+
+    def tick(_: str, done: int, total: int) -> None:
+        options.tick("shadow", done, total)
+
     # Nothing is known under the hole: its surroundings are carried over it.
     spanned = grown(hole, RIM)
     layers = difference(
-        *pair, np.zeros_like(hole), guides, hidden=inner(spanned), spp=spp, seed=seed, progress=tick
+        *pair, np.zeros_like(hole), guides, replace(options, progress=tick), hidden=inner(spanned)
     )
     # --- Their ratio, spanned over the hole, and applied to the photo ---
     factor = np.log((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor))

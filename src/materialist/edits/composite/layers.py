@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
 
 import cv2
 import numpy as np
@@ -12,7 +11,14 @@ from skimage.morphology import remove_small_objects
 from materialist.color import linear_to_srgb, luminance
 from materialist.edits.composite.native_layer import NativeLayer, native_layer
 from materialist.edits.core.region import body_coverage
-from materialist.edits.core.renderer import EditRenderer, Render, denoised, is_relit, same_shapes
+from materialist.edits.core.renderer import (
+    EditRenderer,
+    Render,
+    RenderOptions,
+    denoised,
+    is_relit,
+    same_shapes,
+)
 from materialist.errors import InputError
 from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Scene
@@ -64,18 +70,10 @@ class Layers:
     """[H, W] bool: bodies that only one scene has and `native` has not: the rendering alone is seen; in `changed`."""
 
 
-def render_layers(
-    renderer: EditRenderer,
-    edited: Scene,
-    *,
-    spp: int,
-    seed: int = 0,
-    clean: bool = True,
-    progress=None,
-) -> Layers:
+def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions) -> Layers:
     """Render a fitted scene and an edit of it, and separate the edit from the noise.
 
-    `spp` counts paths a pixel. Both pictures come in two halves with different seeds: what the halves disagree on is
+    Both pictures come in two halves with different seeds: what the halves disagree on is
     noise. See `difference`.
     """
     scene = renderer.scene
@@ -93,19 +91,20 @@ def render_layers(
     covered = None
     hidden = None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
-        alone = native_layer(renderer, edited, spp=spp, seed=seed, clean=clean)
+        alone = native_layer(renderer, edited, options)
         anything = renderer.covered(edited)
         covered = anything if alone is None else anything & (alone.inside == 0)
         changed = changed | covered
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
         if alone is not None:
             hidden = inner(alone.inside == 1)
-        if clean:
+        if options.denoise:
             guides[1] = renderer.guides(edited, anything)
 
     # --- Everything else, at working size ---
-    options: dict[str, Any] = {"hidden": hidden, "spp": spp, "seed": seed, "progress": progress}
-    layers = difference(base, other, changed, guides if clean else None, **options)
+    layers = difference(
+        base, other, changed, guides if options.denoise else None, options, hidden=hidden
+    )
     return replace(
         layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited)
     )
@@ -137,11 +136,9 @@ def difference(
     edited: Render,
     changed: Array,
     guides: list[tuple[Array, Array]] | None,
+    options: RenderOptions,
     *,
     hidden: Array | None = None,
-    spp: int,
-    seed: int,
-    progress=None,
 ) -> Layers:
     """Layers of any two renderings of one view, 0 where they are not traced.
 
@@ -152,22 +149,22 @@ def difference(
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
-        hidden: [H, W] bool: pixels that nothing shows of either picture. spp: paths a pixel, in each.
+        hidden: [H, W] bool: pixels that nothing shows of either picture.
         guides: albedo and normal [H, W, 3] of the base, and of the edited scene, with which both pictures are denoised
             before they are compared, where the denoiser is installed; None: as they are.
     """
+    spp = options.spp
     if spp < 2:
         raise InputError(f"spp is {spp}; a composite needs at least 2 samples per pixel.")
     half = -(-spp // 2)
     probe_paths = min(half, max(SETTINGS.min_probe_paths, spp // SETTINGS.probe_divisor))
-    tick = progress or (lambda *_: None)
-    seeds = (2 * seed, 2 * seed + 1)
+    seeds = (2 * options.seed, 2 * options.seed + 1)
     done = count()
     steps = 2 * (1 + (not changed.all()) + (half > probe_paths))
     shown_pixels = np.ones_like(changed) if hidden is None else ~hidden
 
     def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
-        tick("render", next(done), steps)
+        options.tick("render", next(done), steps)
         return base(paths, seed, of_base & shown_pixels), edited(
             paths, seed, of_edited & shown_pixels
         )
@@ -199,7 +196,7 @@ def difference(
             share = (half - probe_paths) / half * near[..., None]
             pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
         pairs.append((pair[0], np.where(near[..., None], pair[1], pair[0])))
-    tick("render", steps, steps)
+    options.tick("render", steps, steps)
 
     # --- What the halves agree on is the edit, what they disagree on is noise ---
     (b0, e0), (b1, e1) = pairs
@@ -213,10 +210,10 @@ def difference(
     # --- Denoise both, and keep the difference by its gain ---
     if guides is not None:
         box = window(near, margin=SETTINGS.denoiser_margin)
-        for picture, noisy, (albedo, normal) in zip(
-            (b, e), (b, without_fireflies(e, changed)), guides, strict=True
-        ):
-            picture[box] = denoised(noisy[box], albedo[box], normal[box])
+        # Both alike: a sparkle taken from one picture alone would be a dot in their difference.
+        for picture, (albedo, normal) in zip((b, e), guides, strict=True):
+            noisy = without_fireflies(picture[box])
+            picture[box] = denoised(noisy, albedo[box], normal[box])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
@@ -263,11 +260,10 @@ def _mean(values: Array) -> Array:
     )
 
 
-def without_fireflies(picture: Array, where: Array | None = None) -> Array:
+def without_fireflies(picture: Array) -> Array:
     """[H, W, 3] linear with lone bright pixels brought down, their colour kept; a highlight of two pixels stays.
 
-    They come from single paths, as where glass focuses small lights. `where` [H, W] bool: pixels that may change, all
-    by default.
+    They come from single paths, as where glass focuses small lights.
     """
     light = luminance(picture)
     around = np.ones((3, 3), bool)
@@ -277,7 +273,7 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
         SETTINGS.firefly_ratio * rank_filter(light, -2, footprint=around, mode="nearest"),
         SETTINGS.min_firefly,
     )
-    fireflies = (light > limit) & (True if where is None else where)
+    fireflies = light > limit
     return (picture * np.where(fireflies, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(
         np.float32
     )

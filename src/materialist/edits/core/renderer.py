@@ -1,7 +1,7 @@
 """Renderings of a fitted scene and of its edits, with common random numbers."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -13,11 +13,29 @@ from materialist.envmap import environment, paste_visible_sky, texel_directions
 from materialist.forks import check_process
 from materialist.geometry.silhouette import window
 from materialist.io.photo import HDR_CLIP
+from materialist.options import PATHS
 from materialist.render.bodies import is_glowing, is_transparent
-from materialist.types import Array, Scene
+from materialist.types import Array, Progress, Scene
 
 SKY_ROWS = 768
 """Rows of the largest map with the photo's sky (derived: memory)."""
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """How the pictures of a scene and of its edit are rendered."""
+
+    spp: int = PATHS
+    """Paths a pixel, of each picture."""
+    seed: int = 0
+    denoise: bool = True
+    """Whether they are denoised before they are compared, where the denoiser is installed."""
+    device: str = "auto"
+    progress: Progress | None = None
+
+    def tick(self, stage: str, done: int, total: int) -> None:
+        if self.progress is not None:
+            self.progress(stage, done, total)
 
 
 Pictures = dict[tuple[int, int], tuple[Array, Array]]

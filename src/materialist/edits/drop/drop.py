@@ -11,6 +11,7 @@ import numpy as np
 from materialist.camera import project
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.drop.ground import blocks, depth_in, ground_field
+from materialist.edits.drop.options import Drop, DropKeywords
 from materialist.edits.drop.physics import Pose, RigidBody, convex_pieces, fall, load_library
 from materialist.edits.insert.insert import Support, moved_body, put, surface_points
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
@@ -18,9 +19,7 @@ from materialist.errors import InputError
 from materialist.geometry.boundary import joined_faces
 from materialist.geometry.planes import axes, upright
 from materialist.io.video import MAX_FRAMES
-from materialist.keywords import DropKeywords
 from materialist.option_kinds import documented, parse_numbers, several
-from materialist.options import Drop
 from materialist.types import Array, Body, Scene
 
 
@@ -70,7 +69,7 @@ def drop(
         InputError: a place or mesh that cannot be used, or a number out of its range. SetupError: mujoco or coacd is
             missing.
     """
-    options = Drop.given(options, **values)
+    options = Drop.merged(options, **values)
     # --- Options and places, before anything is computed ---
     if not 2 <= frames <= MAX_FRAMES:
         raise InputError(f"The number of frames is {frames}; it must lie in 2 to {MAX_FRAMES}.")
@@ -108,7 +107,7 @@ def settle(
         InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
         SetupError: mujoco or coacd is missing.
     """
-    falling = _prepared(scene, meshes, at, Drop.given(options, **values))
+    falling = _prepared(scene, meshes, at, Drop.merged(options, **values))
     poses, gone, rests = _rested(falling)
     names = falling.facts["meshes"]
     if len(gone) == len(names):

@@ -10,13 +10,12 @@ from materialist.camera import pixel_rays
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_region
 from materialist.edits.core.surfaces import PHOTO_GLASS
+from materialist.edits.glass.options import Glass, GlassKeywords
 from materialist.edits.glass.thickness import object_thickness, objects_in, wall_of
 from materialist.edits.remove.remove import remove
 from materialist.geometry.membrane import nearest
 from materialist.geometry.slopes import blurred_normals
-from materialist.keywords import GlassKeywords
 from materialist.option_kinds import documented
-from materialist.options import Glass
 from materialist.predict import resample
 from materialist.predict.refraction.thickness import Thickness
 from materialist.solids.closed import closed_proxy
@@ -48,7 +47,7 @@ def glass(
     fitted: the scene before its edits: a given background is the photo's, in the light of the photo.
     Raises InputError for an option out of its range, or a mask that cannot be used; WeightsError without weights.
     """
-    options = Glass.given(options, **values)
+    options = Glass.merged(options, **values)
     region = checked_region(scene, mask) > 0.5
     removed = remove(scene, mask, options, fitted=fitted)
     # --- The thickness of each object under the mask ---

@@ -7,9 +7,9 @@ from materialist.edits.composite.layers import without_fireflies
 from materialist.edits.composite.native_layer import spread_known
 from materialist.edits.core.renderer import EditRenderer, denoised, photo_sky
 from materialist.edits.glass.glass import glass, glass_surface
+from materialist.edits.glass.options import Glass
 from materialist.errors import InputError
 from materialist.geometry.silhouette import area, window
-from materialist.options import Glass
 from materialist.types import Array, Scene, Surface
 
 MAX_PATHS = 600_000
@@ -34,7 +34,7 @@ class GlassPreview:
         from materialist.render.pixels import first_hits
         from materialist.render.variant import setup
 
-        self._options = options = Glass.given(options, **values)
+        self._options = options = Glass.merged(options, **values)
         if options.model != "closed":
             raise InputError(
                 f"The preview traces the closed body; model is '{options.model}', leave it 'closed'."
@@ -67,7 +67,7 @@ class GlassPreview:
         from materialist.render.pixels import radiance
         from materialist.render.scene import GLASS_DEPTH
 
-        surface = glass_surface(self.scene, Glass.given(self._options, **values))
+        surface = glass_surface(self.scene, Glass.merged(self._options, **values))
         target = self._target(surface)
         box = self._box
         paths = max(MIN_PATHS, min(spp, MAX_PATHS // area(box)))

@@ -19,11 +19,11 @@ import numpy as np
 
 from materialist.bsdf.dielectric import fresnel_dielectric, masking, reflect, refract, visible_facet
 from materialist.camera import pixel_rays, project, rays_through, unit
+from materialist.edits.glass.options import Glass
 from materialist.envmap import bilinear, environment
 from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import surface_in
 from materialist.geometry.slopes import back_normals
-from materialist.options import Glass
 from materialist.types import Array, Camera
 
 LONGEST = 3.0

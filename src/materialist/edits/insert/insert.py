@@ -12,10 +12,9 @@ from materialist.camera import rays_through, unit, unproject
 from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_pixel
 from materialist.edits.insert.meshes import MeshModel, read_model, repainted
+from materialist.edits.insert.options import Insertion, InsertionKeywords
 from materialist.errors import InputError
-from materialist.keywords import InsertionKeywords
 from materialist.option_kinds import documented
-from materialist.options import Insertion
 from materialist.render.bodies import is_transparent
 from materialist.types import Array, Body, Scene
 
@@ -72,7 +71,7 @@ def insert(
     Raises InputError for a place outside the photo, on the sky, or so near that the mesh would reach behind the
     camera; a mesh that cannot be used; a number out of its range.
     """
-    options = Insertion.given(options, **values)
+    options = Insertion.merged(options, **values)
     model = repainted(
         mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=options.up), options.material
     )

@@ -11,12 +11,11 @@ from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
+from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
 from materialist.geometry.planes import axes
 from materialist.io.photo import decode_photo
-from materialist.keywords import MaterialKeywords
 from materialist.option_kinds import documented
-from materialist.options import MaterialEdit
 from materialist.types import Array, Materials, Scene
 
 
@@ -37,7 +36,7 @@ def edit(
     options, values: see `options.MaterialEdit`; `values` are fields of it, as in `edit(scene, mask, hue=120)`.
     Raises InputError for a mask of another size or empty, or a value out of its range.
     """
-    changes = MaterialEdit.given(options, **values)
+    changes = MaterialEdit.merged(options, **values)
     weight = reshaped(checked_region(scene, mask), changes.grow, changes.feather) * (
         scene.depth > 0
     )

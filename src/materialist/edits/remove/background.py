@@ -10,11 +10,11 @@ from PIL import Image
 
 from materialist.color import srgb_levels, srgb_to_linear
 from materialist.edits.remove.behind import HiddenGeometry
+from materialist.edits.remove.options import Removal
 from materialist.edits.remove.patches import patched
 from materialist.errors import InputError
 from materialist.io.image import same_aspect
 from materialist.io.photo import decode_photo
-from materialist.options import Removal
 from materialist.predict import hub, resample
 from materialist.predict.models import locate
 from materialist.predict.protocol import on_gpu

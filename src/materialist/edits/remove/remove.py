@@ -12,12 +12,11 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import picture_behind
 from materialist.edits.remove.behind import behind
 from materialist.edits.remove.hole import evidence_notes, make_hole
+from materialist.edits.remove.options import Removal, RemovalKeywords
 from materialist.geometry.build import rebuilt
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import window
-from materialist.keywords import RemovalKeywords
 from materialist.option_kinds import documented
-from materialist.options import Removal
 from materialist.predict import resample
 from materialist.types import Array, Materials, Photo, Scene
 
@@ -44,7 +43,7 @@ def remove(
     Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
     of the photo; a background of another aspect. SetupError, WeightsError: a library or model that is not there.
     """
-    options = Removal.given(options, **values)
+    options = Removal.merged(options, **values)
     fitted = fitted or scene
     photographed = replace(scene, bodies=fitted.bodies)
     bodies = (

@@ -19,28 +19,13 @@ NAMES: tuple[tuple[str, str], ...] = (
     ("shelf", r"shel|bookcase|stand$"),
 )
 _NAMES = tuple((role, re.compile(pattern, re.IGNORECASE)) for role, pattern in NAMES)
-ROLES = (
-    "chair",
-    "sofa",
-    "bed",
-    "rug",
-    "table",
-    "shelf",
-    "storage",
-    "lamp",
-    "small",
-    "thing",
-    "wall",
-    "ceiling",
-    "outdoor",
-    "vehicle",
-    "person",
-)
-"""Storage: what stands by walls. Small: things on tables. Thing: things on floors."""
 
 
 def role_of(entry: CatalogEntry) -> str | None:
-    """The role of a model, None for those that are not used."""
+    """The role of a model, None for those that are not used.
+
+    Storage: what stands by walls. Small: things on tables. Thing: things on floors.
+    """
     width, height, depth = entry.size
     if LEFT_OUT.search(entry.name) or entry.category in ("Doors and windows", "Staircases"):
         return None

@@ -1,4 +1,4 @@
-"""Procedural triangle meshes with texture coordinates: closed solids, and sheets, tubes and leaves."""
+"""Procedural triangle meshes with texture coordinates: closed solids, and sheets and tubes."""
 
 from dataclasses import replace
 from functools import lru_cache
@@ -359,36 +359,6 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     uv = np.stack(np.broadcast_arrays(around, _lengths(line)[:, None]), -1)
     faces = grid_faces(len(line), n + 1, flip=True)
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
-
-
-def leaves(
-    rng: np.random.Generator, roots: Array, directions: Array, length: float, width: float
-) -> Solid:
-    """Bent leaves of six triangles each, from roots [N, 3] along unit directions [N, 3]."""
-    n = len(roots)
-    directions = unit(directions)
-    up = np.array([0, 1, 0]) + rng.normal(scale=0.3, size=(n, 3))
-    side = unit(np.cross(directions, up))
-    size = (length * rng.uniform(0.6, 1.2, n))[:, None]
-    # Pairs of points at both sides of a spine that sinks with the square of its length:
-    # (share of the length, share of the width).
-    rows = []
-    for t, w in ((0.0, 0.1), (0.35, 1.0), (0.7, 0.8), (1.0, 0.05)):
-        sag = np.array([0, -1, 0]) * size * 0.35 * t * t
-        spine = roots + directions * size * t + sag
-        half_width = side * width / 2 * w * size / length
-        rows += [spine - half_width, spine + half_width]
-    vertices = np.stack(rows, 1)  # [N, 8, 3]
-    flat = vertices.reshape(-1, 3)
-    leaf_faces = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4], [4, 5, 7], [4, 7, 6]])
-    first_vertex = 8 * np.arange(n)
-    faces = (leaf_faces[None] + first_vertex[:, None, None]).reshape(-1, 3).astype(np.int32)
-    # One leaf's coordinates for all; leaves that touch must not share normals.
-    across = np.tile([0, width], 4)
-    down = np.repeat([0, 0.35, 0.7, 1], 2) * length
-    uv = np.tile(np.stack([across, down], -1), (n, 1))
-    apart = flat + np.repeat(np.arange(n), 8)[:, None] * 1e3
-    return Solid(flat, faces, smooth_normals(flat, faces, apart), uv)
 
 
 def joined(parts: list[Solid]) -> Solid:

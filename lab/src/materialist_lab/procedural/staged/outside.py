@@ -6,7 +6,6 @@ from materialist_lab.procedural import lights
 from materialist_lab.procedural import materials as m
 from materialist_lab.procedural.objects import shapes as s
 from materialist_lab.procedural.objects import street_things as street
-from materialist_lab.procedural.outdoors import houses
 from materialist_lab.procedural.relief import Relief
 from materialist_lab.procedural.staged.finishes import covered
 from materialist_lab.procedural.staged.pieces import backdrop_of, piece
@@ -35,7 +34,7 @@ def outside(rng: np.random.Generator, stock: Stock) -> World:
     behind = rng.random()
     at = -rng.uniform(6, 16)
     if behind < 0.45:
-        for x, house in houses(rng, -rng.uniform(6, 14), 14, 4):
+        for x, house in street.houses(rng, -rng.uniform(6, 14), 14, 4):
             parts += placed(house, (x, 0, at + rng.normal() * 0.3))
     elif behind < 0.6:
         parts += placed(street.wall(rng, 40.0), (0, 0, at))

@@ -77,7 +77,7 @@ def draw_views(
     }
 
 
-def load(folder: Path) -> dict[str, Array]:
+def load_views(folder: Path) -> dict[str, Array]:
     """All views of a set, as `make_views` has them. Raises InputError when FOLDER holds no set, or a damaged file."""
     files = sorted(folder.glob("[0-9]*.npz"))
     if not files or not (folder / DESCRIPTION).is_file():

@@ -8,8 +8,8 @@ from PIL import Image
 
 from materialist.color import srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.given import photo_of
 from materialist.io.photo import read_photo
+from materialist.io.photo_input import photo_of
 
 LEVELS = np.random.default_rng(5).integers(0, 256, (12, 17, 3)).astype(np.uint8)
 
