@@ -25,6 +25,13 @@ def texel_directions(height: int, width: int, kind: type = np.float32) -> Array:
     return np.stack(np.broadcast_arrays(x, np.cos(theta), z), -1).astype(kind)
 
 
+def direction_of(azimuth: float, elevation: float) -> Array:
+    """[3] unit direction, of degrees right of straight ahead of the camera and above the horizon."""
+    az = np.radians(azimuth)
+    el = np.radians(elevation)
+    return np.array([np.cos(el) * np.sin(az), np.sin(el), -np.cos(el) * np.cos(az)])
+
+
 def sh_basis(direction: Array, degree: int) -> Array:
     """Real orthonormal spherical harmonics about +Y of unit directions [..., 3]: [..., (degree + 1)^2] float32."""
     # Polar axis +Y: the cyclic permutation (z, x, y) of ours is a right-handed frame with +Y as

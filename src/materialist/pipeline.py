@@ -22,6 +22,7 @@ from materialist.io.out.residual import shading_residual
 from materialist.io.photo import HDR_CLIP, exposed
 from materialist.io.photo_input import PhotoInput, photo_of
 from materialist.keywords import InvertKeywords
+from materialist.memory import kept_memory
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
@@ -37,6 +38,7 @@ MIN_DEPTH = 0.05
 
 @documented(InvertOptions)
 @fixed_threads()
+@kept_memory()
 def invert(
     photo: PhotoInput,
     options: InvertOptions | None = None,

@@ -1,4 +1,4 @@
-"""The nouns of the project: frozen dataclasses, with shape and unit on every array.
+"""The types of the project: frozen dataclasses, with shape and unit on every array.
 
 Conventions (see docs/conventions.md): linear Rec.709 RGB float32; camera at the origin looking down -Z, +Y up,
 +X right; pixel (0, 0) is top left with its centre at (0.5, 0.5); depth is planar along -Z, 0 where there is no surface.

@@ -42,6 +42,11 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
     assert without_secrets("ftp://user:p@ss@host/x.jpg") == "ftp://host/x.jpg"
 
 
+def test_a_list_may_be_utf16(tmp_path):
+    (tmp_path / "list.txt").write_text("# grün\nexample:cat\n", "utf-16")
+    assert [photo.id for photo in list_photos(tmp_path / "list.txt", runs="r")] == ["example:cat"]
+
+
 def test_what_is_passed_over_is_named(tmp_path):
     photos(tmp_path, "b", "a.JPG")
     for name in ("c.jxl", "d.psd", ".hidden", "Thumbs.db", "sub/e.txt"):

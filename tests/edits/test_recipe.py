@@ -48,6 +48,18 @@ def test_steps_are_the_functions_in_order(folder):
     assert got.lamps == expected.lamps and len(got.provenance["edits"]) == 3
 
 
+def test_a_list_may_be_utf16_and_no_other_encoding_than_that_and_utf8(folder, real_data):
+    (folder / "latin.yaml").write_bytes("# grün\n- relight: {rotate: 45}\n".encode("latin-1"))
+    with pytest.raises(InputError, match="save it as UTF-8"):
+        read_recipe(folder / "latin.yaml")
+    text = "# grün\n- relight: {rotate: 45}\n"
+    for encoding in ("utf-8", "utf-8-sig", "utf-16"):
+        (folder / "edits.yaml").write_text(text, encoding)
+        assert [step.kind for step in read_recipe(folder / "edits.yaml")] == ["relight"]
+    (step,) = read_recipe(real_data("data/reported/edits_utf16/u16.yaml"))
+    assert step.kind == "edit" and step.options["click"] == ["50", "30"]
+
+
 def test_an_insert_may_have_several_places(folder):
     box_file(folder / "box.ply", (0.1, 0.1, 0.1))
     for places in ("[[8, 30], [40, 30]]", "['8,30', '40,30']"):

@@ -90,3 +90,9 @@ def test_a_step_cap_holds_in_every_stage_and_adds_none(settings):
     assert [one.max_steps for one in schedules] == [7] * len(schedules)
     assert (cut.light.again is None) == (settings.light.again is None)
     assert settings.at_most(10**6) == settings
+
+
+def test_a_large_picture_is_rendered_again_with_fewer_paths():
+    paths = {side: DEFAULT.rerender_paths(side * side) for side in (256, 512, 1024, 2048, 8192)}
+    assert paths == {256: 32, 512: 16, 1024: 8, 2048: 4, 8192: 2}
+    assert PAPER.rerender_paths(2048 * 2048) == 64

@@ -17,12 +17,12 @@ from materialist.io.image import write_png
 from materialist.studio import SETTINGS, objects
 from materialist.studio.controls import control_values, set_option
 from materialist.studio.edit_list import EditList
+from materialist.studio.lights import place_lamp
 from materialist.studio.live_preview import LivePreview, free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
-from materialist.studio.stage import named_maps, report, stage
-from materialist.studio.tab_light import place_lamp
-from materialist.studio.widgets import PageContext, commands
+from materialist.studio.stage import commands, named_maps, report, stage
+from materialist.studio.widgets import PageContext
 
 
 def test_an_edit_from_click_to_recipe(session):

@@ -27,7 +27,6 @@ from materialist.studio.access import quota
 from materialist.studio.edit_list import EditList
 from materialist.studio.server import check_host
 from materialist.studio.studio import LOCAL_PERSON
-from materialist.studio.tab_open import _start_inversion, _unpack
 from materialist.studio.widgets import PageContext
 
 
@@ -272,9 +271,7 @@ def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
     for _ in range(SETTINGS.jobs_a_person):
         shared.submit(session, wait, shared.work.root)
     with pytest.raises(InputError, match="6 jobs waiting"):
-        _start_inversion(
-            PageContext(shared), session, str(example_path("example:cat")), "auto", 512, "auto"
-        )
+        shared.begin(session, example_path("example:cat"), "auto", 512, "auto")
     assert not shared.work.projects()
 
 
@@ -335,5 +332,5 @@ def test_a_scene_that_is_unpacked_counts_as_stored(studio, tmp_path, monkeypatch
     monkeypatch.setattr(quota, "SETTINGS", StudioSettings(storage_quota=1000))
     before = studio.work.projects()
     with pytest.raises(InputError, match="within an hour"):
-        _unpack(PageContext(studio), studio._new_session("me"), zipped_package(tmp_path))
+        studio.unpack(studio._new_session("me"), zipped_package(tmp_path))
     assert studio.work.projects() == before

@@ -207,3 +207,11 @@ def test_points_fill_the_square():
     assert x.min() >= 0 and y.min() >= 0 and x.max() < 1 and y.max() < 1
     counts, _, _ = np.histogram2d(x, y, bins=64, range=[[0, 1], [0, 1]])
     assert counts.min() >= 2 and counts.max() <= 6
+
+
+def test_a_large_picture_has_no_more_rays_than_one_of_a_megapixel():
+    settings = CacheSettings()
+    assert settings.at_size(1024 * 1024) == settings
+    large = settings.at_size(2048 * 2048)
+    assert (large.diffuse_samples, large.specular_samples) == (16, 4)
+    assert settings.at_size(2**40).specular_samples == 1

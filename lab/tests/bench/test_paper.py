@@ -63,7 +63,7 @@ def stubs(monkeypatch):
 
         there = benchmark_class(name)
         return SimpleNamespace(
-            columns=there.columns, given=lambda **options: SimpleNamespace(run=run)
+            columns=there.columns, merged=lambda **options: SimpleNamespace(run=run)
         )
 
     monkeypatch.setattr(paper, "benchmark_class", stub)

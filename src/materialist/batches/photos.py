@@ -15,6 +15,7 @@ from materialist.io.atomic import FILE_MANAGER_FILES, MARKER
 from materialist.io.bitmap import FORMATS
 from materialist.io.decode import SUFFIXES
 from materialist.io.photo import PREFIX
+from materialist.io.text import read_text
 
 NAMED = 5
 """Names in a note."""
@@ -112,7 +113,7 @@ def _raise(error: OSError) -> None:
 
 def _of_list(file: Path, notes: list[str]) -> list[Listed]:
     try:
-        lines = file.read_text("utf-8-sig").splitlines()
+        lines = read_text(file).splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
             f"{file} is no list of photos ({error}); write one path or URL on each line."

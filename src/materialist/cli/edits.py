@@ -1,6 +1,5 @@
 """`materialist select`, `edit`, `glass`, `remove`, `insert`, `apply`, `relight` and `drop`: pictures and films."""
 
-import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,7 +68,7 @@ def select_command(
     import numpy as np
 
     from materialist.color import srgb_to_linear
-    from materialist.edits.composite.upsample import matte
+    from materialist.edits.composite.matte import matte
     from materialist.io.image import ensure_image_writable, write_image
 
     if output.suffix.lower() != ".png":
@@ -94,60 +93,53 @@ def select_command(
 
 def operation_command(operation: Operation) -> Callable[..., None]:
     """The command of an operation that acts on a region or on places, for `generate.add_command`."""
-    command = _place_command if operation.target is Target.PLACE else _region_command
-
-    def of_operation(**arguments: Any) -> None:
-        command(operation, **arguments)
-
-    # The parameters of the shared command, with the options of this operation.
-    shared = inspect.signature(command).parameters.values()
-    parameters = [
-        entry.replace(annotation=operation.options) if entry.name == "options" else entry
-        for entry in shared
-        if entry.name != "operation"
-    ]
-    of_operation.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    of_operation.__annotations__ = {entry.name: entry.annotation for entry in parameters}
-    of_operation.__doc__ = operation.about
-    return of_operation
+    make = _place_command if operation.target is Target.PLACE else _region_command
+    command = make(operation)
+    command.__annotations__["options"] = operation.options
+    command.__doc__ = operation.about
+    return command
 
 
-def _region_command(
-    operation: Operation,
-    scene: SceneArgument,
-    output: PictureOutput,
-    region: Region,
-    options: Any,
-    rendering: Rendering,
-) -> None:
-    check_needed(operation, options)
-    if options.only_in_photo and rendering.full_render:
-        from materialist.edits.core.notes import PICTURED
+def _region_command(operation: Operation) -> Callable[..., None]:
+    def command(
+        scene: SceneArgument,
+        output: PictureOutput,
+        region: Region,
+        options: Any,
+        rendering: Rendering,
+    ) -> None:
+        check_needed(operation, options)
+        if options.only_in_photo and rendering.full_render:
+            from materialist.edits.core.notes import PICTURED
 
-        raise InputError(
-            f"{PICTURED}--full-render would not show it; take --model closed, or leave that out."
-        )
-    check_before(output, rendering)
-    loaded = mt.load_scene(scene)
-    mask = chosen_region(loaded, region, rendering.device)
-    write_operation(operation, loaded, mask, options, output, rendering)
+            raise InputError(
+                f"{PICTURED}--full-render would not show it; take --model closed, or leave that out."
+            )
+        check_before(output, rendering)
+        loaded = mt.load_scene(scene)
+        mask = chosen_region(loaded, region, rendering.device)
+        write_operation(operation, loaded, mask, options, output, rendering)
+
+    return command
 
 
-def _place_command(
-    operation: Operation,
-    scene: SceneArgument,
-    mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
-    output: PictureOutput,
-    at: At,
-    options: Any,
-    rendering: Rendering,
-) -> None:
-    from materialist.edits.insert.meshes import read_model
+def _place_command(operation: Operation) -> Callable[..., None]:
+    def command(
+        scene: SceneArgument,
+        mesh: Annotated[Path, typer.Argument(metavar="MESH", help=MESH_FILES)],
+        output: PictureOutput,
+        at: At,
+        options: Any,
+        rendering: Rendering,
+    ) -> None:
+        from materialist.edits.insert.meshes import read_model
 
-    check_before(output, rendering)
-    places = tuple(parse_numbers(text, 2, "--at") for text in at)
-    placement = Placement((read_model(mesh, up=options.up),), places)
-    write_operation(operation, mt.load_scene(scene), placement, options, output, rendering)
+        check_before(output, rendering)
+        places = tuple(parse_numbers(text, 2, "--at") for text in at)
+        placement = Placement((read_model(mesh, up=options.up),), places)
+        write_operation(operation, mt.load_scene(scene), placement, options, output, rendering)
+
+    return command
 
 
 def check_needed(operation: Operation, options: Any) -> None:

@@ -26,6 +26,13 @@ class Serving(Computing):
     work: Path = option(
         Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR"
     )
+    page: str = option(
+        "classic",
+        "Which page: the classic one, or the darkroom, a full-window editor (preview).",
+        kind="word",
+        choices=("classic", "darkroom"),
+        called="--page",
+    )
     # Who may come in.
     password: str | None = option(
         None,
@@ -63,8 +70,10 @@ def studio_command(
     ] = None,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
+    from materialist.darkroom.app import application as darkroom
     from materialist.studio import server
 
+    page = darkroom if serving.page == "darkroom" else server.application
     # --- Who may reach it, checked before anything is made ---
     password = server.password_of(
         serving.password or os.environ.get("MATERIALIST_PASSWORD"), serving.password_file
@@ -101,4 +110,5 @@ def studio_command(
         password=password,
         proxy=serving.behind_proxy,
         on_ready=on_ready,
+        page=page,
     )

@@ -90,6 +90,11 @@ class Preview:
 
         return TransportCache(self.scene.geometry, self.scene.camera, CacheSettings(8, 1))
 
+    @property
+    def coarse(self) -> bool:
+        """Whether pictures still have a seventh of the rays."""
+        return self._coarse
+
     def prepare(self) -> bool:
         """Trace the next part for finer pictures and another light, a second or so; False where all is there."""
         if self._quick.trace_next() or self._engine.cache.trace_next():

@@ -11,22 +11,10 @@ from materialist.edits.registry import OPERATIONS
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole
+from materialist.io.text import read_text
 from materialist.option_kinds import OFF, ON, beside, declarations, parse_numbers, several
 from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
-
-KEYS = {
-    name: (
-        *operation.target.keys,
-        *(
-            key
-            for key, (declared, _) in declarations(operation.options).items()
-            if declared.written
-        ),
-    )
-    for name, operation in OPERATIONS.items()
-}
-"""Kind of step -> what it may say."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +49,12 @@ def read_recipe(path: str | Path) -> list[Step]:
     try:
         if path.stat().st_size > 1_000_000:
             raise InputError(f"{path} is larger than 1 MB; a list of edits is a short text.")
-        content = yaml.load(path.read_text("utf-8"), Loader=_loader())
-    except (OSError, UnicodeDecodeError) as error:
+        content = yaml.load(read_text(path), Loader=_loader())
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"The list of edits {path} is not text in UTF-8; save it as UTF-8."
+        ) from error
+    except OSError as error:
         raise InputError(f"The list of edits {path} cannot be read: {error}.") from error
     except yaml.YAMLError as error:
         raise InputError(f"{path} is not valid YAML: {' '.join(str(error).split())}.") from error
@@ -110,26 +102,25 @@ def _loader() -> Any:
 
 
 def _step(entry: Any, number: int, path: Path) -> Step:
-    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in KEYS:
+    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in OPERATIONS:
         said = (
             f"'{next(iter(entry))}'"
             if isinstance(entry, dict) and len(entry) == 1
             else "not one kind of edit"
         )
-        known = ", ".join(KEYS)
+        known = ", ".join(OPERATIONS)
         raise InputError(
             f"Step {number} of {path} is {said}; it must be one of {known} with its options below it."
         )
     # --- The step's options: only those that its kind has ---
     kind, options = next(iter(entry.items()))
+    keys = OPERATIONS[kind].keys
     if not isinstance(options, dict):
-        raise InputError(
-            f"Step {number} of {path} has no options; give some of {', '.join(KEYS[kind])}."
-        )
-    unknown = sorted(set(options) - {*KEYS[kind], "skip"})
+        raise InputError(f"Step {number} of {path} has no options; give some of {', '.join(keys)}.")
+    unknown = sorted(set(options) - {*keys, "skip"})
     if unknown:
         raise InputError(
-            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(KEYS[kind])}."
+            f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(keys)}."
         )
     if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
         raise InputError(

@@ -23,6 +23,7 @@ from materialist.fit.optimise import Stop, never
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import build_geometry
 from materialist.render.scene import RenderScene
+from materialist.transport.cache import CacheSettings
 from materialist.types import Array, Geometry, Materials, Photo, Prediction, Progress
 
 
@@ -160,7 +161,7 @@ class Fit:
         pixels = self.engine.pixels
         photo = self._photo()[pixels]
         if isinstance(self.engine, PathEngine):  # it renders all pixels anyway
-            settings = replace(settings, step_pixels=0)
+            settings = replace(settings, step_pixels=0, strip_pixels=0)
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
         model = material_field(
@@ -304,8 +305,7 @@ def invert(
         progress("rerender", 0, 1)
     settings = setup.settings
     pixels = setup.photo.linear.shape[0] * setup.photo.linear.shape[1]
-    fewer = min(1.0, settings.rerender_pixels / pixels)
-    each = max(1, (setup.spp or max(8, round(settings.rerender_spp * fewer))) // 2)
+    each = max(1, (setup.spp or settings.rerender_paths(pixels)) // 2)
     first, second = timed(
         stages,
         "rerender",
@@ -334,6 +334,7 @@ def _engine(
         roughness=setup.prior.materials.roughness if stays else None,
         seed=seed,
         light_height=setup.settings.light_grid,
+        cache=CacheSettings().at_size(camera.width * camera.height),
         progress=progress,
     )
 

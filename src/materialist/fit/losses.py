@@ -18,10 +18,19 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
 
 
 def residual(
-    radiance: torch.Tensor, photo: torch.Tensor, encoding: Encoding, *, white: float
+    radiance: torch.Tensor,
+    photo: torch.Tensor,
+    encoding: Encoding,
+    *,
+    white: float,
+    encoded: torch.Tensor | None = None,
 ) -> torch.Tensor:
-    """Encoded rendering minus encoded photo, [..., 3]; no error where it is brighter than a channel of `white`."""
-    error = encode(radiance, encoding) - encode(photo, encoding)
+    """Encoded rendering minus encoded photo, [..., 3]; no error where it is brighter than a channel of `white`.
+
+    encoded: the photo encoded, where it is at hand.
+    """
+    seen = encode(photo, encoding) if encoded is None else encoded
+    error = encode(radiance, encoding) - seen
     return torch.where(photo >= white, error.clamp_max(0), error)
 
 
@@ -41,17 +50,23 @@ def rendering_loss(error: torch.Tensor, loss: Loss = "l1+l2") -> torch.Tensor:
 
 
 def consistency(
-    maps: torch.Tensor, prior: torch.Tensor, settings: MaterialSettings
+    maps: torch.Tensor,
+    prior: torch.Tensor,
+    settings: MaterialSettings,
+    *,
+    encoded: torch.Tensor | None = None,
 ) -> torch.Tensor:
     """delta L_cons: mean over pixels of the weighted distance of maps [P, 5] to the prior [P, 5].
 
     It is L1 (paper), or with an `l2` loss the square of the encoded albedo's, roughness's and metallic's change.
+    encoded: [P, 3] the prior's albedo encoded, where it is at hand.
     """
     albedo, roughness, metallic = settings.weights
     weights = torch.tensor([albedo / 3] * 3 + [roughness, metallic]).to(maps)
     if settings.loss == "l2":
-        encoded = encode(maps[:, :3], settings.encoding) - encode(prior[:, :3], settings.encoding)
-        change = torch.cat([encoded, maps[:, 3:] - prior[:, 3:]], 1).square()
+        before = encode(prior[:, :3], settings.encoding) if encoded is None else encoded
+        albedo_change = encode(maps[:, :3], settings.encoding) - before
+        change = torch.cat([albedo_change, maps[:, 3:] - prior[:, 3:]], 1).square()
     else:
         change = (maps - prior).abs()
     return settings.delta * (change * weights).sum(1).mean()

@@ -1,6 +1,6 @@
 """Material properties optimisation (paper, Progressive Differentiable Rendering)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import torch
@@ -17,7 +17,7 @@ from materialist.fit.fields import (
     Rows,
     Unified,
 )
-from materialist.fit.losses import consistency, rendering_loss, residual
+from materialist.fit.losses import consistency, encode, rendering_loss, residual
 from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera, Progress
@@ -43,7 +43,7 @@ def material_field(
     torch.manual_seed(seed)
     fresh: dict[str, Callable[[], nn.Module]] = {
         "mlp": lambda: MaterialMLP(start, pixels, camera.height, camera.width),
-        "maps": lambda: MaterialMaps(start),
+        "maps": lambda: MaterialMaps(start, settings.strip_pixels if inside is None else 0),
         "unet": lambda: MaterialUNet(start, pixels, camera.height, camera.width),
     }
     if settings.field not in fresh:
@@ -69,26 +69,45 @@ def fit_materials(
     """
     results = []
     draw = _pixel_draw(len(photo), settings.step_pixels, seed)
+    # Powers take most of a step, and these do not change.
+    encoded_photo = encode(photo, settings.encoding)
+    encoded_albedo = encode(prior[:, :3], settings.encoding)
+    strips = field.rows if isinstance(field, MaterialMaps) and not settings.step_pixels else []
     for stage in settings.stages:
         held = {
             name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets
         }
 
-        def loss(_: int, held=held) -> torch.Tensor:
-            rows = draw()
+        def part(rows: Rows, held: dict[str, torch.Tensor]) -> torch.Tensor:
             moved = field(rows)
             values = torch.cat(
                 [held[name][rows] if name in held else moved[:, c] for name, c in COLUMNS.items()],
                 1,
             )
             radiance = problem(values, rows)
-            error = residual(radiance, photo[rows], settings.encoding, white=settings.white)
-            return rendering_loss(error, settings.loss) + consistency(values, prior[rows], settings)
+            error = residual(
+                radiance,
+                photo[rows],
+                settings.encoding,
+                white=settings.white,
+                encoded=encoded_photo[rows],
+            )
+            change = consistency(values, prior[rows], settings, encoded=encoded_albedo[rows])
+            return rendering_loss(error, settings.loss) + change
+
+        def loss(_: int, held=held) -> Iterator[torch.Tensor]:
+            if not strips:
+                yield part(draw(), held)
+            for rows in strips:
+                # The loss is a mean: that of a strip counts by its share of the pixels.
+                share = (rows.stop - rows.start) / len(photo) if len(strips) > 1 else 1.0
+                yield share * part(rows, held)
 
         def into_range() -> None:
             base = field.field if isinstance(field, Unified) else field
             if isinstance(base, MaterialMaps):
-                base.maps.clamp_(0, 1)
+                for strip in base.strips:
+                    strip.clamp_(0, 1)
 
         name = stage.name or ("+".join(stage.targets) if held else "materials")
         run = optimise(

@@ -76,15 +76,16 @@ class Adam:
 def optimise(
     name: str,
     parameters: Iterable[torch.Tensor],
-    loss: Callable[[int], torch.Tensor],
+    loss: Callable[[int], Iterable[torch.Tensor]],
     schedule: Schedule,
     *,
     after_step: Callable[[], None] | None = None,
     progress: Progress | None = None,
     stop: Stop = never,
 ) -> StageResult:
-    """Minimise `loss(step)` over the tensors `parameters` in place.
+    """Minimise the sum of `loss(step)` over the tensors `parameters` in place.
 
+    Its parts are differentiated one after another, so that a generator of them needs the memory of one.
     It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
     """
     if progress is not None:
@@ -96,23 +97,25 @@ def optimise(
     start = time.perf_counter()
     losses = []
     for step in range(schedule.max_steps):
-        value = loss(step)
-        value.backward()
-        if schedule.keep_best and value.item() < best:
-            best = value.item()
+        value = 0.0
+        for part in loss(step):
+            part.backward()
+            value += part.item()
+        if schedule.keep_best and value < best:
+            best = value
             kept = [t.detach().clone() for t in tensors]
         adam.step(schedule.rate(step))
         if after_step is not None:
             with torch.no_grad():
                 after_step()
-        losses.append(value.item())
+        losses.append(value)
         if progress is not None:
             progress(name, step + 1, schedule.max_steps)
         if stop() or _stalled(losses, schedule):
             break
     with torch.no_grad():
-        for tensor, value in zip(tensors, kept, strict=False):  # kept is empty unless asked for
-            tensor.copy_(value)
+        for tensor, values in zip(tensors, kept, strict=False):  # kept is empty unless asked for
+            tensor.copy_(values)
     return StageResult(name, len(losses), time.perf_counter() - start, tuple(losses))
 
 

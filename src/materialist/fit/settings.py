@@ -84,6 +84,7 @@ class MaterialSettings:
     loss: Loss = "l1+l2"
     white: float = math.inf
     step_pixels: int = 0  # pixels that a step with cached transport compares, drawn anew; 0: all
+    strip_pixels: int = 0  # of `maps`, pixels that are differentiated at once; 0: all
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -100,8 +101,16 @@ class FitSettings:
     """What surfaces send each other with cached transport: as the photo shows, or, once there is a light, `traced`."""
     light_grid: int = 32  # rows of the envmap that the transport engine's light matrix resolves
     rerender_spp: int = 64  # paths a pixel of the final re-rendering
-    # pixels of a picture from which they are fewer, in proportion; 8 at the least
+    # pixels of a picture from which they are fewer, in proportion, down to 8
     rerender_pixels: int = 2**62
+    # paths of a whole picture from which they are fewer than 8
+    rerender_most: int = 2**62
+
+    def rerender_paths(self, pixels: int) -> int:
+        """Paths a pixel of the final re-rendering of a picture of so many pixels."""
+        fewer = min(1.0, self.rerender_pixels / pixels)
+        least = min(8, max(2, self.rerender_most // pixels))
+        return max(least, round(self.rerender_spp * fewer))
 
     def at_most(self, steps: int) -> "FitSettings":
         """The same with no more steps in any stage."""
@@ -164,6 +173,7 @@ DEFAULT = FitSettings(
         white=CLIPPED,
         delta=1.0,
         weights=(0.7, 1.0, 1.0),
+        strip_pixels=2**18,
         stages=(
             MaterialStage(
                 ("albedo",),
@@ -176,6 +186,7 @@ DEFAULT = FitSettings(
     light_grid=24,
     rerender_spp=32,
     rerender_pixels=2**17,
+    rerender_most=2**24,
 )
 """Measured against the paper's settings in docs/benchmarks.md; the reasons are in docs/decisions.md."""
 

@@ -1,6 +1,5 @@
 """Controls of the page, each for one option of an operation: how a value goes to the list of edits, and back."""
 
-import math
 import re
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -20,18 +19,12 @@ from materialist.edits.material.options import MaterialEdit
 from materialist.errors import InputError
 from materialist.option_kinds import ON, OperationOptions, declarations, parse_colour
 from materialist.studio import objects
+from materialist.studio.lights import number_text
 from materialist.studio.session import Session
 
 SUN = (45.0, 40.0)
 """Where a new sun stands: degrees right of ahead, and above the horizon."""
 WHITE, GREY = "#ffffff", "#808080"
-
-
-def number_text(value: float) -> str:
-    """A number as the list of edits has it. Raises InputError for what a slider cannot give."""
-    if not math.isfinite(float(value)):
-        raise InputError(f"The value {value} is no finite number; move the slider again.")
-    return f"{float(value):.4g}"
 
 
 def hex_colour(value: Any) -> str:

@@ -71,6 +71,13 @@ class LivePreview:
     def ready(self) -> bool:
         return self._preview.done()
 
+    @property
+    def fine(self) -> bool:
+        """Whether pictures have all their rays by now."""
+        preview = self._preview
+        built = preview.done() and not preview.cancelled() and preview.exception() is None
+        return built and not preview.result().coarse
+
     def wait(self) -> None:
         """Wait for the preview. Raises the error of its building, if there was one."""
         self._preview.result()

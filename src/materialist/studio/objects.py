@@ -8,7 +8,7 @@ from trimesh import creation, transformations
 from materialist.edits.core.operation import Target
 from materialist.edits.drop.operation import DROP
 from materialist.edits.insert.operation import INSERT
-from materialist.edits.recipe import KEYS, Step
+from materialist.edits.recipe import Step
 from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.io.atomic import whole_file
@@ -59,7 +59,7 @@ def set_object_option(session: Session, name: str, value: str | None) -> None:
             session.edits = session.edits.chosen(None)
         # A fallen object knows fewer options: it cannot be turned.
         kind = session.current_kind
-        if kind in KINDS and name in KEYS[kind]:
+        if kind in KINDS and name in OPERATIONS[kind].keys:
             session.put(session.edits, **{name: value})
         session.next_object = {
             k: v for k, v in {**session.next_object, name: value}.items() if v is not None
@@ -83,11 +83,7 @@ def let_fall(session: Session, height: float) -> list[str]:
         # Only what this fall adds is told.
         known = session.live.edited(session.edits.active).report.warnings
         step = session.edits.steps[index]
-        kept = {
-            name: value
-            for name, value in step.options.items()
-            if name in {*KEYS[DROP.name], "skip"}
-        }
+        kept = {name: value for name, value in step.options.items() if name in {*DROP.keys, "skip"}}
         options = {**kept, "height": f"{height:.3g}", "seed": str(session.falls)}
         after = session.edits.put(index, replace(step, kind=DROP.name, options=options))
         session.falls += 1

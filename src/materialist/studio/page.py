@@ -20,6 +20,7 @@ from materialist.studio import (
     tab_open,
     tab_take,
 )
+from materialist.studio.lights import place_lamp
 from materialist.studio.objects import place
 from materialist.studio.selection import read_pick
 from materialist.studio.session import Session
@@ -138,7 +139,7 @@ def _pick(
     picked = read_pick(data)
     if picked["tool"] == "lamp":
         x, y = picked["at"]
-        tab_light.place_lamp(session, x, y, kelvin, power, before)
+        place_lamp(session, x, y, kelvin, power, before)
     elif picked["tool"] == "place":
         place(session, *picked["at"])
     else:

@@ -57,9 +57,18 @@ class Selection:
         }
 
     def click(
-        self, scene: Scene, x: float, y: float, mode: str, method: str = "network"
+        self,
+        scene: Scene,
+        x: float,
+        y: float,
+        mode: str,
+        method: str = "network",
+        region: Array | None = None,
     ) -> Selection:
-        """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
+        """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added.
+
+        region: [H, W] bool of that object, where it is known already.
+        """
         height, width = scene.depth.shape
         # The right and bottom edge belong to the last pixel.
         row = min(int(y), height - 1)
@@ -72,7 +81,9 @@ class Selection:
                 if inside
                 else self
             )
-        return self._with(select(scene, click=(x, y), method=method), mode)
+        if region is None:
+            region = select(scene, click=(x, y), method=method)
+        return self._with(region, mode)
 
     def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
         if mode == REMOVE:

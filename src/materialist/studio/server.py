@@ -97,9 +97,14 @@ def serve(
     password: str | None = None,
     proxy: str | None = None,
     on_ready: Callable[[str], None],
+    page: Callable[..., Any] | None = None,
 ) -> None:
-    """Show the studio until Ctrl-C. `on_ready` gets the address once the page answers."""
-    gate = application(studio, host=host, port=port, password=password, proxy=proxy)
+    """Show the studio until Ctrl-C. `on_ready` gets the address once the page answers.
+
+    page: makes the page behind its gate, as `application` does, whose page it is by default.
+    """
+    build = page or application
+    gate = build(studio, host=host, port=port, password=password, proxy=proxy)
     import uvicorn
 
     config = uvicorn.Config(

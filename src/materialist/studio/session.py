@@ -21,7 +21,7 @@ from materialist.studio.glass import GlassClient
 from materialist.studio.live_preview import LivePreview
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.workspace import Project, located, read_steps, write_mask
-from materialist.types import Scene
+from materialist.types import Array, Scene
 
 EDITS = "edits.yaml"
 ENDING = ("final", "take")
@@ -162,15 +162,25 @@ class Session:
 
     # Selecting
 
-    def pick(self, pick: dict[str, Any], method: str = "network") -> None:
-        """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError."""
+    @property
+    def can_undo(self) -> tuple[bool, bool]:
+        """Whether there is a change to take back, and one to do again."""
+        return bool(self._past), bool(self._future)
+
+    def pick(
+        self, pick: dict[str, Any], method: str = "network", region: Array | None = None
+    ) -> None:
+        """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError.
+
+        region: [H, W] bool of the object at a click, where it is known already.
+        """
         with self.lock:
             scene = self.scene
             mode = pick["mode"]
             before = self.selection
             if pick["tool"] == "click":
                 x, y = self.pixel(*pick["at"])
-                after = before.click(scene, x, y, mode, method)
+                after = before.click(scene, x, y, mode, method, region)
             elif pick["tool"] == "box":
                 after = before.box(scene, pick["at"], mode, method)
             else:

@@ -1,6 +1,7 @@
-"""The picture on the stage with its label, and what the page shows of a scene: maps, and a report in words."""
+"""What a page shows: the picture with its label, maps, a report, the list of edits, and jobs in words."""
 
 from pathlib import Path
+from shlex import quote
 from time import time
 from typing import Any
 
@@ -10,11 +11,12 @@ from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.errors import MaterialistError
 from materialist.io import display
+from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, glass
-from materialist.studio.edit_list import EditList
+from materialist.studio.edit_list import EditList, step_summary
 from materialist.studio.live_preview import is_shaded
 from materialist.studio.selection import Selection, data_url
-from materialist.studio.session import Session
+from materialist.studio.session import EDITS, Session
 from materialist.studio.tasks import before_of
 from materialist.types import Array, Scene
 
@@ -29,6 +31,23 @@ _EMPTY: dict[str, Any] = {
     "coarse": False,
 }
 """What the page shows without a photo."""
+_WORDS = {
+    "start": "Starting",
+    "read": "Reading the photo",
+    "predict": "Guessing colours, shapes and depth",
+    "geometry": "Building the surface",
+    "trace": "Tracing light paths",
+    "light": "Finding the light",
+    "albedo": "Finding the materials",
+    "materials": "Finding the materials",
+    "rerender": "Rendering the result",
+    "save": "Saving",
+    "load": "Loading",
+    "shadow": "Taking its shadow away",
+    "render": "Path tracing",
+    "frames": "Path tracing the frames",
+    "export": "Writing the file",
+}
 
 
 def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) -> dict[str, Any]:
@@ -182,3 +201,44 @@ def report(scene: Scene) -> str:
 def _safe(text: str) -> str:
     """A text that may hold a file name, without meaning in Markdown or HTML."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace("[", "&#91;")
+
+
+def failure_message(job: Job) -> str:
+    """The reason of a failure; it names the photo by its title."""
+    # The path on this machine is nothing for a page.
+    photo = job.arguments.get("photo")
+    return job.message.replace(str(photo), job.arguments["title"]) if photo else job.message
+
+
+def words(stage: str) -> str:
+    """A stage in words; names such as `light 2` or `materials: albedo` go by their first word."""
+    return _WORDS.get(stage) or _WORDS.get(
+        stage.replace(":", " ").partition(" ")[0], stage.capitalize()
+    )
+
+
+def steps(session: Session) -> list[dict[str, Any]]:
+    return [
+        {"text": step_summary(step), "on": not step.skipped, "current": k == session.edits.current}
+        for k, step in enumerate(session.edits.steps)
+    ]
+
+
+def commands(session: Session) -> str:
+    """The commands that give the same result; nothing where no photo is open."""
+    project = session.project
+    if project is None:
+        return ""
+    # Whoever has no command line here gets the names alone.
+    place = str if session.local else session.without_folders
+    lines = [f"cd {quote(place(str(project.folder)))}"]
+    scene = quote(place(str(project.scene)))
+    if session.edits.active:
+        lines.append(
+            f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene"
+        )
+        scene = "edited.scene"
+    else:
+        lines.append(f"materialist render {scene} -o out.png")
+    lines.append(f"materialist export {scene} --to glb -o out.glb")
+    return "\n".join(lines)

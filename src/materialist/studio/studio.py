@@ -19,7 +19,7 @@ import psutil
 from materialist.errors import InputError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
-from materialist.studio import SETTINGS, tasks
+from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
 from materialist.studio.live_preview import free_memory
@@ -32,6 +32,8 @@ PERSON = "materialist_person"
 """The cookie that tells whose photos a browser may see."""
 PERSON_HEADER = "x-materialist-person"
 """The header in which the gate tells the page whose request it is; what a browser sends of that name is dropped."""
+PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
+"""Ways to make the first guess that a page offers, and their names of `invert`."""
 _FOLDERS = re.compile(r"(?<![\w/:.<])/(?:[^/\s<>'\"]+/)*(?=[^/\s<>])")
 
 
@@ -74,14 +76,8 @@ class Studio:
         Forgets pages that never did so, a while after their last request. Raises InputError for another person's page.
         """
         now = time.monotonic()
+        self.leave_idle(page)
         with self._lock:
-            last = now - SETTINGS.page_seconds
-            # Pages that never held a request, and were not heard of for a while.
-            gone = [
-                name
-                for name, session in self._sessions.items()
-                if not session.beats and session.seen < last and name != page
-            ]
             known = self._sessions.get(page or "")
             if known is None and page:
                 self._check_pages(person)
@@ -89,11 +85,21 @@ class Studio:
             if known is not None and known.person == person:
                 known.seen = now
                 known.beats = known.beats or beats
-        for name in gone:
-            self.leave(name)
         if known is None or known.person != person:
             raise InputError(LOST)
         return known
+
+    def leave_idle(self, page: str | None = None) -> None:
+        """Forget the pages that never held a request, and were not heard of for a while, but for one."""
+        last = time.monotonic() - SETTINGS.page_seconds
+        with self._lock:
+            gone = [
+                name
+                for name, session in self._sessions.items()
+                if not session.beats and session.seen < last and name != page
+            ]
+        for name in gone:
+            self.leave(name)
 
     def _check_pages(self, person: str) -> None:
         """Raise InputError where a person's sender has too many pages open."""
@@ -190,6 +196,48 @@ class Studio:
         job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
         session.note_job(job)
         return job
+
+    def begin(
+        self, session: Session, source: Path, predictor: str, size: int, fov: str
+    ) -> tuple[Project, Job]:
+        """A project with a copy of an uploaded photo in it, and its inversion in the queue. Raises InputError."""
+        if predictor not in {value for _, value in PREDICTORS}:
+            raise InputError("Choose one of the listed ways to make the first guess.")
+        uploads.opened_upload(
+            uploads.checked_upload, source, session.allowance, option=uploads.PHOTO
+        )
+        # --- A project of its own, with a copy of the photo ---
+        project = self.work.new(source.name, session.person)
+        photo = project.folder / f"original{source.suffix.lower()}"
+        try:
+            session.allowance.claim(source.stat().st_size)
+            shutil.copyfile(source, photo)
+            job = self.submit(
+                session,
+                tasks.invert,
+                project.folder,
+                photo=str(photo),
+                scene=str(project.scene),
+                title=project.title,
+                predictor=predictor,
+                size=size,
+                fov=fov.strip() or "auto",
+                seed=self.seed,
+            )
+        except Exception:
+            shutil.rmtree(project.folder, ignore_errors=True)
+            raise
+        return project, job
+
+    def unpack(self, session: Session, file: Path) -> Project:
+        """A project with an uploaded, zipped scene package. Raises InputError."""
+        project = self.work.new(file.stem, session.person)
+        try:
+            archives.unpack_scene(file, project.scene, session.allowance)
+        except Exception:
+            shutil.rmtree(project.folder, ignore_errors=True)
+            raise
+        return project
 
     def leave(self, page: str | None) -> None:
         """Forget a page that was closed, and its renderings; its work and its inversions go on.

@@ -8,11 +8,10 @@ import gradio as gr
 import numpy as np
 
 from materialist.edits.light import presets
-from materialist.errors import InputError
 from materialist.io.display import light
-from materialist.io.image import write_image
 from materialist.studio import SETTINGS, uploads
-from materialist.studio.controls import SUN, file_field, number_text, slider
+from materialist.studio.controls import SUN, file_field, slider
+from materialist.studio.lights import light_file, number_text
 from materialist.studio.session import Session
 from materialist.studio.widgets import PageContext
 from materialist.types import Array
@@ -91,7 +90,7 @@ def _choose(session: Session, data: Any) -> None:
         session.light(envmap=None, gain=None)
     else:
         session.light(
-            envmap=_written(session, [*presets.LIGHTS][int(data["index"]) - 1]), gain="auto"
+            envmap=light_file(session, [*presets.LIGHTS][int(data["index"]) - 1]), gain="auto"
         )
 
 
@@ -105,34 +104,6 @@ def _uploaded(session: Session, file: Path) -> None:
         session.light(envmap=name, gain="auto")
 
     uploads.used(session.workspace, file, "envmap", session.allowance, use)
-
-
-def place_lamp(
-    session: Session,
-    x: float,
-    y: float,
-    kelvin: float = 2700,
-    power: float = 1,
-    before: float = SETTINGS.lamp_share,
-) -> None:
-    """Hang a lamp before the surface at a pixel, `before` its share of the way. Raises InputError without a surface."""
-    column, row = session.pixel(x, y)
-    depth = float(session.scene.depth[row, column])
-    if depth <= 0:
-        raise InputError("There is no surface to hang the lamp before; click on an object.")
-    # The lamp hangs between the camera and the clicked surface.
-    new = [str(column), str(row), *(number_text(v) for v in (depth * before, kelvin, power))]
-    place = session.edits.light
-    known = session.edits.steps[place].options.get("lamps", []) if place is not None else []
-    session.light(lamps=[*known, new])
-
-
-def _written(session: Session, name: str) -> str:
-    """A computed light as a file in the workspace, so that the recipe can be replayed anywhere."""
-    file = session.workspace / f"light-{name.lower()}.exr"
-    if not file.is_file():
-        write_image(file, presets.preset_light(name), force=True)
-    return file.name
 
 
 @cache

@@ -14,11 +14,12 @@ from materialist.errors import InputError
 from materialist.io.decode import SUFFIXES
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.jobs.queue import Job
-from materialist.studio import archives, tasks, uploads
+from materialist.studio import tasks, uploads
 from materialist.studio.controls import file_field
 from materialist.studio.session import Session
 from materialist.studio.stage import stage, waiting_photo
-from materialist.studio.widgets import LONG, PREDICTORS, PageContext, Updates, message_box
+from materialist.studio.studio import PREDICTORS
+from materialist.studio.widgets import LONG, PageContext, Updates, message_box
 from materialist.studio.workspace import Project
 from materialist.types import Array
 
@@ -101,9 +102,11 @@ def wire(context: PageContext, page: gr.Blocks) -> None:
         session: Session, file: str | None, predictor: str, size: int, fov: str
     ) -> Iterator[Updates]:
         if file is not None and Path(file).suffix.lower() == ".zip":
-            yield from _show_project(context, session, _unpack(context, session, Path(file)))
+            yield from _show_project(context, session, studio.unpack(session, Path(file)))
         else:
-            project, job = _start_inversion(context, session, file, predictor, size, fov)
+            if file is None:
+                raise InputError("Drop a photo first, or choose an example.")
+            project, job = studio.begin(session, Path(file), predictor, int(size), fov)
             yield from _follow_inversion(context, session, project, job)
 
     def arrive(session: Session) -> Iterator[Updates]:
@@ -138,52 +141,6 @@ def _examples() -> list[tuple[Array, str]]:
         )
 
     return [(small(photo), name.capitalize()) for name, photo in photos.items()]
-
-
-def _start_inversion(
-    context: PageContext, session: Session, file: str | None, predictor: str, size: int, fov: str
-) -> tuple[Project, Job]:
-    """A project with its photo in it, and the inversion in the queue."""
-    studio = context.studio
-    if file is None:
-        raise InputError("Drop a photo first, or choose an example.")
-    if predictor not in {value for _, value in PREDICTORS}:
-        raise InputError("Choose one of the listed ways to make the first guess.")
-    source = Path(file)
-    uploads.opened_upload(uploads.checked_upload, source, session.allowance, option=uploads.PHOTO)
-    # --- A project of its own, with a copy of the photo ---
-    suffix = source.suffix.lower()
-    project = studio.work.new(source.name, session.person)
-    photo = project.folder / f"original{suffix}"
-    try:
-        session.allowance.claim(source.stat().st_size)
-        shutil.copyfile(source, photo)
-        job = studio.submit(
-            session,
-            tasks.invert,
-            project.folder,
-            photo=str(photo),
-            scene=str(project.scene),
-            title=project.title,
-            predictor=predictor,
-            size=int(size),
-            fov=fov.strip() or "auto",
-            seed=studio.seed,
-        )
-    except Exception:
-        shutil.rmtree(project.folder, ignore_errors=True)
-        raise
-    return project, job
-
-
-def _unpack(context: PageContext, session: Session, file: Path) -> Project:
-    project = context.studio.work.new(file.stem, session.person)
-    try:
-        archives.unpack_scene(file, project.scene, session.allowance)
-    except Exception:
-        shutil.rmtree(project.folder, ignore_errors=True)
-        raise
-    return project
 
 
 def _follow_inversion(

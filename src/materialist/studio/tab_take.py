@@ -11,21 +11,8 @@ from materialist.studio.archives import pack_edits
 from materialist.studio.controls import file_field
 from materialist.studio.session import EDITS, Session
 from materialist.studio.stage import stage
+from materialist.studio.tasks import KINDS
 from materialist.studio.widgets import PageContext, Updates, message_box
-
-KINDS = {
-    "png": ("Picture, PNG (path traced)", ".png"),
-    "exr": ("Picture, EXR: linear, for further work", ".exr"),
-    "edits": ("edits.yaml with its masks (zip)", ".zip"),
-    "scene": ("The edited scene, a package (zip)", ".zip"),
-    "glb": ("glTF with its light (zip)", ".zip"),
-    "blend": ("Blender: script and files (zip)", ".zip"),
-    "usd": ("USD (usdz)", ".usdz"),
-    "mitsuba": ("Mitsuba (zip)", ".zip"),
-    "html": ("A page that opens without a server", ".html"),
-    "turn": ("A video: the light goes round", ".mp4"),
-}
-"""Kind of result -> its title, and the suffix of the file."""
 
 
 def layout(context: PageContext) -> None:

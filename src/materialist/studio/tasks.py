@@ -25,6 +25,19 @@ Task = Callable[..., None]
 """task(report, **arguments)."""
 PHOTO = "photo"
 """The name under which an inversion shows its photo, before anything is found."""
+KINDS = {
+    "png": ("Picture, PNG (path traced)", ".png"),
+    "exr": ("Picture, EXR: linear, for further work", ".exr"),
+    "edits": ("edits.yaml with its masks (zip)", ".zip"),
+    "scene": ("The edited scene, a package (zip)", ".zip"),
+    "glb": ("glTF with its light (zip)", ".zip"),
+    "blend": ("Blender: script and files (zip)", ".zip"),
+    "usd": ("USD (usdz)", ".usdz"),
+    "mitsuba": ("Mitsuba (zip)", ".zip"),
+    "html": ("A page that opens without a server", ".html"),
+    "turn": ("A video: the light goes round", ".mp4"),
+}
+"""Kind of result -> its title, and the suffix of the file."""
 
 
 def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> None:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from html import escape
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 import gradio as gr
@@ -19,9 +18,8 @@ from materialist.jobs.queue import QUEUED, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio import SETTINGS, tasks
 from materialist.studio.controls import CONTROLS, control_values, set_option
-from materialist.studio.edit_list import step_summary
-from materialist.studio.session import EDITS, FinalPicture, Session
-from materialist.studio.stage import stage
+from materialist.studio.session import FinalPicture, Session
+from materialist.studio.stage import commands, failure_message, stage, steps, words
 from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
 LIVE: dict[str, Any] = {
@@ -37,24 +35,6 @@ LONG: dict[str, Any] = {
     "api_visibility": "private",
 }
 """Events that take long, and send updates meanwhile."""
-_WORDS = {
-    "start": "Starting",
-    "read": "Reading the photo",
-    "predict": "Guessing colours, shapes and depth",
-    "geometry": "Building the surface",
-    "trace": "Tracing light paths",
-    "light": "Finding the light",
-    "albedo": "Finding the materials",
-    "materials": "Finding the materials",
-    "rerender": "Rendering the result",
-    "save": "Saving",
-    "load": "Loading",
-    "shadow": "Taking its shadow away",
-    "render": "Path tracing",
-    "frames": "Path tracing the frames",
-    "export": "Writing the file",
-}
-PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
 
 
 Updates = dict[str, Any]
@@ -250,48 +230,7 @@ class PageContext:
                 picture.remove()
 
 
-def failure_message(job: Job) -> str:
-    """The reason of a failure; it names the photo by its title."""
-    # The path on this machine is nothing for a page.
-    photo = job.arguments.get("photo")
-    return job.message.replace(str(photo), job.arguments["title"]) if photo else job.message
-
-
-def words(stage: str) -> str:
-    """A stage in words; names such as `light 2` or `materials: albedo` go by their first word."""
-    return _WORDS.get(stage) or _WORDS.get(
-        stage.replace(":", " ").partition(" ")[0], stage.capitalize()
-    )
-
-
 def message_box(text: str, part: float | None = None, bad: bool = False) -> str:
     bar = "" if part is None else f'<div class="bar"><i style="width:{100 * part:.0f}%"></i></div>'
     kind, role = ("progress bad", "alert") if bad else ("progress", "status")
     return f'<div class="{kind}" role="{role}">{escape(text)}{bar}</div>'
-
-
-def steps(session: Session) -> list[dict[str, Any]]:
-    return [
-        {"text": step_summary(step), "on": not step.skipped, "current": k == session.edits.current}
-        for k, step in enumerate(session.edits.steps)
-    ]
-
-
-def commands(session: Session) -> str:
-    """The commands that give the same result; nothing where no photo is open."""
-    project = session.project
-    if project is None:
-        return ""
-    # Whoever has no command line here gets the names alone.
-    place = str if session.local else session.without_folders
-    lines = [f"cd {quote(place(str(project.folder)))}"]
-    scene = quote(place(str(project.scene)))
-    if session.edits.active:
-        lines.append(
-            f"materialist apply {scene} {session.workspace.name}/{EDITS} -o out.png --save edited.scene"
-        )
-        scene = "edited.scene"
-    else:
-        lines.append(f"materialist render {scene} -o out.png")
-    lines.append(f"materialist export {scene} --to glb -o out.glb")
-    return "\n".join(lines)

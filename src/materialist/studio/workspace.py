@@ -8,6 +8,7 @@ import hashlib
 import json
 import os
 import re
+import secrets
 import shutil
 import tempfile
 import threading
@@ -35,6 +36,7 @@ SCENE = "photo.scene"
 LOST = "The page has lost its session; reload it."
 _NAME = re.compile(r"photo-\d{3,6}")
 _CACHE = "materialist-cache-"
+_DISCARDED = "discarded-"
 _CACHE_MARK = "cache-of-a-studio"
 """A file in each cache: what lacks it is somebody's own."""
 _COOKIE = re.compile(r"[a-f0-9]{32}")
@@ -154,8 +156,25 @@ class WorkFolder:
             (folder / CARD).write_text(json.dumps(content, indent=1), "utf-8")
         return project
 
+    def rename(self, project: Project, title: str) -> Project:
+        """Give a project another title. Raises OutputError where it cannot be written."""
+        card = json.loads((project.folder / CARD).read_text("utf-8"))
+        card["title"] = _shown(title)
+        write_whole(project.folder / CARD, json.dumps(card, indent=1))
+        return replace(project, title=card["title"])
+
+    def discard(self, project: Project) -> None:
+        """Take a project, its edits included, out of the list; its folder goes a day later (`sweep`)."""
+        with writing(project.folder):
+            bin_folder = self.root / f"{_DISCARDED}{project.name}-{secrets.token_hex(4)}"
+            project.folder.rename(bin_folder)
+            os.utime(bin_folder)
+
     def sweep(self) -> None:
         """Remove what lies idle: folders of photos that were not taken apart to the end, uploads, and results."""
+        for folder in self.root.glob(f"{_DISCARDED}photo-*"):
+            if time.time() - folder.stat().st_mtime > SETTINGS.unfinished_seconds:
+                shutil.rmtree(folder, ignore_errors=True)
         for place in {*self.cache.iterdir()} - self.kept:
             with suppress(
                 OSError

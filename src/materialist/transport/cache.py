@@ -8,7 +8,7 @@ memory traffic.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import drjit as dr
@@ -45,6 +45,15 @@ class CacheSettings:
     specular_samples: int = 16  # rays a pixel of a wide specular level; tuned by eye
     level_share: tuple[float, ...] = (0.25, 0.375, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0)
     """Of `specular_samples`, by roughness level: a narrow lobe needs fewer."""
+    full_pixels: int = 2**20  # pixels of a picture from which a pixel has fewer rays; derived: time
+
+    def at_size(self, pixels: int) -> CacheSettings:
+        """For a picture of so many pixels: a large one has as many rays in all as one of `full_pixels`."""
+        fewer = min(1.0, self.full_pixels / pixels)
+        diffuse, specular = (
+            max(1, round(count * fewer)) for count in (self.diffuse_samples, self.specular_samples)
+        )
+        return replace(self, diffuse_samples=diffuse, specular_samples=specular)
 
 
 @dataclass(frozen=True)

@@ -39,14 +39,27 @@ class Guide:
 
     def alike(self, dy: int, dx: int) -> Array:
         """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
-        normal = _shifted(self.normal, dy, dx)
-        position = _shifted(self.position, dy, dx)
+        normal = self._shifted("normal", dy, dx)
+        position = self._shifted("position", dy, dx)
         cosine = np.clip((self.normal * normal).sum(-1), 0, 1)
         # Distance of the neighbour from the pixel's tangent plane, in pixel sizes.
         away = (self.normal * (position - self.position)).sum(-1) / (
             self.scale * np.sqrt(1 + dy * dy + dx * dx)
         )
         return cosine**_NORMAL_POWER * np.exp(-0.5 * away * away)
+
+    @cached_property
+    def _padded(self) -> dict[str, Array]:
+        """Both maps with zeros beyond the frame, as far as the taps reach."""
+        reach = len(_TAPS) // 2
+        sides = [(reach, reach), (reach, reach), (0, 0)]
+        return {name: np.pad(getattr(self, name), sides) for name in ("position", "normal")}
+
+    def _shifted(self, name: str, dy: int, dx: int) -> Array:
+        """[H, W, 3] a map with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
+        h, w = self.scale.shape
+        reach = len(_TAPS) // 2
+        return self._padded[name][reach + dy : reach + dy + h, reach + dx : reach + dx + w]
 
     @cached_property
     def mean(self) -> csr_array:
@@ -80,14 +93,6 @@ def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
     """Average `values` [H, W, C] over neighbours that lie on the same surface."""
     flat = values.flatten(0, 1).cpu().numpy()
     return placed(guide.mean @ flat).view(values.shape)
-
-
-def _shifted(image: Array, dy: int, dx: int) -> Array:
-    """`image` [H, W, ...] with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
-    h, w = image.shape[:2]
-    reach = len(_TAPS) // 2
-    padded = np.pad(image, [(reach, reach), (reach, reach), *[(0, 0)] * (image.ndim - 2)])
-    return padded[reach + dy : reach + dy + h, reach + dx : reach + dx + w]
 
 
 def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:

@@ -33,7 +33,7 @@ def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
     low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
     t = ((r - levels[low]) / (levels[low + 1] - levels[low]))[:, None]
     # --- Both tables at each pixel, by one index into [L * P, 6] ---
-    flat = tables.specular.view(-1, 6)
+    flat = tables.specular.reshape(-1, 6)
     index = low * len(r) + torch.arange(len(r), device=r.device)
     s_low = flat[index]
     s_high = flat[index + len(r)]

@@ -71,6 +71,19 @@ def test_the_window_is_found_and_a_speck_is_not():
     assert not visible_lights(replace(fit, photo=replace(fit.photo, linear=large), depth=depth))
 
 
+def test_a_window_is_found_with_the_trees_in_it():
+    """Trees outshine a dark room, a lit wall does not; a bright room has nothing that does."""
+    _, fit = rooms()
+    shown = np.full((30, 40, 3), 0.05, np.float32)
+    shown[LIGHT] = 1.0
+    shown[9:12, 8:20] = [0.1, 0.3, 0.05]
+    shown[12:14] = 0.08
+    (mask,) = visible_lights(replace(fit, photo=replace(fit.photo, linear=shown)))
+    np.testing.assert_array_equal(mask, LIGHT)
+    (mask,) = visible_lights(replace(fit, photo=replace(fit.photo, linear=np.maximum(shown, 0.25))))
+    assert not mask[9:12, 8:19].any()
+
+
 def test_specks_take_no_memory():
     specks = np.zeros((256, 256), bool)
     specks[::4, ::4] = True

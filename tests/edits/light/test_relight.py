@@ -1,12 +1,15 @@
 """Other light, against closed forms; a lamp against the inverse square law, path traced."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from edit_scenes import flat_scene
 
+from materialist.color import luminance
 from materialist.edits.core.notes import effect_notes, mean_change
+from materialist.edits.core.reach import sun_reach
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light import presets
 from materialist.edits.light.relight import (
@@ -20,6 +23,7 @@ from materialist.edits.light.relight import (
     with_sun,
 )
 from materialist.edits.material.material import edit
+from materialist.envmap import row_solid_angle, texel_directions
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 from materialist.types import Materials
@@ -56,6 +60,44 @@ def test_sun_stands_where_it_was_asked_for_and_has_its_irradiance():
         irradiance, 2 * np.pi, rtol=1e-3
     )  # twice pi, that of a sky of radiance 1
     np.testing.assert_array_equal(calm, envmap)
+
+
+def irradiance(envmap, towards):
+    """Luminance that a surface with that normal gets from a map, no horizon in its way."""
+    solid = row_solid_angle(len(envmap))[:, None]
+    cosine = np.maximum(texel_directions(*envmap.shape[:2]) @ np.asarray(towards), 0)
+    return float((luminance(envmap) * cosine * solid).sum())
+
+
+def test_a_sun_is_seen_without_further_options_and_keeps_the_brightness():
+    even = replace(SCENE, envmap=np.ones((64, 128, 3), np.float32))
+    before = irradiance(even.envmap, (0, 0, 1))
+    slanting = relight(even, sun=(180, 45)).envmap  # from behind the camera, onto the wall
+    shade = irradiance(np.where(slanting > 1, 1 / 2, slanting), (0, 0, 1))
+    lit = irradiance(slanting, (0, 0, 1))
+    assert shade == pytest.approx(before / 2, rel=1e-3), "what the sun does not reach"
+    assert 2.5 < lit / shade < 3 and lit == pytest.approx(before, rel=0.45)
+    weak = relight(even, sun=(180, 45), sun_power=0).envmap
+    np.testing.assert_allclose(weak, even.envmap, rtol=1e-6)
+
+
+def test_a_sun_that_reaches_nothing_is_named_with_one_that_does():
+    front = relight(SCENE, sun=(180, 30))
+    photo = SCENE.photo.original
+    assert sun_reach(SCENE, 180, 30)[1] > 0.9
+    assert effect_notes(SCENE, front, mean_change(SCENE, photo * np.float32(0.5))) == []
+    behind = relight(SCENE, sun=(0, 30))
+    (note,) = effect_notes(SCENE, behind, mean_change(SCENE, photo * np.float32(0.5)))
+    assert "reaches 0%" in note and "100% of it faces away" in note
+    azimuth, elevation = (float(v) for v in re.search("From (.*?),(.*?) it", note).groups())
+    assert sun_reach(SCENE, azimuth, elevation)[1] > 0.6
+
+
+def test_a_sun_behind_what_the_photo_shows_is_hidden_by_it():
+    """From the right, the block's shadow lies on the wall on its left; both face the camera."""
+    facing, lit = sun_reach(SCENE, 150, 0)
+    assert facing == 1
+    assert lit < facing - 0.02
 
 
 def test_gain_auto_keeps_the_mean_light():

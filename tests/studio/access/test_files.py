@@ -13,8 +13,8 @@ from materialist.io.photo import example_path
 from materialist.studio import server
 from materialist.studio.access.files import HandedFiles, with_known_files
 from materialist.studio.edit_list import EditList
+from materialist.studio.stage import commands
 from materialist.studio.studio import PERSON
-from materialist.studio.widgets import commands
 
 SECRET = b"the photo of somebody else"
 

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from materialist import metrics, pipeline
+from materialist.color import linear_to_srgb
 from materialist.edits.composite.composite import composite, pictures
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
@@ -28,6 +29,7 @@ from materialist.edits.light.relight import relight
 from materialist.edits.material import material
 from materialist.edits.preview import Preview
 from materialist.edits.remove.remove import remove
+from materialist.geometry.silhouette import grown
 from materialist.option_kinds import option
 from materialist.types import Array, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
@@ -44,6 +46,11 @@ from materialist_lab.bench.edits import (
 from materialist_lab.bench.report import CEILING, Column, Report, strip
 from materialist_lab.procedural.synthetic import SyntheticSample
 
+STRAY = 8 / 255
+"""Change of an sRGB-encoded channel that is seen as a dot."""
+MARGIN = 4
+"""Pixels beside those that an edit's light reaches in the truth; the fitted scene's are a little elsewhere."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class EditBench(Benchmark):
@@ -53,6 +60,7 @@ class EditBench(Benchmark):
         Column("inside", "PSNR inside", "higher", 2),
         Column("outside", "PSNR outside", "higher", 2),
         Column("overall", "PSNR overall", "higher", 2),
+        Column("stray", "stray pixels", "lower", 0),
         Column("fit_seconds", "fit s", "lower", 1),
         Column("seconds", "s", "lower", 2),
         Column("cpu_seconds", "CPU s", "lower", 2),
@@ -131,6 +139,7 @@ class EditBench(Benchmark):
         yield {
             "method": f"{edit.kind}: edit",
             **scores(picture, after, inside),
+            "stray": stray(picture, photo, before, after, inside),
             "fit_seconds": seconds,
             **cost,
         }
@@ -193,6 +202,18 @@ class EditBench(Benchmark):
                 )
 
             yield {"method": f"drop: {self.frames} frames", "sample": sample, **timed(film)[1]}
+
+
+def stray(picture: Array, photo: Array, before: Array, after: Array, inside: Array) -> int:
+    """Pixels that an edit moves by more than STRAY farther than its light reaches; pictures [H, W, 3] linear.
+
+    before, after: the true picture without and with the edit. Its light reaches the edited object `inside` [H, W] bool,
+    the pixels around which the truth changes in the mean by a level of 255 or more, and MARGIN pixels beyond.
+    """
+    moved = np.abs(linear_to_srgb(picture) - linear_to_srgb(photo)).max(-1) > STRAY
+    smooth = [cv2.GaussianBlur(linear_to_srgb(p), (0, 0), 2.0) for p in (before, after)]
+    lit = np.abs(smooth[1] - smooth[0]).max(-1) >= 1 / 255
+    return int((moved & ~grown(lit | inside, MARGIN)).sum())
 
 
 def scores(picture: Array, truth: Array, inside: Array) -> dict[str, float]:

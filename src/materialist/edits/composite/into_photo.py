@@ -4,13 +4,16 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from scipy import ndimage
 
+from materialist.edits.composite.glow import light_share
 from materialist.edits.composite.layers import Layers
-from materialist.edits.composite.upsample import GuidedUpsample, matte, strips
+from materialist.edits.composite.matte import SETTINGS as MATTE
+from materialist.edits.composite.matte import matte, unmixed
+from materialist.edits.composite.upsample import GuidedUpsample, strips
 from materialist.geometry.membrane import nearest
-from materialist.geometry.silhouette import grown, window
+from materialist.geometry.silhouette import disc, grown, window
 from materialist.types import Array, Photo, Progress
 
 
@@ -20,8 +23,7 @@ class CompositeSettings:
 
     floor: float = 0.02  # radiance added to edited and base: ratios of dark pixels count less
     max_detail_factor: float = 2.0  # on the photo's finest detail, under another light
-    edge_pixels: int = 2  # working pixels beside a changed border; derived: the matte's reach
-    rim_pixels: float = 4.0  # by which a change goes on under a body; derived: upsampling's reach
+    mixed_pixels: int = 1  # working pixels inside of a border whose maps may mix both sides
     clipped_photo: float = 0.995  # channel of a linear photo that is clipped; derived: 8 bits
     clipped_emitter: float = 0.97  # least channel of an emitter's clipped pixel; derived: 8 bits
     bright_emitter: float = 0.9  # least channel from which it may be brighter than it looks
@@ -40,7 +42,7 @@ def into_photo(
     """[H0, W0, 3] the photo with the difference of two renderings added.
 
     out = photo + change + (factor - 1) (photo - reference), of which `_same_light` and `_other_light` give the three.
-    At the border of a replaced surface both sides are mixed by the share that each has in the photo's pixel.
+    At the border of a replaced surface each side moves in its own colour, by the share that it has in the pixel.
 
     New bodies stand before it: they are the rendering alone, and hide the photo by their share. At the rim of bodies
     brighter than an ordinary photo's white, white is mixed in: a few hundredths of a lamp's radiance would fill a
@@ -60,49 +62,47 @@ def into_photo(
     bodies = layers.native.picture[box]
     bodies = bodies if photo.hdr else np.where(share < 1, np.minimum(bodies, 1), bodies)
     here = picture[box]
-    picture[box] = np.where(share > 0, share * bodies + (1 - share) * here, here)
+    mixed = np.maximum(share * bodies + (1 - share) * here, 0)
+    picture[box] = np.where(share > 0, mixed, here)
     return picture
 
 
 def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
     """[H0, W0, 3] the same without the new bodies."""
-    # --- All terms at working size, and how they are enlarged ---
+    # --- All terms at working size; each side of the border of a replaced surface is a picture of its own ---
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
-    upsample = GuidedUpsample(photo.linear, photo.original)
     native = photo.original.shape[:2]
+    clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside == 0
     alpha = matte(layers.changed, photo.original)
-    stack, clear = _under_bodies(stack, layers)
-    changed = layers.changed
-    reached = (stack[..., :3] != 0).any(-1)
+    sides = [
+        _alone(stack, photo.linear, side & clear, native)
+        for side in (layers.changed, ~layers.changed)
+    ]
+    # Beyond its own pixels a change goes as far as the border may move.
+    reached = grown((stack[..., :3] != 0).any(-1), int(np.ceil(MATTE.reach + MATTE.width)))
     out = photo.original.copy()
     if not reached.any():
         return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
-    # Two sides of the border of a replaced surface: each is enlarged from its own pixels.
-    sides = [
-        (stack[nearest(side)] if upsample.same and side.any() else stack * side.any(), side)
-        for side in (changed & clear, ~changed & clear)
-    ]
 
     def laid(rows: slice) -> None:
-        here = out[rows, columns]
         share = alpha[rows, columns]
-        large = np.zeros((*share.shape, stack.shape[-1]), np.float32)
-        for part, side in zip((share, 1 - share), sides, strict=True):
+        colours = _side_colours(alpha, photo, rows, columns)
+        moved = out[rows, columns].copy()
+        for part, colour, side in zip((share, 1 - share), colours, sides, strict=True):
             # Only the columns that this side has a share in.
             used = np.flatnonzero((part > 0).any(0))
-            if used.size:
-                local = slice(int(used[0]), int(used[-1]) + 1)
-                native_columns = slice(columns.start + local.start, columns.start + local.stop)
-                large[:, local] += part[:, local, None] * upsample(*side, rows, native_columns)
-        # out = photo + change + (factor - 1) (photo - reference), see `into_photo`.
-        change = large[..., :3]
-        excess = large[..., 3:6]
-        reference = large[..., 6:]
-        held = here if photo.hdr or layers.relit else _unclipped(here, reference)
-        moved = np.maximum(held + change + excess * (held - reference), 0)
-        out[rows, columns] = np.where((change != 0).any(-1, keepdims=True), moved, here)
+            if not used.size:
+                continue
+            local = slice(int(used[0]), int(used[-1]) + 1)
+            there = slice(columns.start + local.start, columns.start + local.stop)
+            large = side(rows, there, colour[:, local])
+            free = photo.hdr or layers.relit
+            moved[:, local] += part[:, local, None] * _difference(
+                colour[:, local], large, part[:, local, None], free
+            )
+        out[rows, columns] = np.maximum(moved, 0)
 
     # --- Strip by strip, which bounds the memory ---
     parts = list(strips(box.stop, start=box.start))
@@ -111,6 +111,64 @@ def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
             tick("photo", done, len(parts))
     tick("photo", len(parts), len(parts))
     return out
+
+
+def _alone(stack: Array, guide: Array, side: Array, native: tuple[int, ...]) -> GuidedUpsample:
+    """The terms [H, W, 9] of one side [H, W] bool of a border, carried on over the other; 0 where it has no pixel.
+
+    Maps of pixels at the border mix both sides: those inside of them speak for them.
+    """
+    size = SETTINGS.mixed_pixels
+    pure = cv2.erode(side.astype(np.uint8), disc(size), borderValue=1)
+    # What is too thin to have an inside speaks for itself.
+    thin = side & (cv2.dilate(pure, disc(2 * size)) == 0)
+    known = (pure > 0) | thin
+    if not known.any():
+        return GuidedUpsample(np.zeros_like(stack), guide, native)
+    source = nearest(known)
+    return GuidedUpsample(stack[source], guide[source], native)
+
+
+def _side_colours(alpha: Array, photo: Photo, rows: slice, columns: slice) -> tuple[Array, Array]:
+    """Colours [h, w, 3] of both sides of the border in a native window: the photo's, unmixed where both share it."""
+    here = photo.original[rows, columns]
+    mixed = np.flatnonzero(((alpha[rows, columns] > 0) & (alpha[rows, columns] < 1)).any(0))
+    if not mixed.size:
+        return here, here
+    # --- Only the columns with mixed pixels, and what their means look up ---
+    scale = max(1.0, photo.original.shape[1] / photo.linear.shape[1])
+    margin = int(np.ceil(3 * scale))
+    left = columns.start + int(mixed[0])
+    right = columns.start + int(mixed[-1]) + 1
+    around = np.s_[
+        max(rows.start - margin, 0) : rows.stop + margin, max(left - margin, 0) : right + margin
+    ]
+    pictures = unmixed(alpha[around], photo.original[around], scale)
+    top = rows.start - around[0].start
+    first = left - around[1].start
+    inner = np.s_[top : top + len(here), first : first + right - left]
+    sides = []
+    for picture in pictures:
+        side = here.copy()
+        side[:, left - columns.start : right - columns.start] = picture[inner]
+        sides.append(side)
+    return sides[0], sides[1]
+
+
+def _difference(colour: Array, large: Array, share: Array, free: bool) -> Array:
+    """[h, w, 3] by which one side's colour moves: change + (factor - 1) (colour - reference), see `into_photo`.
+
+    large: [h, w, 9] the three terms. share: [h, w, 1] of the side; where it is a part of a pixel, no more than white is
+    mixed in, unless the picture is `free` of that bound.
+    """
+    change = large[..., :3]
+    excess = large[..., 3:6]
+    reference = large[..., 6:]
+    held = colour if free else _unclipped(colour, reference)
+    moved = np.maximum(held + change + excess * (held - reference), 0)
+    if not free:
+        moved = np.where(share < 1, np.minimum(moved, np.maximum(held, 1)), moved)
+    return np.where((change != 0).any(-1, keepdims=True), moved - colour, 0)
 
 
 def onto_working(photo: Photo, layers: Layers) -> Array:
@@ -132,12 +190,6 @@ def _terms(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
         covered = layers.covered[..., None]
         change = np.where(covered, layers.edited - reference, change)
         excess = np.where(covered, -1, excess)
-    if not (photo.hdr or layers.relit):
-        # As with the rim of bodies: where a surface ends, white is mixed in, not what outshines it.
-        edge = grown(layers.changed, SETTINGS.edge_pixels) & grown(
-            ~layers.changed, SETTINGS.edge_pixels
-        )
-        change = np.where(edge[..., None], np.minimum(change, np.maximum(1 - reference, 0)), change)
     return change.astype(np.float32), excess.astype(np.float32), reference
 
 
@@ -174,18 +226,6 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     return moved - photo.linear, np.minimum(factor, SETTINGS.max_detail_factor) - 1, photo.linear
 
 
-def _under_bodies(stack: Array, layers: Layers) -> tuple[Array, Array]:
-    """(stack [H, W, 9], [H, W] bool where it is known), continued under the rim of bodies at native resolution.
-
-    Pixels beside a body look up values under its rim when they are enlarged, where the layers show the body itself.
-    """
-    clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside == 0
-    if clear.all() or not clear.any():
-        return stack, clear
-    away, (row, column) = ndimage.distance_transform_edt(~clear, return_indices=True)
-    return stack[row, column], away <= SETTINGS.rim_pixels
-
-
 def _unclipped(photo: Array, base: Array) -> Array:
     """A channel at the photo's white is a lower bound: where the fit says more, its value is taken."""
     return np.where(photo >= SETTINGS.clipped_photo, np.maximum(photo, base), photo)
@@ -200,9 +240,9 @@ def in_photo(picture: Array, photo: Photo, seen: Array, emitters: dict) -> Array
     dim = float(emitters["dim"])
     if dim == 1 or not seen.any():
         return picture
-    share = matte(seen, photo.original)
+    share = light_share(seen, photo)
     picture = picture.copy()
-    box = window(seen, picture.shape[:2], 4)
+    box = window(share > 0)
     share = share[box][..., None]
     original = photo.original[box]
     here = picture[box]

@@ -210,10 +210,10 @@ def difference(
     # --- Denoise both, and keep the difference by its gain ---
     if guides is not None:
         box = window(near, margin=SETTINGS.denoiser_margin)
-        for picture, noisy, (albedo, normal) in zip(
-            (b, e), (b, without_fireflies(e, changed)), guides, strict=True
-        ):
-            picture[box] = denoised(noisy[box], albedo[box], normal[box])
+        # Both alike: a sparkle taken from one picture alone would be a dot in their difference.
+        for picture, (albedo, normal) in zip((b, e), guides, strict=True):
+            noisy = without_fireflies(picture[box])
+            picture[box] = denoised(noisy, albedo[box], normal[box])
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
@@ -260,11 +260,10 @@ def _mean(values: Array) -> Array:
     )
 
 
-def without_fireflies(picture: Array, where: Array | None = None) -> Array:
+def without_fireflies(picture: Array) -> Array:
     """[H, W, 3] linear with lone bright pixels brought down, their colour kept; a highlight of two pixels stays.
 
-    They come from single paths, as where glass focuses small lights. `where` [H, W] bool: pixels that may change, all
-    by default.
+    They come from single paths, as where glass focuses small lights.
     """
     light = luminance(picture)
     around = np.ones((3, 3), bool)
@@ -274,7 +273,7 @@ def without_fireflies(picture: Array, where: Array | None = None) -> Array:
         SETTINGS.firefly_ratio * rank_filter(light, -2, footprint=around, mode="nearest"),
         SETTINGS.min_firefly,
     )
-    fireflies = (light > limit) & (True if where is None else where)
+    fireflies = light > limit
     return (picture * np.where(fireflies, limit / np.maximum(light, 1e-9), 1)[..., None]).astype(
         np.float32
     )

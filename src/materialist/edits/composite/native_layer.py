@@ -6,7 +6,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.edits.composite.upsample import matte
+from materialist.edits.composite.matte import matte, unmixed
 from materialist.edits.core.renderer import (
     EditRenderer,
     RenderOptions,
@@ -110,8 +110,13 @@ def native_layer(
     # --- Coverage and radiance at native size ---
     share = np.zeros(native, np.float32)
     whole = np.zeros((*native, 3), np.float32)
-    share[there] = _behind_things(target.mi_scene, sight, alone, scene, there, gap, stands=stands)
-    whole[there] = np.where(share[there][..., None] > 0, _resized(picture, sight.share.shape), 0)
+    bodies_share, hidden = _behind_things(
+        target.mi_scene, sight, alone, scene, there, gap, stands=stands
+    )
+    share[there] = bodies_share
+    # A share of a pixel's body takes the place of what it hides, not of the thing before it.
+    colours = _resized(picture, sight.share.shape) + scene.photo.original[there] - hidden
+    whole[there] = np.where(bodies_share[..., None] > 0, colours, 0)
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
         small = np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8)))
@@ -135,31 +140,36 @@ def _resized(values: Array, shape: tuple[int, ...], kind: int = cv2.INTER_LINEAR
 
 def _behind_things(
     mi_scene: Any, sight: Any, alone: Any, scene: Scene, there: Box, gap: float, *, stands: bool
-) -> Array:
+) -> tuple[Array, Array]:
     """[h, w] share of the bodies, with the photo's own silhouettes where its surface is more than `gap` before them.
 
-    The mesh has the steps of working pixels there; `upsample.matte` finds the thing's outline in the photo. A surface
-    less than `gap` before a body is the ground that it `stands` on, and hides nothing: its bumps would make the foot
-    ragged.
+    And [h, w, 3] the colours that they hide, without those of the things before them. The mesh has the steps of working
+    pixels there; `matte` finds the thing's outline in the photo. A surface less than `gap` before a body is the ground
+    that it `stands` on, and hides nothing: its bumps would make the foot ragged.
     """
     from materialist.render.pixels import first_hits
 
     native = scene.photo.original.shape[:2]
     working = scene.depth.shape
     share = alone.share if stands else sight.share
+    photo = scene.photo.original[there]
     hidden = alone.share > sight.share + 0.05
     if hidden.any():
         ground = first_hits(mi_scene, scene.camera, {"surface": None}, native, there)
         hidden &= (ground.share > 0) & (alone.depth - ground.depth > gap)
     if not hidden.any():
-        return share
+        return share, photo
     near = grown(hidden, int(np.ceil(2 * max(native[0] / working[0], 1.0))))
     whole = np.zeros(native, np.float32)
     whole[there] = spread_known(alone.depth)
     depth = spread_known(_resized(whole, working, cv2.INTER_NEAREST))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
-    cut = alone.share * (1 - matte(thing, scene.photo.original)[there])
-    return np.where(near, cut, share).astype(np.float32)
+    before = matte(thing, scene.photo.original)[there]
+    _, behind = unmixed(before, photo, max(1.0, native[1] / working[1]))
+    # Where nothing but the thing is seen, nothing is known of what it hides.
+    mixed = near & (before > 0) & (before < 1)
+    cut = np.where(near, alone.share * (1 - before), share)
+    return cut.astype(np.float32), np.where(mixed[..., None], behind, photo)
 
 
 def _extent(alone: Any) -> float:

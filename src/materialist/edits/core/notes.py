@@ -10,6 +10,10 @@ from materialist.types import Array, Scene
 
 LITTLE = 5 / 255
 """Mean change of a picture (sRGB-encoded) below which another light is hardly seen."""
+REACHED = 1 / 3
+"""Share of the photo's surfaces below which the command says why a sun reaches no more."""
+MENTIONED = 0.05
+"""Share of them from which on a cause of that is named."""
 MEASURED = 2_000_000
 """Pixels that a mean change is measured on."""
 PICTURED = "Glass of the two-interface model is a picture in the photo: "
@@ -53,12 +57,34 @@ def mean_change(scene: Scene, picture: Array) -> float:
 def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
     """What to say of another light whose picture, or most changed frame, has no more than that `mean_change`."""
     asked = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
+    suns = [step["sun"] for step in asked if step["kind"] == "light" and "sun" in step]
+    if suns and (notes := sun_notes(edited, *suns[-1])):
+        return notes
     if change >= LITTLE or not any(step["kind"] == "light" for step in asked):
         return []
     return [
         f"The new light changes the picture by {255 * change:.1f} of 255 levels in the mean: the light that was found "
         "is nearly even, or the new one does not reach what the photo shows. A lamp, a stronger or lower sun, or a "
         "smaller ambient shows more."
+    ]
+
+
+def sun_notes(scene: Scene, azimuth: float, elevation: float) -> list[str]:
+    """What to say of a sun that reaches little of what the photo shows."""
+    from materialist.edits.core.reach import better_sun, sun_reach
+
+    facing, lit = sun_reach(scene, azimuth, elevation)
+    if lit >= REACHED:
+        return []
+    causes = {
+        "of it faces away from the sun": 1 - facing,
+        "lies behind walls or things of the photo": facing - lit,
+    }
+    reasons = [f"{share:.0%} {cause}" for cause, share in causes.items() if share >= MENTIONED]
+    better, share = better_sun(scene, azimuth, elevation)
+    return [
+        f"The sun reaches {lit:.0%} of what the photo shows, and the rest is darker than before: "
+        f"{' and '.join(reasons)}. From {better[0]:g},{better[1]:g} it would reach {share:.0%}."
     ]
 
 

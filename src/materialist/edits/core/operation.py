@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
-from materialist.option_kinds import OperationOptions
+from materialist.option_kinds import OperationOptions, declarations
 
 if TYPE_CHECKING:
     from materialist.types import Scene
@@ -83,3 +83,9 @@ class Operation:
     @property
     def name(self) -> str:
         return self.options.operation
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What a step of a list of edits may say."""
+        declared = declarations(self.options).items()
+        return (*self.target.keys, *(name for name, (option, _) in declared if option.written))

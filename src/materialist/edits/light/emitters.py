@@ -31,8 +31,10 @@ class EmitterSettings:
     # Which pixels are of an emitter.
     clipped: float = 0.97  # least channel from which a pixel's radiance is unknown; derived: 8 bits
     min_hdr_ratio: float = 4.0  # to the median radiance of an HDR photo
-    min_rim: float = 0.6  # share of `clipped` from which pixels beside it belong to it, as a shade
-    max_rim_reach: float = 0.015  # how far beside it, share of the longer side
+    min_rim: float = 0.6  # share of `clipped` from which pixels beside it always belong to it
+    rim_ratio: float = 2.5  # to the median radiance of the photo; from there on they do, too
+    max_outshining_reach: float = 0.08  # how far beside it, share of the longer side
+    max_rim_reach: float = 0.015  # likewise, in a photo as bright as its lights
     gap: float = 0.006  # half of the gaps that are closed, as leaves before a window; likewise
     max_upward: float = 0.7  # mean Y of the normals; above, a surface reflects or lies in the sun
     min_area: float = 0.001  # share of the picture; less is a highlight
@@ -66,16 +68,12 @@ def visible_lights(scene: Scene) -> list[Array]:
     if not bright.any():
         return []
     # --- Grown over the bright pixels beside them, and gaps closed ---
-    near = ndimage.distance_transform_edt(~bright) <= max(1, round(SETTINGS.max_rim_reach * longer))
-    grown = ndimage.binary_propagation(
-        bright, mask=(value >= SETTINGS.min_rim * threshold) & surface & near
-    )
-    closed = (
-        cv2.morphologyEx(
-            grown.astype(np.uint8), cv2.MORPH_CLOSE, disc(round(SETTINGS.gap * longer))
-        )
-        > 0
-    )
+    near = _beside(bright, SETTINGS.max_rim_reach) & (value >= SETTINGS.min_rim * threshold)
+    near |= _beside(bright, SETTINGS.max_outshining_reach) & _outshining(photo, surface)
+    grown = ndimage.binary_propagation(bright, mask=near & surface)
+    gap = disc(round(SETTINGS.gap * longer))
+    closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, gap) > 0
+    closed = ndimage.binary_fill_holes(closed) & surface
     masks = [
         mask
         for mask in _parts(closed, SETTINGS.min_area * closed.size)
@@ -83,6 +81,17 @@ def visible_lights(scene: Scene) -> list[Array]:
         and scene.normal[mask][:, 1].mean() <= SETTINGS.max_upward
     ]
     return sorted(masks, key=lambda mask: -int(mask.sum()))
+
+
+def _beside(mask: Array, reach: float) -> Array:
+    """[H, W] bool: within so many longer sides of a mask [H, W] bool, and at least its neighbours."""
+    return ndimage.distance_transform_edt(~mask) <= max(1, round(reach * max(mask.shape)))
+
+
+def _outshining(photo: Photo, surface: Array) -> Array:
+    """[H, W] bool: what is much brighter than the surfaces are: trees in a window, the shade of a lamp."""
+    radiance = photo.linear.mean(-1)
+    return radiance >= SETTINGS.rim_ratio * float(np.median(radiance[surface]))
 
 
 def dimmed(

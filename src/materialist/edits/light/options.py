@@ -63,7 +63,11 @@ class Relight(OperationOptions):
         metavar="AZ,EL",
     )
     sun_power: float = option(
-        1.0, "Its light, relative to the mean light of the photo.", low=0, high=1e4, needs="sun"
+        1.0,
+        "Its strength; 1 shows clear shadows and keeps the brightness.",
+        low=0,
+        high=1e4,
+        needs="sun",
     )
     ambient: float = option(1.0, "Factor on the light that was there.", low=0, high=1e4)
     lamps: tuple[Lamp | tuple[float, float, float, float, float], ...] = option(

@@ -70,6 +70,10 @@ class Gate:
     shown before it was given. The name of a page (Gradio's session hash) belongs to the browser that used it first.
     """
 
+    headers = HEADERS
+    upload_place = _UPLOAD
+    """Headers of every answer, and the one place that takes bodies as large as an upload."""
+
     def __init__(
         self,
         app: Application,
@@ -102,8 +106,8 @@ class Gate:
         address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
         max_bytes = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
-        if scope["path"] == _UPLOAD:
-            max_bytes = _largest_upload()
+        if scope["path"] == self.upload_place:
+            max_bytes = largest_upload()
         request = Request(scope, _limited(receive, max_bytes))
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies, address)
@@ -111,7 +115,7 @@ class Gate:
         async def answer(message: Any) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                headers.update(HEADERS)
+                headers.update(self.headers)
                 for name, value in cookies.items():
                     secure = (
                         "; Secure"
@@ -185,7 +189,10 @@ class Gate:
         person = self._person(request, cookies, login)
         self.studio.note_sender(person, address)
         request.scope["headers"].append((PERSON_HEADER.encode(), person.encode()))
-        # --- What is asked: only what the page itself uses ---
+        return await self._admitted(request, person)
+
+    async def _admitted(self, request: Request, person: str) -> Any:
+        """The application that answers a person who may come in: only what the page itself asks for."""
         path = request.scope["path"]
         if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
             return PlainTextResponse("The studio has no such place.\n", 404)
@@ -200,7 +207,7 @@ class Gate:
                 self.studio.session(page, person, beats=True)
                 return partial(_held, self.app, self.studio, page)
             if path == _UPLOAD:
-                return partial(_upload, self.app, self.studio, person, _promised(request))
+                return partial(_upload, self.app, self.studio, person, promised_size(request))
             if path in _EVENTS:
                 return await self._event(request, person)
         except InputError as error:
@@ -304,17 +311,17 @@ async def _held(
         studio.leave(page)
 
 
-def _largest_upload() -> int:
+def largest_upload() -> int:
     """Bytes of the largest body of an upload: a file, and what surrounds it in a form."""
     return int(SETTINGS.upload_megabytes * 1e6) + SETTINGS.request_bytes
 
 
-def _promised(request: Request) -> int:
+def promised_size(request: Request) -> int:
     """The length that an upload gives. Raises InputError for none, another way of saying it, and too much."""
     size = request.headers.get("content-length", "")
     if not size.isdigit() or "transfer-encoding" in request.headers:
         raise InputError("An upload must say how long it is.")
-    if int(size) > _largest_upload():
+    if int(size) > largest_upload():
         raise InputError(f"An upload may have up to {SETTINGS.upload_megabytes} MB.")
     return int(size)
 

@@ -1,0 +1,160 @@
+"""Photos with a rendered thing in them whose share of every pixel is known, and how well its border is found."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import mitsuba as mi
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+from scipy.spatial.transform import Rotation
+
+from materialist.color import linear_to_srgb, srgb_to_linear
+from materialist.edits.composite.matte import matte, unmixed
+from materialist.edits.insert.meshes import read_model
+from materialist.geometry.silhouette import disc
+from materialist.io.photo import read_photo
+from materialist.render.pixels import first_hits
+from materialist.render.scene import seen_shape
+from materialist.types import Array, Body, Camera, Photo
+from materialist_lab.procedural.options import captures
+
+COLOURS = ((0.5, 0.06, 0.04), (0.7, 0.66, 0.58), (0.05, 0.12, 0.35), (0.2, 0.14, 0.08))
+"""Linear albedo of the things, in turn: some stand out, some are like wood and walls."""
+EXTENT = 0.45
+"""Longest side of a thing, share of the photo's height."""
+LENS = 0.7
+"""Standard deviation of the blur of lens and sensor, native pixels."""
+NOISE = 0.01
+"""Standard deviation of the sensor's noise, sRGB-encoded."""
+BORDER = 8
+"""Native pixels on both sides of a border within which a matte is judged."""
+PAINT = (0.35, 0.8, 1.3)
+"""Factors on the colour of a thing that is painted anew."""
+TOLERANCE = 2.0
+"""Native pixels within which two borders agree."""
+
+
+@dataclass(frozen=True)
+class KnownComposite:
+    """A photo with a rendered thing in it."""
+
+    name: str
+    photo: Photo
+    share: Array
+    """[H0, W0] float32 in [0, 1]: of the thing in each native pixel."""
+    colour: Array
+    """[H0, W0, 3] float32 linear: the thing's colour where its share is above 0."""
+
+    @property
+    def mask(self) -> Array:
+        """[H, W] bool: pixels of working size that are mostly of the thing."""
+        size = self.photo.linear.shape[1::-1]
+        return np.asarray(cv2.resize(self.share, size, interpolation=cv2.INTER_AREA)) > 0.5
+
+    def errors(self, mask: Array) -> dict[str, float]:
+        """How far the matte of a mask [H, W] bool, and the thing painted anew by it, are from the truth."""
+        picture = self.photo.original
+        share = matte(mask, picture)
+        mixed = ((self.share > 0.001) & (self.share < 0.999)).astype(np.uint8)
+        near = cv2.dilate(mixed, disc(BORDER)) > 0
+        # --- The thing in another paint: its own colour times PAINT, the rest as it is ---
+        paint = np.array(PAINT, np.float32) - 1
+        scale = picture.shape[1] / mask.shape[1]
+        front, _ = unmixed(share, picture, max(1.0, scale))
+        painted = picture + share[..., None] * front * paint
+        truth = picture + self.share[..., None] * self.colour * paint
+        away = linear_to_srgb(np.maximum(painted, 0)) - linear_to_srgb(np.maximum(truth, 0))
+        wrong = share - self.share
+        return {
+            "border": boundary_f(share > 0.5, self.share > 0.5),
+            "sad": float(np.abs(wrong).sum()) / 1000,
+            "mse": 1000 * float((wrong[near] ** 2).mean()),
+            "fringe": 255 * float(np.sqrt((away[near] ** 2).mean())),
+        }
+
+
+def known_composites(
+    data: Path, names: Sequence[str], size: int, seed: int
+) -> Iterator[KnownComposite]:
+    """A thing of DATA's meshes that no network has learnt from in each of these photos of DATA."""
+    meshes = captures(data / "meshes", "**/*.ply", True)
+    for k, name in enumerate(names):
+        rng = np.random.default_rng([seed, k])
+        photo = read_photo(str(data / "photos" / name), size=size)
+        mesh = meshes[k % len(meshes)]
+        share, colour = _rendered(mesh, photo, np.array(COLOURS[k % len(COLOURS)]), rng)
+        # --- Over the photo, in linear light, through the lens and onto the sensor ---
+        covered = _blurred(share[..., None])
+        mixed = _blurred(share[..., None] * colour + (1 - share[..., None]) * photo.original)
+        native = _as_taken(mixed, rng)
+        linear = cv2.resize(native, photo.linear.shape[1::-1], interpolation=cv2.INTER_AREA)
+        shown = replace(photo, original=native, linear=np.asarray(linear), source=None)
+        yield KnownComposite(f"{mesh.stem} in {Path(name).stem}", shown, covered[..., 0], colour)
+
+
+def _rendered(
+    mesh: Path, photo: Photo, albedo: Array, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Share [H0, W0] of a turned mesh in the lower middle of a photo, and its colour [H0, W0, 3] under a lamp."""
+    camera = photo.camera
+    (body,) = read_model(mesh).parts
+    turn = Rotation.from_euler("yx", [rng.uniform(0, 360), 20], degrees=True)
+    placed = _placed(body, turn, camera, rng.uniform(-0.15, 0.15))
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "embree_use_robust_intersections": True,
+            "body0": seen_shape(mi, placed, {"type": "diffuse"}),
+        }
+    )
+    sight = first_hits(scene, camera, {"body0": None}, photo.original.shape[:2])
+    # --- A lamp above, and even light: no path is traced ---
+    lamp = np.array([0.4, 0.8, 0.45])
+    facing = np.maximum(sight.normal @ (lamp / np.linalg.norm(lamp)), 0)[..., None]
+    colour = np.where(sight.share[..., None] > 0, albedo * (0.35 + 0.8 * facing), 0)
+    sheen = 0.3 * facing**40
+    return sight.share, (colour + sheen).astype(np.float32)
+
+
+def _placed(body: Body, turn: Rotation, camera: Camera, aside: float) -> Body:
+    """The body at depth 10, a share of the picture's height large, `aside` of the middle by a share of the width."""
+    corners = turn.apply(body.vertices.astype(np.float64))
+    middle = (corners.min(0) + corners.max(0)) / 2
+    height = 10 * camera.height / camera.focal
+    factor = EXTENT * height / float(np.ptp(corners, axis=0).max())
+    shift = np.array([aside * height * camera.width / camera.height, -0.12 * height, -10])
+    vertices = ((corners - middle) * factor + shift).astype(np.float32)
+    normals = turn.apply(body.normals.astype(np.float64)).astype(np.float32)
+    return replace(body, vertices=vertices, normals=normals)
+
+
+def _blurred(picture: Array) -> Array:
+    """A native picture [H0, W0, C] through the lens."""
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), LENS)).reshape(picture.shape)
+
+
+def _as_taken(picture: Array, rng: np.random.Generator) -> Array:
+    """Linear [H0, W0, 3] with a sensor's noise, in 8 bits."""
+    noisy = linear_to_srgb(picture) + rng.normal(0, NOISE, picture.shape)
+    levels = np.round(np.clip(noisy, 0, 1) * 255) / 255
+    return srgb_to_linear(levels.astype(np.float32))
+
+
+def boundary_f(found: Array, true: Array, tolerance: float = TOLERANCE) -> float:
+    """F measure of the border of a mask [H, W] bool against that of the true one, within a tolerance in pixels."""
+    borders = [_border(mask) for mask in (found, true)]
+    if not all(border.any() for border in borders):
+        return 0.0
+    near = [distance_transform_edt(~border) <= tolerance for border in borders]
+    precision = float(near[1][borders[0]].mean())
+    recall = float(near[0][borders[1]].mean())
+    return 2 * precision * recall / max(precision + recall, 1e-9)
+
+
+def _border(mask: Array) -> Array:
+    """[H, W] bool: pixels of a mask beside one outside of it; the picture's rim is no border."""
+    padded = np.pad(mask.astype(np.uint8), 1, mode="edge")
+    inner = cv2.erode(padded, np.ones((3, 3), np.uint8))
+    return mask & (inner[1:-1, 1:-1] == 0)

@@ -1,0 +1,189 @@
+"""The darkroom's server: its places, behind the gate."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.websockets import WebSocket
+
+from materialist.darkroom import bodies, editing, opening, taking
+from materialist.darkroom.channel import channel
+from materialist.darkroom.desk import Desk, Desks
+from materialist.darkroom.door import CHANNEL, UPLOAD, Door
+from materialist.darkroom.endpoint import got, guarded, posted
+from materialist.darkroom.state import (
+    about,
+    example_file,
+    light_jpeg,
+    map_jpeg,
+    native_jpeg,
+    photo_jpeg,
+    report_of,
+    state,
+    working_jpeg,
+)
+from materialist.studio.studio import Studio
+
+SWEEP = 10.0
+"""Seconds between two looks for pages that were closed."""
+STATIC = Path(str(files("materialist.darkroom") / "static"))
+_POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
+    # Photos.
+    "start": (bodies.Start, opening.start),
+    "open": (bodies.Named, opening.open_project),
+    "close": (bodies.Nothing, opening.close_project),
+    "rename": (bodies.Renamed, opening.rename),
+    "discard": (bodies.Named, opening.discard),
+    "stop": (bodies.Numbered, lambda desk, body: desk.stop(body.number)),
+    # Selecting.
+    "pick": (bodies.Pick, editing.pick),
+    "point": (bodies.Pointed, editing.point),
+    "deselect": (bodies.Nothing, editing.deselect),
+    # Changing.
+    "set": (bodies.Options, editing.set_options),
+    "use": (bodies.File, editing.use_file),
+    "light": (bodies.Chosen, editing.choose_light),
+    "lamp": (bodies.NewLamp, editing.add_lamp),
+    "lamps": (bodies.Lamps, editing.set_lamps),
+    "object": (bodies.Chosen, editing.choose_object),
+    "place": (bodies.Put, editing.put_object),
+    "fall": (bodies.Fall, editing.let_fall),
+    # The list.
+    "act": (bodies.Act, editing.act),
+    "undo": (bodies.Undo, editing.undo),
+    "load": (bodies.LoadedList, taking.load),
+    # Taking away.
+    "final": (bodies.Nothing, taking.render),
+    "take": (bodies.Take, taking.take),
+}
+"""Place under /api -> the body of its requests, and what answers them."""
+
+
+def application(
+    studio: Studio,
+    *,
+    host: str,
+    port: int,
+    password: str | None = None,
+    proxy: str | None = None,
+) -> Door:
+    """The page behind its gate, an ASGI application."""
+    studio.work.sweep()
+    desks = Desks(studio)
+    app = Starlette(routes=_routes(desks), lifespan=_sweeping(studio))
+    single = host if studio.single_user else None
+    return Door(app, studio, host=single, proxy=proxy, password=password, port=port)
+
+
+def _sweeping(studio: Studio) -> Any:
+    """A lifespan in which the memory of closed pages is given back."""
+
+    @asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        task = asyncio.create_task(sweep())
+        yield
+        task.cancel()
+
+    async def sweep() -> None:
+        while True:
+            await asyncio.sleep(SWEEP)
+            await run_in_threadpool(studio.leave_idle)
+
+    return lifespan
+
+
+def _routes(desks: Desks) -> list[Any]:
+    studio = desks.studio
+
+    async def upload(request: Request) -> Response:
+        return await opening.receive_upload(desks, request)
+
+    async def socket(connection: WebSocket) -> None:
+        await channel(desks, connection)
+
+    read = {
+        "/api/about": lambda desk, request: _json(about(studio, desk.session.person)),
+        "/api/arrive": lambda desk, request: _json(opening.arrive(desk)),
+        "/api/state": _state,
+        "/api/projects": lambda desk, request: _json(opening.listed(desk)),
+        "/api/report": lambda desk, request: _json(report_of(desk)),
+        "/api/photo": _photo,
+        "/api/light/{name}": lambda desk, request: _jpeg(light_jpeg(request.path_params["name"])),
+        "/api/example/{name}": _example,
+        "/api/map/{name}": lambda desk, request: _jpeg(map_jpeg(desk, request.path_params["name"])),
+        "/api/picture/{project}/{name}": _picture,
+        "/api/file/{file}": taking.download,
+    }
+    return [
+        Route("/", _page),
+        *(Route(place, got(desks, make)) for place, make in read.items()),
+        *(
+            Route(f"/api/{name}", posted(desks, kind, change), methods=["POST"])
+            for name, (kind, change) in _POSTED.items()
+        ),
+        Route(UPLOAD, guarded(studio, upload), methods=["POST"]),
+        WebSocketRoute(CHANNEL, socket),
+        Route("/favicon.svg", _favicon),
+        Mount("/assets", _Assets(directory=STATIC / "assets", check_dir=False)),
+    ]
+
+
+class _Assets(StaticFiles):
+    """The built files. Their names stay the same, so a browser asks whether they have changed."""
+
+    def file_response(self, *arguments: Any, **options: Any) -> Response:
+        response = super().file_response(*arguments, **options)
+        response.headers["cache-control"] = "no-cache"
+        return response
+
+
+async def _page(request: Request) -> Response:
+    page = STATIC / "index.html"
+    if not page.is_file():
+        words = "The page is not built; see docs/studio.md: npm ci && npm run build in web/.\n"
+        return PlainTextResponse(words, 503)
+    return FileResponse(page, headers={"cache-control": "no-cache"})
+
+
+async def _favicon(request: Request) -> Response:
+    return FileResponse(STATIC / "favicon.svg")
+
+
+def _state(desk: Desk, request: Request) -> Response:
+    """What the page shows; the photo without its edits while the preview is still being built."""
+    live = desk.session.live
+    return _json(state(desk, with_edits=live is None or live.ready))
+
+
+def _photo(desk: Desk, request: Request) -> Response:
+    """The open photo; `working=1` at working size."""
+    return _jpeg((working_jpeg if "working" in request.query_params else native_jpeg)(desk))
+
+
+def _example(desk: Desk, request: Request) -> Response:
+    file = example_file(desk.studio, request.path_params["name"])
+    return _jpeg(photo_jpeg(str(file), file.stat().st_mtime, 320))
+
+
+def _picture(desk: Desk, request: Request) -> Response:
+    file = opening.picture_of(desk, request)
+    return _jpeg(photo_jpeg(str(file), file.stat().st_mtime, 1024))
+
+
+def _json(content: Any) -> Response:
+    return JSONResponse(content, headers={"cache-control": "no-store"})
+
+
+def _jpeg(content: bytes) -> Response:
+    return Response(
+        content, media_type="image/jpeg", headers={"cache-control": "private, no-cache"}
+    )

@@ -1,0 +1,195 @@
+"""What a page needs beside its session: the jobs that it follows, and what the pointer has pointed at."""
+
+import re
+import threading
+import time
+import traceback
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from materialist.edits.core.notes import noise_notes
+from materialist.edits.select.select import select
+from materialist.errors import InputError, MaterialistError
+from materialist.jobs.queue import QUEUED, STOPPED, Job
+from materialist.jobs.worker import DONE, FAILED
+from materialist.studio.session import Session
+from materialist.studio.stage import failure_message, words
+from materialist.studio.studio import Studio
+from materialist.studio.workspace import LOST, Project
+from materialist.types import Array
+
+POINTED = 12
+"""Objects under the pointer that are remembered: a click on what is outlined takes just that."""
+POLL = 0.05
+"""Seconds between two looks at a job."""
+_PAGE = re.compile(r"[0-9a-f]{32}")
+
+
+@dataclass(eq=False)
+class Followed:
+    """A job that a page shows."""
+
+    job: Job
+    number: int
+    notes: list[str] = field(default_factory=list)
+    result: dict[str, Any] | None = None
+    """What it made, for the page; a file by the id under which it is handed over."""
+    finished: bool = False
+    """Whether what follows the job was done, too."""
+
+
+class Desk:
+    """One page: its session, and what it follows. Its methods may be called from any thread."""
+
+    def __init__(self, studio: Studio, session: Session) -> None:
+        self.studio = studio
+        self.session = session
+        self.revision = 0
+        """Grows when something that the page shows has changed without a request of this page."""
+        self.expected: Project | None = None
+        """The photo that is being taken apart, and is opened when that is done."""
+        self.followed: list[Followed] = []
+        self._numbers = 0
+        self._at_work = 0
+        self._pointed: OrderedDict[tuple[int, int], Array] = OrderedDict()
+        self._scene: object = None
+        self._lock = threading.Lock()
+        self._pointing = threading.Lock()
+
+    def changed(self) -> None:
+        """Let the page, and others of the same session, ask for what is shown."""
+        with self._lock:
+            self.revision += 1
+
+    @contextmanager
+    def at_work(self) -> Iterator[None]:
+        """While a request, or the channel, is at work the page is open, however long it takes."""
+        with self._lock:
+            self._at_work += 1
+            self.session.beats = True
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._at_work -= 1
+                self.session.beats = self._at_work > 0
+                self.session.seen = time.monotonic()
+
+    # Jobs
+
+    def follow(self, job: Job, then: Callable[[Followed], None]) -> Followed:
+        """Show a job on the page, and call then(it) in another thread when it is done."""
+        with self._lock:
+            self._numbers += 1
+            entry = Followed(job, self._numbers)
+            # Those that are over were shown.
+            self.followed = [*(one for one in self.followed if not one.finished), entry]
+        threading.Thread(target=self._wait, args=(entry, then), daemon=True).start()
+        return entry
+
+    def _wait(self, entry: Followed, then: Callable[[Followed], None]) -> None:
+        job = entry.job
+        while not job.over:
+            time.sleep(POLL)
+        try:
+            then(entry)
+        except MaterialistError as error:
+            entry.notes.append(self.session.without_folders(str(error)))
+        except Exception as error:
+            traceback.print_exception(error)
+            entry.notes.append("Something went wrong inside; the terminal of the studio says what.")
+        entry.finished = True
+        self.changed()
+
+    def stop(self, number: int) -> None:
+        """Stop a job that the page follows. Raises InputError where there is none of that number."""
+        for entry in self.followed:
+            if entry.number == number:
+                return self.studio.jobs.stop(entry.job)
+        raise InputError("That work is not there any more.")
+
+    def shown_jobs(self) -> list[dict[str, Any]]:
+        """The followed jobs as the page shows them."""
+        return [self._shown(entry) for entry in self.followed]
+
+    def _shown(self, entry: Followed) -> dict[str, Any]:
+        job = entry.job
+        state = job.state if entry.finished or not job.over else "running"
+        part = min(1.0, job.done / job.total) if job.total and not job.over else None
+        found = [facts["name"] for facts in job.intermediate]
+        return {
+            "number": entry.number,
+            "kind": job.kind,
+            "state": state,
+            "text": self._words(entry),
+            "part": part,
+            "seconds": int(job.seconds),
+            "found": list(dict.fromkeys(found)),
+            "project": job.folder.name if job.kind == "invert" else None,
+            "result": entry.result,
+        }
+
+    def _words(self, entry: Followed) -> str:
+        job = entry.job
+        if job.state == QUEUED:
+            return f"Waiting: {self.studio.jobs.ahead(job)} before yours"
+        if job.state == STOPPED:
+            return "Stopped; nothing was changed."
+        if job.state == FAILED:
+            return self.session.without_folders(failure_message(job))
+        if job.state == DONE and entry.finished:
+            notes = noise_notes() if job.kind == "final" else []
+            return " ".join([*entry.notes, *notes]) or f"Done in {job.seconds:.0f} s."
+        return words(job.stage or "start")
+
+    # The pointer
+
+    def pointed(self, x: float, y: float, *, compute: bool = True) -> Array | None:
+        """[H, W] bool of the object that a click at a pixel takes, or None; remembered for that click.
+
+        compute: False gives only what is remembered. Raises InputError where a click would.
+        """
+        scene = self.session.scene
+        place = self.session.pixel(x, y)
+        with self._pointing:
+            if scene is not self._scene:
+                self._pointed.clear()
+                self._scene = scene
+            if place not in self._pointed and compute:
+                # While one is being found, the next pointer waits: a page asks for one at a time.
+                self._pointed[place] = select(scene, click=place)
+                while len(self._pointed) > POINTED:
+                    self._pointed.popitem(last=False)
+            return self._pointed.get(place)
+
+
+class Desks:
+    """The desks of all pages."""
+
+    def __init__(self, studio: Studio) -> None:
+        self.studio = studio
+        self._desks: WeakKeyDictionary[Session, Desk] = WeakKeyDictionary()
+        self._lock = threading.Lock()
+
+    def of(self, page: str | None, person: str) -> Desk:
+        """The desk of a page by its name. Raises InputError for no name, and for another person's page."""
+        if not page or not _PAGE.fullmatch(page):
+            raise InputError(LOST)
+        session = self.studio.session(page, person)
+        with self._lock:
+            if session not in self._desks:
+                self._desks[session] = Desk(self.studio, session)
+            return self._desks[session]
+
+
+def found_file(project: Project, name: str) -> Path:
+    """A first picture of an inversion. Raises InputError for another file."""
+    file = project.folder / f"found-{name}.jpg"
+    if not re.fullmatch(r"[a-z_]{1,30}", name) or not file.is_file():
+        raise InputError("That picture is not there.")
+    return file

@@ -1,0 +1,150 @@
+"""Requests that select and change: each returns the page's new state."""
+
+from typing import Any
+
+from materialist.darkroom import bodies
+from materialist.darkroom.desk import Desk
+from materialist.darkroom.state import outline, settable, state
+from materialist.edits.light import presets
+from materialist.edits.registry import OPERATIONS
+from materialist.errors import InputError
+from materialist.option_kinds import declarations
+from materialist.studio import objects, uploads
+from materialist.studio.lights import light_file, number_text, place_lamp
+from materialist.studio.selection import read_pick
+
+State = dict[str, Any]
+FILES = {"texture", "envmap", "gain", "mesh"}
+"""Options that a request may clear, and sets by other means."""
+
+
+def pick(desk: Desk, body: bodies.Pick) -> State:
+    """A click, a box or a brush stroke."""
+    given = body.model_dump(exclude={"method"})
+    known = None
+    # What the page outlined under the pointer is what the click takes.
+    if body.tool == "click" and body.method == "network" and len(body.at) == 2:
+        known = desk.pointed(*body.at, compute=body.mode != "remove")
+    desk.session.pick(read_pick(given), body.method, known)
+    return state(desk)
+
+
+def point(desk: Desk, body: bodies.Pointed) -> State:
+    """The outline of what a click would take."""
+    return {"region": outline(desk.pointed(*body.at))}
+
+
+def deselect(desk: Desk, body: bodies.Nothing) -> State:
+    desk.session.deselect()
+    return state(desk)
+
+
+def set_options(desk: Desk, body: bodies.Options) -> State:
+    """Set or clear options of the current edit, of the light, or of the object."""
+    options = {name: _text(body.kind, name, value) for name, value in body.options.items()}
+    session = desk.session
+    if body.kind == "relight":
+        session.light(**options)
+    elif body.kind == "insert":
+        for name, value in options.items():
+            objects.set_object_option(session, name, value)
+    else:
+        session.set(body.kind, **options)
+    return state(desk, coarse=body.coarse)
+
+
+def _text(kind: str, name: str, value: Any) -> Any:
+    """An option as the list of edits has it; None clears it. Raises InputError for one that no request may set."""
+    if name not in settable(kind) | (FILES if value is None else set()):
+        raise InputError(f"'{name}' of {kind} cannot be set in this way.")
+    # The default is left out of the list: it says nothing.
+    if value is None or value == declarations(OPERATIONS[kind].options)[name][1]:
+        return None
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list):
+        return [number_text(number) for number in value]
+    return value if isinstance(value, str) else number_text(value)
+
+
+def use_file(desk: Desk, body: bodies.File) -> State:
+    """Use an upload as a texture, an environment, or an object."""
+    session = desk.session
+    file = desk.studio.files.path(session.person, body.file)
+
+    def use(name: str) -> None:
+        if body.option == "texture":
+            session.set("edit", albedo=None, texture=name)
+        elif body.option == "envmap":
+            session.light(envmap=name, gain="auto")
+        else:
+            objects.set_object_option(session, "mesh", name)
+
+    uploads.used(session.workspace, file, body.option, session.allowance, use)
+    return state(desk)
+
+
+# Light
+
+
+def choose_light(desk: Desk, body: bodies.Chosen) -> State:
+    """A computed environment, or the photo's own light (None)."""
+    session = desk.session
+    if body.name is None:
+        session.light(envmap=None, gain=None)
+    elif body.name in presets.LIGHTS:
+        session.light(envmap=light_file(session, body.name), gain="auto")
+    else:
+        raise InputError(f"There is no light '{body.name}'; choose one of the list.")
+    return state(desk)
+
+
+def add_lamp(desk: Desk, body: bodies.NewLamp) -> State:
+    place_lamp(desk.session, *body.at, body.kelvin, body.power, body.before)
+    return state(desk)
+
+
+def set_lamps(desk: Desk, body: bodies.Lamps) -> State:
+    """Lamps moved, changed or taken away."""
+    session = desk.session
+    for lamp in body.lamps:
+        session.pixel(lamp[0], lamp[1])
+    lamps = [[number_text(value) for value in lamp] for lamp in body.lamps]
+    session.light(lamps=lamps or None)
+    return state(desk, coarse=body.coarse)
+
+
+# Objects
+
+
+def choose_object(desk: Desk, body: bodies.Chosen) -> State:
+    """An object of the library; the next place that is clicked gets it."""
+    if body.name not in objects.LIBRARY:
+        raise InputError(f"There is no object '{body.name}'; choose one of the list.")
+    file = objects.library_file(desk.session, body.name)
+    objects.set_object_option(desk.session, "mesh", file)
+    return state(desk)
+
+
+def put_object(desk: Desk, body: bodies.Put) -> State:
+    """Stand the current object, or a new one, at a place; a drag sends many."""
+    objects.place(desk.session, *body.at)
+    return state(desk)
+
+
+def let_fall(desk: Desk, body: bodies.Fall) -> State:
+    notes = objects.let_fall(desk.session, body.height)
+    return {**state(desk), "notes": [desk.session.without_folders(note) for note in notes]}
+
+
+# The list
+
+
+def act(desk: Desk, body: bodies.Act) -> State:
+    desk.session.act(body.action, body.index)
+    return state(desk)
+
+
+def undo(desk: Desk, body: bodies.Undo) -> State:
+    desk.session.undo(again=body.again)
+    return state(desk)

@@ -1,0 +1,90 @@
+"""From a function of a desk to an endpoint: who asks, what the body says, and errors as sentences."""
+
+import traceback
+from collections.abc import Awaitable, Callable
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from materialist.darkroom.bodies import RequestBody, complaint
+from materialist.darkroom.desk import Desk, Desks
+from materialist.darkroom.door import PAGE_HEADER
+from materialist.errors import MaterialistError
+from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
+
+Kind = TypeVar("Kind", bound=RequestBody)
+Answerer = Callable[[Request], Awaitable[Response]]
+
+
+def person_of(studio: Studio, request: Any) -> str:
+    """The person of a request, whom the gate has named in a header."""
+    return LOCAL_PERSON if studio.single_user else request.headers.get(PERSON_HEADER, "")
+
+
+def desk_of(desks: Desks, request: Request) -> Desk:
+    """The desk of the page that asks: named in a header, or in the address of a picture. Raises InputError."""
+    page = request.headers.get(PAGE_HEADER) or request.query_params.get("page")
+    return desks.of(page, person_of(desks.studio, request))
+
+
+def posted(desks: Desks, kind: type[Kind], change: Callable[[Desk, Kind], Any]) -> Answerer:
+    """An endpoint that reads a body and answers with what change(desk, body) returns, as JSON."""
+
+    async def answer(request: Request) -> Response:
+        raw = await request.body()
+
+        def work() -> Any:
+            desk = desk_of(desks, request)
+            body = kind.model_validate_json(raw or b"{}")
+            # Counted: one page must not keep all threads busy.
+            with desk.session.allowance.request(), desk.at_work():
+                return change(desk, body)
+
+        return JSONResponse(await run_in_threadpool(work))
+
+    return guarded(desks.studio, answer)
+
+
+def got(desks: Desks, make: Callable[[Desk, Request], Response]) -> Answerer:
+    """An endpoint that answers with make(desk, request)."""
+
+    async def answer(request: Request) -> Response:
+        def work() -> Response:
+            desk = desk_of(desks, request)
+            with desk.session.allowance.request(), desk.at_work():
+                return make(desk, request)
+
+        return await run_in_threadpool(work)
+
+    return guarded(desks.studio, answer)
+
+
+def guarded(studio: Studio, answer: Answerer) -> Answerer:
+    """The endpoint, whose errors are answers: {"error": a sentence}, and the status that fits."""
+
+    async def careful(request: Request) -> Response:
+        try:
+            return await answer(request)
+        except ValidationError as error:
+            return refusal(complaint(error), 422)
+        except MaterialistError as error:
+            return refusal(studio.without_folders(str(error)), 400)
+        except HTTPException as error:
+            return refusal(str(error.detail), error.status_code)
+        except Exception as error:
+            traceback.print_exception(error)
+            name = type(error).__name__
+            words = (
+                f"Something went wrong inside ({name}); the terminal of the studio has the details."
+            )
+            return refusal(words, 500)
+
+    return careful
+
+
+def refusal(words: str, status: int) -> Response:
+    return JSONResponse({"error": words}, status)

@@ -1,0 +1,225 @@
+"""Uploads, and photos that are taken apart, opened again, renamed and deleted."""
+
+import asyncio
+import re
+import secrets
+import shutil
+from pathlib import Path
+from typing import Any
+
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import JSONResponse, Response
+
+from materialist.darkroom import bodies
+from materialist.darkroom.desk import Desk, Desks, Followed, found_file
+from materialist.darkroom.endpoint import desk_of
+from materialist.darkroom.state import example_file, project_facts, state
+from materialist.errors import InputError
+from materialist.jobs.queue import Job
+from materialist.studio import SETTINGS
+from materialist.studio.access.gate import promised_size
+from materialist.studio.workspace import Project
+
+State = dict[str, Any]
+
+
+async def receive_upload(desks: Desks, request: Request) -> Response:
+    """Store the body as an upload of this person, and answer with its id. Nothing of it is opened yet."""
+    desk = desk_of(desks, request)
+    studio = desks.studio
+    person = desk.session.person
+    size = promised_size(request)
+    sender = studio.sender(person)
+    with studio.quota.uploading(sender):
+        claim = studio.quota.claim(sender, size)
+        folder = studio.work.cache / secrets.token_hex(16)
+        folder.mkdir()
+        file = folder / _safe_name(request.query_params.get("name", ""))
+        stored = 0
+        try:
+            stored = await _written(request, file, size)
+        except (ClientDisconnect, TimeoutError) as error:
+            raise InputError("The upload ended too early; send the file again.") from error
+        finally:
+            studio.quota.settle(claim, stored)
+            if not stored:
+                shutil.rmtree(folder, ignore_errors=True)
+    return JSONResponse({"file": studio.files.add(person, file), "name": file.name})
+
+
+async def _written(request: Request, file: Path, size: int) -> int:
+    """Write a body to a file; returns its bytes. Raises InputError where they are not as many as promised."""
+    stored = 0
+    parts = request.stream()
+    with file.open("wb") as out:
+        while True:
+            try:
+                part = await asyncio.wait_for(anext(parts), SETTINGS.body_seconds)
+            except StopAsyncIteration:
+                break
+            stored += len(part)
+            if stored > size:
+                break
+            out.write(part)
+    if stored != size or not stored:
+        raise InputError("The upload is empty, or not as long as it says; send the file again.")
+    return stored
+
+
+def _safe_name(name: str) -> str:
+    """The name of an upload without folders: letters, digits, and what else is harmless in a name."""
+    bare = re.sub(r"[^\w .()-]+", "_", Path(name.replace("\\", "/")).name).strip(" .")
+    return bare[-80:].lstrip(" .") or "upload"
+
+
+# Projects
+
+
+def start(desk: Desk, body: bodies.Start) -> State:
+    """Take a photo apart; a zipped scene is opened as it is."""
+    studio = desk.studio
+    source = _source(desk, body)
+    if source.suffix.lower() == ".zip":
+        return _opened(desk, studio.unpack(desk.session, source))
+    project, job = studio.begin(desk.session, source, body.predictor, body.size, body.fov)
+    studio.note_last(desk.session.person, project.name)
+    _expect(desk, project, job)
+    return state(desk)
+
+
+def _source(desk: Desk, body: bodies.Start) -> Path:
+    """The file of a photo. Raises InputError for none, and for another's."""
+    studio = desk.studio
+    person = desk.session.person
+    if body.file is not None:
+        return studio.files.path(person, body.file)
+    if body.example is None:
+        raise InputError("Drop a photo first, or choose an example.")
+    file = example_file(studio, body.example)
+    if body.example == "start":
+        return file
+    return Path(studio.public_copy(person, file, f"{body.example}{file.suffix}"))
+
+
+def open_project(desk: Desk, body: bodies.Named) -> State:
+    """Open a project of this person, or follow its inversion if that still runs."""
+    project = desk.studio.project(body.project, desk.session.person)
+    job = _running(desk, project)
+    if job is not None:
+        desk.session.note_job(job)
+        _expect(desk, project, job)
+        return state(desk)
+    if not project.ready:
+        raise InputError("That photo was not taken apart to the end; give it again.")
+    return _opened(desk, project)
+
+
+def arrive(desk: Desk) -> State:
+    """What a page shows when it is loaded: as it was left, else the photo that this person had last."""
+    session = desk.session
+    studio = desk.studio
+    if session.project is None and desk.expected is None:
+        start = studio.start
+        last = studio.last.get(session.person) or (
+            start.name if isinstance(start, Project) else None
+        )
+        known = {project.name for project in studio.projects(session.person)}
+        if last in known:
+            try:
+                return open_project(desk, bodies.Named(project=str(last)))
+            except InputError as error:
+                return {**state(desk), "notes": [session.without_folders(str(error))]}
+    return state(desk)
+
+
+def close_project(desk: Desk, body: bodies.Nothing) -> State:
+    """Back to the choice of photos; edits and inversions stay."""
+    desk.session.close()
+    desk.expected = None
+    desk.studio.last.pop(desk.session.person, None)
+    return state(desk)
+
+
+def listed(desk: Desk) -> list[State]:
+    """The projects of a person, the newest first."""
+    running = {job.folder for job in desk.studio.jobs.unfinished(desk.session.person, "invert")}
+    return [
+        {**(project_facts(project) or {}), "ready": project.ready}
+        for project in desk.studio.projects(desk.session.person)
+        if project.ready or project.folder in running
+    ]
+
+
+def rename(desk: Desk, body: bodies.Renamed) -> list[State]:
+    renamed = desk.studio.work.rename(_own(desk, body.project), body.title)
+    session = desk.session
+    if session.project is not None and session.project.folder == renamed.folder:
+        session.project = renamed
+    return listed(desk)
+
+
+def discard(desk: Desk, body: bodies.Named) -> list[State]:
+    """Delete a project of this person, stopping its inversion; the open one is closed first."""
+    project = _own(desk, body.project)
+    job = _running(desk, project)
+    if job is not None:
+        desk.studio.jobs.stop(job)
+    opened = desk.session.project
+    if opened is not None and opened.folder == project.folder:
+        desk.session.close()
+        desk.changed()
+    desk.studio.work.discard(project)
+    return listed(desk)
+
+
+def picture_of(desk: Desk, request: Request) -> Path:
+    """The file of a project's picture: its photo, or a map that its inversion has found."""
+    project = desk.studio.project(request.path_params["project"], desk.session.person)
+    name = request.path_params["name"]
+    scene_photo = project.scene / "photo.png"
+    if name == "photo" and scene_photo.is_file():
+        return scene_photo
+    return found_file(project, name)
+
+
+def _own(desk: Desk, name: str) -> Project:
+    """A project that belongs to a person. Raises InputError for another's, even where it may be opened."""
+    project = desk.studio.project(name, desk.session.person)
+    if project.owner != desk.session.person:
+        raise InputError("That photo belongs to somebody else.")
+    return project
+
+
+def _running(desk: Desk, project: Project) -> Job | None:
+    jobs = desk.studio.jobs.unfinished(desk.session.person, "invert")
+    return next((job for job in jobs if job.folder == project.folder), None)
+
+
+def _opened(desk: Desk, project: Project) -> State:
+    """Open a project; its photo is shown at once, the edits when the preview is ready."""
+    desk.studio.open(desk.session, project.name)
+    desk.studio.note_last(desk.session.person, project.name)
+    desk.expected = None
+    return state(desk, with_edits=False)
+
+
+def _expect(desk: Desk, project: Project, job: Job) -> None:
+    """Follow an inversion, and open its project when it is done, unless another photo was opened meanwhile."""
+    if any(entry.job is job and not entry.finished for entry in desk.followed):
+        desk.expected = project
+        return
+    desk.session.close()
+    desk.expected = project
+
+    def then(entry: Followed) -> None:
+        if not project.ready:
+            # Nothing to go on with: the folder goes.
+            shutil.rmtree(project.folder, ignore_errors=True)
+        elif desk.expected == project and not desk.session.left:
+            desk.studio.open(desk.session, project.name)
+        elif not desk.session.left:
+            entry.notes.append(f"{project.title} is ready; it is among your photos.")
+        if desk.expected == project:
+            desk.expected = None
+
+    desk.follow(job, then)

@@ -1,0 +1,135 @@
+"""The final picture, files to take away, and lists of edits to load."""
+
+import secrets
+import shutil
+from pathlib import Path
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+
+from materialist.darkroom import bodies
+from materialist.darkroom.desk import Desk, Followed
+from materialist.darkroom.state import state
+from materialist.edits.recipe import Step
+from materialist.errors import InputError
+from materialist.jobs.worker import DONE
+from materialist.studio import tasks
+from materialist.studio.archives import pack_edits
+from materialist.studio.session import EDITS, FinalPicture
+from materialist.studio.tasks import KINDS
+from materialist.studio.workspace import Project
+
+
+def render(desk: Desk, body: bodies.Nothing) -> dict[str, Any]:
+    """Path-trace the edits; the page shows the picture when it is there."""
+    _active_steps(desk)
+    _traced(desk, None)
+    return state(desk)
+
+
+def take(desk: Desk, body: bodies.Take) -> dict[str, Any]:
+    """Make a file to take away; the page gets its id when it is there."""
+    session = desk.session
+    if body.kind not in KINDS:
+        raise InputError(f"There is no '{body.kind}' to take away; choose one of the list.")
+    project = session.opened
+    file = session.workspace / f"take-{body.kind}{KINDS[body.kind][1]}"
+    if body.kind == "edits":
+        steps = _active_steps(desk)
+        session.save()
+        pack_edits(session.edits.steps or steps, session.workspace / EDITS, file)
+        return {"result": _handed(desk, project, body.kind, file)}
+    if body.kind in ("png", "exr"):
+        final = session.final
+        if final is not None and final.of(session.edits.active):
+            return {"result": _copied(desk, project, final, body.kind)}
+        _active_steps(desk)
+        _traced(desk, body.kind)
+        return {}
+    job = desk.studio.submit(
+        session,
+        tasks.take,
+        file.parent,
+        scene=str(project.scene),
+        output=str(file),
+        steps=session.edits.active,
+        kind=body.kind,
+    )
+
+    def hand_over(entry: Followed) -> None:
+        if entry.job.state == DONE:
+            entry.result = _handed(desk, project, body.kind, file)
+
+    desk.follow(job, hand_over)
+    return {}
+
+
+def load(desk: Desk, body: bodies.LoadedList) -> dict[str, Any]:
+    """Put the steps of an uploaded list in place of the edits."""
+    desk.session.read_edits(desk.studio.files.path(desk.session.person, body.file))
+    return state(desk)
+
+
+def download(desk: Desk, request: Request) -> Response:
+    """A file that was handed over to this person."""
+    file = desk.studio.files.path(desk.session.person, request.path_params["file"])
+    return FileResponse(file, filename=file.name, content_disposition_type="attachment")
+
+
+def _active_steps(desk: Desk) -> tuple[Step, ...]:
+    _ = desk.session.scene
+    steps = desk.session.edits.active
+    if not steps:
+        raise InputError("There is no edit yet: change something first.")
+    return steps
+
+
+def _traced(desk: Desk, kind: str | None) -> None:
+    """Begin to path-trace the edits; with a kind its file is handed over then."""
+    session = desk.session
+    project = session.opened
+    picture = FinalPicture(
+        session.edits.active, desk.studio.work.cache / f"final-{secrets.token_hex(16)}"
+    )
+    job = desk.studio.submit(
+        session,
+        tasks.final,
+        picture.path.parent,
+        scene=str(project.scene),
+        output=str(picture.path),
+        steps=picture.steps,
+    )
+
+    def keep(entry: Followed) -> None:
+        # Another photo may have been opened meanwhile, or the page closed.
+        opened = session.project
+        elsewhere = opened is None or opened.folder != project.folder or session.left
+        if entry.job.state != DONE or elsewhere:
+            picture.remove()
+            return
+        before = session.final
+        session.final = picture
+        if before is not None:
+            before.remove()
+        if kind is not None:
+            entry.result = _copied(desk, project, picture, kind)
+
+    desk.follow(job, keep)
+
+
+def _copied(desk: Desk, project: Project, picture: FinalPicture, kind: str) -> dict[str, Any]:
+    """A path-traced picture as a file for the page, kept in the workspace, too."""
+    file = desk.session.workspace / f"take-{kind}.{kind}"
+    shutil.copyfile(picture.path.with_suffix(f".{kind}"), file)
+    return _handed(desk, project, kind, file)
+
+
+def _handed(desk: Desk, project: Project, kind: str, file: Path) -> dict[str, Any]:
+    """A copy of a file for the person of a page, under a name that says what it is."""
+    what = "edited" if kind in ("png", "exr") else kind
+    name = f"{project.stem}-{what}{file.suffix}"
+    person = desk.session.person
+    copy = Path(desk.studio.public_copy(person, file, name))
+    handle = desk.studio.files.hand_out(person, copy, f"result-{secrets.token_hex(16)}")
+    return {"file": handle, "name": name, "bytes": copy.stat().st_size}

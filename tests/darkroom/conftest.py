@@ -1,0 +1,114 @@
+"""The darkroom on a small scene: by requests alone, and in a real browser."""
+
+import pytest
+
+pytest.importorskip("starlette", reason="needs the studio extra")
+pytest.importorskip("pydantic", reason="needs the studio extra")
+import studio_server
+from starlette.testclient import TestClient
+from studio_scenes import package
+
+from materialist.darkroom import application
+from materialist.jobs.queue import JobQueue
+from materialist.studio.studio import Studio
+from materialist.studio.workspace import WorkFolder
+
+ADDRESS = "http://127.0.0.1:7860"
+CHANNEL = "ws://127.0.0.1:7860/api/channel?page=" + "b" * 32
+
+
+@pytest.fixture
+def shared(tmp_path):
+    """A studio that several people reach, with the small scene for everybody."""
+    work = WorkFolder(tmp_path / "work")
+    made = Studio(work, JobQueue(1), single_user=False)
+    made.start = work.new("Room", "nobody", scene=package(tmp_path))
+    yield made
+    made.jobs.close()
+
+
+@pytest.fixture
+def visit(shared):
+    """visit(page, address): a browser of its own, whose requests come from an address and name a page."""
+    gate = application(shared, host="0.0.0.0", port=0)
+
+    def browser(page="a" * 32, address="1.2.3.4", arrive=True):
+        headers = {"x-materialist-page": page, "origin": "http://studio.example"}
+        client = TestClient(
+            gate, base_url="http://studio.example", client=(address, 1), headers=headers
+        )
+        if arrive:
+            assert client.get("/api/arrive").status_code == 200
+        return client
+
+    return browser
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    """The open small scene on a page of this machine's own studio, as a client."""
+    folder = tmp_path_factory.mktemp("local")
+    work = WorkFolder(folder / "work")
+    studio = Studio(work, JobQueue(1))
+    studio.start = work.new("Room", "me", scene=package(folder))
+    gate = application(studio, host="127.0.0.1", port=7860)
+    headers = {"x-materialist-page": "b" * 32, "origin": ADDRESS}
+    with TestClient(gate, base_url=ADDRESS, headers=headers) as client:
+        # With the channel the page is open between the tests, too.
+        client.get("/")
+        state = client.get("/api/arrive").json()
+        assert state["project"]["title"] == "Room"
+        with client.websocket_connect(CHANNEL):
+            studio.session("b" * 32, "me").live.wait()
+            client.studio = studio
+            yield client
+    studio.jobs.close()
+
+
+@pytest.fixture
+def client(local):
+    """That page without edits."""
+    session = local.studio.session("b" * 32, "me")
+    session.edits = type(session.edits)()
+    session.next_object = {}
+    session.deselect()
+    session._past = []
+    session.save()
+    return local
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory):
+    """(address, work folder) of the darkroom in a process of its own, on the small scene."""
+    folder = tmp_path_factory.mktemp("browser")
+    arguments = (str(package(folder)), "--page", "darkroom")
+    with studio_server.studio(folder, *arguments) as (_, address):
+        yield address, folder / "work"
+
+
+@pytest.fixture
+def page(browser, running):
+    """The small scene on a page, without edits; those that a test makes go with it."""
+    address, work = running
+    context = browser.new_context(
+        viewport={"width": 1280, "height": 800}, accept_downloads=True, reduced_motion="reduce"
+    )
+    made = context.new_page()
+    made.requested = []
+    made.errors = []
+    made.on("request", lambda request: made.requested.append(request.url))
+    made.on("pageerror", lambda error: made.errors.append(str(error)))
+
+    def refused(message):
+        if "Content Security Policy" in message.text:
+            made.errors.append(message.text)
+
+    made.on("console", refused)
+    made.set_default_timeout(60_000)
+    made.goto(address)
+    made.wait_for_selector(".marks")
+    made.wait_for_selector("#progress", state="hidden")
+    yield made
+    context.close()
+    for file in work.glob("photo-*/edits-me/edits.yaml"):
+        file.unlink()

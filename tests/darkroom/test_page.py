@@ -1,0 +1,392 @@
+"""The darkroom in a real browser. Its policy forbids scripts of texts, so waiting for a function is done from here."""
+
+import io
+import re
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+from studio_scenes import zipped_package
+
+AREA = """() => { const m = document.querySelector('.marks').getBoundingClientRect();
+  return m.width * m.height / (innerWidth * innerHeight); }"""
+SELECTED = "#stage[data-selected=yes]"
+
+
+def until(page, question, argument=None, seconds=60):
+    """Wait until a function of the page says yes."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(question, argument):
+        assert time.monotonic() < end, question
+        page.wait_for_timeout(50)
+
+
+def place(page, x, y):
+    """[x, y] on the page of a share of the photo's width and height."""
+    box = page.locator(".marks").bounding_box()
+    return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+
+def select_block(page):
+    page.mouse.click(*place(page, 0.39, 0.5))
+    page.wait_for_selector(SELECTED)
+
+
+def slide(page, name, value):
+    script = """([name, value]) => { const r = document.querySelector(`#${name} input[type=range]`);
+      r.value = value; r.dispatchEvent(new Event('input', {bubbles: true})); }"""
+    page.evaluate(script, [name, value])
+
+
+def colour(page, x=0.39, y=0.5):
+    """[3] uint8 of the picture that is seen at a share of the photo, outlines and handles aside."""
+    left, top = place(page, x, y)
+    clip = {"x": left - 2, "y": top - 2, "width": 4, "height": 4}
+    return np.asarray(Image.open(io.BytesIO(page.screenshot(clip=clip))))[2, 2, :3].astype(int)
+
+
+def becomes(page, test, x=0.39, y=0.5):
+    """Wait until the colour at a place passes a test."""
+    end = time.monotonic() + 60
+    while not test(colour(page, x, y)):
+        assert time.monotonic() < end, colour(page, x, y)
+        page.wait_for_timeout(100)
+
+
+def green(rgb):
+    return rgb[1] > rgb[0] + 40
+
+
+def red(rgb):
+    return rgb[0] > rgb[1] + 40
+
+
+def test_the_photo_takes_most_of_the_window_and_everything_is_in_sight(page):
+    for (width, height), share in (((1440, 900), 0.55), ((1024, 768), 0.4), ((1920, 1080), 0.5)):
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(200)
+        assert page.evaluate(AREA) > share  # of a photo of 4:3
+        for part in ("#undo", "#compare", "#final", "#take", "#steps"):
+            box = page.locator(part).bounding_box()
+            assert box["y"] >= 0 and box["y"] + box["height"] <= height, part
+        assert page.evaluate("document.documentElement.scrollHeight") <= height
+
+
+def test_select_change_undo_and_reload(page):
+    becomes(page, red)
+    select_block(page)
+    slide(page, "hue", 120)
+    page.wait_for_selector("#steps >> text=hue 120")
+    becomes(page, green)
+    assert np.abs(colour(page, 0.8, 0.8) - colour(page, 0.9, 0.8)).max() < 60
+    page.get_by_role("checkbox", name=re.compile("On or off")).uncheck()
+    becomes(page, red)
+    page.get_by_role("checkbox", name=re.compile("On or off")).check()
+    becomes(page, green)
+    page.keyboard.down("b")
+    becomes(page, red)
+    page.keyboard.up("b")
+    page.reload()
+    page.wait_for_selector("#steps >> text=hue 120")
+    page.wait_for_selector(SELECTED)  # the selection, and what can be undone
+    becomes(page, green)
+    # Both switches are taken back, then the edit itself.
+    for _ in range(3):
+        page.keyboard.press("Control+z")
+    page.wait_for_selector("#steps >> text=No edits yet")
+    becomes(page, red)
+    page.keyboard.press("Control+Shift+z")
+    page.wait_for_selector("#steps >> text=hue 120")
+    assert not page.errors
+
+
+def test_a_slider_does_not_jump_back_and_a_cleared_number_is_no_error(page):
+    select_block(page)
+    page.locator("#hue input[type=range]").focus()
+    for _ in range(6):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_selector("#steps >> text=hue 6")
+    number = page.locator("#hue .number")
+    number.fill("")
+    number.press("Enter")
+    page.wait_for_selector("#steps >> text=hue 6", state="hidden")
+    assert number.input_value() == "0°" and page.locator("#message").count() == 0
+    number.fill("45")
+    number.press("Enter")
+    page.wait_for_selector("#steps >> text=hue 45")
+    page.locator("#hue input[type=range]").dblclick()
+    page.wait_for_selector("#steps >> text=hue 45", state="hidden")
+
+
+def test_a_picked_colour_appears_as_picked_after_a_hue(page):
+    select_block(page)
+    slide(page, "hue", 120)
+    becomes(page, green)
+    script = (
+        """(n) => { n.value = '#2040e0'; n.dispatchEvent(new Event('input', {bubbles: true})); }"""
+    )
+    page.locator(".colour input").first.evaluate(script)
+    becomes(page, lambda rgb: rgb[2] > rgb[1] + 40 and rgb[2] > rgb[0] + 40)
+    assert "hue" not in page.inner_text("#steps")
+
+
+def test_a_preset_and_the_divider(page):
+    select_block(page)
+    page.get_by_role("button", name="Gold").click()
+    page.wait_for_selector("#steps >> text=metallic 1")
+    page.locator("#compare").click()
+    divider = page.get_by_role("slider", name="Before and after")
+    box = divider.bounding_box()
+    page.mouse.move(box["x"] + 14, box["y"] + 40)
+    page.mouse.down()
+    page.mouse.move(*place(page, 0.95, 0.2), steps=4)
+    page.mouse.up()
+    becomes(page, red)
+    divider.press("ArrowLeft")
+    assert int(divider.get_attribute("aria-valuenow")) < 95
+    page.keyboard.press("c")
+    page.wait_for_selector(".divider", state="hidden")
+
+
+def test_the_pointer_outlines_what_a_click_takes(page):
+    page.mouse.move(*place(page, 0.4, 0.5))
+    page.wait_for_selector(".marks .hover", state="attached")
+    outline = page.locator(".marks .hover").get_attribute("d")
+    page.mouse.move(*place(page, 0.42, 0.52))
+    page.mouse.click(*place(page, 0.42, 0.52))
+    page.wait_for_selector(SELECTED)
+    assert page.locator(".marks .ants").get_attribute("d") == outline
+    page.keyboard.press("Escape")
+    page.wait_for_selector(SELECTED, state="detached")
+
+
+def test_box_brush_shift_and_alt(page):
+    page.keyboard.press("2")
+    page.mouse.move(*place(page, 0.2, 0.28))
+    page.mouse.down()
+    page.mouse.move(*place(page, 0.56, 0.7), steps=5)
+    assert page.locator(".marks .trace").count() == 1
+    page.mouse.up()
+    page.wait_for_selector(SELECTED)
+    outline = "() => document.querySelector('.marks .ants')?.getAttribute('d') ?? ''"
+    first = page.evaluate(outline)
+    page.keyboard.press("3")
+    paint = [place(page, 0.7, 0.8), place(page, 0.9, 0.8)]
+    for key in (None, "Alt"):
+        before = page.evaluate(outline)
+        if key:
+            page.keyboard.down(key)
+        page.mouse.move(*paint[0])
+        page.mouse.down()
+        page.mouse.move(*paint[1], steps=5)
+        page.mouse.up()
+        if key:
+            page.keyboard.up(key)
+        until(page, f"(old) => ({outline})() !== old", before)
+    assert page.evaluate(outline).count("M") >= first.count("M")
+
+
+def test_a_swipe_selects_nothing(browser, running):
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True)
+    page = context.new_page()
+    page.goto(running[0])
+    page.wait_for_selector(".marks")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    x, y = place(page, 0.3, 0.5)
+    swipe = """([x, y]) => { const stage = document.querySelector('#stage');
+      const send = (kind, dx) => stage.dispatchEvent(new PointerEvent(kind, {pointerId: 5,
+        pointerType: 'touch', isPrimary: true, bubbles: true, clientX: x + dx, clientY: y}));
+      stage.setPointerCapture = () => undefined;
+      send('pointerdown', 0); for (let dx = 10; dx < 90; dx += 10) send('pointermove', dx);
+      send('pointerup', 90); }"""
+    page.evaluate(swipe, [x, y])
+    page.wait_for_timeout(800)
+    assert page.locator(SELECTED).count() == 0
+    page.touchscreen.tap(*place(page, 0.39, 0.5))
+    page.wait_for_selector(SELECTED)
+    stage = page.locator("#stage").bounding_box()
+    panel = page.locator("#panel").bounding_box()
+    assert stage["y"] + stage["height"] <= panel["y"] + 1 <= 844
+    context.close()
+
+
+def test_an_object_lands_where_it_is_released(page):
+    page.get_by_role("tab", name="Objects").click()
+    page.get_by_role("button", name="Ball").click()
+    page.wait_for_selector(".stage.place")
+    page.mouse.click(*place(page, 0.7, 0.8))
+    page.wait_for_selector(".handle.thing")
+    page.mouse.move(*place(page, 0.7, 0.8))
+    page.mouse.down()
+    page.mouse.move(*place(page, 0.25, 0.85), steps=8)
+    page.mouse.up()
+    knob = ".handle.thing .knob"
+    until(page, f"() => Math.abs(document.querySelector('{knob}').getAttribute('cx') - 16) < 1.5")
+    assert page.locator("#steps li").count() == 1
+    page.keyboard.press("Control+z")
+
+
+def test_light_sun_and_lamps(page):
+    page.get_by_role("tab", name="Light").click()
+    page.get_by_role("radio", name="Sunset").click()
+    page.wait_for_selector("#steps >> text=sunset")
+    page.get_by_role("switch", name="A sun in the sky").check()
+    page.wait_for_selector(".sunpad")
+    page.locator(".sunpad").press("ArrowUp")
+    page.wait_for_selector("#steps >> text=sun 45,43")
+    page.keyboard.press("4")
+    page.mouse.click(*place(page, 0.6, 0.8))
+    page.wait_for_selector(".handle.lamp")
+    page.get_by_role("button", name="Take this lamp away: 1").click()
+    page.wait_for_selector(".handle.lamp", state="detached")
+
+
+def test_what_cannot_be_done_is_said_and_controls_tell_the_truth(page):
+    page.get_by_role("tab", name="Objects").click()
+    page.keyboard.press("5")
+    page.mouse.click(*place(page, 0.5, 0.8))
+    page.wait_for_selector("#message >> text=Choose an object")
+    page.keyboard.press("Escape")
+    page.wait_for_selector("#message", state="detached")
+
+
+def test_final_picture_and_download(page, tmp_path):
+    page.set_default_timeout(300_000)
+    select_block(page)
+    slide(page, "hue", 120)
+    page.wait_for_selector("#steps >> text=hue 120")
+    page.locator("#final").click()
+    page.wait_for_selector("#progress .stop")
+    page.wait_for_selector("#stage[data-kind=final]")
+    becomes(page, green)
+    page.locator("#take").click()
+    with page.expect_download() as download:
+        page.locator("#take-png").click()
+    assert download.value.suggested_filename == "room-edited.png"
+    download.value.save_as(tmp_path / "a.png")
+    picture = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+    assert green(picture[24, 25, :3])
+
+
+def test_a_dropped_scene_opens_and_photos_are_kept(page, tmp_path):
+    file = zipped_package(tmp_path)
+    page.get_by_role("button", name="Photos").click()
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Choose a file").click()
+    chooser.value.set_files(str(file))
+    page.wait_for_selector(".bar h1 >> text=a")
+    page.wait_for_selector("#progress", state="hidden")
+    page.get_by_role("button", name="Photos").click()
+    assert page.locator("#projects li").count() >= 2
+    page.locator("#projects li").first.hover()
+    page.get_by_role("button", name=re.compile("^Rename")).first.click()
+    page.locator("#projects input").fill("Kitchen")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("#projects >> text=Kitchen")
+    page.get_by_role("button", name="Delete: Kitchen").click()
+    page.get_by_role("button", name="Delete", exact=True).click()
+    page.wait_for_selector("#projects >> text=Kitchen", state="detached")
+    page.locator("#projects .photo").first.click()
+    page.wait_for_selector(".marks")
+    assert not page.errors
+
+
+def test_nothing_is_asked_of_anyone_else_and_the_page_is_small(page, running):
+    for name in ("Light", "Objects", "Look", "Material"):
+        page.get_by_role("tab", name=name).click()
+        page.wait_for_timeout(300)
+    page.keyboard.press("?")
+    page.wait_for_selector("text=Keys and gestures")
+    outside = [u for u in page.requested if not u.startswith((running[0], "data:", "blob:"))]
+    assert not outside and not page.errors
+    sizes = page.evaluate(
+        """() => performance.getEntriesByType('resource').filter((e) => e.name.includes('/assets/'))
+          .map((e) => e.decodedBodySize)"""
+    )
+    assert 10_000 < sum(sizes) < 500_000
+
+
+CONTRAST = """() => {
+  const lum = (c) => { const f = (v) => { v /= 255; return v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; };
+    return .2126 * f(c[0]) + .7152 * f(c[1]) + .0722 * f(c[2]); };
+  const rgba = (s) => { const m = s.match(/[\\d.]+/g).map(Number); return m.length > 3 ? m : [...m, 1]; };
+  const low = [];
+  for (const n of document.querySelectorAll('button, label, span, p, h1, h2, h3, b, li, summary, code, input')) {
+    const text = [...n.childNodes].some((c) => c.nodeType === 3 && /\\w/.test(c.textContent));
+    if (!text || n.disabled || n.closest(':disabled')) continue;
+    if (!n.checkVisibility({visibilityProperty: true, opacityProperty: true}) || n.closest('#stage')) continue;
+    const ink = rgba(getComputedStyle(n).color);
+    let paper = null;
+    for (let p = n; p && !paper; p = p.parentElement) {
+      const b = rgba(getComputedStyle(p).backgroundColor); if (b[3] > .8) paper = b; }
+    const [a, b] = [lum(ink), lum(paper || [255, 255, 255])].sort((x, y) => y - x);
+    if ((a + .05) / (b + .05) < 4.5) low.push([n.tagName, n.textContent.trim().slice(0, 40)]);
+  }
+  return low; }"""
+UNNAMED = """() => [...document.querySelectorAll('button, input, select, [role=application], [role=slider]')]
+  .filter((n) => n.checkVisibility() && !n.innerText && !n.ariaLabel && !n.title
+          && !(n.labels && n.labels.length)).map((n) => n.outerHTML.slice(0, 160))"""
+
+
+def test_text_is_readable_and_things_have_names(page):
+    select_block(page)
+    for name in ("Material", "Light", "Objects", "Look"):
+        page.get_by_role("tab", name=name).click()
+        page.wait_for_timeout(300)
+        assert page.evaluate(CONTRAST) == [], name
+        assert page.evaluate(UNNAMED) == [], name
+    for opener in ("Photos", "Take away", "Help"):
+        page.get_by_role("button", name=opener).first.click()
+        page.wait_for_selector("[role=dialog]")
+        assert page.evaluate(CONTRAST) == [], opener
+        assert page.evaluate(UNNAMED) == [], opener
+        page.keyboard.press("Escape")
+        page.wait_for_selector("[role=dialog]", state="detached")
+
+
+def test_by_keyboard_alone(page):
+    page.locator("#stage").focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Enter")
+    page.wait_for_selector(SELECTED)
+    steps = 0
+    while not page.evaluate("document.activeElement.closest('#hue') !== null"):
+        page.keyboard.press("Tab")
+        steps += 1
+        assert steps < 40
+    outline = "getComputedStyle(document.activeElement).outlineStyle"
+    assert page.evaluate(outline) == "solid"
+    page.keyboard.press("ArrowRight")
+    page.wait_for_selector("#steps >> text=hue 1")
+    page.keyboard.press("Delete")
+    page.wait_for_selector("#steps >> text=No edits yet")
+
+
+@pytest.mark.slow
+def test_the_whole_story(page, tmp_path):
+    """A dropped photo is shown at once, stopped and begun again, reloaded in the middle, and edited."""
+    page.set_default_timeout(400_000)
+    from materialist.io.photo import example_path
+
+    Image.open(example_path("coffee")).resize((150, 100)).save(tmp_path / "coffee.png")
+    for stopped in (True, False):
+        page.get_by_role("button", name="Photos").click()
+        with page.expect_file_chooser() as chooser:
+            page.get_by_role("button", name="Choose a file").click()
+        chooser.value.set_files(str(tmp_path / "coffee.png"))
+        page.wait_for_selector("#progress .stop")
+        if stopped:
+            page.locator("#progress .stop").click()
+            page.wait_for_selector(".note >> text=Stopped")
+    page.wait_for_selector(".found img")  # maps as they come
+    page.reload()
+    page.wait_for_selector("#progress .stop")  # the work goes on
+    page.wait_for_selector(".marks")
+    page.wait_for_selector("#progress", state="hidden")
+    page.mouse.click(*place(page, 0.3, 0.8))
+    page.wait_for_selector(SELECTED)
+    slide(page, "hue", 100)
+    page.wait_for_selector("#steps >> text=hue 100")
+    assert not page.errors

@@ -1,0 +1,228 @@
+"""Selecting and changing by requests: what they answer, and what they refuse."""
+
+import io
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+from studio_scenes import HEIGHT, WIDTH, block, zipped_package
+
+from materialist.darkroom.state import outline
+from materialist.io.image import write_png
+
+CHANNEL = "ws://127.0.0.1:7860/api/channel?page=" + "b" * 32
+
+
+def select_block(client):
+    answer = client.post("/api/pick", json={"tool": "click", "at": [25, 24]})
+    assert answer.status_code == 200, answer.text
+    return answer.json()
+
+
+def change(client, kind="edit", **options):
+    return client.post("/api/set", json={"kind": kind, "options": options})
+
+
+def pixels(state):
+    """[H, W, 3] uint8 of the picture in an answer."""
+    data = state["stage"]["picture"].partition(",")[2]
+    import base64
+
+    return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
+
+
+def test_select_change_undo(client):
+    before = pixels(client.get("/api/state").json())
+    state = select_block(client)
+    assert state["stage"]["region"].startswith("M") and state["fitted"]["colour"].startswith("#")
+    state = change(client, hue=120).json()
+    assert state["steps"][0]["options"]["hue"] == "120" and state["undo"] and not state["redo"]
+    after = pixels(state)
+    assert after[24, 25, 1] > after[24, 25, 0] + 40
+    assert np.abs(after[40, 55].astype(int) - before[40, 55]).max() < 6
+    state = client.post("/api/undo", json={}).json()
+    assert state["steps"] == [] and state["redo"]
+    state = client.post("/api/undo", json={"again": True}).json()
+    assert len(state["steps"]) == 1
+
+
+def test_a_default_is_left_out_of_the_list_and_none_clears(client):
+    select_block(client)
+    change(client, hue=30, saturation=0.5)
+    assert "hue" not in change(client, hue=0).json()["steps"][0]["options"]
+    assert "saturation" not in change(client, saturation=None).json()["steps"][0]["options"]
+
+
+def test_what_is_outlined_under_the_pointer_is_what_a_click_takes(client):
+    pointed = client.post("/api/point", json={"at": [25, 24]}).json()["region"]
+    assert pointed and select_block(client)["stage"]["region"] == pointed
+    assert client.post("/api/point", json={"at": [5, 1]}).status_code == 400  # the sky
+
+
+def test_an_outline_follows_a_region():
+    assert outline(None) == ""
+    numbers = [
+        tuple(map(float, pair.split(" ")))
+        for pair in outline(block()).removeprefix("M").removesuffix("Z").split("L")
+    ]
+    xs, ys = zip(*numbers, strict=True)
+    assert min(xs) == pytest.approx(16, abs=0.7) and max(xs) == pytest.approx(34, abs=0.7)
+    assert min(ys) == pytest.approx(16, abs=0.7) and max(ys) == pytest.approx(32, abs=0.7)
+    ring = block()
+    ring[20:28, 20:30] = False
+    assert outline(ring).count("M") == 2
+
+
+def test_the_light_lamps_and_sun(client):
+    state = client.post("/api/light", json={"name": "Sunset"}).json()
+    assert state["steps"][0]["options"]["envmap"] == "light-sunset.exr"
+    assert "sun" in change(client, "relight", sun=[45, 40]).json()["steps"][0]["options"]
+    state = client.post("/api/lamp", json={"at": [40, 40], "kelvin": 4000}).json()
+    lamp = [float(value) for value in state["steps"][0]["options"]["lamps"][0]]
+    assert lamp[:2] == [40, 40] and lamp[3] == 4000
+    moved = {"lamps": [[10, 40, *lamp[2:]]]}
+    state = client.post("/api/lamps", json=moved).json()
+    assert state["stage"]["lamps"] == [[10, 40]]
+    assert client.post("/api/lamps", json={"lamps": [[900, 4, 1, 1, 1]]}).status_code == 400
+    state = client.post("/api/lamps", json={"lamps": []}).json()
+    assert "lamps" not in state["steps"][0]["options"]
+    assert client.post("/api/light", json={"name": "Moon"}).status_code == 400
+
+
+def test_an_object_is_placed_moved_and_changed(client):
+    assert client.post("/api/place", json={"at": [40, 40]}).status_code == 400
+    client.post("/api/object", json={"name": "Ball"})
+    state = client.post("/api/place", json={"at": [40, 40]}).json()
+    assert state["steps"][0]["options"]["at"] == ["40", "40"]
+    state = client.post("/api/place", json={"at": [20, 42]}).json()
+    assert state["steps"][0]["options"]["at"] == ["20", "42"] and len(state["steps"]) == 1
+    state = change(client, "insert", material="mirror", scale=2).json()
+    assert state["steps"][0]["options"]["material"] == "mirror"
+    assert client.post("/api/object", json={"name": "../x"}).status_code == 400
+
+
+def test_the_list_is_switched_ordered_and_shortened(client):
+    select_block(client)
+    change(client, hue=30)
+    client.post("/api/light", json={"name": "Overcast"})
+    state = client.post("/api/act", json={"action": "up", "index": 1}).json()
+    assert [step["kind"] for step in state["steps"]] == ["relight", "edit"]
+    assert not client.post("/api/act", json={"action": "toggle", "index": 0}).json()["steps"][0][
+        "on"
+    ]
+    state = client.post("/api/act", json={"action": "choose", "index": 1}).json()
+    assert state["current"] == 1 and state["stage"]["region"]
+    assert len(client.post("/api/act", json={"action": "remove", "index": 0}).json()["steps"]) == 1
+    assert client.post("/api/act", json={"action": "remove", "index": 7}).status_code == 400
+
+
+@pytest.mark.parametrize(
+    ("place", "body", "words"),
+    [
+        ("set", {"kind": "edit", "options": {"texture": "/etc/passwd"}}, "cannot be set"),
+        ("set", {"kind": "edit", "options": {"mask": "mask-1.png"}}, "cannot be set"),
+        ("set", {"kind": "relight", "options": {"envmap": "light.exr"}}, "cannot be set"),
+        ("set", {"kind": "insert", "options": {"mesh": "../../x.ply"}}, "cannot be set"),
+        ("set", {"kind": "glass", "options": {"thickness": "x.exr"}}, "cannot be set"),
+        ("set", {"kind": "remove", "options": {"inpaint": "sd:evil"}}, "cannot be set"),
+        ("set", {"kind": "remove", "options": {"background": "a.png"}}, "cannot be set"),
+        ("set", {"kind": "edit", "options": {"hue": "x"}}, "hue"),
+        ("set", {"kind": "edit", "options": {"roughness": 2}}, "must lie in"),
+        ("set", {"kind": "edit", "options": {"nothing": 2}}, "cannot be set"),
+        ("set", {"kind": "edit", "options": {"hue": {}}}, "options.hue"),
+        ("set", {"kind": "edit", "options": {"hue": 1}, "more": 1}, "more"),
+        ("set", {"kind": "sudo", "options": {}}, "kind"),
+        ("set", [], "its body"),
+        ("pick", {"tool": "click", "at": [25]}, "could not be read"),
+        ("pick", {"tool": "click", "at": [1e9, 3]}, "at"),
+        ("pick", {"tool": "brush", "points": [[1, 2, 3]], "radius": 2}, "points"),
+        ("point", {"at": [-5, 2]}, "outside"),
+        ("act", {"action": "explode", "index": 0}, "action"),
+        ("act", {"action": "up", "index": -1}, "index"),
+        ("take", {"kind": "../x"}, "choose one"),
+        ("final", {}, "change something first"),
+        ("lamp", {"at": [5, 1]}, "no surface"),
+        ("start", {}, "Drop a photo"),
+        ("start", {"example": "../../etc/passwd"}, "no example"),
+        ("start", {"example": "cat", "size": 100000}, "size"),
+        ("start", {"example": "cat", "predictor": "maps:/etc"}, "listed ways"),
+        ("open", {"project": "../x"}, "no longer in the work folder"),
+        ("stop", {"number": 99}, "not there any more"),
+    ],
+)
+def test_what_is_wrong_is_said_and_changes_nothing(client, place, body, words):
+    if place == "set":
+        select_block(client)
+    answer = client.post(f"/api/{place}", json=body)
+    assert answer.status_code in (400, 422) and words in answer.json()["error"], answer.text
+    assert client.get("/api/state").json()["steps"] == []
+
+
+def test_json_that_is_none_is_said(client):
+    for raw in (b"{", b"\xff\xfe", b'{"at": [NaN, 1]}', b"[" * 5000):
+        answer = client.post("/api/point", content=raw)
+        assert answer.status_code == 422 and "cannot be read" in answer.json()["error"]
+
+
+def test_a_texture_is_uploaded_and_taken_off(client, tmp_path):
+    write_png(tmp_path / "wood.png", np.full((8, 8, 3), 90, np.uint8))
+    content = (tmp_path / "wood.png").read_bytes()
+    sent = client.post("/api/upload?name=wood.png", content=content).json()
+    select_block(client)
+    state = client.post("/api/use", json={"option": "texture", "file": sent["file"]}).json()
+    assert state["steps"][0]["options"]["texture"].startswith("texture-")
+    assert "texture" not in change(client, texture=None).json()["steps"][0]["options"]
+
+
+def test_pictures_maps_and_what_there_is_to_choose_from(client):
+    about = client.get("/api/about").json()
+    assert about["options"]["edit"]["roughness"]["high"] == 1 and "Ball" in about["objects"]
+    titles = client.get("/api/report").json()["maps"]
+    places = [f"map/{place}" for place in range(len(titles))]
+    places += ["photo", "photo?working=1", "picture/photo-001/photo", "light/Sunset", "example/cat"]
+    for place in places:
+        answer = client.get(f"/api/{place}")
+        assert answer.headers["content-type"] == "image/jpeg", place
+    picture = Image.open(io.BytesIO(client.get("/api/photo?working=1").content))
+    assert picture.size == (WIDTH, HEIGHT)
+    for place in ("map/99", "map/x", "light/x", "example/x", "picture/photo-001/x"):
+        assert client.get(f"/api/{place}").status_code == 400, place
+
+
+def test_a_final_picture_comes_by_the_channel_and_is_taken_away(client):
+    select_block(client)
+    change(client, hue=90)
+    revision = client.post("/api/final", json={}).json()["revision"]
+    news = {}
+    with client.websocket_connect(CHANNEL) as channel:
+        end = time.monotonic() + 240
+        while news.get("revision", revision) == revision and time.monotonic() < end:
+            news = channel.receive_json()
+    assert news["jobs"][-1]["state"] == "done", news
+    assert client.get("/api/state").json()["stage"]["badge"] == "Path traced"
+    result = client.post("/api/take", json={"kind": "png"}).json()["result"]
+    answer = client.get(f"/api/file/{result['file']}")
+    assert "attachment" in answer.headers["content-disposition"]
+    assert Image.open(io.BytesIO(answer.content)).size == (WIDTH, HEIGHT)
+    archive = client.post("/api/take", json={"kind": "edits"}).json()["result"]
+    content = client.get(f"/api/file/{archive['file']}").content
+    client.post("/api/act", json={"action": "remove", "index": 0})
+    sent = client.post("/api/upload?name=edits.zip", content=content).json()
+    state = client.post("/api/load", json={"file": sent["file"]}).json()
+    assert state["steps"][0]["options"]["hue"] == "90"
+
+
+def test_photos_are_opened_renamed_and_deleted(client, tmp_path):
+    content = zipped_package(tmp_path).read_bytes()
+    sent = client.post("/api/upload?name=kitchen.zip", content=content).json()
+    state = client.post("/api/start", json={"file": sent["file"]}).json()
+    name = state["project"]["name"]
+    assert state["project"]["title"] == "kitchen"
+    renamed = client.post("/api/rename", json={"project": name, "title": "My <kitchen>"}).json()
+    assert renamed[0]["title"] == "My kitchen"
+    left = client.post("/api/discard", json={"project": name}).json()
+    assert name not in [project["name"] for project in left]
+    state = client.get("/api/state").json()
+    assert state["project"] is None
+    assert client.post("/api/open", json={"project": "photo-001"}).json()["project"]

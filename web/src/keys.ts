@@ -1,0 +1,58 @@
+// Keys that work anywhere on the page but where text is typed.
+import { change, set, view, type Tool } from "./store";
+
+const TOOLS: Tool[] = ["click", "box", "brush", "lamp", "place"];
+
+export function undo(again: boolean): void {
+  if (again ? view.state?.redo : view.state?.undo) void change("undo", { again });
+}
+
+function typing(target: EventTarget | null): boolean {
+  return target instanceof HTMLElement && target.matches("textarea, input:not([type=range], [type=checkbox], [type=color])");
+}
+
+export function shortcuts(): () => void {
+  const down = (event: KeyboardEvent) => {
+    if (event.defaultPrevented) return;
+    if (event.key === "Escape") return escape();
+    if (typing(event.target)) return;
+    if (event.ctrlKey || event.metaKey) {
+      const key = event.key.toLowerCase();
+      if (key !== "z" && key !== "y") return;
+      event.preventDefault();
+      return undo(key === "y" || event.shiftKey);
+    }
+    if (view.sheet || event.altKey) {
+      if (event.key === "?") set({ sheet: "" });
+      return;
+    }
+    const { state } = view;
+    const key = event.key.toLowerCase();
+    if (event.key === "?") set({ sheet: "help" });
+    if (!state?.project) return;
+    const tool = TOOLS[Number(event.key) - 1];
+    if (tool) set({ tool });
+    else if (key === "b") set({ before: true });
+    else if (key === "c") set({ comparing: !view.comparing });
+    else if (key === "f") void change("final");
+    else if (event.key === "Delete" && state.current !== null)
+      void change("act", { action: "remove", index: state.current });
+  };
+  const over = () => view.before && set({ before: false });
+  window.addEventListener("keydown", down);
+  window.addEventListener("keyup", over);
+  window.addEventListener("blur", over);
+  return () => {
+    window.removeEventListener("keydown", down);
+    window.removeEventListener("keyup", over);
+    window.removeEventListener("blur", over);
+  };
+}
+
+function escape(): void {
+  if (view.message) set({ message: "" });
+  else if (view.sheet && (view.state?.project || view.state?.expected)) set({ sheet: "" });
+  else if (view.sheet === "help") set({ sheet: view.state?.project ? "" : "open" });
+  else if (view.tool !== "click") set({ tool: "click" });
+  else if (view.state?.stage.region || view.state?.current !== null) void change("deselect");
+}

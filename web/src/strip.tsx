@@ -1,0 +1,46 @@
+// The list of edits, always in sight: switch, choose, order, remove.
+import { Icon } from "./icons";
+import { change, useView } from "./store";
+import { t } from "./strings";
+import type { Step } from "./types";
+
+export function Strip() {
+  const { state } = useView();
+  const steps = state?.steps ?? [];
+  return (
+    <footer class="strip" aria-label={t.edits} id="steps">
+      {!steps.length && <span class="none">{t.noEdits}</span>}
+      <ol>
+        {steps.map((step, index) => (
+          <Chip key={index} step={step} index={index} count={steps.length} current={state?.current === index} />
+        ))}
+      </ol>
+    </footer>
+  );
+}
+
+function Chip({ step, index, count, current }: { step: Step; index: number; count: number; current: boolean }) {
+  const act = (action: string) => void change("act", { action, index });
+  const [kind, ...rest] = step.text.split(": ");
+  return (
+    <li class={`chip ${current ? "current" : ""} ${step.on ? "" : "off"}`}>
+      <input type="checkbox" checked={step.on} aria-label={t.toggle(step.text)} onChange={() => act("toggle")} />
+      <button class="text" aria-current={current ? "true" : undefined} title={step.text} onClick={() => act("choose")}>
+        <b>{kind}</b> <span>{rest.join(": ")}</span>
+      </button>
+      {current && (
+        <span class="order">
+          <button class="icon-only" disabled={index === 0} aria-label={`${t.earlier}: ${step.text}`} title={t.earlier} onClick={() => act("up")}>
+            ‹
+          </button>
+          <button class="icon-only" disabled={index === count - 1} aria-label={`${t.later}: ${step.text}`} title={t.later} onClick={() => act("down")}>
+            ›
+          </button>
+        </span>
+      )}
+      <button class="icon-only" aria-label={`${t.removeEdit}: ${step.text}`} title={t.removeEdit} onClick={() => act("remove")}>
+        <Icon name="close" />
+      </button>
+    </li>
+  );
+}
