@@ -246,6 +246,19 @@ def _train(
     report_success(f"train {kind}", training.as_json, lines, **facts, **scores)
 
 
+def mean(
+    first: Annotated[Path, typer.Argument(metavar="FIRST", help="Weights before a run.")],
+    second: Annotated[Path, typer.Argument(metavar="SECOND", help="Weights after it.")],
+    output: Annotated[Path, output_option("FILE", "The mean, as .safetensors.")],
+    share: Annotated[float, typer.Option(metavar="S", help="Of SECOND, 0 to 1.")] = 0.5,
+) -> None:
+    """Average two weights of the bundled network: what a short run has learnt, without what it has forgotten."""
+    from materialist_lab.train.mean import write_mean
+
+    write_mean(first, second, output, share)
+    report_success("train mean", False, [f"{output}: {share:g} of {second}, the rest of {first}."])
+
+
 app = group("train", "Make training data, and train the networks that predict materials.")
-for command in (data, matnet, refraction, clicks):
+for command in (data, matnet, refraction, clicks, mean):
     add_command(app, command)
