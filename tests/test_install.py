@@ -1,5 +1,6 @@
-"""Commands that install work where pip, uv or pipx made the environment, and name no other project."""
+"""Commands that install work in environments with and without a pip, and name no other project."""
 
+import shlex
 import sys
 
 import pytest
@@ -9,11 +10,19 @@ from materialist import install
 
 def test_a_command_is_of_this_very_python(monkeypatch):
     assert (
-        install.install_command("rawpy>=0.21") == f"{sys.executable} -m pip install 'rawpy>=0.21'"
+        install.install_command("rawpy>=0.21")
+        == f"{shlex.quote(sys.executable)} -m pip install 'rawpy>=0.21'"
     )
     monkeypatch.setattr(install, "find_spec", lambda name: None)  # as in an environment of uv
-    expected = f"uv pip install --python {sys.executable} 'rawpy>=0.21'"
+    expected = f"uv pip install --python {shlex.quote(sys.executable)} 'rawpy>=0.21'"
     assert install.install_command("rawpy>=0.21") == expected
+
+
+def test_a_python_in_a_folder_with_a_space_is_quoted(monkeypatch):
+    monkeypatch.setattr(sys, "executable", "/home/a b/bin/python")
+    assert shlex.split(install.install_command("rawpy"))[0] == "/home/a b/bin/python"
+    monkeypatch.setattr(install, "find_spec", lambda name: None)
+    assert "/home/a b/bin/python" in shlex.split(install.install_command("rawpy"))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The command that installs a package into this very Python, whether pip, uv or pipx made its environment."""
+"""The command that installs a package into this very Python: by its own pip, or by uv where it has none."""
 
 import re
 import shlex
@@ -16,13 +16,12 @@ LABORATORY = "materialist-photo-lab"
 def install_command(*requirements: str) -> str:
     """A line for a shell that installs requirements, as in `install_command("rawpy>=0.21")`.
 
-    Environments of uv have no pip of their own.
+    Environments that uv made have no pip of their own.
     """
-    words = shlex.join(requirements)
     # This very Python's pip, whatever the shell would find first.
     if find_spec("pip") is not None:
-        return f"{sys.executable} -m pip install {words}"
-    return f"uv pip install --python {sys.executable} {words}"
+        return shlex.join([sys.executable, "-m", "pip", "install", *requirements])
+    return shlex.join(["uv", "pip", "install", "--python", sys.executable, *requirements])
 
 
 def laboratory_command() -> str:

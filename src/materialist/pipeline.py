@@ -18,11 +18,11 @@ from materialist.color import CLIPPED, linear_to_srgb
 from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.io.image import read_mask
-from materialist.io.out.residual import shading_residual
 from materialist.io.photo import HDR_CLIP, exposed
 from materialist.io.photo_input import PhotoInput, photo_of
 from materialist.keywords import InvertKeywords
 from materialist.memory import kept_memory
+from materialist.metrics.residual import shading_residual
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked

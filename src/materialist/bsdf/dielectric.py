@@ -1,6 +1,7 @@
 """What a transparent surface does to a ray: Snell's law, Fresnel's equations, and rough surfaces of both.
 
 Directions are unit vectors [..., 3] along which light is followed; normals are unit and point against the ray.
+`eta` is n_t / n_i: index of refraction beyond the surface over that of the side the ray comes from.
 """
 
 import numpy as np
@@ -9,19 +10,21 @@ from materialist.bsdf import ggx
 from materialist.types import Array
 
 
-def refract(direction: Array, normal: Array, ratio: float) -> tuple[Array, Array]:
+def refract(direction: Array, normal: Array, eta: float) -> tuple[Array, Array]:
     """Snell's law in vector form (paper, Material Transparency Editing: the direction omega_t).
 
-    Of unit directions [..., 3] at unit normals [..., 3] with normal . direction <= 0; `ratio`: index of refraction of
-    the side the ray comes from, over that of the other. Returns the unit directions beyond the surface, and [...] bool
-    where there is none because all light is reflected; the direction is then that of the reflection.
+    Of unit directions [..., 3] at unit normals [..., 3] with normal . direction <= 0; `eta`: n_t / n_i. Returns the
+    unit directions beyond the surface, and [...] bool where there is none because all light is reflected; the direction
+    is then that of the reflection.
     """
-    # sin(theta_t) = ratio sin(theta_i), written in cosines; below 0 there is no refracted ray.
-    cosine = np.clip(-np.sum(direction * normal, -1, keepdims=True), 0, 1)
-    squared = 1 - ratio**2 * (1 - cosine**2)  # cosine squared on the other side
-    bent = ratio * direction + (ratio * cosine - np.sqrt(np.maximum(squared, 0))) * normal
-    total = squared[..., 0] < 0
-    return np.where(total[..., None], reflect(direction, normal), bent), total
+    inverse_eta = 1 / eta
+    cos_i = np.clip(-np.sum(direction * normal, -1, keepdims=True), 0, 1)
+    # Snell: sin_t = sin_i / eta; above 1 there is no refracted ray.
+    sin2_t = inverse_eta**2 * (1 - cos_i**2)
+    cos_t = np.sqrt(np.maximum(1 - sin2_t, 0))
+    refracted = inverse_eta * direction + (inverse_eta * cos_i - cos_t) * normal
+    is_total = sin2_t[..., 0] > 1
+    return np.where(is_total[..., None], reflect(direction, normal), refracted), is_total
 
 
 def reflect(direction: Array, normal: Array) -> Array:
@@ -29,22 +32,22 @@ def reflect(direction: Array, normal: Array) -> Array:
     return direction - 2 * np.sum(direction * normal, -1, keepdims=True) * normal
 
 
-def fresnel_dielectric(cosine: Array, ior: float) -> Array:
+def fresnel_dielectric(cosine: Array, eta: float) -> Array:
     """Exact reflectance [...] of unpolarised light (F_s of the paper's f_glass, without Schlick's approximation).
 
-    `cosine`: [...] of the angle between the ray and the normal, in [0, 1]. `ior`: index of refraction of the other side
-    over that of the side the ray comes from. In [0, 1]; 1 where reflection is total.
+    `cosine`: [...] of the angle between the ray and the normal, in [0, 1]; `eta`: n_t / n_i.
+    In [0, 1]; 1 where reflection is total.
     """
-    cosine = np.clip(cosine, 0, 1)
-    squared = 1 - (1 - cosine**2) / ior**2
-    other = np.sqrt(np.maximum(squared, 0))
+    cos_i = np.clip(cosine, 0, 1)
+    sin2_t = (1 - cos_i**2) / eta**2
+    cos_t = np.sqrt(np.maximum(1 - sin2_t, 0))
+    is_total = sin2_t >= 1
+    # Amplitudes of both polarisations; unpolarised light reflects the mean of their squares.
     with np.errstate(invalid="ignore", divide="ignore"):
-        # r_p and r_s, the amplitudes of both polarisations; unpolarised light has the mean of
-        # their squares.
-        parallel = (ior * cosine - other) / (ior * cosine + other)
-        across = (cosine - ior * other) / (cosine + ior * other)
-    both = 0.5 * (parallel**2 + across**2)
-    return np.where((squared <= 0) | ~np.isfinite(both), 1.0, both)
+        r_parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t)
+        r_perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t)
+    reflectance = 0.5 * (r_parallel**2 + r_perpendicular**2)
+    return np.where(is_total | ~np.isfinite(reflectance), 1.0, reflectance)
 
 
 def visible_facet(direction: Array, normal: Array, alpha: float, u: float, v: float) -> Array:

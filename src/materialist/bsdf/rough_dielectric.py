@@ -40,11 +40,11 @@ def directional_albedo(ior: float, alpha: float) -> Array:
     m = np.stack(visible_normal(np.moveaxis(wi, -1, 0), alpha, u, v), -1)  # [N, FACETS, FACETS, 3]
     along = (wi * m).sum(-1)
     albedos = []
-    for relative in (ior, 1 / ior):
+    for eta in (ior, 1 / ior):
         # --- What leaves after one facet: reflected on the same side, refracted on the other ---
-        reflected = fresnel_dielectric(along, relative)
+        reflected = fresnel_dielectric(along, eta)
         upward = (2 * along[..., None] * m - wi)[..., 2]
-        downward = refract(-wi, m, 1 / relative)[0][..., 2]
+        downward = refract(-wi, m, eta)[0][..., 2]
         shares = [
             np.where(sign * z > 0, smith_g1(z, alpha), 0)
             for sign, z in ((1, upward), (-1, downward))

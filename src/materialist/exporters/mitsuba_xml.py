@@ -49,7 +49,7 @@ def write_mitsuba(folder: Path, scene: Scene, parts: list[Part]) -> None:
 
 
 def _xml(mi, description: dict, depth: int) -> str:
-    """The text of a description; what `spp` and `max_depth` stand for can be chosen: mi.load_file(path, spp=256)."""
+    """The text of a description, whose `spp` and `max_depth` are parameters: mi.load_file(path, spp=256)."""
     state = mi.parser.parse_dict(mi.parser.ParserConfig(mi.variant()), description)
     kinds = {
         PLUGIN: mi.ObjectType.BSDF,
@@ -58,7 +58,9 @@ def _xml(mi, description: dict, depth: int) -> str:
     }
     for node in state.nodes:  # Mitsuba knows the kinds of its own plugins alone
         node.type = kinds.get(node.props.plugin_name(), node.type)
-    text = mi.parser.write_string(state)  # with `spp` as such a parameter
+    text = mi.parser.write_string(state)
+    # max_depth becomes an XML parameter (`mi.load_file(path, max_depth=…)`); Mitsuba's writer does
+    # this for spp only.
     text = text.replace(f'"max_depth" value="{depth}"', '"max_depth" value="$max_depth"')
     return text.replace("<default", f'<default name="max_depth" value="{depth}"/>\n    <default', 1)
 
@@ -85,8 +87,7 @@ def _description(mi, scene: Scene, parts: list[Part], uses_plugin: bool) -> dict
 
 
 def _bsdf(part: Part, uses_plugin: bool) -> dict:
-    """The renderer's material. Both sides shade alike: `principled` needs a wrapper for that, which our own plugin must
-    not have, since it would take what leans away from the eye for a back."""
+    """The renderer's material, as `mi.load_dict` takes it."""
     sampling = ("nearest", "clamp") if part.surface is None else ("bilinear", "repeat")
     opaque: dict = {"type": PLUGIN}
     for name, key in MAPS.items():
@@ -99,6 +100,8 @@ def _bsdf(part: Part, uses_plugin: bool) -> dict:
             "wrap_mode": sampling[1],
         }
     bsdf = opaque if part.surface is None else body_bsdf(part.surface, opaque)
+    # Both sides shade alike. `principled` is one-sided, so wrap it in `twosided`. Our plugin handles
+    # back sides itself; `twosided` would flip hits whose shading normal faces away from the camera.
     if uses_plugin:
         return bsdf
     bsdf = _standard(bsdf)

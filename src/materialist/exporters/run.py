@@ -100,12 +100,14 @@ def _losses(scene: Scene, bodies: list[Part], to: str) -> Iterator[str]:
     clear = any(surface.transmission > 0 for surface in surfaces)
     absent = []
     if to == "usd" and clear:
-        absent = ["refraction and tint of glass"]
+        absent.append("refraction and tint of glass")
     if to == "html":
-        absent = ["textures but for their colours at the vertices"] * any(
-            not p.constant for p in bodies
-        )
-        absent += ["glass"] * clear + ["glow"] * any(max(s.emission) > 0 for s in surfaces)
+        if any(not body.constant for body in bodies):
+            absent.append("textures but for their colours at the vertices")
+        if clear:
+            absent.append("glass")
+        if any(max(surface.emission) > 0 for surface in surfaces):
+            absent.append("glow")
     if absent:
         yield f"{to} shows bodies without {' and '.join(absent)}; glb, blend and mitsuba have all of it."
     if scene.lamps and to == "html":

@@ -72,7 +72,7 @@ def _without_strays(
 ) -> Array:
     """[N] log depth whose strays, as the blurred rim of a thing, follow a neighbour in place of their own depth.
 
-    found, pull, data: [N] as in `_Grid.solved`. angle: of a pixel, radians.
+    log_depth: [N] from the solves before. pull, data: [N] as in `_Grid.solved`. angle: of a pixel, radians.
     """
     gap = np.abs(grid.step @ log_depth - grid.demanded)
     least = SETTINGS.least * len(data)

@@ -34,7 +34,9 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
     # --- The files that this package must have, and those that it may ---
     pictures = [f"{part}/{name}.exr" for part in ("prior", "maps") for name in MAPS]
     pictures += [file for file in map(spread_file, MAPS) if (folder / file).exists()]
-    pictures += ["photo.exr", "rerender.exr", "envmap.exr", *[LIGHT] * (folder / LIGHT).exists()]
+    pictures += ["photo.exr", "rerender.exr", "envmap.exr"]
+    if (folder / LIGHT).exists():
+        pictures.append(LIGHT)
     pictures += [f"bodies/{k}.{name}.exr" for k in range(bodies) for name in MAPS[:3]]
     meshes = ["mesh.ply", *(f"bodies/{k}.ply" for k in range(bodies))]
     # --- Their size in memory, by headers alone ---

@@ -24,9 +24,9 @@ from materialist.io.manifest import (
     spread_file,
 )
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
-from materialist.io.out.residual import shading_residual
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
+from materialist.metrics.residual import shading_residual
 from materialist.plain import plain
 from materialist.types import (
     Array,
@@ -78,8 +78,8 @@ def _read(folder: Path, most: float) -> Scene:
     # Sizes first: nothing is decoded that would not fit into memory.
     check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
     shape = (camera.height, camera.width)
-    predicted = _read_maps(folder / "prior", shape)
-    materials, normal, depth = _read_maps(folder / "maps", shape)
+    prior_maps = _read_maps(folder / "prior", shape)
+    fitted_maps = _read_maps(folder / "maps", shape)
     light = package_map(folder / LIGHT) if (folder / LIGHT).exists() else None
     if light is not None and light.shape[2:] != (4,):
         raise SceneError(
@@ -95,18 +95,23 @@ def _read(folder: Path, most: float) -> Scene:
     return Scene(
         camera=camera,
         photo=_read_photo(folder, photo, shape),
-        materials=materials,
-        normal=normal,
-        depth=depth,
+        materials=_materials(fitted_maps),
+        normal=fitted_maps["normal"],
+        depth=fitted_maps["depth"],
         prior=Prediction(
-            *predicted,
-            prior["predictor"],
-            tuple(prior["warnings"]),
-            prior.get("sources", {}),
-            light,
-            spread,
+            materials=_materials(prior_maps),
+            normal=prior_maps["normal"],
+            depth=prior_maps["depth"],
+            predictor=prior["predictor"],
+            warnings=tuple(prior["warnings"]),
+            sources=prior.get("sources", {}),
+            light=light,
+            spread=spread,
         ),
-        geometry=Geometry(read_ply(folder / "mesh.ply", math.prod(shape)), label.astype(np.int8)),
+        geometry=Geometry(
+            mesh=read_ply(folder / "mesh.ply", math.prod(shape)),
+            plane_label=label.astype(np.int8),
+        ),
         envmap=package_map(folder / "envmap.exr"),
         rerender=package_map(folder / "rerender.exr", (*shape, 3)),
         report=_read_report(folder),
@@ -223,27 +228,36 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
         source = None
     exif = meta.get("exif")
     return Photo(
-        package_map(folder / "photo.exr", (*shape, 3)),
-        Camera(**meta["camera"]),
-        original,
-        meta["hdr"],
-        meta["fov_source"],
-        meta["path"],
-        source,
-        tuple(meta["warnings"]),
-        bool(meta.get("deep", False)),
-        stops,
-        meta.get("layer"),
-        None if exif is None else base64.b64decode(exif, validate=True),
+        linear=package_map(folder / "photo.exr", (*shape, 3)),
+        camera=Camera(**meta["camera"]),
+        original=original,
+        hdr=meta["hdr"],
+        fov_source=meta["fov_source"],
+        path=meta["path"],
+        source=source,
+        warnings=tuple(meta["warnings"]),
+        deep=bool(meta.get("deep", False)),
+        stops=stops,
+        layer=meta.get("layer"),
+        exif=None if exif is None else base64.b64decode(exif, validate=True),
     )
 
 
-def _read_maps(folder: Path, shape: tuple[int, int]) -> tuple[Materials, Array, Array]:
-    maps = [
-        package_map(folder / f"{k}.exr", (*shape, 3) if k in ("albedo", "normal") else shape)
-        for k in MAPS
-    ]
-    return Materials(*maps[:3]), maps[3], maps[4]
+def _read_maps(folder: Path, shape: tuple[int, int]) -> dict[str, Array]:
+    """Each of `MAPS` by its name: albedo and normal [H, W, 3], the others [H, W]."""
+    maps = {}
+    for name in MAPS:
+        channels = (3,) if name in ("albedo", "normal") else ()
+        maps[name] = package_map(folder / f"{name}.exr", (*shape, *channels))
+    return maps
+
+
+def _materials(maps: dict[str, Array]) -> Materials:
+    return Materials(
+        albedo=maps["albedo"],
+        roughness=maps["roughness"],
+        metallic=maps["metallic"],
+    )
 
 
 def _read_meta(folder: Path) -> dict[str, Any]:
@@ -302,4 +316,8 @@ def _read_report(folder: Path) -> FitReport:
         for k, v in content.items()
         if k not in ("stages", "warnings")
     }
-    return FitReport(tuple(content.get("stages", ())), metrics, tuple(content.get("warnings", ())))
+    return FitReport(
+        stages=tuple(content.get("stages", ())),
+        metrics=metrics,
+        warnings=tuple(content.get("warnings", ())),
+    )

@@ -168,29 +168,33 @@ def _closed(view: _View, camera: Camera) -> Shell:
     front = view.depth
     thick = view.thickness
     # --- The outline, triangulated on a grid finer than the pixels of a small object ---
-    edge = silhouette_field(known)  # [h, w] pixels
-    factor = int(
+    silhouette_distance = silhouette_field(known)  # [h, w] pixels
+    points_per_pixel = int(
         np.clip(round(SETTINGS.grid_points / max(known.shape)), 1, SETTINGS.max_points_per_pixel)
     )
-    size = (known.shape[1] * factor, known.shape[0] * factor)
-    within = cv2.resize(edge.astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
-    points, faces = region(_ended(within))
+    height, width = known.shape
+    upsampled_distance = cv2.resize(
+        silhouette_distance.astype(np.float32),
+        (width * points_per_pixel, height * points_per_pixel),
+        interpolation=cv2.INTER_LINEAR,
+    )
+    points, faces = region(_closed_at_border(upsampled_distance))
     if not len(faces):
         raise InputError(
             "The mask is too thin to give a body; mark an object that is some pixels wide."
         )
-    place = (points + 0.5) / factor - 0.5  # [V, 2] (x, y) pixels of the view
+    pixel_xy = (points + 0.5) / points_per_pixel - 0.5  # [V, 2] pixels of the view
 
     def at_points(values):
-        return sampled(values, place, order=1)
+        return sampled(values, pixel_xy, order=1)
 
     # --- Front depth and thickness at the vertices ---
-    # Towards a round silhouette front and back turn away, and the middle between them does not: it is carried on, as
-    # is the square of the thickness, which ends evenly there and stays where the object ends in a wall.
-    middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
-    square = np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)
-    through = np.sqrt(np.maximum(at_points(square), 0))
-    front_depth = np.exp(at_points(middle)) - through / (2 * at_points(length))
+    # Near a rounded silhouette thickness falls like sqrt(distance), so thickness² is linear there:
+    # extrapolate thickness² and the mid-surface depth, not front and back.
+    log_middle = continued(np.log(np.where(known, front + thick / (2 * length), 1)), known)
+    squared_thickness = np.minimum(continued(thick**2, known), 2 * thick.max() ** 2)
+    through = np.sqrt(np.maximum(at_points(squared_thickness), 0))
+    front_depth = np.exp(at_points(log_middle)) - through / (2 * at_points(length))
     through = np.maximum(
         np.minimum(through, at_points(_room(view))), SETTINGS.min_border_thickness * front_depth
     )
@@ -202,16 +206,16 @@ def _closed(view: _View, camera: Camera) -> Shell:
     else:
         back = blurred_normals(view.back, known, sigma)
     normals = (
-        _between(blurred_normals(view.normal, known, sigma), known, place),
-        _between(back, known, place),
+        _between(blurred_normals(view.normal, known, sigma), known, pixel_xy),
+        _between(back, known, pixel_xy),
     )
 
     # --- The wall between them faces down the slope of the outline's distance field ---
-    down, right = np.gradient(edge)
+    down, right = np.gradient(silhouette_distance)
     outward = np.stack([-at_points(right), -at_points(down)], -1)
     return closed_shell(
         faces,
-        place + np.array([view.left, view.top]),
+        pixel_xy + np.array([view.left, view.top]),
         front_depth,
         through,
         normals,
@@ -220,9 +224,9 @@ def _closed(view: _View, camera: Camera) -> Shell:
     )
 
 
-def _between(normal: Array, known: Array, place: Array) -> Array:
-    """[V, 3] unit normals at places [V, 2] of a map [h, w, 3], the nearest known ones beyond the mask."""
-    return unit(sampled(normal[nearest(known)], place))
+def _between(normal: Array, known: Array, pixel_xy: Array) -> Array:
+    """[V, 3] unit normals at points [V, 2] of a map [h, w, 3], the nearest known ones beyond the mask."""
+    return unit(sampled(normal[nearest(known)], pixel_xy))
 
 
 def _room(view: _View) -> Array:
@@ -237,8 +241,9 @@ def _room(view: _View) -> Array:
     return membrane(room, view.inside)
 
 
-def _ended(field: Array) -> Array:
-    """The field with its outermost points negative, and none so near 0 that its border meets a grid point."""
-    field[[0, -1]] = np.minimum(field[[0, -1]], -1)
-    field[:, [0, -1]] = np.minimum(field[:, [0, -1]], -1)
-    return np.copysign(np.maximum(np.abs(field), SETTINGS.min_grid_distance), field)
+def _closed_at_border(distance: Array) -> Array:
+    """The distance field with its outermost points negative, and none so near 0 that the outline meets a grid point."""
+    closed = distance.copy()
+    closed[[0, -1]] = np.minimum(closed[[0, -1]], -1)
+    closed[:, [0, -1]] = np.minimum(closed[:, [0, -1]], -1)
+    return np.copysign(np.maximum(np.abs(closed), SETTINGS.min_grid_distance), closed)

@@ -37,7 +37,7 @@ class StudioSettings:
     unpacked_bytes: int = 1_500_000_000  # largest zip once unpacked
     decoded_bytes: int = 1_000_000_000  # largest zipped scene in memory, by its files' headers
     # Who may work at a time.
-    jobs_a_person: int = 6  # that wait or run
+    jobs_a_person: int = 6  # that wait or run, counted by address: people behind one share them
     jobs: int = 60  # of all
     wrong_passwords: int = 20  # a minute, of one address
     addresses: int = 10_000  # whose wrong passwords are remembered

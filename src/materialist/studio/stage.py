@@ -169,7 +169,7 @@ def named_maps(scene: Scene) -> list[tuple[Array, str]]:
         (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
         (
             display.error(scene.photo.linear, scene.rerender),
-            "Residual: where it misses the photo (x 4)",
+            "Error: where it misses the photo (x 4)",
         ),
     ]
 

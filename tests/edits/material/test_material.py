@@ -8,7 +8,7 @@ from edit_scenes import MASK, flat_scene
 from made_meshes import floor_scene
 
 from materialist.color import linear_to_srgb
-from materialist.edits.material.material import edit, shifted_hsv
+from materialist.edits.material.material import edit, projected, shifted_hsv
 from materialist.errors import InputError
 
 SCENE = flat_scene()
@@ -136,3 +136,11 @@ def test_a_texture_lies_on_a_floor_with_its_top_in_the_depth():
     assert (np.diff(albedo[..., 0], axis=0) < 0).mean() > 0.9 and (
         np.diff(albedo[..., 1], axis=1) < 0
     ).mean() > 0.9
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_a_texture_of_one_pixel_has_the_shape_of_the_photo(scale):
+    pixel = np.float32([[[0.25, 0.5, 0.75]]])
+    albedo = projected(SCENE, MASK, pixel, scale)
+    assert albedo.shape == SCENE.materials.albedo.shape
+    np.testing.assert_allclose(albedo, np.broadcast_to(pixel, albedo.shape), atol=1e-6)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from materialist import metrics
-from materialist.edits.composite.disclosed import compared, without_traces
+from materialist.edits.composite.disclosed import base_scene, base_without_shadow
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured, warned
@@ -127,11 +127,11 @@ class _Compositor:
         last = self._last
         self._last = edited
         if self._renderer is None or last is None or not _same_base(self._scene, last, edited):
-            # As in the paper, a plain rendering needs no photo without the traces of the object.
+            # As in the paper, a plain rendering needs no photo without the object's shadow.
             if self._full_render:
-                base = compared(self._scene, edited)
+                base = base_scene(self._scene, edited)
             else:
-                base = without_traces(self._scene, edited, self._options)
+                base = base_without_shadow(self._scene, edited, self._options)
             self._renderer = EditRenderer(base, device=self._options.device)
         return self._renderer
 

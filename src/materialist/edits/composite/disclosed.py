@@ -20,12 +20,11 @@ RIM = 3
 """Pixels around filled ones that change as those do: there the two renderings show edges of what is gone."""
 
 
-def compared(scene: Scene, edited: Scene) -> Scene:
-    """The scene that an edit is compared with, which shows what the composite's photo shows.
+def base_scene(scene: Scene, edited: Scene) -> Scene:
+    """The scene that edits are compared with.
 
-    It is the fitted scene; with in-photo emitters as surfaces where the edit has them (`core.surfaces`). Where the
-    edit discloses hidden places, it carries a photo that is filled there (`remove`): that photo stands in for the
-    photo, and the fitted scene without the removed object for the fitted scene.
+    If an edit removed something, its filled photo and maps replace the fitted ones inside the hole. In-photo emitters
+    are surfaces where the edit has them as such (`core.surfaces`).
     """
     base = base_of(scene, edited)
     if edited.photo is scene.photo:
@@ -49,17 +48,17 @@ def compared(scene: Scene, edited: Scene) -> Scene:
     )
 
 
-def without_traces(
+def base_without_shadow(
     scene: Scene,
     edited: Scene,
     options: RenderOptions,
 ) -> Scene:
-    """`compared`, and its photo changes around the hole as the rendering does when the object goes.
+    """`base_scene`, whose photo changes around the hole as the rendering does when the object goes.
 
-    Its shadow and its reflection go, and the light that it shed on other things. Filled pixels, which are like their
-    surroundings, change by the factor of the surroundings.
+    The object's shadow and reflection go, and the light that it shed on other things. Filled pixels, which are like
+    their surroundings, change by the ratio of the surroundings.
     """
-    base = compared(scene, edited)
+    base = base_scene(scene, edited)
     if base.photo is scene.photo:
         return base
     # --- What the renderings say: the scene with the object, and without it ---
@@ -82,12 +81,14 @@ def without_traces(
     layers = difference(
         *pair, np.zeros_like(hole), guides, replace(options, progress=tick), hidden=inner(spanned)
     )
-    # --- Their ratio, spanned over the hole, and applied to the photo ---
-    factor = np.log((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor))
-    factor = np.where(spanned[..., None], membrane(factor, ~spanned), factor)
-    reached = np.where(spanned, np.abs(factor).max(-1) > MIN_CHANGE, layers.reached)
+    # --- Their ratio, spanned over the hole ---
+    log_ratio = np.log((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor))
+    log_ratio = np.where(spanned[..., None], membrane(log_ratio, ~spanned), log_ratio)
+    reached = np.where(spanned, np.abs(log_ratio).max(-1) > MIN_CHANGE, layers.reached)
+    # Scale the photo by the ratio through the ordinary composite, as if photo and scaled photo were
+    # the two renderings.
     layers = replace(
-        layers, base=photo.linear, edited=photo.linear * np.exp(factor), reached=reached
+        layers, base=photo.linear, edited=photo.linear * np.exp(log_ratio), reached=reached
     )
     return replace(
         base,

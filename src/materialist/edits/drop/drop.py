@@ -124,7 +124,9 @@ def settle(
             f"After {SETTINGS.max_seconds:g} seconds not everything that fell is at rest; it stays where it is then."
         )
     edited = falling.at(poses, gone)
-    return warned(edited, *notes, *[UNSEEN] * (not _in_view(scene, edited)))
+    if not _in_view(scene, edited):
+        notes.append(UNSEEN)
+    return warned(edited, *notes)
 
 
 def _in_view(scene: Scene, edited: Scene) -> bool:

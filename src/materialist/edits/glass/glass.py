@@ -113,7 +113,8 @@ def _shell(
         shell = revolution.body(camera, wall=wall)
     # Of several reasons the note names the first that holds.
     note = NO_ROOM if not shell.hollow else LID if revolution is None else NARROW
-    return shell, [note] * (hollow == "open" or (bool(hollow) and not shell.hollow))
+    failed = hollow == "open" or (bool(hollow) and not shell.hollow)
+    return shell, [note] if failed else []
 
 
 def glass_surface(scene: Scene, options: Glass) -> Surface:

@@ -180,7 +180,7 @@ def cross(
     points = [((k + 0.5) * g) % 1 for g in (0.7320508076, 1 / n, 0.6180339887, 0.4142135623)]
     facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
     # At the front: omega_t1 inside (Snell), the reflection, and what share goes which way (Fresnel)
-    inner, _ = refract(front.direction, facet, 1 / ior)
+    inner, _ = refract(front.direction, facet, ior)
     mirrored = reflect(front.direction, facet)
     fresnel = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
     reflectance = fresnel * _unmasked(mirrored, front.normal, alpha, below=False)
@@ -191,9 +191,9 @@ def cross(
     # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
     against = -_facing(outward, -inner)
     facet = visible_facet(inner, against, alpha, points[2], points[3])
-    direction, total = refract(inner, facet, ior)
+    direction, is_total = refract(inner, facet, 1 / ior)
     passed = 1 - fresnel_dielectric(-np.sum(inner * facet, -1), 1 / ior)
-    passed = np.where(total, 1.0, passed) * _unmasked(direction, against, alpha, below=~total)
+    passed = np.where(is_total, 1.0, passed) * _unmasked(direction, against, alpha, below=~is_total)
     return Crossing(exit_point, direction, share * passed, mirrored, reflectance)
 
 

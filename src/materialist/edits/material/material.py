@@ -138,30 +138,33 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
     # [H, W] scene units; `along` grows downwards as rows do.
     across = points @ right
     along = points @ -up
-    h, w = picture.shape[:2]
+    height, width = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
-    extent = max(np.ptp(across[use]) / w, np.ptp(along[use]) / h, 1e-9) * scale
-    u = (across - across[use].min()) / (extent * w)
-    v = (along - along[use].min()) / (extent * h)
+    texel = max(np.ptp(across[use]) / width, np.ptp(along[use]) / height, 1e-9) * scale
+    u = (across - across[use].min()) / (texel * width)
+    v = (along - along[use].min()) / (texel * height)
     return _repeated(picture, u, v, use)
 
 
 def _repeated(picture: Array, u: Array, v: Array, use: Array) -> Array:
-    """[H, W, 3] bilinear lookup at (u, v) in pictures, repeated; a large picture is first shrunk to what `use` sees."""
-    h, w = picture.shape[:2]
-    x = (u - np.floor(u)) * w - 0.5
-    y = (v - np.floor(v)) * h - 0.5
-    # Texture pixels to a pixel of the photo, by the median step: above 1 the picture would alias.
-    step = max(_median_step(u.T, use.T) * w, _median_step(v, use) * h)
-    if step > 1.5:
-        k = min(1 / step, 1.0)
-        small = cv2.resize(
-            picture, (max(1, round(w * k)), max(1, round(h * k))), interpolation=cv2.INTER_AREA
-        )
-        return _repeated(small, u, v, use) if small.shape != picture.shape else small
+    """[H, W, 3] bilinear lookup in a picture [h, w, 3] that repeats; one too fine for the photo is shrunk first.
+
+    u, v: [H, W] texture coordinates, from 0 to 1 across and down one picture. use: [H, W] bool, the pixels that count.
+    """
+    height, width = picture.shape[:2]
+    # Texels to a pixel of the photo, by the median step: above 1 the picture would alias.
+    texels_per_pixel = max(_median_step(u.T, use.T) * width, _median_step(v, use) * height)
+    if texels_per_pixel > 1.5:
+        if (height, width) == (1, 1):
+            return np.broadcast_to(picture, (*u.shape, 3))
+        shrink = 1 / texels_per_pixel
+        size = (max(1, round(width * shrink)), max(1, round(height * shrink)))
+        return _repeated(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), u, v, use)
     # One pixel of the opposite side around it: the bilinear lookup then repeats without a seam.
     padded = cv2.copyMakeBorder(picture, 1, 1, 1, 1, cv2.BORDER_WRAP)
-    return cv2.remap(padded, x.astype(np.float32) + 1, y.astype(np.float32) + 1, cv2.INTER_LINEAR)
+    columns = ((u - np.floor(u)) * width - 0.5).astype(np.float32) + 1
+    rows = ((v - np.floor(v)) * height - 0.5).astype(np.float32) + 1
+    return cv2.remap(padded, columns, rows, cv2.INTER_LINEAR)
 
 
 def _median_step(values: Array, use: Array) -> float:

@@ -79,8 +79,11 @@ def evidence_notes(hole: Hole) -> list[str]:
     outline = painted & ~binary_erosion(painted)
     share = float(painted.mean())
     cut = float((painted & frame).sum() / max(int(outline.sum()), 1))
-    reasons = [f"it takes {share:.0%} of the photo"] * (share > SETTINGS.large_share)
-    reasons += [f"{cut:.0%} of its outline lies on the frame"] * (cut > SETTINGS.cut_share)
+    reasons = []
+    if share > SETTINGS.large_share:
+        reasons.append(f"it takes {share:.0%} of the photo")
+    if cut > SETTINGS.cut_share:
+        reasons.append(f"{cut:.0%} of its outline lies on the frame")
     if not reasons:
         return []
     return [

@@ -5,7 +5,6 @@ go on through the hole. They come from the surfaces that go on there or from nea
 guide prefers those of the same surface.
 """
 
-import sys
 import threading
 from dataclasses import dataclass
 
@@ -99,6 +98,6 @@ def _inpainted(levels: Array, gap: Array, excluded: Array, guide: Array, seed: i
             )
     except (ImportError, RuntimeError) as error:
         raise SetupError(
-            f"Filling what was hidden needs the package PyPatchMatch ({error}); install it with: {sys.executable} -m "
+            f"Filling what was hidden needs the package PyPatchMatch ({error}); install it with: "
             f"{install_command('--force-reinstall', '--no-deps', 'PyPatchMatch')}, or give a background."
         ) from error

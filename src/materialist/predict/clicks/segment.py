@@ -54,32 +54,35 @@ def object_likelihood(
     network = loaded(ClickNet, Path(weights) if str(weights) else WEIGHTS)
     scale = SIDE / max(height, width)
     rows, columns = size = resample.with_longer_side(depth.shape, SIDE)
-    whole = [np.ascontiguousarray(v, np.float32) for v in (rgb, normal, depth)]
+    rgb = np.ascontiguousarray(rgb, np.float32)
+    normal = np.ascontiguousarray(normal, np.float32)
+    depth = np.ascontiguousarray(depth, np.float32)
     # Depth by the nearest pixel: a mean across an edge is a depth that nothing has.
-    nearest = np.asarray(cv2.resize(whole[2], (columns, rows), interpolation=cv2.INTER_NEAREST))
-    places = [
+    small_depth = np.asarray(cv2.resize(depth, (columns, rows), interpolation=cv2.INTER_NEAREST))
+    small_clicks = [
         (min(int((x + 0.5) * scale), columns - 1), min(int((y + 0.5) * scale), rows - 1))
         for x, y in clicks
     ]
-    frame = None if box is None else _scaled(box, scale, (columns, rows))
+    small_box = None if box is None else _scaled(box, scale, (columns, rows))
     maps = click_features(
-        resample.values(whole[0], size),
-        unit(resample.values(whole[1], size)),
-        nearest,
-        places,
-        frame,
+        resample.values(rgb, size),
+        unit(resample.values(normal, size)),
+        small_depth,
+        small_clicks,
+        small_box,
     )
     # --- The network on the picture and its mirror image, padded to whole strides ---
-    below = -maps.shape[1] % STRIDE
-    beside = -maps.shape[2] % STRIDE
-    padded = torch.from_numpy(np.pad(maps, ((0, 0), (0, below), (0, beside)), mode="edge"))[None]
+    pad_rows = -maps.shape[1] % STRIDE
+    pad_columns = -maps.shape[2] % STRIDE
+    padding = ((0, 0), (0, pad_rows), (0, pad_columns))
+    padded = torch.from_numpy(np.pad(maps, padding, mode="edge"))[None]
     mirrored = padded.flip(-1)
     mirrored[:, NORMAL_X] *= -1
     with torch.inference_mode():
-        both = (network(padded) + network(mirrored).flip(-1)) / 2
+        logits = (network(padded) + network(mirrored).flip(-1)) / 2
     # --- Back to the photo's size ---
-    share = both[0].sigmoid().numpy()[: maps.shape[1], : maps.shape[2]]
-    return np.asarray(cv2.resize(share, (width, height), interpolation=cv2.INTER_LINEAR))
+    likelihood = logits[0].sigmoid().numpy()[:rows, :columns]
+    return np.asarray(cv2.resize(likelihood, (width, height), interpolation=cv2.INTER_LINEAR))
 
 
 def _scaled(box: Box, scale: float, size: tuple[int, int]) -> Box:

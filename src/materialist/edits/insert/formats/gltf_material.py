@@ -177,14 +177,18 @@ def _shining(entry: dict[str, Any], surface: Surface) -> Surface:
 
 def _left_out(entry: dict[str, Any]) -> list[str]:
     """Parts of a material that are not shown."""
+    left_out = []
+    if "normalTexture" in entry:
+        left_out.append("its normal map")
+    if "emissiveTexture" in entry:
+        left_out.append("its emissive texture")
+    if entry.get("alphaMode", "OPAQUE") != "OPAQUE":
+        left_out.append("its transparency (taken as opaque)")
+    if "transmissionTexture" in extension(entry, TRANSMISSION):
+        left_out.append("its transmission texture")
     extensions = entry.get("extensions") or {}
-    return [
-        *["its normal map"] * ("normalTexture" in entry),
-        *["its emissive texture"] * ("emissiveTexture" in entry),
-        *["its transparency (taken as opaque)"] * (entry.get("alphaMode", "OPAQUE") != "OPAQUE"),
-        *["its transmission texture"] * ("transmissionTexture" in extension(entry, TRANSMISSION)),
-        *(str(name)[:80] for name in extensions if name not in SHOWN),
-    ]
+    left_out += [str(name)[:80] for name in extensions if name not in SHOWN]
+    return left_out
 
 
 def _metals(diffuse: Array, specular: Array) -> tuple[Array, Array]:

@@ -143,16 +143,13 @@ def _pair(values: list[str], otherwise: float) -> tuple[float, float]:
 
 def _left_out(entries: dict[str, list[str]]) -> list[str]:
     """Parts of a material that are not shown."""
-    clear = _numbers(entries.get("d"), (1.0,))[0] < 1 or _numbers(entries.get("tr"), (0.0,))[0] > 0
-    maps = [
-        key
-        for key in entries
-        if key.startswith(("map_", "bump", "norm", "disp")) and key != "map_kd"
-    ]
-    return [
-        *["its transparency (taken as opaque)"] * bool(clear),
-        *(f"its {key[:40]}" for key in maps),
-    ]
+    left_out = []
+    if _numbers(entries.get("d"), (1.0,))[0] < 1 or _numbers(entries.get("tr"), (0.0,))[0] > 0:
+        left_out.append("its transparency (taken as opaque)")
+    for key in entries:
+        if key.startswith(("map_", "bump", "norm", "disp")) and key != "map_kd":
+            left_out.append(f"its {key[:40]}")
+    return left_out
 
 
 def _numbers(value: Any, otherwise: tuple[float, ...]) -> Array:

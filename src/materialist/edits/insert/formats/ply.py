@@ -162,7 +162,8 @@ def _texture(source: MeshSource, names: list[str], content: MeshContent) -> str 
         pictures.add(names[0], data)
     pixels = pictures.pixels(names[0])
     content.notes += pictures.notes()
-    content.left_out += ["its further textures"] * (len(names) > 1)
+    if len(names) > 1:
+        content.left_out.append("its further textures")
     if pixels is None:
         return None
     surface = replace(uniform_surface(GREY, GREY, 0.0), albedo=srgb_to_linear(pixels))

@@ -81,7 +81,9 @@ class Textures:
 
     def notes(self) -> list[str]:
         """Sentences on what could not be kept as it is in the file."""
-        notes = ["a texture cannot be read; a constant takes its place."] * bool(self.damaged)
+        notes = []
+        if self.damaged:
+            notes.append("a texture cannot be read; a constant takes its place.")
         side = self.side
         if side < self.source.limits.texture and any(
             max(size) > side for size in self._sizes.values()
