@@ -22,10 +22,10 @@ from materialist.io.photo import HDR_CLIP, exposed
 from materialist.io.photo_input import PhotoInput, photo_of
 from materialist.keywords import InvertKeywords
 from materialist.memory import kept_memory
-from materialist.metrics.residual import shading_residual
 from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
+from materialist.residual import shading_residual
 from materialist.threads import fixed_threads
 from materialist.types import Array, FitReport, Photo, Prediction, Prior, Scene
 

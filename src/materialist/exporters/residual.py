@@ -1,6 +1,6 @@
 """The shading residual, carried by base colour and metallic, so that an export looks like the photo unedited.
 
-Light and fitted maps leave something of the photo unexplained: `metrics.residual` has it as a factor on the
+Light and fitted maps leave something of the photo unexplained: `materialist.residual` has it as a factor on the
 re-rendering, which no format knows. With the light held, the radiance of a pixel is affine in its base colour, so the
 colour that gives the wanted radiance is known. Where even black reflects too much, as a dielectric does (4 %, and more
 at grazing angles), metallic goes up as far as needed: that lowers the specular reflectance to the base colour's.
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.metrics.residual import shading_residual
 from materialist.render.variant import setup
+from materialist.residual import shading_residual
 from materialist.types import Array, Materials, Scene
 
 _LEVELS = 21

@@ -9,7 +9,7 @@ from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 from materialist.color import srgb_levels
 from materialist.io import display
-from materialist.metrics.residual import shading_residual
+from materialist.residual import shading_residual
 from materialist.types import Array, Scene
 
 _WIDTH = 1600

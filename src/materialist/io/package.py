@@ -26,8 +26,8 @@ from materialist.io.manifest import (
 from materialist.io.meshes import read_bodies, read_ply, write_bodies, write_ply
 from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
-from materialist.metrics.residual import shading_residual
 from materialist.plain import plain
+from materialist.residual import shading_residual
 from materialist.types import (
     Array,
     Camera,

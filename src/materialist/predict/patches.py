@@ -33,6 +33,9 @@ DEVIATION = (0.229, 0.224, 0.225)
 class PatchFeatures(nn.Module):
     """sRGB picture in, features of its patches out."""
 
+    mean: Tensor
+    deviation: Tensor
+
     def __init__(self) -> None:
         super().__init__()
         self.vit = Encoder(WIDTH, BLOCKS, HEADS)

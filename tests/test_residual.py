@@ -3,7 +3,7 @@
 import numpy as np
 
 from materialist import metrics
-from materialist.metrics.residual import LIMIT, shading_residual
+from materialist.residual import LIMIT, shading_residual
 
 
 def test_the_residual_finds_smooth_shading_again():
