@@ -291,7 +291,7 @@ direction = st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.05, 1))
 
 
 @hypothesis.settings(max_examples=6, deadline=None, database=None, derandomize=True)
-@hypothesis.merged(
+@hypothesis.given(
     albedo=st.tuples(unit, unit, unit),
     roughness=unit,
     metallic=unit,
