@@ -36,6 +36,7 @@ _EXTRAS = {
     "rawpy": ("raw", "camera RAW photos"),
     "pyoidn": ("denoise", "denoised pictures"),
     "gradio": ("studio", "the studio"),
+    "websockets": ("studio", "the darkroom"),
     "mujoco": ("physics", "things that fall"),
     "coacd": ("physics", "their convex parts"),
     "imageio-ffmpeg": ("video", "films"),

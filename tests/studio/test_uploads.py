@@ -11,10 +11,9 @@ from materialist.errors import InputError, SceneError
 from materialist.io.decode import decoded_bytes, image_size
 from materialist.io.exr import write_exr
 from materialist.io.package import load_scene
-from materialist.studio import StudioSettings, archives, tab_open, uploads
+from materialist.studio import StudioSettings, archives, uploads
 from materialist.studio.access.quota import Allowance
 from materialist.studio.session import Session
-from materialist.studio.widgets import PageContext
 
 pytestmark = pytest.mark.usefixtures("opens_here")
 
@@ -68,7 +67,7 @@ def test_a_scene_that_would_not_fit_into_the_server_is_not_decoded(studio, tmp_p
     before = studio.work.projects()
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(decoded_bytes=100_000))
     with pytest.raises(SceneError, match="GB of memory") as error:
-        tab_open._unpack(PageContext(studio), Session("me"), file)
+        studio.unpack(Session("me"), file)
     assert studio.work.projects() == before and str(studio.work.root) not in studio.without_folders(
         str(error.value)
     )
