@@ -41,6 +41,7 @@ def test_every_photo_ends_as_done_or_with_a_reason(tmp_path):
     assert len(traces) == 1 and "RuntimeError" in traces[0]
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_number_of_workers_or_what_ran_before(tmp_path):
     source = photos(tmp_path / "in", "a", "b", "c")
     one = run(source, tmp_path / "one", workers=1)
@@ -70,6 +71,7 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     assert again.hash != first.hash and again.hash == run(source, tmp_path / "fresh").hash
 
 
+@pytest.mark.slow
 def test_what_lies_there_of_somebody_else_is_not_replaced(tmp_path):
     source = photos(tmp_path / "in", "b")
     runs = tmp_path / "runs"

@@ -87,6 +87,7 @@ def test_papers_first_stage_leaves_albedo_alone(room):
     assert 0 < float((state.maps[:, 3:] - expected).abs().max()) < 0.1
 
 
+@pytest.mark.slow
 def test_paper_fits_the_light_again_after_each_stage_under_its_own_bounces(room):
     """The maps move; the light of the second fit goes on from that of the first."""
     fit = room.fit(PAPER.at_most(25))

@@ -52,6 +52,7 @@ def test_photos_are_found_in_folders_and_masks_are_left_out(tmp_path):
     assert [path.name for path in photo_files(tmp_path)] == ["a.jpg", "c.PNG"]
 
 
+@pytest.mark.slow
 def test_the_command_measures_photos(measured, real_data):
     rows = measured("geometry", data=real_data("data"), size=64, limit=2, device="cpu").rows
     assert len(rows) == 2

@@ -19,6 +19,7 @@ def test_the_fitted_light_explains_the_photo_better_than_grey_light(sample):
     assert better > 3 + metrics.psnr(sample.scene.render(grey, spp=64), photo)
 
 
+@pytest.mark.slow
 def test_maps_are_given_as_the_method_says(sample):
     """The paper's "w/ mat" is MatNet's maps, held fixed; "w/o mat": A = R = 0.5 and M = 0.1, whatever the true ones."""
     names = ("paper", "paper w/o mat", "paper predicted", "paper predicted w/o mat")

@@ -44,6 +44,7 @@ def test_the_loss_has_a_closed_form():
     assert sure["entropy"].item() < 1e-6 and sure["overlap"].item() < 1e-6
 
 
+@pytest.mark.slow
 def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):
