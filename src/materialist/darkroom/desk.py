@@ -121,7 +121,7 @@ class Desk:
         job = entry.job
         state = job.state if entry.finished or not job.over else "running"
         part = min(1.0, job.done / job.total) if job.total and not job.over else None
-        found = [facts["name"] for facts in job.intermediate]
+        map_names = [facts["name"] for facts in job.intermediate]
         return {
             "number": entry.number,
             "kind": job.kind,
@@ -129,7 +129,7 @@ class Desk:
             "text": self._words(entry),
             "part": part,
             "seconds": int(job.seconds),
-            "found": list(dict.fromkeys(found)),
+            "found": list(dict.fromkeys(map_names)),
             "project": job.folder.name if job.kind == "invert" else None,
             "result": entry.result,
         }

@@ -183,9 +183,8 @@ class MaterialMaps(nn.Module):
         strips = prior.split(strip_pixels or len(prior))
         self.strips = nn.ParameterList(strip.clone() for strip in strips)
         ends = np.cumsum([0] + [len(strip) for strip in strips])
-        self.rows = [slice(int(start), int(end)) for start, end in pairwise(ends)]
-        if len(strips) == 1:
-            self.rows = [ALL]
+        parts = [slice(int(start), int(end)) for start, end in pairwise(ends)]
+        self.rows = parts if len(parts) > 1 else [ALL]
         """Of each strip."""
 
     def forward(self, rows: Rows = ALL) -> torch.Tensor:

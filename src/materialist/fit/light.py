@@ -77,7 +77,7 @@ def fit_light(
     progress: Progress | None = None,
     stop: Stop = never,
 ) -> StageResult:
-    """Move `field` so that the rendering matches the photo: argmin_E L_re, with the prior's materials.
+    """Move `field` so that the rendering matches the photo: argmin_E L_re, with the materials of the problem.
 
     Beyond the paper, what the light differs from `start` by is kept smooth, white and small. photo: [H * W, 3] linear.
     """

@@ -214,10 +214,10 @@ def _outline_score(scene: Scene, thing: dict[str, Any]) -> Row:
     photo = scene.photo.original
     mask = drawn(thing, scene.depth.shape)
     selected = _found(scene, mask, box=boxes(mask, 0.1)["exact box"])
-    found = matte(selected, photo) > 0.5
+    outlined = matte(selected, photo) > 0.5
     return {
         "method": "border, photos, exact box",
-        "border": boundary_f(found, drawn(thing, photo.shape[:2])),
+        "border": boundary_f(outlined, drawn(thing, photo.shape[:2])),
     }
 
 

@@ -142,9 +142,9 @@ def _as_taken(picture: Array, rng: np.random.Generator) -> Array:
     return srgb_to_linear(levels.astype(np.float32))
 
 
-def boundary_f(found: Array, true: Array, tolerance: float = TOLERANCE) -> float:
+def boundary_f(predicted: Array, true: Array, tolerance: float = TOLERANCE) -> float:
     """F measure of the border of a mask [H, W] bool against that of the true one, within a tolerance in pixels."""
-    borders = [_border(mask) for mask in (found, true)]
+    borders = [_border(mask) for mask in (predicted, true)]
     if not all(border.any() for border in borders):
         return 0.0
     near = [distance_transform_edt(~border) <= tolerance for border in borders]
