@@ -114,6 +114,8 @@ interface Waiting {
 }
 let queue: Waiting[] = [];
 let running = false;
+/** How many changes were sent: a state that was asked for before the last one may be of before it. */
+let changes = 0;
 let rest = 0;
 
 export function change(place: string, body: object = {}, key = "", words = ""): Promise<void> {
@@ -135,11 +137,12 @@ async function drain(): Promise<void> {
     const { words } = entry;
     // Words for what takes long only: a slider answers before anybody could read.
     const timer = window.setTimeout(() => set({ working: words || t.working }), words ? 150 : 700);
+    changes += 1;
     try {
       accept(await entry.run());
     } catch (error) {
       tell(error);
-      await refresh(); // controls go back to what is true
+      await load(); // controls go back to what is true
     }
     clearTimeout(timer);
     if (view.working) set({ working: "" });
@@ -162,12 +165,19 @@ export function accept(state: State): void {
   if (stage.coarse) rest = window.setTimeout(() => void refresh(), 300);
 }
 
-export async function refresh(): Promise<void> {
+async function load(): Promise<void> {
+  const sent = changes;
   try {
-    accept(await get<State>("state"));
+    const state = await get<State>("state");
+    if (sent === changes) accept(state);
   } catch (error) {
     tell(error);
   }
+}
+
+/** Ask for the state. While a change is on its way its answer brings one. */
+export async function refresh(): Promise<void> {
+  if (!running) await load();
 }
 
 // The channel
