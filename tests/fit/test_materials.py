@@ -16,8 +16,13 @@ from materialist.fit.settings import DEFAULT, MaterialStage, Schedule
 WEIGHT = 0.7
 
 
-def fitted(light, photo, prior, white=math.inf, step_pixels=0, strip_pixels=0):
-    """[P, 5] maps where a pixel's radiance is light [P, 3] times albedo."""
+def shaded(light):
+    """Rendering where a pixel's radiance is light [P, 3] times albedo."""
+    return lambda maps, rows: maps[:, :3] * light[rows]
+
+
+def fitted(light, photo, prior, white=math.inf, step_pixels=0):
+    """[P, 5] maps by steps of Adam."""
     schedule = Schedule(learning_rate=0.02, max_steps=400, decay_every=100, decay=0.3, patience=0)
     settings = replace(
         DEFAULT.materials,
@@ -26,8 +31,8 @@ def fitted(light, photo, prior, white=math.inf, step_pixels=0, strip_pixels=0):
         stages=(MaterialStage(("albedo",), schedule),),
         step_pixels=step_pixels,
     )
-    field = MaterialMaps(prior, strip_pixels)
-    fit_materials(lambda maps, rows: maps[:, :3] * light[rows], photo, field, prior, settings)
+    field = MaterialMaps(prior)
+    fit_materials(shaded(light), photo, field, prior, settings)
     return field().detach()
 
 
@@ -50,15 +55,6 @@ def test_albedo_lies_between_the_prior_and_what_the_photo_asks_for():
         best = minimize_scalar(cost, bounds=(0, 1), method="bounded").x
         assert abs(found[place].item() - best) < 0.01
     torch.testing.assert_close(found[:, 3:], torch.full((6, 2), 0.5))
-
-
-def test_strips_of_pixels_move_as_all_together():
-    generator = torch.Generator().manual_seed(0)
-    light, photo = 0.5 + torch.rand(2, 7, 3, generator=generator)
-    prior = torch.rand(7, 5, generator=generator)
-    together = fitted(light, photo, prior)
-    torch.testing.assert_close(fitted(light, photo, prior, strip_pixels=3), together)
-    assert (together - prior).abs().max() > 0.05
 
 
 def test_a_clipped_photo_asks_for_nothing_darker():

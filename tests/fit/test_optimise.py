@@ -14,7 +14,7 @@ def run(losses, schedule, **options) -> StageResult:
     """A loop whose loss takes the given values, whatever the parameter does."""
     parameter = torch.nn.Parameter(torch.zeros(1))
     return optimise(
-        "test", [parameter], lambda step: [losses(step) + 0 * parameter.sum()], schedule, **options
+        "test", [parameter], lambda step: losses(step) + 0 * parameter.sum(), schedule, **options
     )
 
 
@@ -25,27 +25,12 @@ def test_learning_rate_falls_in_steps():
     optimise(
         "test",
         [parameter],
-        lambda _: [-parameter.sum()],
+        lambda _: -parameter.sum(),
         Schedule(learning_rate=0.1, max_steps=7, decay_every=3, decay=0.5, patience=0),
         after_step=lambda: seen.append(parameter.item()),
     )
     moves = [b - a for a, b in zip([0.0, *seen], seen, strict=False)]
     assert moves == pytest.approx([0.1, 0.1, 0.1, 0.05, 0.05, 0.05, 0.025], rel=1e-4)
-
-
-def test_parts_of_a_loss_are_summed():
-    """Two parts, one for each parameter, move them as their sum does."""
-
-    def moved(parts):
-        parameters = [torch.nn.Parameter(torch.tensor([start])) for start in (1.0, 3.0)]
-        schedule = Schedule(learning_rate=0.1, max_steps=5, patience=0)
-        result = optimise("test", parameters, lambda _: parts(*parameters), schedule)
-        return [p.item() for p in parameters], result.losses
-
-    apart = moved(lambda a, b: (p.square().sum() for p in (a, b)))
-    together = moved(lambda a, b: [a.square().sum() + b.square().sum()])
-    assert apart[0] == together[0]
-    assert apart[1] == pytest.approx(together[1]) and apart[1][0] == 10
 
 
 def test_adam_is_torchs():
@@ -110,7 +95,7 @@ def test_the_best_parameters_are_kept_when_asked():
         optimise(
             "test",
             [parameter],
-            lambda k, p=parameter: [values[k] + (p - p.detach()).sum()],
+            lambda k, p=parameter: values[k] + (p - p.detach()).sum(),
             Schedule(learning_rate=0.1, max_steps=5, patience=0, keep_best=keep),
         )
         assert parameter.item() == pytest.approx(expected, rel=1e-3)

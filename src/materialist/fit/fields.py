@@ -7,7 +7,6 @@ ablations. A field is a torch module; calling it gives the map or the materials.
 import math
 from itertools import pairwise
 
-import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
@@ -171,27 +170,15 @@ def clamped(values: torch.Tensor) -> torch.Tensor:
 
 
 class MaterialMaps(nn.Module):
-    """The maps themselves as parameters ("w/o Network" in the paper), in strips of pixels that move on their own.
+    """The maps themselves as parameters ("w/o Network" in the paper)."""
 
-    What a step computes of one strip fits into memory that is at hand; that of a large picture is asked of the system
-    for every operation, which takes longer than the operation.
-    """
-
-    def __init__(self, prior: torch.Tensor, strip_pixels: int = 0):
-        """prior: [P, 5]. strip_pixels: of a strip; 0: all are one."""
+    def __init__(self, prior: torch.Tensor):
+        """prior: [P, 5]."""
         super().__init__()
-        strips = prior.split(strip_pixels or len(prior))
-        self.strips = nn.ParameterList(strip.clone() for strip in strips)
-        ends = np.cumsum([0] + [len(strip) for strip in strips])
-        parts = [slice(int(start), int(end)) for start, end in pairwise(ends)]
-        self.rows = parts if len(parts) > 1 else [ALL]
-        """Of each strip."""
+        self.maps = nn.Parameter(prior.clone())
 
     def forward(self, rows: Rows = ALL) -> torch.Tensor:
-        for strip, own in zip(self.strips, self.rows, strict=True):
-            if isinstance(rows, slice) and rows == own:
-                return strip.clamp(0, 1)
-        return torch.cat(list(self.strips))[rows].clamp(0, 1)
+        return self.maps[rows].clamp(0, 1)
 
 
 class MaterialUNet(nn.Module):

@@ -10,6 +10,7 @@ import torch
 
 from materialist.buffers import placed
 from materialist.envmap import paste_visible_sky
+from materialist.fit.albedo import solve_albedo
 from materialist.fit.engine import (
     Engine,
     MaterialProblem,
@@ -17,6 +18,7 @@ from materialist.fit.engine import (
     TransportEngine,
     prepared_envmap,
 )
+from materialist.fit.fields import MaterialMaps
 from materialist.fit.light import LightStart, envmap_field, fit_light, start_light
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Stop, never
@@ -161,28 +163,35 @@ class Fit:
         pixels = self.engine.pixels
         photo = self._photo()[pixels]
         if isinstance(self.engine, PathEngine):  # it renders all pixels anyway
-            settings = replace(settings, step_pixels=0, strip_pixels=0)
+            settings = replace(settings, step_pixels=0)
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
         model = material_field(
             held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed
         )
+        separable = not isinstance(self.engine, PathEngine) and isinstance(model, MaterialMaps)
+        separable &= settings.loss == "l2"
         for stage in settings.stages:
             if self.stop():
                 break
             start = time.perf_counter()
             problem = self.material_problem(state)
-            (result,) = fit_materials(
-                problem,
-                photo,
-                model,
-                held,
-                replace(settings, stages=(stage,)),
-                seed=setup.seed,
-                progress=self.progress,
-                stop=self.stop,
-            )
-            state.maps = model().detach()
+            if separable and stage.targets == ("albedo",):
+                state.maps, result = solve_albedo(
+                    problem, photo, held, settings, progress=self.progress, stop=self.stop
+                )
+            else:
+                (result,) = fit_materials(
+                    problem,
+                    photo,
+                    model,
+                    held,
+                    replace(settings, stages=(stage,)),
+                    seed=setup.seed,
+                    progress=self.progress,
+                    stop=self.stop,
+                )
+                state.maps = model().detach()
             seconds = round(time.perf_counter() - start, 3)  # with those of the tables
             state.stages.append({**result.summary(), "seconds": seconds})
             again = setup.settings.light.again is not None and state.light is not None

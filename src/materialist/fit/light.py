@@ -89,7 +89,7 @@ def fit_light(
         trust = angle / angle.mean() / resize_envmap(start.scale, problem.height)
     jitter = torch.Generator().manual_seed(seed)
 
-    def loss(_: int) -> list[torch.Tensor]:
+    def loss(_: int) -> torch.Tensor:
         envmap = _at_height(field, settings, problem.height, jitter)
         error = residual(problem.render(envmap), target, settings.encoding, white=settings.white)
         value = rendering_loss(error)
@@ -100,7 +100,7 @@ def fit_light(
             value = value + settings.chroma * log_chroma(change, share)
             if trust is not None:
                 value = value + settings.prior * (trust * change.abs()).mean()
-        return [value]
+        return value
 
     return optimise(name, field.parameters(), loss, settings.schedule, progress=progress, stop=stop)
 

@@ -17,6 +17,19 @@ def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     )
 
 
+def decode(encoded: torch.Tensor, encoding: Encoding) -> torch.Tensor:
+    """The inverse of `encode` on [0, 1]."""
+    if encoding == "linear":
+        return encoded
+    if encoding == "log1p":
+        return torch.expm1(encoded)
+    return torch.where(
+        encoded <= 0.04045,
+        encoded / 12.92,
+        ((encoded.clamp_min(0.04045) + 0.055) / 1.055) ** 2.4,
+    )
+
+
 def residual(
     radiance: torch.Tensor,
     photo: torch.Tensor,

@@ -1,6 +1,6 @@
 """Material properties optimisation (paper, Progressive Differentiable Rendering)."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -43,7 +43,7 @@ def material_field(
     torch.manual_seed(seed)
     fresh: dict[str, Callable[[], nn.Module]] = {
         "mlp": lambda: MaterialMLP(start, pixels, camera.height, camera.width),
-        "maps": lambda: MaterialMaps(start, settings.strip_pixels if inside is None else 0),
+        "maps": lambda: MaterialMaps(start),
         "unet": lambda: MaterialUNet(start, pixels, camera.height, camera.width),
     }
     if settings.field not in fresh:
@@ -72,13 +72,13 @@ def fit_materials(
     # Powers take most of a step, and these do not change.
     encoded_photo = encode(photo, settings.encoding)
     encoded_albedo = encode(prior[:, :3], settings.encoding)
-    strips = field.rows if isinstance(field, MaterialMaps) and not settings.step_pixels else []
     for stage in settings.stages:
         held = {
             name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets
         }
 
-        def part(rows: Rows, held: dict[str, torch.Tensor]) -> torch.Tensor:
+        def loss(_: int, held=held) -> torch.Tensor:
+            rows = draw()
             moved = field(rows)
             values = torch.cat(
                 [held[name][rows] if name in held else moved[:, c] for name, c in COLUMNS.items()],
@@ -95,19 +95,10 @@ def fit_materials(
             change = consistency(values, prior[rows], settings, encoded=encoded_albedo[rows])
             return rendering_loss(error, settings.loss) + change
 
-        def loss(_: int, held=held) -> Iterator[torch.Tensor]:
-            if not strips:
-                yield part(draw(), held)
-            for rows in strips:
-                # The loss is a mean: that of a strip counts by its share of the pixels.
-                share = (rows.stop - rows.start) / len(photo) if len(strips) > 1 else 1.0
-                yield share * part(rows, held)
-
         def into_range() -> None:
             base = field.field if isinstance(field, Unified) else field
             if isinstance(base, MaterialMaps):
-                for strip in base.strips:
-                    strip.clamp_(0, 1)
+                base.maps.clamp_(0, 1)
 
         name = stage.name or ("+".join(stage.targets) if held else "materials")
         run = optimise(

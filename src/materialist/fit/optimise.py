@@ -76,16 +76,15 @@ class Adam:
 def optimise(
     name: str,
     parameters: Iterable[torch.Tensor],
-    loss: Callable[[int], Iterable[torch.Tensor]],
+    loss: Callable[[int], torch.Tensor],
     schedule: Schedule,
     *,
     after_step: Callable[[], None] | None = None,
     progress: Progress | None = None,
     stop: Stop = never,
 ) -> StageResult:
-    """Minimise the sum of `loss(step)` over the tensors `parameters` in place.
+    """Minimise `loss(step)` over the tensors `parameters` in place.
 
-    Its parts are differentiated one after another, so that a generator of them needs the memory of one.
     It stops when the best loss of the last `patience` steps is not `min_improvement` below the best before them.
     """
     if progress is not None:
@@ -97,10 +96,9 @@ def optimise(
     start = time.perf_counter()
     losses = []
     for step in range(schedule.max_steps):
-        value = 0.0
-        for part in loss(step):
-            part.backward()
-            value += part.item()
+        current = loss(step)
+        current.backward()
+        value = current.item()
         if schedule.keep_best and value < best:
             best = value
             kept = [t.detach().clone() for t in tensors]

@@ -77,14 +77,14 @@ class MaterialStage:
 class MaterialSettings:
     """Material properties optimisation; a triple is for albedo, roughness and metallic."""
 
-    field: str = "mlp"  # `mlp`, `maps` or `unet`
+    # `mlp`, `maps` or `unet`; `maps` whose albedo moves alone are solved pixel by pixel (`albedo.py`)
+    field: str = "mlp"
     remap: bool = True  # start roughness and metallic from 0.7 x + 0.2 (paper, Initialization)
     encoding: Encoding = "linear"
     # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
     loss: Loss = "l1+l2"
     white: float = math.inf
     step_pixels: int = 0  # pixels that a step with cached transport compares, drawn anew; 0: all
-    strip_pixels: int = 0  # of `maps`, pixels that are differentiated at once; 0: all
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -173,7 +173,6 @@ DEFAULT = FitSettings(
         white=CLIPPED,
         delta=1.0,
         weights=(0.7, 1.0, 1.0),
-        strip_pixels=2**18,
         stages=(
             MaterialStage(
                 ("albedo",),
