@@ -79,7 +79,7 @@ def test_the_page_has_the_papers_figures_beside_ours_and_says_what_was_not_run(s
     assert "| w/ mat | paper predicted | – | – | – | 31.25 |" in text
     assert (
         "Not run: it needs --data DIR with iiw." in text
-        and "Not run yet." in text
+        and "Not run yet: materialist bench paper -o REPORT --resume --only glass-room." in text
         and "They need people." in text
     )
     assert "No <glass> here." in text and "No &lt;glass&gt; here." in page

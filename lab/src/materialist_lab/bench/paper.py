@@ -191,7 +191,7 @@ def write_page(
     """Write report.html, which opens without a server or other files, and report.md. Raises OutputError."""
     parts: list[dict[str, Any]] = []
     for table in tables:
-        row: dict[str, Any] = rows.get(table.measure, {"absent": table.absent or "Not run yet."})
+        row: dict[str, Any] = rows.get(table.measure) or {"absent": _absence(table, measures)}
         columns = (
             {c.key: c for c in benchmark_class(measures[table.measure].bench).columns}
             if table.measure
@@ -226,6 +226,15 @@ def write_page(
         page = Environment(autoescape=kind == "html", trim_blocks=True, lstrip_blocks=True)
         text = page.from_string((assets / f"paper.{kind}").read_text("utf-8")).render(entry)
         write_whole(output / f"report.{kind}", text)
+
+
+def _absence(table: Table, measures: dict[str, Measure]) -> str:
+    """Why a table has no figures, and the command that makes them."""
+    if table.absent:
+        return table.absent
+    needs = measures[table.measure].needs
+    data = f" --data DIR with DIR/{needs}" if needs else ""
+    return f"Not run yet: materialist bench paper -o REPORT --resume --only {table.measure}{data}."
 
 
 def _picture(path: Path, widest: int = 1400) -> str:
