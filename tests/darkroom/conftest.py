@@ -59,7 +59,7 @@ def local(tmp_path_factory):
         state = client.get("/api/arrive").json()
         assert state["project"]["title"] == "Room"
         with client.websocket_connect(CHANNEL):
-            studio.session("b" * 32, "me").live.wait()
+            studio.page("b" * 32, "me").session.live.wait()
             client.studio = studio
             yield client
     studio.jobs.close()
@@ -68,11 +68,12 @@ def local(tmp_path_factory):
 @pytest.fixture
 def client(local):
     """That page without edits."""
-    session = local.studio.session("b" * 32, "me")
+    session = local.studio.page("b" * 32, "me").session
     session.edits = type(session.edits)()
     session.next_object = {}
     session.deselect()
     session._past = []
+    session.final = None
     session.save()
     return local
 
@@ -81,8 +82,7 @@ def client(local):
 def running(tmp_path_factory):
     """(address, work folder) of the darkroom in a process of its own, on the small scene."""
     folder = tmp_path_factory.mktemp("browser")
-    arguments = (str(package(folder)), "--page", "darkroom")
-    with studio_server.studio(folder, *arguments) as (_, address):
+    with studio_server.studio(folder, str(package(folder))) as (_, address):
         yield address, folder / "work"
 
 

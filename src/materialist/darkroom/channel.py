@@ -29,7 +29,7 @@ async def channel(desks: Desks, socket: WebSocket) -> None:
     await socket.accept()
     heard = asyncio.create_task(_until_closed(socket))
     try:
-        with desk.at_work():
+        with desk.page.at_work():
             await _tell(desk, socket, heard)
     except (WebSocketDisconnect, RuntimeError):
         pass  # the page went while something was being sent
@@ -48,7 +48,7 @@ async def _until_closed(socket: WebSocket) -> None:
 async def _tell(desk: Desk, socket: WebSocket, heard: "asyncio.Task[None]") -> None:
     last: dict[str, Any] = {}
     said = 0.0
-    while not heard.done() and not desk.session.left:
+    while not heard.done() and not desk.page.left:
         now = time.monotonic()
         current = news(desk)
         if current != last or now - said > BEAT:

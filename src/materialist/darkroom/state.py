@@ -23,7 +23,7 @@ from materialist.studio import SETTINGS, objects, uploads
 from materialist.studio.edit_list import step_summary
 from materialist.studio.stage import commands, named_maps, report, stage
 from materialist.studio.studio import PREDICTORS, Studio
-from materialist.studio.tasks import KINDS
+from materialist.studio.tasks import kinds_here
 from materialist.studio.workspace import Project
 from materialist.types import Array, Scene
 
@@ -41,9 +41,6 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
     session = desk.session
     revision = desk.revision
     shown = stage(session, with_edits=with_edits, coarse=coarse)
-    # The outline goes as a path, which is sharp at any size.
-    for name in ("fill", "outline"):
-        shown.pop(name, None)
     with session.lock:
         edits = session.edits
         mask = session.selection.mask
@@ -124,7 +121,7 @@ def about(studio: Studio, person: str) -> dict[str, Any]:
         "fov": declarations(InvertOptions)["fov"][1],
         "lights": [*presets.LIGHTS],
         "objects": objects.LIBRARY,
-        "takes": [[kind, title] for kind, (title, _) in KINDS.items()],
+        "takes": [[kind, title] for kind, (title, _) in kinds_here().items()],
         "sam": sam.sam_problem(),
         "megabytes": SETTINGS.upload_megabytes,
         "photos": sorted(SUFFIXES),

@@ -20,6 +20,7 @@ from materialist.color import luminance
 from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step, apply, options_of, region_of
+from materialist.edits.remove.patches import remembered
 from materialist.errors import InputError
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
@@ -112,7 +113,9 @@ class LivePreview:
             is_slow = step.operation.preview is PreviewMode.SIMULATED
             if is_slow and not step.skipped and self._package is not None:
                 return self._fallen(before, steps)
-            return apply(self.scene, [step], onto=before)
+            # What a removal hides was filled by a job, into the folder of the edits.
+            with remembered(step.folder):
+                return apply(self.scene, [step], onto=before)
         except InputError as error:
             reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
             raise InputError(f"'{step_summary(step)}' cannot be applied. {reason}") from error
