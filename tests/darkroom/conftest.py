@@ -1,5 +1,7 @@
 """The darkroom on a small scene: by requests alone, and in a real browser."""
 
+import time
+
 import pytest
 
 pytest.importorskip("starlette", reason="needs the studio extra")
@@ -112,3 +114,19 @@ def page(browser, running):
     context.close()
     for file in work.glob("photo-*/edits-me/edits.yaml"):
         file.unlink()
+
+
+@pytest.fixture
+def heard(client):
+    """heard(test): what the channel of that page says, once it passes a test."""
+
+    def until(test, seconds=240):
+        end = time.monotonic() + seconds
+        with client.websocket_connect(CHANNEL) as channel:
+            while True:
+                news = channel.receive_json()
+                if test(news):
+                    return news
+                assert time.monotonic() < end, news
+
+    return until
