@@ -54,6 +54,8 @@ class Desk:
         self.expected: Project | None = None
         """The photo that is being taken apart, and is opened when that is done."""
         self.followed: list[Followed] = []
+        self.channels = 0
+        """Its open websockets; counted on the loop that serves them."""
         self._revision = 0
         self._numbers = 0
         self._pointed: OrderedDict[tuple[int, int], Array] = OrderedDict()

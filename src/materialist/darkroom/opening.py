@@ -70,7 +70,9 @@ async def _written(request: Request, file: Path, size: int) -> int:
 def _safe_name(name: str) -> str:
     """The name of an upload without folders: letters, digits, and what else is harmless in a name."""
     bare = re.sub(r"[^\w .()-]+", "_", Path(name.replace("\\", "/")).name).strip(" .")
-    return bare[-80:].lstrip(" .") or "upload"
+    # In bytes: a letter may have four, and a name in a folder 255.
+    short = bare.encode("utf-8", "replace")[-80:].decode("utf-8", "ignore")
+    return short.lstrip(" .") or "upload"
 
 
 # Projects

@@ -1,5 +1,6 @@
 """What a page of the darkroom shows, as one JSON object, and the outline of a region."""
 
+import re
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -211,7 +212,7 @@ def example_file(studio: Studio, name: str) -> Path:
 def map_jpeg(desk: Desk, name: str) -> bytes:
     """A map of what the page shows, by its place in `stage.named_maps`. Raises InputError for another name."""
     maps = named_maps(_edited(desk))
-    if not name.isdigit() or int(name) >= len(maps):
+    if not re.fullmatch("[0-9]{1,3}", name) or int(name) >= len(maps):
         raise InputError(f"There is no map {name!r}.")
     return display.encoded(maps[int(name)][0], "JPEG", quality=92)
 

@@ -25,6 +25,10 @@ class StudioSettings:
     uploads: int = 8  # that one sender sends at a time
     body_seconds: float = 60.0  # in which the next part of an upload must come
     pages: int = 40  # that one sender has open
+    channels: int = 4  # of one page; after a reload the one before may still be closing
+    message_bytes: int = 4096  # largest message of a page; none is expected
+    connections: int = 200  # of one address
+    request_seconds: float = 30.0  # in which a new connection must have sent a request
     requests: int = 16  # of one sender that change something at a time; the server has 40 threads
     # What is read of it.
     edit_pixels: int = 8_000_000  # largest picture of an edit, to which a larger one is shrunk

@@ -99,6 +99,8 @@ def serve(
     """Show a page, an ASGI application, until Ctrl-C. `on_ready` gets the address once it answers."""
     import uvicorn
 
+    from materialist.studio.access.connections import Connection, ProxiedConnection
+
     config = uvicorn.Config(
         page,
         host,
@@ -107,6 +109,8 @@ def serve(
         proxy_headers=False,
         server_header=False,
         timeout_graceful_shutdown=1,
+        ws_max_size=SETTINGS.message_bytes,
+        http=ProxiedConnection if proxy else Connection,
     )
     server = uvicorn.Server(config)
     # A thread of its own: signals are for the command.

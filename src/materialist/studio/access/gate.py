@@ -34,6 +34,8 @@ _READ = re.compile(r"/|/favicon\.svg|/assets/[\w.-]+|/api/[\w./-]+")
 _PLACES = {"GET": _READ, "HEAD": _READ, "POST": re.compile(r"/api/[\w-]+")}
 """Method -> what the page asks for."""
 _FORM_BYTES = 4096
+FOREIGN = ("cross-site", "same-site")
+"""What a browser says of a request that a page of another place began."""
 
 
 @cache
@@ -147,10 +149,7 @@ class Gate:
         # DNS rebinding: a foreign name that points to this machine.
         if self.names is not None and place[0] not in self.names:
             return False
-        if (
-            values.get("sec-fetch-site") in ("cross-site", "same-site")
-            and values.get("sec-fetch-mode") != "navigate"
-        ):
+        if values.get("sec-fetch-site") in FOREIGN and values.get("sec-fetch-mode") != "navigate":
             return False
         return not origin or (_place(origin) == place and "" not in place)
 
@@ -172,7 +171,10 @@ class Gate:
 
     async def _answer(self, request: Request, cookies: dict[str, str], address: str) -> Any:
         """The application that answers: the page, or a refusal; with cookies to set."""
-        if not self.allows(dict(request.scope["headers"])):
+        headers = request.headers
+        # A link of another site leads to the page, to nothing else.
+        led = headers.get("sec-fetch-site") in FOREIGN and request.url.path != "/"
+        if led or not self.allows(dict(request.scope["headers"])):
             return PlainTextResponse("The studio answers its own pages only.\n", 403)
         # --- Who asks ---
         login = request.cookies.get(self._cookie, "")
@@ -270,7 +272,7 @@ def largest_upload() -> int:
 def promised_size(request: Request) -> int:
     """The length that an upload gives. Raises InputError for none, another way of saying it, and too much."""
     size = request.headers.get("content-length", "")
-    if not size.isdigit() or "transfer-encoding" in request.headers:
+    if not re.fullmatch("[0-9]{1,15}", size) or "transfer-encoding" in request.headers:
         raise InputError("An upload must say how long it is.")
     if int(size) > largest_upload():
         raise InputError(f"An upload may have up to {SETTINGS.upload_megabytes} MB.")
