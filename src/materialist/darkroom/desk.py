@@ -17,11 +17,12 @@ from materialist.errors import InputError, MaterialistError
 from materialist.jobs.queue import QUEUED, RUNNING, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
 from materialist.studio.page import Page
+from materialist.studio.selection import Selection
 from materialist.studio.session import Session, next_revision
 from materialist.studio.stage import failure_message, words
 from materialist.studio.studio import Studio
 from materialist.studio.workspace import LOST, Project
-from materialist.types import Array
+from materialist.types import Array, Scene
 
 POINTED = 12
 """Objects under the pointer that are remembered: a click on what is outlined takes just that."""
@@ -56,6 +57,8 @@ class Desk:
         self.followed: list[Followed] = []
         self.channels = 0
         """Its open websockets; counted on the loop that serves them."""
+        self.selected: tuple[Selection, Scene | None, str, Any] | None = None
+        """A selection, its scene, and what `state` made of them."""
         self._revision = 0
         self._numbers = 0
         self._pointed: OrderedDict[tuple[int, int], Array] = OrderedDict()

@@ -22,6 +22,7 @@ from materialist.option_kinds import declarations
 from materialist.options import InvertOptions
 from materialist.studio import SETTINGS, objects, uploads
 from materialist.studio.edit_list import step_summary
+from materialist.studio.selection import Selection
 from materialist.studio.stage import commands, named_maps, report, stage
 from materialist.studio.studio import PREDICTORS, Studio
 from materialist.studio.tasks import kinds_here
@@ -44,14 +45,15 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
     shown = stage(session, with_edits=with_edits, coarse=coarse)
     with session.lock:
         edits = session.edits
-        mask = session.selection.mask
+        selection = session.selection
         undo, redo = session.can_undo
+        outlined, fitted = _of_selection(desk, selection)
         return {
             "revision": revision,
             "project": project_facts(session.project),
             "expected": project_facts(desk.expected),
             "ready": session.live is not None and session.live.ready,
-            "stage": {**shown, "region": outline(mask)},
+            "stage": {**shown, "region": outlined},
             "steps": [
                 {
                     "text": step_summary(step),
@@ -63,7 +65,7 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
             ],
             "current": edits.current,
             "light": edits.light,
-            "fitted": _fitted(desk, mask),
+            "fitted": fitted,
             "undo": undo,
             "redo": redo,
             "object": session.next_object,
@@ -76,12 +78,21 @@ def project_facts(project: Project | None) -> dict[str, Any] | None:
     return None if project is None else {"name": project.name, "title": project.title}
 
 
-def _fitted(desk: Desk, mask: Array | None) -> dict[str, Any] | None:
+def _of_selection(desk: Desk, selection: Selection) -> tuple[str, dict[str, Any] | None]:
+    """Outline of a selection, and what was found under it: made once, as a slider asks for them with every picture."""
+    scene = None if desk.session.live is None else desk.session.live.scene
+    made = desk.selected
+    if made is None or made[0] is not selection or made[1] is not scene:
+        mask = selection.mask
+        made = desk.selected = (selection, scene, outline(mask), _fitted(scene, mask))
+    return made[2], made[3]
+
+
+def _fitted(scene: Scene | None, mask: Array | None) -> dict[str, Any] | None:
     """What was found under a selection: its mean roughness and metallic, and its colour as #rrggbb."""
-    live = desk.session.live
-    if live is None or mask is None:
+    if scene is None or mask is None:
         return None
-    materials = live.scene.materials
+    materials = scene.materials
     colour = srgb_levels(materials.albedo[mask].mean(0)[None])
     return {
         "roughness": round(float(materials.roughness[mask].mean()), 2),

@@ -59,6 +59,7 @@ class StudioSettings:
     glass_niceness: int = 3  # between previews and inversions: somebody waits at a slider
     glass_bodies: int = 2  # that it keeps: going between two objects builds nothing anew
     # The live preview.
+    quiet_seconds: float = 1.5  # since the last picture, before another light is prepared
     undo_steps: int = 60  # length of the undo history
     scenes_kept: int = 24  # edited scenes: moving the last step must not replay those before
     kept_bytes: float = 3e8  # of the bodies in them

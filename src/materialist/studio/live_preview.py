@@ -4,6 +4,7 @@ import ctypes
 import gc
 import sys
 import threading
+import time
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -56,13 +57,22 @@ class LivePreview:
         self._allowance = allowance or Allowance()
         self.scene = scene
         self._package = package
+        self._asked = float("-inf")
+        """When a picture was last asked for, by the monotonic clock."""
+        self._later: threading.Timer | None = None
         self._kept: dict[str, Any] = {}
         """What steps make: scenes, and what a sketch needs of glass."""
         self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
         _THREAD.submit(self._prepare, self._preview)
 
     def _prepare(self, built: Future[Any]) -> None:
-        """Get ready for another light part by part: pictures come between."""
+        """Get ready for another light part by part, while nobody moves a slider: a part takes longer than a picture."""
+        quiet = SETTINGS.quiet_seconds - (time.monotonic() - self._asked)
+        if built is self._preview and quiet > 0:
+            self._later = threading.Timer(quiet, _THREAD.submit, (self._prepare, built))
+            self._later.daemon = True
+            self._later.start()
+            return
         more = built is self._preview and built.exception() is None and built.result().prepare()
         # Only while it is open: the task would hold a closed preview until after `free_memory`.
         if more and built is self._preview:
@@ -157,6 +167,7 @@ class LivePreview:
         if not steps:
             return self.scene.photo.linear
         preview = self._preview.result()
+        self._asked = time.monotonic()
         edited = self.edited(steps)
         known = [
             (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
@@ -184,6 +195,10 @@ class LivePreview:
         return picture
 
     def close(self) -> None:
+        if self._later is not None:
+            # It would hold the closed preview until it is due.
+            self._later.cancel()
+            self._later = None
         self._preview.cancel()
         self._preview = Future()
         # For whoever still waits for it.

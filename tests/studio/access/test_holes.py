@@ -6,6 +6,7 @@ import threading
 import time
 from contextlib import ExitStack
 
+import cv2
 import numpy as np
 import pytest
 
@@ -177,6 +178,14 @@ def test_a_mesh_of_many_faces_is_refused(tmp_path, monkeypatch):
     box_file(tmp_path / "box.ply")
     with pytest.raises(InputError, match="12 faces; the studio takes up to 10"):
         uploads.checked_upload(None, tmp_path / "box.ply", uploads.MESH)
+
+
+def test_a_large_thumbnail_in_a_small_scene_is_refused(tmp_path):
+    """The server itself opens it, and a few kilobytes of PNG can stand for gigabytes."""
+    large = cv2.imencode(".png", np.zeros((4000, 4000, 3), np.uint8))[1].tobytes()
+    file = zipped_package(tmp_path, **{"photo.png": large})
+    with pytest.raises(InputError, match=r"photo\.png is 4000 x 4000"):
+        archives.extract_scene(None, file, tmp_path / "target")
 
 
 def test_a_large_scene_is_refused(tmp_path, monkeypatch):
