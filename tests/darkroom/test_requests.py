@@ -2,9 +2,12 @@
 
 import base64
 import io
+import os
 import re
+import signal
 import time
 
+import made_tasks
 import numpy as np
 import pytest
 from PIL import Image
@@ -283,6 +286,37 @@ def test_two_tabs_on_one_photo_agree(client):
     assert "roughness" not in options
     client.post("/api/close", json={}, headers=other)
     assert client.get("/api/state").json()["project"]["title"] == "Room"
+
+
+def test_other_photos_are_safe_while_one_is_taken_apart(client, heard, monkeypatch):
+    monkeypatch.setattr("materialist.studio.tasks.invert", made_tasks.invert)
+    begun = client.post("/api/start", json={"example": "cat"}).json()
+    assert begun["project"] is None and begun["expected"]["title"]
+    job = heard(lambda news: [one for one in working(news) if one["text"].startswith("Guess")])
+    folder = client.studio.work.root / begun["expected"]["name"]
+    # Another photo is opened and changed meanwhile, and stays open at the end of the first.
+    state = client.post("/api/open", json={"project": "photo-001"}).json()
+    assert state["project"]["title"] == "Room" and state["expected"] is None
+    client.studio.page("b" * 32, "me").session.live.wait()
+    select_block(client)
+    change(client, hue=60)
+    client.post("/api/stop", json={"number": job["jobs"][-1]["number"]})
+    heard(lambda news: not working(news))
+    state = client.get("/api/state").json()
+    assert state["project"]["title"] == "Room" and state["steps"][0]["options"]["hue"] == "60"
+    assert not folder.exists()
+    # The system ends the process of another, as where memory runs out.
+    begun = client.post("/api/start", json={"example": "cat"}).json()
+    assert begun["expected"]["name"] != folder.name
+    heard(lambda news: [one for one in working(news) if one["text"].startswith("Guess")])
+    (running,) = client.studio.jobs.unfinished("me", "invert")
+    os.kill(running.worker.pid, signal.SIGKILL)
+    news = heard(lambda news: not working(news))
+    assert "SIGKILL" in news["jobs"][-1]["text"]
+    state = client.get("/api/state").json()
+    assert state["expected"] is None and state["project"] is None
+    assert client.post("/api/open", json={"project": "photo-001"}).json()["project"]
+    client.studio.page("b" * 32, "me").session.live.wait()
 
 
 def test_photos_are_opened_renamed_and_deleted(client, tmp_path):

@@ -16,7 +16,7 @@ from typing import Any
 
 import psutil
 
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, archives, tasks, uploads
@@ -216,11 +216,16 @@ class Studio:
         # Put back last: the oldest entries go first.
         self.last.pop(person, None)
         self.last = dict([*self.last.items(), (person, name)][-SETTINGS.people :])
-        self.work.write_last(self.last)
+        self._write_last()
 
     def forget_last(self, person: str) -> None:
         """Forget which project a person had: they went back to the choice of photos."""
         if self.last.pop(person, None) is not None:
+            self._write_last()
+
+    def _write_last(self) -> None:
+        # Without it people choose their photo after a restart: no reason to refuse one on a full disk.
+        with suppress(OutputError):
             self.work.write_last(self.last)
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
