@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import psutil
+from PIL import Image
 
 from materialist.errors import InputError, MaterialistError, SetupError
 from materialist.install import install_command
@@ -139,7 +140,8 @@ class StudioBench(Benchmark):
             _browser() as browser,
             _server(Path(folder)) as (server, address),
         ):
-            measured = self._measured(server, address, browser, photo)
+            shown = _enlarged(photo, self.size, Path(folder))
+            measured = self._measured(server, address, browser, shown)
         yield {"method": "studio", "sample": self.photo, "size": self.size, **measured}
 
     def _measured(
@@ -218,6 +220,19 @@ class StudioBench(Benchmark):
         page.mouse.up()
         page.wait_for_timeout(1000)
         return seen / spent
+
+
+def _enlarged(photo: Path, size: int, folder: Path) -> Path:
+    """The photo, enlarged where it is smaller than the working size: the page enlarges nothing."""
+    with Image.open(photo) as image:
+        scale = size / max(image.size)
+        if scale <= 1:
+            return photo
+        large = image.convert("RGB").resize(
+            (round(image.width * scale), round(image.height * scale))
+        )
+    large.save(folder / "photo.png")
+    return folder / "photo.png"
 
 
 def _load(browser: Any, address: str) -> float:
