@@ -120,16 +120,15 @@ def arrive(desk: Desk) -> State:
     """What a page shows when it is loaded: as it was left, else the photo that this person had last."""
     session = desk.session
     studio = desk.studio
-    if session.project is None and desk.expected is None:
-        start = studio.start
-        last = studio.last.get(desk.person) or (start.name if isinstance(start, Project) else None)
-        known = {project.name for project in studio.projects(desk.person)}
-        if last in known:
-            try:
-                return open_project(desk, bodies.Named(project=str(last)))
-            except InputError as error:
-                return {**state(desk), "notes": [session.without_folders(str(error))]}
-    session.take_over()
+    start = studio.start.name if isinstance(studio.start, Project) else None
+    last = studio.last.get(desk.person) or start
+    known = {project.name for project in studio.projects(desk.person)}
+    try:
+        if session.project is None and desk.expected is None and last in known:
+            return open_project(desk, bodies.Named(project=str(last)))
+        session.take_over()
+    except InputError as error:
+        return {**state(desk), "notes": [session.without_folders(str(error))]}
     return state(desk)
 
 
