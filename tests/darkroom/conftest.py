@@ -19,6 +19,16 @@ ADDRESS = "http://127.0.0.1:7860"
 CHANNEL = "ws://127.0.0.1:7860/api/channel?page=" + "b" * 32
 
 
+CLEAR = """async () => {
+  const headers = {'x-materialist-page': sessionStorage.getItem('page')};
+  const post = (place, body) =>
+    fetch(`/api/${place}`, {method: 'POST', headers, body: JSON.stringify(body)}).then((a) => a.json());
+  let state = await post('deselect', {});
+  while (state.steps.length) state = await post('act', {action: 'remove', index: 0});
+}"""
+"""Takes all edits, and the selection, away."""
+
+
 @pytest.fixture
 def shared(tmp_path):
     """A studio that several people reach, with the small scene for everybody."""
@@ -91,7 +101,7 @@ def running(tmp_path_factory):
 @pytest.fixture
 def page(browser, running):
     """The small scene on a page, without edits; those that a test makes go with it."""
-    address, work = running
+    address, _ = running
     context = browser.new_context(
         viewport={"width": 1280, "height": 800}, accept_downloads=True, reduced_motion="reduce"
     )
@@ -110,10 +120,12 @@ def page(browser, running):
     made.goto(address)
     made.wait_for_selector(".marks")
     made.wait_for_selector("#progress", state="hidden")
+    # Edits and selection of the test before are kept, as they are for people.
+    made.evaluate(CLEAR)
+    made.wait_for_selector("#stage:not([data-selected=yes])")
+    made.wait_for_selector("#steps >> text=No edits yet")
     yield made
     context.close()
-    for file in work.glob("photo-*/edits-me/edits.yaml"):
-        file.unlink()
 
 
 @pytest.fixture

@@ -162,7 +162,7 @@ class StudioBench(Benchmark):
         row["idle_mb"] = _resident(server)
         # --- From the photo to a picture that can be clicked ---
         page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.set_default_timeout(900_000)
+        page.set_default_timeout(300_000)
         page.goto(address)
         row |= _dropped(page, photo, self.size)
         page.evaluate(_WATCH)
