@@ -58,7 +58,16 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jobs": set(),
     "batches": SCENE | EDITING | {"jobs", "pipeline", "predict"},
     "studio": SCENE | EDITING | {"exporters", "jobs", "pipeline"},
-    "darkroom": {"io", "edits", "edits.core", "edits.light", "edits.select", "jobs", "studio"},
+    "darkroom": {
+        "io",
+        "edits",
+        "edits.core",
+        "edits.light",
+        "edits.remove",
+        "edits.select",
+        "jobs",
+        "studio",
+    },
     "doctor": {"predict", "render"},
     "cli": SCENE
     | EDITING

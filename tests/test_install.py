@@ -26,7 +26,7 @@ def test_a_python_in_a_folder_with_a_space_is_quoted(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("extra", "package"), [("usd", "usd-core"), ("hub", "diffusers"), ("app", "gradio")]
+    ("extra", "package"), [("usd", "usd-core"), ("hub", "diffusers"), ("app", "starlette")]
 )
 def test_an_extra_is_installed_by_its_packages(extra, package):
     command = install.extra_command(extra)

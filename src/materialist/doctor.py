@@ -35,8 +35,8 @@ sys.stdout.write(" ".join(names))
 _EXTRAS = {
     "rawpy": ("raw", "camera RAW photos"),
     "pyoidn": ("denoise", "denoised pictures"),
-    "gradio": ("studio", "the studio"),
-    "websockets": ("studio", "the darkroom"),
+    "starlette": ("studio", "the studio"),
+    "websockets": ("studio", "the studio"),
     "mujoco": ("physics", "things that fall"),
     "coacd": ("physics", "their convex parts"),
     "imageio-ffmpeg": ("video", "films"),

@@ -1,5 +1,7 @@
 """The darkroom on a small scene: by requests alone, and in a real browser."""
 
+import time
+
 import pytest
 
 pytest.importorskip("starlette", reason="needs the studio extra")
@@ -15,6 +17,16 @@ from materialist.studio.workspace import WorkFolder
 
 ADDRESS = "http://127.0.0.1:7860"
 CHANNEL = "ws://127.0.0.1:7860/api/channel?page=" + "b" * 32
+
+
+CLEAR = """async () => {
+  const headers = {'x-materialist-page': sessionStorage.getItem('page')};
+  const post = (place, body) =>
+    fetch(`/api/${place}`, {method: 'POST', headers, body: JSON.stringify(body)}).then((a) => a.json());
+  let state = await post('deselect', {});
+  while (state.steps.length) state = await post('act', {action: 'remove', index: 0});
+}"""
+"""Takes all edits, and the selection, away."""
 
 
 @pytest.fixture
@@ -59,7 +71,7 @@ def local(tmp_path_factory):
         state = client.get("/api/arrive").json()
         assert state["project"]["title"] == "Room"
         with client.websocket_connect(CHANNEL):
-            studio.session("b" * 32, "me").live.wait()
+            studio.page("b" * 32, "me").session.live.wait()
             client.studio = studio
             yield client
     studio.jobs.close()
@@ -68,11 +80,12 @@ def local(tmp_path_factory):
 @pytest.fixture
 def client(local):
     """That page without edits."""
-    session = local.studio.session("b" * 32, "me")
+    session = local.studio.page("b" * 32, "me").session
     session.edits = type(session.edits)()
     session.next_object = {}
     session.deselect()
     session._past = []
+    session.final = None
     session.save()
     return local
 
@@ -81,15 +94,14 @@ def client(local):
 def running(tmp_path_factory):
     """(address, work folder) of the darkroom in a process of its own, on the small scene."""
     folder = tmp_path_factory.mktemp("browser")
-    arguments = (str(package(folder)), "--page", "darkroom")
-    with studio_server.studio(folder, *arguments) as (_, address):
+    with studio_server.studio(folder, str(package(folder))) as (_, address):
         yield address, folder / "work"
 
 
 @pytest.fixture
 def page(browser, running):
     """The small scene on a page, without edits; those that a test makes go with it."""
-    address, work = running
+    address, _ = running
     context = browser.new_context(
         viewport={"width": 1280, "height": 800}, accept_downloads=True, reduced_motion="reduce"
     )
@@ -108,7 +120,25 @@ def page(browser, running):
     made.goto(address)
     made.wait_for_selector(".marks")
     made.wait_for_selector("#progress", state="hidden")
+    # Edits and selection of the test before are kept, as they are for people.
+    made.evaluate(CLEAR)
+    made.wait_for_selector("#stage:not([data-selected=yes])")
+    made.wait_for_selector("#steps >> text=No edits yet")
     yield made
     context.close()
-    for file in work.glob("photo-*/edits-me/edits.yaml"):
-        file.unlink()
+
+
+@pytest.fixture
+def heard(client):
+    """heard(test): what the channel of that page says, once it passes a test."""
+
+    def until(test, seconds=240):
+        end = time.monotonic() + seconds
+        with client.websocket_connect(CHANNEL) as channel:
+            while True:
+                news = channel.receive_json()
+                if test(news):
+                    return news
+                assert time.monotonic() < end, news
+
+    return until

@@ -1,12 +1,13 @@
 """Attacks on the darkroom's server: what gets past its door, and what does not."""
 
 import re
+from contextlib import ExitStack
 
 import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from materialist.darkroom import application, door
+from materialist.darkroom import application
 from materialist.darkroom.app import STATIC
 from materialist.studio import StudioSettings
 from materialist.studio.access import gate, quota
@@ -46,6 +47,8 @@ def test_the_policy_lets_nothing_in_from_outside(visit):
         ("GET", "/api/picture/..%2f..%2fx/photo", 404),
         ("GET", "/api/picture/photo-001/..%2f..%2fproject", 404),
         ("GET", "/api/picture/photo-002/photo", 400),
+        ("GET", "/api/map/²", 400),  # a digit, and no number
+        ("GET", "/api/map/" + "9" * 5000, 400),
     ],
 )
 def test_only_what_the_page_asks_for_is_answered(visit, method, place, status):
@@ -143,6 +146,27 @@ def test_the_channel_needs_a_known_browser_and_its_own_page(visit):
         assert "jobs" in channel.receive_json()
 
 
+def test_a_page_has_a_few_channels(visit):
+    """Each is looked after ten times a second."""
+    browser = visit()
+    with ExitStack() as held:
+        for _ in range(4):
+            held.enter_context(browser.websocket_connect(SOCKET)).receive_json()
+        with pytest.raises(WebSocketDisconnect), browser.websocket_connect(SOCKET):
+            pass
+    with browser.websocket_connect(SOCKET) as channel:
+        channel.receive_json()
+
+
+def test_a_link_of_another_site_leads_to_the_page_alone(visit):
+    """Else it could open scenes, and use up the pages of its visitor."""
+    browser = visit()
+    led = {"sec-fetch-site": "cross-site", "sec-fetch-mode": "navigate"}
+    del browser.headers["origin"]
+    assert browser.get("/", headers=led).status_code == 200
+    assert browser.get("/api/arrive?page=" + "9" * 32, headers=led).status_code == 403
+
+
 def test_a_password_closes_every_door(shared):
     app = application(shared, host="0.0.0.0", port=0, password="open sesame")
     headers = {"x-materialist-page": PAGE, "origin": "http://studio.example"}
@@ -156,7 +180,7 @@ def test_a_password_closes_every_door(shared):
     with pytest.raises(WebSocketDisconnect), page.websocket_connect(SOCKET):
         pass
     form = page.get("/")
-    digest = door._style_of_login()
+    digest = re.search(r"'sha256-[\w+/=]+'", gate.policy())[0]
     assert digest in form.headers["content-security-policy"] and "<style>" in form.text
     assert page.post("/login", data={"password": "open sesame"}).status_code == 303
     assert page.get("/api/state").status_code == 200
@@ -209,6 +233,7 @@ def test_uploads_have_a_quota(visit, monkeypatch):
         ("a\x00b\n.png", "a_b_.png"),
         ("x" * 300 + ".png", "x" * 76 + ".png"),
         ("<img onerror=1>.png", "_img onerror_1_.png"),
+        ("\U00010000" * 80 + ".png", "\U00010000" * 19 + ".png"),  # four bytes each
     ],
 )
 def test_names_of_uploads_are_no_paths(visit, shared, name, kept):

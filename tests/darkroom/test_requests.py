@@ -1,8 +1,13 @@
 """Selecting and changing by requests: what they answer, and what they refuse."""
 
+import base64
 import io
+import os
+import re
+import signal
 import time
 
+import made_tasks
 import numpy as np
 import pytest
 from PIL import Image
@@ -10,8 +15,6 @@ from studio_scenes import HEIGHT, WIDTH, block, zipped_package
 
 from materialist.darkroom.state import outline
 from materialist.io.image import write_png
-
-CHANNEL = "ws://127.0.0.1:7860/api/channel?page=" + "b" * 32
 
 
 def select_block(client):
@@ -27,8 +30,6 @@ def change(client, kind="edit", **options):
 def pixels(state):
     """[H, W, 3] uint8 of the picture in an answer."""
     data = state["stage"]["picture"].partition(",")[2]
-    import base64
-
     return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
 
 
@@ -190,27 +191,132 @@ def test_pictures_maps_and_what_there_is_to_choose_from(client):
         assert client.get(f"/api/{place}").status_code == 400, place
 
 
-def test_a_final_picture_comes_by_the_channel_and_is_taken_away(client):
+def test_a_final_picture_is_kept_and_taken_away_in_every_format(client, heard):
     select_block(client)
     change(client, hue=90)
     revision = client.post("/api/final", json={}).json()["revision"]
-    news = {}
-    with client.websocket_connect(CHANNEL) as channel:
-        end = time.monotonic() + 240
-        while news.get("revision", revision) == revision and time.monotonic() < end:
-            news = channel.receive_json()
+    news = heard(lambda news: news["revision"] > revision and not working(news))
     assert news["jobs"][-1]["state"] == "done", news
     assert client.get("/api/state").json()["stage"]["badge"] == "Path traced"
-    result = client.post("/api/take", json={"kind": "png"}).json()["result"]
-    answer = client.get(f"/api/file/{result['file']}")
-    assert "attachment" in answer.headers["content-disposition"]
-    assert Image.open(io.BytesIO(answer.content)).size == (WIDTH, HEIGHT)
+    # The page is closed, and opened anew: the picture is there.
+    name = client.get("/api/state").json()["project"]["name"]
+    client.post("/api/close", json={})
+    client.post("/api/open", json={"project": name})
+    client.studio.page("b" * 32, "me").session.live.wait()
+    state = client.get("/api/state").json()
+    assert state["stage"]["badge"] == "Path traced" and state["steps"][0]["options"]["hue"] == "90"
+    # --- Pictures: at once, or after a job that converts ---
+    for kind, suffix in (("png", "png"), ("tif", "tif"), ("jpg", "jpg"), ("exr", "exr")):
+        result = client.post("/api/take", json={"kind": kind}).json().get("result")
+        if result is None:
+            news = heard(lambda news: not working(news))
+            result = news["jobs"][-1]["result"]
+        answer = client.get(f"/api/file/{result['file']}")
+        assert "attachment" in answer.headers["content-disposition"]
+        assert result["name"] == f"Room-edited.{suffix}"
+        if kind != "exr":
+            assert Image.open(io.BytesIO(answer.content)).size == (WIDTH, HEIGHT)
     archive = client.post("/api/take", json={"kind": "edits"}).json()["result"]
     content = client.get(f"/api/file/{archive['file']}").content
     client.post("/api/act", json={"action": "remove", "index": 0})
     sent = client.post("/api/upload?name=edits.zip", content=content).json()
     state = client.post("/api/load", json={"file": sent["file"]}).json()
     assert state["steps"][0]["options"]["hue"] == "90"
+
+
+def working(news):
+    return [job for job in news["jobs"] if job["state"] in ("queued", "running")]
+
+
+def test_a_page_without_a_server_shows_the_edited_picture(client, heard):
+    select_block(client)
+    change(client, hue=120)
+    assert client.post("/api/take", json={"kind": "html"}).json() == {}
+    heard(working)
+    result = heard(lambda news: not working(news))["jobs"][-1]["result"]
+    page = client.get(f"/api/file/{result['file']}").text
+    before, after = (
+        np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))[24, 25].astype(int)
+        for data in re.findall(r'<img [^>]*src="data:image/jpeg;base64,([^"]+)" alt="The', page)[:2]
+    )
+    assert before[0] > before[1] + 40 and after[1] > after[0] + 40
+
+
+def test_a_removal_is_a_job_that_can_be_stopped(client, heard):
+    select_block(client)
+    state = change(client, "remove").json()
+    assert state["steps"] == []  # not before what it hid is filled
+    job = heard(working)["jobs"][-1]
+    assert job["kind"] == "removal"
+    begun = time.monotonic()
+    client.post("/api/stop", json={"number": job["number"]})
+    job = heard(lambda news: not working(news))["jobs"][-1]
+    assert job["state"] == "stopped" and time.monotonic() - begun < 1
+    change(client, "remove", shadow=0.2)
+    change(client, hue=90)  # the page goes on meanwhile
+    heard(lambda news: not working(news))
+    state = client.get("/api/state").json()
+    assert [step["kind"] for step in state["steps"]] == ["edit", "remove"]
+    assert state["steps"][1]["options"]["shadow"] == "0.2"
+    assert abs(pixels(state)[24, 25].astype(int) - pixels(state)[24, 50]).max() < 40
+    begun = time.monotonic()
+    change(client, "remove", shadow=0.2)  # the same again is nothing to do
+    assert client.post("/api/act", json={"action": "remove", "index": 1}).status_code == 200
+    client.post("/api/undo", json={})
+    assert client.get("/api/state").json()["stage"]["badge"].startswith("Sketch")
+    answer = change(client, "remove", shadow=5)
+    assert answer.status_code == 400 and "must lie in" in answer.json()["error"]
+
+
+def test_two_tabs_on_one_photo_agree(client):
+    """What one changes, the other shows and may change further; nothing is lost."""
+    other = {"x-materialist-page": "c" * 32}
+    select_block(client)
+    before = client.get("/api/arrive", headers=other).json()
+    assert before["project"]["title"] == "Room" and before["stage"]["region"]
+    change(client, hue=30)
+    state = client.get("/api/state", headers=other).json()
+    assert state["revision"] > before["revision"] and state["steps"][0]["options"]["hue"] == "30"
+    body = {"kind": "edit", "options": {"roughness": 0.2}}
+    client.post("/api/set", json=body, headers=other)
+    options = client.get("/api/state").json()["steps"][0]["options"]
+    assert (options["hue"], options["roughness"]) == ("30", "0.2")
+    client.post("/api/undo", json={})
+    options = client.get("/api/state", headers=other).json()["steps"][0]["options"]
+    assert "roughness" not in options
+    client.post("/api/close", json={}, headers=other)
+    assert client.get("/api/state").json()["project"]["title"] == "Room"
+
+
+def test_other_photos_are_safe_while_one_is_taken_apart(client, heard, monkeypatch):
+    monkeypatch.setattr("materialist.studio.tasks.invert", made_tasks.invert)
+    begun = client.post("/api/start", json={"example": "cat"}).json()
+    assert begun["project"] is None and begun["expected"]["title"]
+    job = heard(lambda news: [one for one in working(news) if one["text"].startswith("Guess")])
+    folder = client.studio.work.root / begun["expected"]["name"]
+    # Another photo is opened and changed meanwhile, and stays open at the end of the first.
+    state = client.post("/api/open", json={"project": "photo-001"}).json()
+    assert state["project"]["title"] == "Room" and state["expected"] is None
+    client.studio.page("b" * 32, "me").session.live.wait()
+    select_block(client)
+    change(client, hue=60)
+    client.post("/api/stop", json={"number": job["jobs"][-1]["number"]})
+    heard(lambda news: not working(news))
+    state = client.get("/api/state").json()
+    assert state["project"]["title"] == "Room" and state["steps"][0]["options"]["hue"] == "60"
+    assert not folder.exists()
+    # The system ends the process of another, as where memory runs out.
+    begun = client.post("/api/start", json={"example": "cat"}).json()
+    assert begun["expected"]["name"] != folder.name
+    heard(lambda news: [one for one in working(news) if one["text"].startswith("Guess")])
+    (running,) = client.studio.jobs.unfinished("me", "invert")
+    os.kill(running.worker.pid, signal.SIGKILL)
+    news = heard(lambda news: not working(news))
+    assert "SIGKILL" in news["jobs"][-1]["text"]
+    state = client.get("/api/state").json()
+    assert state["expected"] is None and state["project"] is None
+    assert client.post("/api/open", json={"project": "photo-001"}).json()["project"]
+    client.studio.page("b" * 32, "me").session.live.wait()
 
 
 def test_photos_are_opened_renamed_and_deleted(client, tmp_path):

@@ -48,6 +48,12 @@ def wait(report):
     time.sleep(60)
 
 
+def invert(report, **arguments):
+    """In place of an inversion: a minute, and nothing comes of it."""
+    report("predict", 0, 1)
+    time.sleep(60)
+
+
 def surroundings(report):
     """What a task sees of the process that started it."""
     return {"pid": os.getpid(), "password": os.environ.get("MATERIALIST_PASSWORD")}

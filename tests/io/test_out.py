@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from made_scene import make_scene
 from PIL import Image, ImageCms
@@ -206,6 +207,20 @@ def test_a_deep_tiff_has_exif_too_and_other_programs_read_it(tmp_path):
 def test_damaged_exif_does_not_stop_a_picture(tmp_path):
     photo = photo_of_levels(tmp_path, kind="jpg", exif=b"Exif\0\0MM\0*\0\0\xff\xff broken")
     assert mt.save_image(tmp_path / "out.jpg", photo.original, photo) == ()
+
+
+def test_an_exr_has_what_of_exif_has_a_standard_attribute(tmp_path):
+    exif = Image.Exif()
+    exif[0x010F] = "Canon"
+    exif.get_ifd(0x8769).update({0x9003: "2026:05:04 10:11:12", 0x829A: 0.01, 0x829D: 2.8})
+    photo = photo_of_levels(tmp_path, kind="jpg", exif=exif)
+    mt.save_image(tmp_path / "out.exr", photo.original, photo)
+    header = OpenEXR.File(str(tmp_path / "out.exr")).header()
+    assert (header["cameraMake"], header["capDate"]) == ("Canon", "2026:05:04 10:11:12")
+    assert header["expTime"] == pytest.approx(0.01) and header["aperture"] == pytest.approx(2.8)
+    assert "lensModel" not in header and np.array_equal(
+        read_exr(tmp_path / "out.exr"), photo.original
+    )
 
 
 def test_a_makers_note_that_a_jpeg_has_no_room_for(tmp_path, monkeypatch):

@@ -1,8 +1,6 @@
-"""A session on a small scene; a studio that runs on it, and pages of a browser."""
+"""A session on a small scene, and a studio that several people reach."""
 
 import pytest
-import studio_browser
-import studio_server
 from studio_scenes import package
 
 from materialist.jobs.queue import JobQueue
@@ -10,44 +8,6 @@ from materialist.studio import uploads
 from materialist.studio.edit_list import EditList
 from materialist.studio.studio import Studio
 from materialist.studio.workspace import WorkFolder
-
-
-@pytest.fixture(scope="module")
-def running(tmp_path_factory):
-    """(address, work folder) of a studio that was started on the small scene; it goes on with what was opened last."""
-    pytest.importorskip("gradio", reason="needs gradio")
-    folder = tmp_path_factory.mktemp("browser")
-    with studio_server.studio(folder, str(package(folder))) as (_, address):
-        yield address, folder / "work"
-
-
-@pytest.fixture
-def empty_page(browser):
-    """A page of a new browser that notes its requests and the errors in it, refused content too."""
-    context = browser.new_context(viewport={"width": 1280, "height": 1000}, accept_downloads=True)
-    made = context.new_page()
-    made.requested = []
-    made.errors = []
-    made.on("request", lambda request: made.requested.append(request.url))
-
-    def refused(words):
-        return made.errors.append(words) if "Content Security Policy" in words else None
-
-    made.on("console", lambda message: refused(message.text))
-    made.on("pageerror", lambda error: made.errors.append(str(error)))
-    made.set_default_timeout(40_000)
-    yield made
-    context.close()
-
-
-@pytest.fixture
-def page(empty_page, running):
-    """The small scene on a page, without edits; those that a test makes go with it."""
-    address, work = running
-    studio_browser.opened(empty_page, address)
-    yield empty_page
-    for file in work.glob("photo-*/edits-me/edits.yaml"):
-        file.unlink()
 
 
 @pytest.fixture(scope="module")
@@ -76,10 +36,10 @@ def shared(tmp_path):
 
 @pytest.fixture(scope="module")
 def opened(studio):
-    session = studio.session("page", "me")
-    studio.open(session, studio.start.name)
-    session.live.wait()
-    return session
+    page = studio.page("page", "me")
+    studio.open(page, studio.start.name)
+    page.session.live.wait()
+    return page.session
 
 
 @pytest.fixture

@@ -15,14 +15,14 @@ from materialist.errors import InputError, OutputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.studio import SETTINGS, objects
-from materialist.studio.controls import control_values, set_option
-from materialist.studio.edit_list import EditList
+from materialist.studio.edit_list import EditList, step_summary
+from materialist.studio.finals import keep_final, kept_final, new_final
+from materialist.studio.history import read_history
 from materialist.studio.lights import place_lamp
 from materialist.studio.live_preview import LivePreview, free_memory
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
 from materialist.studio.stage import commands, named_maps, report, stage
-from materialist.studio.widgets import PageContext
 
 
 def test_an_edit_from_click_to_recipe(session):
@@ -53,9 +53,6 @@ def test_a_slider_without_a_number_writes_nothing(session):
     session.set("edit", hue="120")
     session.act("toggle", 0)  # what is switched off is not applied, so nobody else would notice
     session.act("choose", 0)
-    for name in ("hue", "roughness", "texture_scale", "scale", "turn"):
-        with pytest.raises(InputError, match="no finite number"):
-            set_option(name, session, float("nan"))
     with pytest.raises(InputError, match="no finite number"):
         place_lamp(session, 25, 24, float("inf"))
     assert "nan" not in (session.workspace / "edits.yaml").read_text() and not session.next_object
@@ -115,7 +112,7 @@ def test_a_selection_that_grows_takes_its_edit_along(session):
 def test_a_light_that_is_switched_off_is_not_gone_on_with(session):
     place_lamp(session, 40, 40)
     session.act("toggle", 0)
-    assert stage(session)["lamps"] == [] and not control_values(session)["sun_on"]
+    assert stage(session)["lamps"] == []
     place_lamp(session, 10, 40)
     assert [step.skipped for step in session.edits.steps] == [True, False]
     session.act("choose", 0)
@@ -130,14 +127,7 @@ def test_choosing_a_step_brings_its_region_and_values_back(session):
     session.deselect()
     session.act("choose", 0)
     assert (session.selection.mask & block()).sum() > 0.9 * block().sum()
-    assert control_values(session)["hue"] == 90 and control_values(session)["roughness"] == 0.5
-    values = control_values(session)
-    assert (values["rotate"], values["ambient"], values["sun_on"], values["elevation"]) == (
-        30,
-        0.5,
-        True,
-        20,
-    )
+    assert session.edits.current == 0 and session.edits.light == 1
     session.act("up", 1)
     assert [s.kind for s in session.edits.steps] == ["relight", "edit"]
     with pytest.raises(InputError, match="no longer"):
@@ -146,28 +136,87 @@ def test_choosing_a_step_brings_its_region_and_values_back(session):
         session.act("rm -rf", 0)
 
 
-def test_reopened_where_it_was_left(studio, session):
+def test_reopened_where_it_was_left(session):
+    """After a restart of the studio, too: nothing of it is in memory alone."""
     click(session)
     session.set("edit", hue="77")
-    other = studio.session("another page", "me")
-    studio.open(other, studio.start.name)
-    assert other.edits.steps[0].options["hue"] == "77" and other.selection == Selection()
+    session.light(rotate="5")
+    session.undo()
+    picture = new_final(session.workspace, session.edits.active)
+    for suffix in (".jpg", ".png", ".exr", "-before.jpg"):
+        picture.path.with_name(picture.path.name + suffix).write_bytes(b"x")
+    keep_final(session.workspace, picture)
+    other = Session("me")
+    other.open(session.project)
+    assert other.edits == session.edits and other.final.of(other.edits.active)
+    assert np.array_equal(other.selection.mask, session.selection.mask)
     assert "materialist apply" in commands(other) and "edits-me/edits.yaml" in commands(other)
-    other.light(rotate="5")
-    assert len(session.edits.steps) == 1  # in memory they are apart
+    other.undo(again=True)
+    assert other.edits.steps[1].options["rotate"] == "5"
+    for count in (1, 0):
+        other.undo()
+        assert len(other.edits.steps) == count
     other.live.wait()
     stage(other)
     known = [weakref.ref(one) for one in (other.live.scene, other.live._preview.result())]
-    studio.leave("another page")
+    other.close()
     free_memory().result()
     assert [one() for one in known] == [None, None]
-    assert other.live is None and session.live is not None
-    live = LivePreview(session.scene)
-    live.close()
-    with pytest.raises(InputError, match="was closed"):  # it does not wait for ever
-        live.wait()
     with pytest.raises(InputError, match="Open a photo"):
         other.set("edit", hue="1")
+    session.take_over()
+
+
+def test_a_closed_preview_is_waited_for_by_nobody(session):
+    live = LivePreview(session.scene)
+    live.close()
+    with pytest.raises(InputError, match="was closed"):
+        live.wait()
+
+
+def test_of_two_final_pictures_the_last_is_kept(session):
+    for hue in ("3", "4"):
+        picture = new_final(session.workspace, (Step("edit", {"hue": hue}, session.workspace),))
+        picture.path.with_suffix(".jpg").write_bytes(hue.encode())
+        keep_final(session.workspace, picture)
+    assert kept_final(session.workspace) == picture
+    assert [file.read_text() for file in session.workspace.glob("final-*.jpg")] == ["4"]
+    (session.workspace / "final.json").write_text('{"name": "../../x", "steps": [["edit", {}]]}')
+    assert kept_final(session.workspace) is None
+
+
+@pytest.mark.parametrize("damage", ["{", "[]", '{"past": [["", [7], null, []]]}', "mask"])
+def test_a_history_that_cannot_be_read_begins_anew(session, damage):
+    click(session)
+    session.set("edit", hue="10")
+    if damage == "mask":
+        for file in session.workspace.glob("mask-*.png"):
+            write_png(file, np.zeros((5, 5, 3), np.uint8))
+    else:
+        (session.workspace / "history.json").write_text(damage)
+    history = read_history(session.workspace, session.scene.depth.shape)
+    assert history.past == [] and history.selection == Selection()
+    for file in session.workspace.glob("mask-*.png"):
+        file.unlink()
+
+
+def test_a_change_that_cannot_be_written_is_none(session, monkeypatch):
+    """On a full disk the page shows what is kept, not what was refused."""
+    click(session)
+    session.set("edit", hue="10")
+    before = session.edits
+
+    def full(path, steps):
+        raise OutputError("The disk is full.")
+
+    monkeypatch.setattr("materialist.studio.session.write_recipe", full)
+    for change in (lambda: session.set("edit", hue="20"), lambda: session.act("toggle", 0)):
+        with pytest.raises(OutputError, match="full"):
+            change()
+        assert session.edits == before
+    monkeypatch.undo()
+    session.undo()
+    assert session.edits.steps == ()
 
 
 def test_a_preview_closed_while_it_prepares_is_freed(session, monkeypatch):
@@ -210,22 +259,25 @@ def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
     file.unlink()
 
 
-def test_edits_that_were_changed_elsewhere_stay_and_so_does_the_history(session):
-    click(session)
-    session.set("edit", hue="10")
-    stack = session.edits
-    past = session._past
-    (session.workspace / "edits.yaml").write_text("- relight: {rotate: 20}\n")
+def test_edits_that_were_changed_elsewhere_are_taken_over(session):
+    """By another studio on the same folder, or by hand: neither list is lost."""
     for act in (
         lambda: session.set("edit", hue="60"),
         session.undo,
         lambda: session.act("toggle", 0),
         lambda: session.light(rotate="5"),
     ):
-        with pytest.raises(InputError, match="changed in another place"):
+        session.deselect()
+        click(session)
+        session.set("edit", hue="10")
+        own = session.edits.steps
+        (session.workspace / "edits.yaml").write_text("- relight: {rotate: 20}\n")
+        with pytest.raises(InputError, match="changed in another place meanwhile; here they are"):
             act()
-        assert session.edits == stack and session._past == past
-    assert "rotate" in (session.workspace / "edits.yaml").read_text()
+        assert session.edits.steps[0].options == {"rotate": "20"}
+        session.undo()
+        assert session.edits.steps == own
+        session.act("remove", 0)
 
 
 @pytest.mark.parametrize("where", ["box: [12, 12, 40, 36]", "click: [25, 24], with: grabcut"])
@@ -258,9 +310,9 @@ def test_a_list_that_cannot_be_applied_is_shown_and_can_be_mended(session, bad, 
     other = Session("me")
     other.open(session.project)
     other.live.wait()
-    shown = PageContext(None).everything(other)
-    assert len(shown["steps"]) == 2 and shown["stage"]["picture"] and shown["stage"]["bad"]
-    assert words in shown["stage"]["badge"] and shown["steps"][1]["text"] in shown["stage"]["badge"]
+    shown = stage(other)
+    assert len(other.edits.steps) == 2 and shown["picture"] and shown["bad"]
+    assert words in shown["badge"] and step_summary(other.edits.steps[1]) in shown["badge"]
     other.act("remove", 1)
     assert stage(other)["badge"] == "Live preview" and not stage(other)["bad"]
     other.close()

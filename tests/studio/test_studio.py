@@ -6,7 +6,6 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.request
 from collections import deque
 from concurrent.futures import Future
 from dataclasses import replace
@@ -17,24 +16,22 @@ from made_tasks import until, wait
 from studio_scenes import zipped_package
 from studio_server import free_port
 
-from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.io.photo import example_path
-from materialist.jobs.queue import QUEUED, STOPPED, Job
-from materialist.jobs.worker import DONE, FAILED
-from materialist.studio import SETTINGS, StudioSettings, live_preview, stage, widgets
+from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
+from materialist.studio import SETTINGS, StudioSettings, archives, live_preview, stage
 from materialist.studio.access import quota
-from materialist.studio.edit_list import EditList
+from materialist.studio.access.quota import Allowance
 from materialist.studio.server import check_host
-from materialist.studio.studio import LOCAL_PERSON
-from materialist.studio.widgets import PageContext
+from materialist.studio.studio import LOCAL_PERSON, Studio
+from materialist.studio.workspace import WorkFolder
 
 
 def test_people_are_kept_apart(shared):
     anna, bert = (shared.person(cookie * 32) for cookie in "ab")
     project = shared.work.new("Anna's", anna)
     (project.scene).mkdir()
-    session = shared.session("page", bert)
+    page = shared.page("page", bert)
     assert shared.projects(bert) == [] and shared.projects(anna) == [project]
     shared.start = shared.work.new("For all", LOCAL_PERSON)
     assert (
@@ -42,14 +39,14 @@ def test_people_are_kept_apart(shared):
         and shared.project(shared.start.name, bert) == shared.start
     )
     with pytest.raises(InputError, match="no longer"):
-        shared.open(session, project.name)
-    for page, person in ((None, bert), ("page", anna)):
+        shared.open(page, project.name)
+    for name, person in ((None, bert), ("page", anna)):
         with pytest.raises(InputError, match="reload"):
-            shared.session(page, person)
-    assert shared.session("page", bert) is session
+            shared.page(name, person)
+    assert shared.page("page", bert) is page
     shared.leave("page")
     shared.leave("page")
-    assert shared.session("page", bert) is not session
+    assert shared.page("page", bert) is not page
 
 
 @pytest.mark.parametrize("token", [None, "", "../../x", "A" * 32, "a" * 40, 5])
@@ -105,11 +102,11 @@ def test_files_are_handed_over_under_names_nobody_guesses(shared):
             shared.files.path(person, name)
 
 
-def test_renderings_end_with_their_page_and_inversions_go_on(shared, tmp_path):
-    session = shared.session("page", shared.person("a" * 32))
+def test_what_is_made_for_a_page_ends_with_it_and_the_rest_goes_on(shared, tmp_path):
+    session = shared.page("page", shared.person("a" * 32)).session
     jobs = {
         kind: Job(kind, session.person, tmp_path, print)
-        for kind in ("final", "take", "invert", "mesh")
+        for kind in ("take", "removal", "final", "invert")
     }
     for job in jobs.values():
         session.note_job(job)
@@ -123,35 +120,20 @@ def test_strangers_see_no_folders_of_this_machine(shared, tmp_path):
         shared.without_folders(text)
         == "a b.txt: x.png and 'y.exr' are damaged; see https://a.example/b (1/2)"
     )
-    assert str(tmp_path) not in str(PageContext(shared).message(InputError(text)))
-    session = shared.session("page", "a" * 32)
+    session = shared.page("page", "a" * 32).session
     session.project = shared.work.new("One", session.person)
-    assert str(tmp_path) not in widgets.commands(session) and "photo-001" in widgets.commands(
-        session
-    )
+    assert str(tmp_path) not in stage.commands(session) and "photo-001" in stage.commands(session)
     session.local = True
-    assert f"cd {tmp_path}" in widgets.commands(session)
-
-
-def test_the_end_of_a_job_is_said_and_cannot_carry_html(shared, tmp_path, monkeypatch):
-    job = Job("final", "me", tmp_path, print, state=DONE, ended=0.0)
-    assert "Done in" in PageContext(shared).state(job)
-    monkeypatch.setitem(sys.modules, "pyoidn", None)
-    assert "not denoised" in PageContext(shared).state(job)
-    job.state = FAILED
-    job.message = "<script>alert(1)</script>"
-    shown = PageContext(shared).state(job)
-    assert "<script>" not in shown and 'role="alert"' in shown
-    assert widgets.words("light 2") == "Finding the light" and widgets.words("odd") == "Odd"
+    assert f"cd {tmp_path}" in stage.commands(session)
 
 
 def test_one_person_cannot_fill_the_queue(shared, tmp_path):
-    session = shared.session("page", "a" * 32)
+    session = shared.page("page", "a" * 32).session
     for _ in range(SETTINGS.jobs_a_person):
         shared.submit(session, wait, tmp_path)
     with pytest.raises(InputError, match="6 jobs waiting or running"):
         shared.submit(session, wait, tmp_path)
-    assert shared.submit(shared.session("other", "b" * 32), wait, tmp_path)
+    assert shared.submit(shared.page("other", "b" * 32).session, wait, tmp_path)
 
 
 def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
@@ -173,7 +155,7 @@ def test_photos_that_were_not_taken_apart_to_the_end_are_swept(shared):
 
 @pytest.mark.slow
 def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
-    """Two jobs at work, two in the queue, two pages open."""
+    """Two jobs at work, two in the queue."""
     script = """if True:
         import sys
         from functools import partial
@@ -201,12 +183,8 @@ def test_a_studio_that_is_terminated_leaves_no_cache_and_no_jobs(tmp_path):
         if b"The studio is open" in line:
             break
     until(lambda: len(list((tmp_path / "work").glob(".partial-*"))) == 2, 60)
-    held = [
-        urllib.request.urlopen(f"http://127.0.0.1:{port}/gradio_api/heartbeat/{page}")
-        for page in "ab"
-    ]
     process.terminate()
-    assert process.wait(30) == -15 and held
+    assert process.wait(30) == -15
     until(lambda: not list((tmp_path / "work").glob(".partial-*")))
     assert [file.name for file in tmp_path.iterdir() if file.name != "work"] == []
 
@@ -231,9 +209,8 @@ def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_close
 
     monkeypatch.setattr("materialist.studio.studio.free_memory", free)
     for number in range(201):
-        shared.session(f"page{number}", f"person{number}").live = SimpleNamespace(
-            close=lambda: None
-        )
+        page = shared.page(f"page{number}", f"person{number}")
+        page.session.live = SimpleNamespace(close=lambda: None)
     shared.leave("page0")
     assert begun.wait(10)
     for number in range(1, 201):
@@ -256,18 +233,18 @@ def test_one_freeing_serves_all_who_wait_for_it(monkeypatch):
     assert live_preview.free_memory() not in futures
 
 
-def test_a_page_that_never_shows_that_it_is_open_is_forgotten_after_a_while(shared, monkeypatch):
+def test_a_page_that_is_not_heard_of_is_forgotten_after_a_while(shared, monkeypatch):
     monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(page_seconds=0))
     person = "a" * 32
-    silent = shared.session("silent", person)
-    open_ = shared.session("open", person, beats=True)
-    assert (
-        shared.session("silent", person) is not silent and shared.session("open", person) is open_
-    )
+    busy = shared.page("busy", person)
+    with busy.at_work():
+        silent = shared.page("silent", person)
+        assert shared.page("other", person) and silent.left and not busy.left
+    assert shared.page("silent", person) is not silent and busy.left
 
 
 def test_a_job_that_is_refused_leaves_no_photo_behind(shared):
-    session = shared.session("page", "a" * 32)
+    session = shared.page("page", "a" * 32).session
     for _ in range(SETTINGS.jobs_a_person):
         shared.submit(session, wait, shared.work.root)
     with pytest.raises(InputError, match="6 jobs waiting"):
@@ -297,26 +274,47 @@ def test_the_disk_of_the_photos_counts_too(shared, monkeypatch):
         shared.claim("a", 10)
 
 
-def test_path_traced_pictures_of_a_page_are_files_of_their_own_and_the_last_stays(
-    shared, monkeypatch
-):
-    """The job of the first is stopped."""
-    session = shared.session("page", "a" * 32)
-    session.project = shared.work.new("One", session.person)
-    made = []
+def test_pages_of_one_person_on_one_photo_share_a_session(studio, opened):
+    name = studio.start.name
+    second = studio.page("second", "me")
+    empty = second.session
+    studio.open(second, name)
+    assert second.session is opened and empty is not opened
+    revision = opened.revision
+    opened.deselect()
+    assert second.session.revision > revision
+    studio.put_away(second)  # back to the photos: the other page keeps its scene
+    assert opened.live is not None and second.session.project is None
+    studio.leave("second")
+    assert studio.session_on(studio.start, "me") is opened
 
-    def work(self, session, task, output, **arguments):
-        output.with_suffix(".png").write_text(str(len(made)))
-        made.append(output)
-        return len(made) > 1
-        yield
 
-    monkeypatch.setattr(PageContext, "work", work)
-    for kind in ("glass", "edit", "relight"):
-        session.edits = EditList((Step(kind, {"hue": "3"}),))
-        assert [*PageContext(shared).traced(session)] == []
-    assert len({*made}) == 3 and session.final.path == made[2]
-    assert [file.name for file in shared.work.cache.glob("final-*")] == [f"{made[2].name}.png"]
+def test_a_photo_that_is_deleted_is_gone_from_every_page(shared, tmp_path):
+    person = "a" * 32
+    project = shared.work.new("One", person)
+    archives.unpack_scene(zipped_package(tmp_path), project.scene, Allowance())
+    pages = [shared.page(name, person) for name in ("first", "second")]
+    for page in pages:
+        shared.open(page, project.name)
+    rendering = shared.submit(pages[0].session, wait, pages[0].session.workspace)
+    shared.discard(project)
+    assert [page.session.project for page in pages] == [None, None]
+    assert rendering.state == STOPPED and shared.projects(person) == []
+    # A late end of the old photo's work must never meet a new one of the same number.
+    assert shared.work.new("Two", person).name != project.name
+
+
+def test_who_opened_what_survives_the_studio(tmp_path):
+    for _ in range(2):
+        made = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
+        made.jobs.close()
+        if made.last:
+            break
+        made.note_last("anna", "photo-007")
+    assert made.last == {"anna": "photo-007"}
+    made.forget_last("anna")
+    (tmp_path / "last.json").write_text("[]")
+    assert WorkFolder(tmp_path).read_last() == {}
 
 
 def test_the_report_carries_no_html_of_a_scene(opened):

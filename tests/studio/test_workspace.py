@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 
@@ -66,18 +67,31 @@ def test_the_newest_photo_is_first_and_no_folder_is_two_studios(tmp_path, monkey
     assert other.new("b", "me").name == "photo-1001"
 
 
-def test_old_copies_go_and_what_the_page_shows_stays(tmp_path):
+def test_old_copies_go_and_fresh_ones_stay(tmp_path):
     work = WorkFolder(tmp_path)
-    for name in ("old", "fresh", "page"):
+    for name in ("old", "fresh"):
         (work.cache / name).mkdir()
-    for name in ("old.png", "final-1.png"):
-        (work.cache / name).touch()
-    work.kept |= {work.cache / "page"}
-    for name in ("old", "page", "old.png", "final-1.png"):
+    (work.cache / "old.png").touch()
+    for name in ("old", "old.png"):
         os.utime(work.cache / name, (0, 0))
     work.sweep()
     left = {place.name for place in work.cache.iterdir()}
-    assert left - {"cache-of-a-studio"} == {"final-1.png", "fresh", "page"}
+    assert left - {"cache-of-a-studio"} == {"fresh"}
+
+
+def test_a_number_is_given_once_and_only_the_photo_itself_is_dropped(tmp_path):
+    """An inversion that ends late must not remove the folder of a photo that came after it."""
+    work = WorkFolder(tmp_path)
+    first = work.new("a", "anna")
+    work.drop(first)
+    second = work.new("b", "bert")
+    assert not first.folder.exists() and second.name == "photo-002"
+    # Another studio on the same folder may give the number again.
+    again = WorkFolder(tmp_path)
+    again.drop(second)
+    third = again.new("c", "cara")
+    work.drop(replace(third, owner="bert", title="b"))
+    assert third.folder.is_dir()
 
 
 def test_the_cache_of_a_killed_studio_is_swept_and_that_of_another_stays(tmp_path):

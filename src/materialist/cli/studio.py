@@ -26,13 +26,6 @@ class Serving(Computing):
     work: Path = option(
         Path("materialist-studio"), "Where scenes and edits are kept.", kind="file", metavar="DIR"
     )
-    page: str = option(
-        "classic",
-        "Which page: the classic one, or the darkroom, a full-window editor (preview).",
-        kind="word",
-        choices=("classic", "darkroom"),
-        called="--page",
-    )
     # Who may come in.
     password: str | None = option(
         None,
@@ -70,10 +63,9 @@ def studio_command(
     ] = None,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
-    from materialist.darkroom.app import application as darkroom
+    from materialist.darkroom import application
     from materialist.studio import server
 
-    page = darkroom if serving.page == "darkroom" else server.application
     # --- Who may reach it, checked before anything is made ---
     password = server.password_of(
         serving.password or os.environ.get("MATERIALIST_PASSWORD"), serving.password_file
@@ -103,12 +95,18 @@ def studio_command(
             "studio", serving.as_json, lines, address=address, work=str(studio.work.root)
         )
 
-    server.serve(
+    page = application(
         studio,
         host=serving.host,
         port=serving.port,
         password=password,
         proxy=serving.behind_proxy,
+    )
+    server.serve(
+        studio,
+        page,
+        host=serving.host,
+        port=serving.port,
+        proxy=serving.behind_proxy,
         on_ready=on_ready,
-        page=page,
     )

@@ -1,8 +1,9 @@
 """The darkroom: a full-window page for the studio, its server and its built client (`static`, from `web/`).
 
-The server (`app`, behind the gate `door`) turns requests with checked bodies into calls of `studio.session.Session`.
-What a page shows is one JSON object (`state`); a websocket (`channel`) tells it when that has changed, and how far jobs
-are. A `desk` holds what a page needs beside its session. Queue, limits, files and work folder are the studio's.
+The server (`app`, behind the gate of `studio.access`) turns requests with checked bodies into calls of a
+`studio.session.Session`. What a page shows is one JSON object (`state`); a websocket (`channel`) tells it when that has
+changed, and how far jobs are. A `desk` holds what a page needs beside its session. Queue, limits, files and work
+folder are the studio's.
 """
 
 from typing import Any

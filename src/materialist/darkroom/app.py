@@ -18,7 +18,6 @@ from starlette.websockets import WebSocket
 from materialist.darkroom import bodies, editing, opening, taking
 from materialist.darkroom.channel import channel
 from materialist.darkroom.desk import Desk, Desks
-from materialist.darkroom.door import CHANNEL, UPLOAD, Door
 from materialist.darkroom.endpoint import got, guarded, posted
 from materialist.darkroom.state import (
     about,
@@ -31,6 +30,7 @@ from materialist.darkroom.state import (
     state,
     working_jpeg,
 )
+from materialist.studio.access.gate import CHANNEL, UPLOAD, Gate
 from materialist.studio.studio import Studio
 
 SWEEP = 10.0
@@ -75,13 +75,13 @@ def application(
     port: int,
     password: str | None = None,
     proxy: str | None = None,
-) -> Door:
+) -> Gate:
     """The page behind its gate, an ASGI application."""
     studio.work.sweep()
     desks = Desks(studio)
     app = Starlette(routes=_routes(desks), lifespan=_sweeping(studio))
     single = host if studio.single_user else None
-    return Door(app, studio, host=single, proxy=proxy, password=password, port=port)
+    return Gate(app, studio, host=single, proxy=proxy, password=password, port=port)
 
 
 def _sweeping(studio: Studio) -> Any:
@@ -111,7 +111,7 @@ def _routes(desks: Desks) -> list[Any]:
         await channel(desks, connection)
 
     read = {
-        "/api/about": lambda desk, request: _json(about(studio, desk.session.person)),
+        "/api/about": lambda desk, request: _json(about(studio, desk.person)),
         "/api/arrive": lambda desk, request: _json(opening.arrive(desk)),
         "/api/state": _state,
         "/api/projects": lambda desk, request: _json(opening.listed(desk)),

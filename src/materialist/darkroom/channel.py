@@ -10,13 +10,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from materialist.darkroom.desk import Desk, Desks
 from materialist.darkroom.endpoint import person_of
 from materialist.errors import InputError
+from materialist.studio import SETTINGS
 
 LOOK = 0.1
 """Seconds between two looks at what may have changed."""
 BEAT = 10.0
 """Seconds after which something is sent in any case: a proxy closes what is silent."""
-HEARD_BYTES = 1000
-"""Largest message of a page; none is expected."""
 
 
 async def channel(desks: Desks, socket: WebSocket) -> None:
@@ -26,10 +25,21 @@ async def channel(desks: Desks, socket: WebSocket) -> None:
     except InputError:
         await socket.close(1008)
         return
-    await socket.accept()
+    if desk.channels >= SETTINGS.channels:
+        await socket.close(1013)
+        return
+    desk.channels += 1
+    try:
+        await socket.accept()
+        await _serve(desk, socket)
+    finally:
+        desk.channels -= 1
+
+
+async def _serve(desk: Desk, socket: WebSocket) -> None:
     heard = asyncio.create_task(_until_closed(socket))
     try:
-        with desk.at_work():
+        with desk.page.at_work():
             await _tell(desk, socket, heard)
     except (WebSocketDisconnect, RuntimeError):
         pass  # the page went while something was being sent
@@ -41,14 +51,14 @@ async def channel(desks: Desks, socket: WebSocket) -> None:
 
 async def _until_closed(socket: WebSocket) -> None:
     with suppress(WebSocketDisconnect, KeyError):
-        while len(await socket.receive_text()) <= HEARD_BYTES:
-            pass
+        while True:
+            await socket.receive_text()
 
 
 async def _tell(desk: Desk, socket: WebSocket, heard: "asyncio.Task[None]") -> None:
     last: dict[str, Any] = {}
     said = 0.0
-    while not heard.done() and not desk.session.left:
+    while not heard.done() and not desk.page.left:
         now = time.monotonic()
         current = news(desk)
         if current != last or now - said > BEAT:

@@ -5,8 +5,7 @@ import threading
 import time
 import traceback
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,13 +14,15 @@ from weakref import WeakKeyDictionary
 from materialist.edits.core.notes import noise_notes
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
-from materialist.jobs.queue import QUEUED, STOPPED, Job
+from materialist.jobs.queue import QUEUED, RUNNING, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
-from materialist.studio.session import Session
+from materialist.studio.page import Page
+from materialist.studio.selection import Selection
+from materialist.studio.session import Session, next_revision
 from materialist.studio.stage import failure_message, words
 from materialist.studio.studio import Studio
 from materialist.studio.workspace import LOST, Project
-from materialist.types import Array
+from materialist.types import Array, Scene
 
 POINTED = 12
 """Objects under the pointer that are remembered: a click on what is outlined takes just that."""
@@ -41,44 +42,47 @@ class Followed:
     """What it made, for the page; a file by the id under which it is handed over."""
     finished: bool = False
     """Whether what follows the job was done, too."""
+    failed: bool = False
+    """Whether that failed; the notes say why."""
 
 
 class Desk:
-    """One page: its session, and what it follows. Its methods may be called from any thread."""
+    """One page: what it follows. Its methods may be called from any thread."""
 
-    def __init__(self, studio: Studio, session: Session) -> None:
+    def __init__(self, studio: Studio, page: Page) -> None:
         self.studio = studio
-        self.session = session
-        self.revision = 0
-        """Grows when something that the page shows has changed without a request of this page."""
+        self.page = page
         self.expected: Project | None = None
         """The photo that is being taken apart, and is opened when that is done."""
         self.followed: list[Followed] = []
+        self.channels = 0
+        """Its open websockets; counted on the loop that serves them."""
+        self.selected: tuple[Selection, Scene | None, str, Any] | None = None
+        """A selection, its scene, and what `state` made of them."""
+        self._revision = 0
         self._numbers = 0
-        self._at_work = 0
         self._pointed: OrderedDict[tuple[int, int], Array] = OrderedDict()
         self._scene: object = None
         self._lock = threading.Lock()
         self._pointing = threading.Lock()
 
-    def changed(self) -> None:
-        """Let the page, and others of the same session, ask for what is shown."""
-        with self._lock:
-            self.revision += 1
+    @property
+    def session(self) -> Session:
+        """What the page shows; another one when it opens another photo."""
+        return self.page.session
 
-    @contextmanager
-    def at_work(self) -> Iterator[None]:
-        """While a request, or the channel, is at work the page is open, however long it takes."""
-        with self._lock:
-            self._at_work += 1
-            self.session.beats = True
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._at_work -= 1
-                self.session.beats = self._at_work > 0
-                self.session.seen = time.monotonic()
+    @property
+    def person(self) -> str:
+        return self.page.person
+
+    @property
+    def revision(self) -> int:
+        """Grows when something that the page shows has changed, by its own requests or without them."""
+        return max(self._revision, self.session.revision)
+
+    def changed(self) -> None:
+        """Let this page ask for what is shown."""
+        self._revision = next_revision()
 
     # Jobs
 
@@ -99,9 +103,11 @@ class Desk:
         try:
             then(entry)
         except MaterialistError as error:
+            entry.failed = True
             entry.notes.append(self.session.without_folders(str(error)))
         except Exception as error:
             traceback.print_exception(error)
+            entry.failed = True
             entry.notes.append("Something went wrong inside; the terminal of the studio says what.")
         entry.finished = True
         self.changed()
@@ -119,7 +125,8 @@ class Desk:
 
     def _shown(self, entry: Followed) -> dict[str, Any]:
         job = entry.job
-        state = job.state if entry.finished or not job.over else "running"
+        state = job.state if entry.finished or not job.over else RUNNING
+        state = FAILED if entry.failed else state
         part = min(1.0, job.done / job.total) if job.total and not job.over else None
         map_names = [facts["name"] for facts in job.intermediate]
         return {
@@ -173,18 +180,18 @@ class Desks:
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
-        self._desks: WeakKeyDictionary[Session, Desk] = WeakKeyDictionary()
+        self._desks: WeakKeyDictionary[Page, Desk] = WeakKeyDictionary()
         self._lock = threading.Lock()
 
-    def of(self, page: str | None, person: str) -> Desk:
+    def of(self, name: str | None, person: str) -> Desk:
         """The desk of a page by its name. Raises InputError for no name, and for another person's page."""
-        if not page or not _PAGE.fullmatch(page):
+        if not name or not _PAGE.fullmatch(name):
             raise InputError(LOST)
-        session = self.studio.session(page, person)
+        page = self.studio.page(name, person)
         with self._lock:
-            if session not in self._desks:
-                self._desks[session] = Desk(self.studio, session)
-            return self._desks[session]
+            if page not in self._desks:
+                self._desks[page] = Desk(self.studio, page)
+            return self._desks[page]
 
 
 def found_file(project: Project, name: str) -> Path:

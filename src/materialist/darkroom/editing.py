@@ -4,6 +4,7 @@ from typing import Any
 
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
+from materialist.darkroom.removing import take_away
 from materialist.darkroom.state import outline, settable, state
 from materialist.edits.light import presets
 from materialist.edits.registry import OPERATIONS
@@ -48,6 +49,8 @@ def set_options(desk: Desk, body: bodies.Options) -> State:
     elif body.kind == "insert":
         for name, value in options.items():
             objects.set_object_option(session, name, value)
+    elif body.kind == "remove":
+        take_away(desk, options)
     else:
         session.set(body.kind, **options)
     return state(desk, coarse=body.coarse)

@@ -12,8 +12,8 @@ from starlette.responses import JSONResponse, Response
 
 from materialist.darkroom.bodies import RequestBody, complaint
 from materialist.darkroom.desk import Desk, Desks
-from materialist.darkroom.door import PAGE_HEADER
 from materialist.errors import MaterialistError
+from materialist.studio.access.gate import PAGE_HEADER
 from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
 Kind = TypeVar("Kind", bound=RequestBody)
@@ -41,7 +41,7 @@ def posted(desks: Desks, kind: type[Kind], change: Callable[[Desk, Kind], Any]) 
             desk = desk_of(desks, request)
             body = kind.model_validate_json(raw or b"{}")
             # Counted: one page must not keep all threads busy.
-            with desk.session.allowance.request(), desk.at_work():
+            with desk.session.allowance.request(), desk.page.at_work():
                 return change(desk, body)
 
         return JSONResponse(await run_in_threadpool(work))
@@ -55,7 +55,7 @@ def got(desks: Desks, make: Callable[[Desk, Request], Response]) -> Answerer:
     async def answer(request: Request) -> Response:
         def work() -> Response:
             desk = desk_of(desks, request)
-            with desk.session.allowance.request(), desk.at_work():
+            with desk.session.allowance.request(), desk.page.at_work():
                 return make(desk, request)
 
         return await run_in_threadpool(work)

@@ -14,6 +14,7 @@ from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk, Desks, Followed, found_file
 from materialist.darkroom.endpoint import desk_of
 from materialist.darkroom.state import example_file, project_facts, state
+from materialist.darkroom.taking import follow_finals
 from materialist.errors import InputError
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS
@@ -27,7 +28,7 @@ async def receive_upload(desks: Desks, request: Request) -> Response:
     """Store the body as an upload of this person, and answer with its id. Nothing of it is opened yet."""
     desk = desk_of(desks, request)
     studio = desks.studio
-    person = desk.session.person
+    person = desk.person
     size = promised_size(request)
     sender = studio.sender(person)
     with studio.quota.uploading(sender):
@@ -69,7 +70,9 @@ async def _written(request: Request, file: Path, size: int) -> int:
 def _safe_name(name: str) -> str:
     """The name of an upload without folders: letters, digits, and what else is harmless in a name."""
     bare = re.sub(r"[^\w .()-]+", "_", Path(name.replace("\\", "/")).name).strip(" .")
-    return bare[-80:].lstrip(" .") or "upload"
+    # In bytes: a letter may have four, and a name in a folder 255.
+    short = bare.encode("utf-8", "replace")[-80:].decode("utf-8", "ignore")
+    return short.lstrip(" .") or "upload"
 
 
 # Projects
@@ -82,7 +85,7 @@ def start(desk: Desk, body: bodies.Start) -> State:
     if source.suffix.lower() == ".zip":
         return _opened(desk, studio.unpack(desk.session, source))
     project, job = studio.begin(desk.session, source, body.predictor, body.size, body.fov)
-    studio.note_last(desk.session.person, project.name)
+    studio.note_last(desk.person, project.name)
     _expect(desk, project, job)
     return state(desk)
 
@@ -90,7 +93,7 @@ def start(desk: Desk, body: bodies.Start) -> State:
 def _source(desk: Desk, body: bodies.Start) -> Path:
     """The file of a photo. Raises InputError for none, and for another's."""
     studio = desk.studio
-    person = desk.session.person
+    person = desk.person
     if body.file is not None:
         return studio.files.path(person, body.file)
     if body.example is None:
@@ -103,10 +106,9 @@ def _source(desk: Desk, body: bodies.Start) -> Path:
 
 def open_project(desk: Desk, body: bodies.Named) -> State:
     """Open a project of this person, or follow its inversion if that still runs."""
-    project = desk.studio.project(body.project, desk.session.person)
+    project = desk.studio.project(body.project, desk.person)
     job = _running(desk, project)
     if job is not None:
-        desk.session.note_job(job)
         _expect(desk, project, job)
         return state(desk)
     if not project.ready:
@@ -118,63 +120,55 @@ def arrive(desk: Desk) -> State:
     """What a page shows when it is loaded: as it was left, else the photo that this person had last."""
     session = desk.session
     studio = desk.studio
-    if session.project is None and desk.expected is None:
-        start = studio.start
-        last = studio.last.get(session.person) or (
-            start.name if isinstance(start, Project) else None
-        )
-        known = {project.name for project in studio.projects(session.person)}
-        if last in known:
-            try:
-                return open_project(desk, bodies.Named(project=str(last)))
-            except InputError as error:
-                return {**state(desk), "notes": [session.without_folders(str(error))]}
+    start = studio.start.name if isinstance(studio.start, Project) else None
+    last = studio.last.get(desk.person) or start
+    known = {project.name for project in studio.projects(desk.person)}
+    try:
+        if session.project is None and desk.expected is None and last in known:
+            return open_project(desk, bodies.Named(project=str(last)))
+        session.take_over()
+    except InputError as error:
+        return {**state(desk), "notes": [session.without_folders(str(error))]}
     return state(desk)
 
 
 def close_project(desk: Desk, body: bodies.Nothing) -> State:
     """Back to the choice of photos; edits and inversions stay."""
-    desk.session.close()
+    desk.studio.put_away(desk.page)
     desk.expected = None
-    desk.studio.last.pop(desk.session.person, None)
+    desk.studio.forget_last(desk.person)
     return state(desk)
 
 
 def listed(desk: Desk) -> list[State]:
     """The projects of a person, the newest first."""
-    running = {job.folder for job in desk.studio.jobs.unfinished(desk.session.person, "invert")}
+    running = {job.folder for job in desk.studio.jobs.unfinished(desk.person, "invert")}
     return [
         {**(project_facts(project) or {}), "ready": project.ready}
-        for project in desk.studio.projects(desk.session.person)
+        for project in desk.studio.projects(desk.person)
         if project.ready or project.folder in running
     ]
 
 
 def rename(desk: Desk, body: bodies.Renamed) -> list[State]:
     renamed = desk.studio.work.rename(_own(desk, body.project), body.title)
-    session = desk.session
-    if session.project is not None and session.project.folder == renamed.folder:
+    session = desk.studio.session_on(renamed, desk.person)
+    if session is not None and session.project is not None:
         session.project = renamed
+        session.changed()
     return listed(desk)
 
 
 def discard(desk: Desk, body: bodies.Named) -> list[State]:
     """Delete a project of this person, stopping its inversion; the open one is closed first."""
     project = _own(desk, body.project)
-    job = _running(desk, project)
-    if job is not None:
-        desk.studio.jobs.stop(job)
-    opened = desk.session.project
-    if opened is not None and opened.folder == project.folder:
-        desk.session.close()
-        desk.changed()
-    desk.studio.work.discard(project)
+    desk.studio.discard(project)
     return listed(desk)
 
 
 def picture_of(desk: Desk, request: Request) -> Path:
     """The file of a project's picture: its photo, or a map that its inversion has found."""
-    project = desk.studio.project(request.path_params["project"], desk.session.person)
+    project = desk.studio.project(request.path_params["project"], desk.person)
     name = request.path_params["name"]
     scene_photo = project.scene / "photo.png"
     if name == "photo" and scene_photo.is_file():
@@ -184,22 +178,22 @@ def picture_of(desk: Desk, request: Request) -> Path:
 
 def _own(desk: Desk, name: str) -> Project:
     """A project that belongs to a person. Raises InputError for another's, even where it may be opened."""
-    project = desk.studio.project(name, desk.session.person)
-    if project.owner != desk.session.person:
+    project = desk.studio.project(name, desk.person)
+    if project.owner != desk.person:
         raise InputError("That photo belongs to somebody else.")
     return project
 
 
 def _running(desk: Desk, project: Project) -> Job | None:
-    jobs = desk.studio.jobs.unfinished(desk.session.person, "invert")
+    jobs = desk.studio.jobs.unfinished(desk.person, "invert")
     return next((job for job in jobs if job.folder == project.folder), None)
 
 
 def _opened(desk: Desk, project: Project) -> State:
     """Open a project; its photo is shown at once, the edits when the preview is ready."""
-    desk.studio.open(desk.session, project.name)
-    desk.studio.note_last(desk.session.person, project.name)
+    desk.studio.open(desk.page, project.name)
     desk.expected = None
+    follow_finals(desk)
     return state(desk, with_edits=False)
 
 
@@ -208,16 +202,17 @@ def _expect(desk: Desk, project: Project, job: Job) -> None:
     if any(entry.job is job and not entry.finished for entry in desk.followed):
         desk.expected = project
         return
-    desk.session.close()
+    desk.studio.put_away(desk.page)
     desk.expected = project
 
     def then(entry: Followed) -> None:
         if not project.ready:
             # Nothing to go on with: the folder goes.
-            shutil.rmtree(project.folder, ignore_errors=True)
-        elif desk.expected == project and not desk.session.left:
-            desk.studio.open(desk.session, project.name)
-        elif not desk.session.left:
+            desk.studio.work.drop(project)
+        expected = desk.expected == project
+        if expected and project.ready and not desk.page.left:
+            desk.studio.open(desk.page, project.name)
+        elif project.ready:
             entry.notes.append(f"{project.title} is ready; it is among your photos.")
         if desk.expected == project:
             desk.expected = None

@@ -1,5 +1,6 @@
 """What a page of the darkroom shows, as one JSON object, and the outline of a region."""
 
+import re
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,10 @@ from materialist.option_kinds import declarations
 from materialist.options import InvertOptions
 from materialist.studio import SETTINGS, objects, uploads
 from materialist.studio.edit_list import step_summary
+from materialist.studio.selection import Selection
 from materialist.studio.stage import commands, named_maps, report, stage
 from materialist.studio.studio import PREDICTORS, Studio
-from materialist.studio.tasks import KINDS
+from materialist.studio.tasks import kinds_here
 from materialist.studio.workspace import Project
 from materialist.types import Array, Scene
 
@@ -41,19 +43,17 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
     session = desk.session
     revision = desk.revision
     shown = stage(session, with_edits=with_edits, coarse=coarse)
-    # The outline goes as a path, which is sharp at any size.
-    for name in ("fill", "outline"):
-        shown.pop(name, None)
     with session.lock:
         edits = session.edits
-        mask = session.selection.mask
+        selection = session.selection
         undo, redo = session.can_undo
+        outlined, fitted = _of_selection(desk, selection)
         return {
             "revision": revision,
             "project": project_facts(session.project),
             "expected": project_facts(desk.expected),
             "ready": session.live is not None and session.live.ready,
-            "stage": {**shown, "region": outline(mask)},
+            "stage": {**shown, "region": outlined},
             "steps": [
                 {
                     "text": step_summary(step),
@@ -65,7 +65,7 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
             ],
             "current": edits.current,
             "light": edits.light,
-            "fitted": _fitted(desk, mask),
+            "fitted": fitted,
             "undo": undo,
             "redo": redo,
             "object": session.next_object,
@@ -78,12 +78,21 @@ def project_facts(project: Project | None) -> dict[str, Any] | None:
     return None if project is None else {"name": project.name, "title": project.title}
 
 
-def _fitted(desk: Desk, mask: Array | None) -> dict[str, Any] | None:
+def _of_selection(desk: Desk, selection: Selection) -> tuple[str, dict[str, Any] | None]:
+    """Outline of a selection, and what was found under it: made once, as a slider asks for them with every picture."""
+    scene = None if desk.session.live is None else desk.session.live.scene
+    made = desk.selected
+    if made is None or made[0] is not selection or made[1] is not scene:
+        mask = selection.mask
+        made = desk.selected = (selection, scene, outline(mask), _fitted(scene, mask))
+    return made[2], made[3]
+
+
+def _fitted(scene: Scene | None, mask: Array | None) -> dict[str, Any] | None:
     """What was found under a selection: its mean roughness and metallic, and its colour as #rrggbb."""
-    live = desk.session.live
-    if live is None or mask is None:
+    if scene is None or mask is None:
         return None
-    materials = live.scene.materials
+    materials = scene.materials
     colour = srgb_levels(materials.albedo[mask].mean(0)[None])
     return {
         "roughness": round(float(materials.roughness[mask].mean()), 2),
@@ -124,7 +133,7 @@ def about(studio: Studio, person: str) -> dict[str, Any]:
         "fov": declarations(InvertOptions)["fov"][1],
         "lights": [*presets.LIGHTS],
         "objects": objects.LIBRARY,
-        "takes": [[kind, title] for kind, (title, _) in KINDS.items()],
+        "takes": [[kind, title] for kind, (title, _) in kinds_here().items()],
         "sam": sam.sam_problem(),
         "megabytes": SETTINGS.upload_megabytes,
         "photos": sorted(SUFFIXES),
@@ -214,7 +223,7 @@ def example_file(studio: Studio, name: str) -> Path:
 def map_jpeg(desk: Desk, name: str) -> bytes:
     """A map of what the page shows, by its place in `stage.named_maps`. Raises InputError for another name."""
     maps = named_maps(_edited(desk))
-    if not name.isdigit() or int(name) >= len(maps):
+    if not re.fullmatch("[0-9]{1,3}", name) or int(name) >= len(maps):
         raise InputError(f"There is no map {name!r}.")
     return display.encoded(maps[int(name)][0], "JPEG", quality=92)
 

@@ -35,9 +35,11 @@ _NAMES = {
 }
 
 
-def page(scene: Scene, parts: list[Part]) -> str:
+def page(scene: Scene, parts: list[Part], before: Array | None = None) -> str:
     """A slider between photo and re-rendering, the mesh to turn, maps, light and report, as text.
 
+    before: [H, W, 3] linear photo before the edits, where the scene's is the edited picture; the slider then goes
+    from one to the other.
     The template escapes whatever came from outside, and a policy in it forbids any request.
     """
     assets = files("materialist.exporters") / "assets"
@@ -52,6 +54,7 @@ def page(scene: Scene, parts: list[Part]) -> str:
         width=camera.width,
         height=camera.height,
         photo=_image(srgb_levels(scene.photo.linear), quality=94),
+        before="" if before is None else _image(srgb_levels(before), quality=94),
         rerender=_image(srgb_levels(scene.rerender), quality=94),
         triangles=f"{sum(len(part.mesh.faces) for part in parts):,}",
         maps=_maps(scene),

@@ -238,8 +238,10 @@ def displayed(pixels: Array, header: dict[str, Any], path: Path) -> Array:
     return out
 
 
-def write_exr(path: str | Path, array: Array) -> None:
-    """Write [H, W] (channel Y), [H, W, 3] (RGB) or [H, W, 4] (RGBA) as float32.
+def write_exr(
+    path: str | Path, array: Array, attributes: dict[str, str | float] | None = None
+) -> None:
+    """Write [H, W] (channel Y), [H, W, 3] (RGB) or [H, W, 4] (RGBA) as float32, with attributes in its header.
 
     Raises InputError for another shape, OutputError when the file cannot be written.
     """
@@ -256,6 +258,7 @@ def write_exr(path: str | Path, array: Array) -> None:
         raise OutputError(problem)
     # ZIP loses nothing.
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header |= attributes or {}
     try:
         with OpenEXR.File(header, {names: pixels}) as file:
             file.write(str(path))

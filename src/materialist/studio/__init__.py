@@ -1,6 +1,6 @@
-"""The studio: the public API on a web page, for people who never open a terminal. It holds no logic of its own.
+"""The studio: the public API behind a web page, for people who never open a terminal. It holds no logic of its own.
 
-A page (`page`, `tab_*`) turns clicks into calls of a `session.Session`; what takes long is a function of `tasks` that
+The page (`darkroom`) turns clicks into calls of a `session.Session`; what takes long is a function of `tasks` that
 `jobs` runs in a process of its own, which can be stopped at any time. Scenes and edits lie in a `workspace.WorkFolder`.
 """
 
@@ -25,7 +25,11 @@ class StudioSettings:
     uploads: int = 8  # that one sender sends at a time
     body_seconds: float = 60.0  # in which the next part of an upload must come
     pages: int = 40  # that one sender has open
-    requests: int = 16  # of one sender that change something at a time; the page has 40 threads
+    channels: int = 4  # of one page; after a reload the one before may still be closing
+    message_bytes: int = 4096  # largest message of a page; none is expected
+    connections: int = 200  # of one address
+    request_seconds: float = 30.0  # in which a new connection must have sent a request
+    requests: int = 16  # of one sender that change something at a time; the server has 40 threads
     # What is read of it.
     edit_pixels: int = 8_000_000  # largest picture of an edit, to which a larger one is shrunk
     mesh_faces: int = 200_000  # of an object's mesh
@@ -44,7 +48,7 @@ class StudioSettings:
     people: int = 10_000  # whose last photo is remembered
     person_seconds: int = 31_536_000  # a browser stays the same person: a year
     # After which idle things are forgotten.
-    page_seconds: float = 60.0  # since the last request of a page that never showed it is open
+    page_seconds: float = 60.0  # since the last request of a page whose channel is closed
     unfinished_seconds: float = 86_400.0  # photos not taken apart to the end, uploads, results
     # Bytes of memory that must be free.
     free_for_scene: float = 0.8e9  # before another scene is opened, and
@@ -55,14 +59,13 @@ class StudioSettings:
     glass_niceness: int = 3  # between previews and inversions: somebody waits at a slider
     glass_bodies: int = 2  # that it keeps: going between two objects builds nothing anew
     # The live preview.
+    quiet_seconds: float = 1.5  # since the last picture, before another light is prepared
     undo_steps: int = 60  # length of the undo history
     scenes_kept: int = 24  # edited scenes: moving the last step must not replay those before
     kept_bytes: float = 3e8  # of the bodies in them
     triangles: int = 12_000  # of all bodies in a sketch; of a finer mesh every n-th
     jpeg_quality: int = 88  # of live pictures
     video_frames: int = 24  # of the turning light
-    message_seconds: float = 12  # a message stays on the page
-    poll_seconds: float = 0.3  # between two looks at a job
     lamp_share: float = 0.75  # of the way from the camera to the surface: there a new lamp hangs
 
 

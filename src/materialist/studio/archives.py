@@ -16,6 +16,7 @@ from typing import Any
 from materialist.edits.recipe import Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
+from materialist.io.decode import image_size
 from materialist.io.package import load_scene
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.access.quota import Allowance, folder_size
@@ -119,6 +120,13 @@ def extract_scene(report: Any, file: Path, target: Path) -> None:
         raise InputError(
             f"{shown} is a scene of {camera.width} x {camera.height} pixels; the studio takes up to "
             f"{SETTINGS.scene_pixels / 1e6:g} megapixels. Invert its photo again at a smaller --size."
+        )
+    # `load_scene` does not read it, but the server does, for the list of photos.
+    shown_photo = target / "photo.png"
+    size = image_size(shown_photo) if shown_photo.is_file() else None
+    if size not in (None, (camera.width, camera.height)):
+        raise InputError(
+            f"{shown} is damaged: its photo.png is {size[0]} x {size[1]}; zip it again."
         )
 
 

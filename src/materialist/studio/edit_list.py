@@ -27,6 +27,9 @@ _OURS = re.compile(r"(?:thing|light)-([a-z]+)")
 _UPLOADED = re.compile(r"[a-z]+-[0-9a-f]{12}")
 """The name that `workspace.store` gives an uploaded file."""
 
+_SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
+"""Values that sliders and colour pickers set: numbers and colours."""
+
 
 @dataclass(frozen=True)
 class EditList:
@@ -92,6 +95,13 @@ def with_options(step: Step, **options: Any) -> Step:
     return replace(
         step, options={k: v for k, v in {**step.options, **options}.items() if v is not None}
     )
+
+
+def slides(value: Any) -> bool:
+    """Whether an option's value is one that sliders and colour pickers set."""
+    if isinstance(value, list):
+        return all(isinstance(item, str) and slides(item) for item in value)
+    return _SLIDES.fullmatch(str(value)) is not None
 
 
 def key_of(steps: tuple[Step, ...]) -> str:

@@ -15,6 +15,7 @@ import psutil
 import materialist as mt
 from materialist.edits.core.operation import REGION, PreviewMode
 from materialist.edits.recipe import Step, apply, options_of, region_of
+from materialist.edits.remove.patches import remembered
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter
@@ -202,7 +203,8 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
         )
 
     # Building takes half a minute: meanwhile a newer request may have come.
-    preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
+    with remembered(step.folder):
+        preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:
         return None
     report("trace", 0, 1)

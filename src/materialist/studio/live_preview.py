@@ -4,6 +4,7 @@ import ctypes
 import gc
 import sys
 import threading
+import time
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -20,6 +21,7 @@ from materialist.color import luminance
 from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step, apply, options_of, region_of
+from materialist.edits.remove.patches import remembered
 from materialist.errors import InputError
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
@@ -55,13 +57,22 @@ class LivePreview:
         self._allowance = allowance or Allowance()
         self.scene = scene
         self._package = package
+        self._asked = float("-inf")
+        """When a picture was last asked for, by the monotonic clock."""
+        self._later: threading.Timer | None = None
         self._kept: dict[str, Any] = {}
         """What steps make: scenes, and what a sketch needs of glass."""
         self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
         _THREAD.submit(self._prepare, self._preview)
 
     def _prepare(self, built: Future[Any]) -> None:
-        """Get ready for another light part by part: pictures come between."""
+        """Get ready for another light part by part, while nobody moves a slider: a part takes longer than a picture."""
+        quiet = SETTINGS.quiet_seconds - (time.monotonic() - self._asked)
+        if built is self._preview and quiet > 0:
+            self._later = threading.Timer(quiet, _THREAD.submit, (self._prepare, built))
+            self._later.daemon = True
+            self._later.start()
+            return
         more = built is self._preview and built.exception() is None and built.result().prepare()
         # Only while it is open: the task would hold a closed preview until after `free_memory`.
         if more and built is self._preview:
@@ -112,7 +123,9 @@ class LivePreview:
             is_slow = step.operation.preview is PreviewMode.SIMULATED
             if is_slow and not step.skipped and self._package is not None:
                 return self._fallen(before, steps)
-            return apply(self.scene, [step], onto=before)
+            # What a removal hides was filled by a job, into the folder of the edits.
+            with remembered(step.folder):
+                return apply(self.scene, [step], onto=before)
         except InputError as error:
             reason = str(error).removeprefix(f"Step 1 ({step.kind}): ")
             raise InputError(f"'{step_summary(step)}' cannot be applied. {reason}") from error
@@ -154,6 +167,7 @@ class LivePreview:
         if not steps:
             return self.scene.photo.linear
         preview = self._preview.result()
+        self._asked = time.monotonic()
         edited = self.edited(steps)
         known = [
             (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
@@ -181,6 +195,10 @@ class LivePreview:
         return picture
 
     def close(self) -> None:
+        if self._later is not None:
+            # It would hold the closed preview until it is due.
+            self._later.cancel()
+            self._later = None
         self._preview.cancel()
         self._preview = Future()
         # For whoever still waits for it.

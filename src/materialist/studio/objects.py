@@ -27,7 +27,6 @@ _SHAPES: dict[str, tuple[str, dict[str, Any]]] = {
     "Slab": ("box", {"extents": (1, 1, 0.12)}),
 }
 LIBRARY = tuple(_SHAPES)
-MATERIALS = (("As it is", "as-is"), ("Glass", "glass"), ("Mirror", "mirror"), ("Colour", "colour"))
 
 
 def last(session: Session) -> int | None:
@@ -95,11 +94,6 @@ def let_fall(session: Session, height: float) -> list[str]:
 
 def file_of(name: str) -> str:
     return f"thing-{name.lower()}.ply"
-
-
-def library_name(file: Any) -> str | None:
-    """The name of the computed mesh that lies in a file; None for another file."""
-    return next((name for name in LIBRARY if file_of(name) == file), None)
 
 
 def library_file(session: Session, name: str) -> str:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import base64
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -12,7 +12,6 @@ import numpy as np
 
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.io.display import encoded
 from materialist.types import Array, Scene
 
 REPLACE = "new"
@@ -26,6 +25,7 @@ class Selection:
 
     parts: tuple[Array, ...] = ()
     """[H, W] bool each."""
+    _names: list[str] = field(default_factory=list, compare=False, repr=False, init=False)
 
     @property
     def mask(self) -> Array | None:
@@ -35,26 +35,18 @@ class Selection:
         mask = np.logical_or.reduce(self.parts)
         return mask if mask.any() else None
 
-    @cached_property
-    def pictures(self) -> dict[str, str]:
-        """The mask as data URLs of two see-through pictures, `fill` and `outline`; empty texts for none."""
-        mask = self.mask
-        if mask is None:
-            return {"fill": "", "outline": ""}
-        inside = mask.astype(np.uint8)
-        kernel = np.ones((3, 3), np.uint8)
-        # A light line inside and a dark one outside: one of them shows on every ground.
-        light = inside - cv2.erode(inside, kernel)
-        dark = cv2.dilate(inside, kernel) - inside
-        outline = np.zeros((*mask.shape, 4), np.uint8)
-        outline[light > 0] = (255, 255, 255, 255)
-        outline[dark > 0] = (20, 30, 60, 200)
-        fill = np.zeros((*mask.shape, 4), np.uint8)
-        fill[mask] = (255, 255, 255, 255)
-        return {
-            "fill": data_url(encoded(fill), "png"),
-            "outline": data_url(encoded(outline), "png"),
-        }
+    @classmethod
+    def read(cls, parts: tuple[Array, ...], names: list[str]) -> Selection:
+        """Of parts that are stored already."""
+        made = cls(parts)
+        made._names.extend(names)
+        return made
+
+    def stored(self, store: Callable[[Array], str]) -> list[str]:
+        """What `store` gives for each part; asked once."""
+        if not self._names:
+            self._names.extend(store(part) for part in self.parts)
+        return [*self._names]
 
     def click(
         self,
@@ -115,7 +107,7 @@ class Selection:
 
     def _without(self, region: Array) -> Selection:
         left = tuple(p & ~region for p in self.parts)
-        return replace(self, parts=tuple(p for p in left if p.any()))
+        return Selection(tuple(p for p in left if p.any()))
 
 
 def read_pick(data: Any) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """Start and stop of the studio."""
 
 import ipaddress
-import os
 import re
 import shutil
 import socket
@@ -11,11 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from materialist.errors import InputError, SetupError
-from materialist.install import extra_command
+from materialist.errors import InputError
 from materialist.io.photo import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
-from materialist.studio import SETTINGS, asset, uploads
+from materialist.studio import SETTINGS, uploads
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import Project, WorkFolder
 
@@ -91,30 +89,28 @@ def first_shown(work: WorkFolder, path: Path) -> Project | Path:
 
 def serve(
     studio: Studio,
+    page: Any,
     *,
     host: str,
     port: int,
-    password: str | None = None,
     proxy: str | None = None,
     on_ready: Callable[[str], None],
-    page: Callable[..., Any] | None = None,
 ) -> None:
-    """Show the studio until Ctrl-C. `on_ready` gets the address once the page answers.
-
-    page: makes the page behind its gate, as `application` does, whose page it is by default.
-    """
-    build = page or application
-    gate = build(studio, host=host, port=port, password=password, proxy=proxy)
+    """Show a page, an ASGI application, until Ctrl-C. `on_ready` gets the address once it answers."""
     import uvicorn
 
+    from materialist.studio.access.connections import Connection, ProxiedConnection
+
     config = uvicorn.Config(
-        gate,
+        page,
         host,
         port,
         log_level="warning",
         proxy_headers=False,
         server_header=False,
         timeout_graceful_shutdown=1,
+        ws_max_size=SETTINGS.message_bytes,
+        http=ProxiedConnection if proxy else Connection,
     )
     server = uvicorn.Server(config)
     # A thread of its own: signals are for the command.
@@ -140,67 +136,6 @@ def serve(
         shutil.rmtree(studio.work.cache, ignore_errors=True)
 
 
-def application(
-    studio: Studio,
-    *,
-    host: str,
-    port: int,
-    password: str | None = None,
-    proxy: str | None = None,
-) -> Any:
-    """The page behind its gate, an ASGI application. Raises SetupError where Gradio is not installed."""
-    studio.work.sweep()
-    # No word to anyone, and uploads in the work folder: read by Gradio when it is imported.
-    os.environ.update(
-        GRADIO_ANALYTICS_ENABLED="False", HF_HUB_OFFLINE="1", GRADIO_TEMP_DIR=str(studio.work.cache)
-    )
-    try:
-        import gradio as gr
-    except ImportError as error:
-        raise SetupError(f"The studio needs one more package: {extra_command('studio')}") from error
-    from fastapi import FastAPI
-
-    from materialist.studio.access.gate import Gate
-    from materialist.studio.page import build
-
-    page = build(studio)
-    # Gradio has put pictures of the page itself into the cache: they stay.
-    studio.work.kept |= {*studio.work.cache.iterdir()}
-    _fetch_nothing()
-    page.queue(default_concurrency_limit=8, max_size=200)
-    app = gr.mount_gradio_app(
-        FastAPI(openapi_url=None),
-        page,
-        "/",
-        footer_links=[],
-        show_error=True,
-        allowed_paths=[],
-        ssr_mode=False,
-        max_file_size=f"{SETTINGS.upload_megabytes}mb",
-        theme=_theme(gr),
-        css=asset("style.css"),
-        js=asset("page.js"),
-        enable_monitoring=False,
-        pwa=False,
-        mcp_server=False,
-        run_history=False,
-    )
-    single = host if studio.single_user else None
-    return Gate(app, studio, host=single, proxy=proxy, password=password, port=port)
-
-
-def _fetch_nothing() -> None:
-    """Let Gradio open no address that a request names in place of a file."""
-    from gradio import processing_utils as fetching
-
-    async def refused(url: str, *_: Any, **options: Any) -> Any:
-        raise InputError(
-            f"The studio fetches nothing from other machines, so not {url[:100]} either; upload the file."
-        )
-
-    fetching.async_ssrf_protected_get = fetching.async_ssrf_protected_download = refused  # type: ignore[assignment]
-
-
 def new_studio(
     work: str | Path, *, single_user: bool, workers: int = 1, seed: int = 0, device: str = "auto"
 ) -> Studio:
@@ -211,28 +146,4 @@ def new_studio(
         single_user,
         seed=seed,
         device=device,
-    )
-
-
-def _theme(gr: Any) -> Any:
-    """Dark ink on light paper, or the other way, with the fonts of the machine: nothing is fetched."""
-    sans = ["system-ui", "Segoe UI", "Roboto", "sans-serif"]
-    mono = ["ui-monospace", "Consolas", "monospace"]
-    return gr.themes.Base(primary_hue="blue", neutral_hue="gray", font=sans, font_mono=mono).set(
-        button_primary_background_fill="#1d4ed8",
-        button_primary_background_fill_hover="#1e40af",
-        button_primary_text_color="#ffffff",
-        body_text_color="#16202e",
-        body_text_color_subdued="#475467",
-        block_label_text_color="#16202e",
-        block_title_text_color="#16202e",
-        button_cancel_background_fill="#b42318",
-        button_cancel_text_color="#ffffff",
-        slider_color="#1d4ed8",
-        body_background_fill="#f6f7f9",
-        border_color_primary="#d5dae2",
-        link_text_color="#1d4ed8",
-        link_text_color_dark="#93b4ff",
-        error_text_color="#8f1d14",
-        error_text_color_dark="#ff9d94",
     )

@@ -1,9 +1,9 @@
-"""The state of one page: its scene, selection, list of edits and undo history."""
+"""What one person does with one photo: scene, selection, list of edits and undo history, for all pages that show it."""
 
-import re
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -11,41 +11,33 @@ import materialist as mt
 from materialist.edits.core.operation import REGION, PreviewMode, Target
 from materialist.edits.light.operation import RELIGHT
 from materialist.edits.recipe import Step, region_of, write_recipe
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.access.quota import Allowance
 from materialist.studio.archives import read_list, unpack
-from materialist.studio.edit_list import EditList, with_options
+from materialist.studio.edit_list import EditList, slides, with_options
+from materialist.studio.finals import FinalPicture, kept_final, sweep_finals
 from materialist.studio.glass import GlassClient
+from materialist.studio.history import History, read_history, write_history
 from materialist.studio.live_preview import LivePreview
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.workspace import Project, located, read_steps, write_mask
 from materialist.types import Array, Scene
 
 EDITS = "edits.yaml"
-ENDING = ("final", "take")
-"""Kinds of jobs that end with the page that asked for them; an inversion runs on."""
-_SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
-"""Values that sliders and colour pickers set: numbers and colours."""
+ENDING = ("take", "removal")
+"""Kinds of jobs that end with the last page of a session; inversions and final pictures run on."""
+_REVISIONS = count(1)
+"""Of all sessions: a page that goes from one to another must not take an older state for a newer one."""
 
 
-@dataclass(frozen=True)
-class FinalPicture:
-    steps: tuple[Step, ...]
-    path: Path
-    """Its files (.png, .exr, .jpg), without the ending."""
-
-    def of(self, steps: tuple[Step, ...]) -> bool:
-        return bool(steps) and self.steps == steps
-
-    def remove(self) -> None:
-        for file in self.path.parent.glob(f"{self.path.name}*"):
-            file.unlink(missing_ok=True)
+def next_revision() -> int:
+    return next(_REVISIONS)
 
 
 class Session:
-    """The state of one page. Its methods may be called from any thread."""
+    """The state that pages show. Its methods may be called from any thread."""
 
     def __init__(
         self,
@@ -61,6 +53,8 @@ class Session:
         self.allowance = allowance or Allowance()
         self.lock = threading.RLock()
         self.project: Project | None = None
+        self.expected: Project | None = None
+        """The photo that is being opened here, or was."""
         self.live: LivePreview | None = None
         self.glass: GlassClient | None = None
         self.selection = Selection()
@@ -71,15 +65,11 @@ class Session:
         self._past: list[tuple[str, EditList, Selection]] = []
         self._future: list[tuple[str, EditList, Selection]] = []
         self.running: list[Job] = []
-        self.left = False
-        """Whether the page was closed."""
-        self.followers: dict[int, object] = {}
-        """Job (by its id) -> who follows it for this page: of several the last."""
-        self.seen = 0.0
-        self.beats = False
-        """When this page last asked for something, by the monotonic clock, and whether it shows that it is open."""
+        self.revision = next_revision()
+        """Grows with every change."""
+        self._history_changed = False
         self._kept: bytes | None = None
-        """The list of edits as this page last read or wrote it."""
+        """The list of edits as this session last read or wrote it."""
         self.final: FinalPicture | None = None
 
     @property
@@ -88,6 +78,10 @@ class Session:
         if self.live is None:
             raise InputError("Open a photo first.")
         return self.live.scene
+
+    def shows(self, project: Project) -> bool:
+        """Whether it is the session of a photo."""
+        return self.expected is not None and self.expected.folder == project.folder
 
     @property
     def opened(self) -> Project:
@@ -109,11 +103,11 @@ class Session:
         return min(int(x), camera.width - 1), min(int(y), camera.height - 1)
 
     def note_job(self, job: Job) -> None:
-        """Note a job that this page asked for, to stop it by a button, or when the page is closed."""
+        """Note a job that a page asked for, to stop it when the last page is closed."""
         self.running = [*(earlier for earlier in self.running if not earlier.over), job]
 
     def stop(self, jobs: JobQueue, *kinds: str) -> None:
-        """Stop the jobs of some kinds, or all, that this page asked for."""
+        """Stop the jobs of some kinds, or all, that pages asked for here."""
         for job in self.running:
             if not kinds or job.kind in kinds:
                 jobs.stop(job)
@@ -123,7 +117,12 @@ class Session:
         step = self.edits.current_step
         return step.kind if step else None
 
+    def changed(self) -> None:
+        """Let every page that shows this session ask for its state."""
+        self.revision = next_revision()
+
     def open(self, project: Project) -> None:
+        """Open a photo with its edits, history and last final picture as they were left. Raises InputError."""
         loaded = mt.load_scene(project.scene)
         workspace = project.workspace(self.person)
         # --- Everything that can fail, before the page changes ---
@@ -137,13 +136,23 @@ class Session:
             ) from error
         with self.lock:
             self.close()
-            self.project = project
+            self.project = self.expected = project
             self.glass = GlassClient(project.scene)
             self.live = LivePreview(
                 loaded, project.folder / "preview.npz", project.scene, self.allowance
             )
-            self.edits = EditList(steps)
+            # --- As it was left ---
+            history = read_history(workspace, loaded.depth.shape)
+            current = history.current
+            self._past = history.past
+            self._future = history.future
+            self.selection = history.selection
+            self.edits = EditList(steps, current if current in range(len(steps)) else None)
             self._kept = kept
+            self._take_up_object()
+            sweep_finals(workspace)
+            self.final = kept_final(workspace)
+            self.changed()
 
     def close(self) -> None:
         """Give the memory back; the edits stay in the work folder."""
@@ -152,13 +161,13 @@ class Session:
                 self.live.close()
             if self.glass is not None:
                 self.glass.stop()
-            if self.final is not None:
-                self.final.remove()
-            self.project = self.live = self.glass = self.final = None
+            self.project = self.expected = self.live = self.glass = self.final = None
             self.edits = EditList()
             self._past = []
             self._future = []
             self.selection = Selection()
+            self.next_object = {}
+            self.changed()
 
     # Selecting
 
@@ -194,6 +203,7 @@ class Session:
                     **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)},
                 )
             self.selection = after
+            self._note_history()
 
     def _follows_selection(self) -> bool:
         """Whether the current edit is one of a region that the preview shows soon enough."""
@@ -207,6 +217,7 @@ class Session:
             self.remember("select")
             self.selection = Selection()
             self.edits = self.edits.chosen(None)
+            self._note_history()
 
     # The list of edits
 
@@ -216,17 +227,18 @@ class Session:
         Raises InputError, and changes nothing, for values that are not valid.
         """
         with self.lock:
-            _ = self.scene
-            # --- A new step over the selection, unless one of its kind is current ---
-            mask = self.selection.mask
-            edits = self.edits
-            if self.current_kind != kind:
-                if mask is None:
-                    raise InputError("Click the object that you want to change first.")
-                edits = edits.add(
-                    Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace)
-                )
-            self.put(edits, **options)
+            self.put(self.planned(kind), **options)
+
+    def planned(self, kind: str) -> EditList:
+        """The edits, whose current step is of a kind: a new one over the selection, if need be. Raises InputError."""
+        _ = self.scene
+        if self.current_kind == kind:
+            return self.edits
+        mask = self.selection.mask
+        if mask is None:
+            raise InputError("Click the object that you want to change first.")
+        step = Step(kind, {"mask": write_mask(self.workspace, mask)}, self.workspace)
+        return self.edits.add(step)
 
     def light(self, **options: Any) -> None:
         """Set or clear (None) options of the light (`EditList.light`); it is made when the first is set."""
@@ -251,7 +263,7 @@ class Session:
         if after.steps != self.edits.steps:
             changed = [name for name in options if new.options.get(name) != step.options.get(name)]
             moving = all(
-                _slides(state.options.get(name)) for state in (step, new) for name in changed
+                slides(state.options.get(name)) for state in (step, new) for name in changed
             )
             self.change(f"{', '.join(options)} of {index}", after, moving=moving)
 
@@ -274,12 +286,13 @@ class Session:
             after = changed[action]()
             # First everything that can fail, then the changes.
             region = self._region_of(after) if action == "choose" else None
-            self.remember(action)
-            self.edits = after
-            if region is not None:
-                self.selection = region
-                self._take_up_object()
-            self.save()
+            with self._or_as_before():
+                self.remember(action)
+                self.edits = after
+                if region is not None:
+                    self.selection = region
+                    self._take_up_object()
+                self.save()
 
     def undo(self, *, again: bool = False) -> None:
         """Take back the last change, or do it again. Raises InputError where there is none."""
@@ -292,11 +305,13 @@ class Session:
                 )
             # Two pages may edit one photo: whoever comes second must not overwrite.
             self._check_unchanged()
-            target.append(("", self.edits, self.selection))
-            _, self.edits, self.selection = source.pop()
-            if self._past:  # a slider that moves on now begins anew
-                self._past[-1] = ("", *self._past[-1][1:])
-            self.save()
+            with self._or_as_before():
+                target.append(("", self.edits, self.selection))
+                _, self.edits, self.selection = source.pop()
+                if self._past:  # a slider that moves on now begins anew
+                    self._past[-1] = ("", *self._past[-1][1:])
+                self._history_changed = True
+                self.save()
 
     def read_edits(self, file: Path) -> None:
         """Put the steps of an uploaded edits.yaml, or of a zip of it and its files, in place of the edits.
@@ -324,9 +339,20 @@ class Session:
             )
         # Applied once before it counts: an edit that cannot be applied is refused.
         self.live.edited(after.active)
-        self.remember(action, moving=moving)
-        self.edits = after
-        self.save()
+        with self._or_as_before():
+            self.remember(action, moving=moving)
+            self.edits = after
+            self.save()
+
+    @contextmanager
+    def _or_as_before(self) -> Iterator[None]:
+        """Within it a change that cannot be written, as on a full disk, is no change."""
+        state = (self.edits, self.selection, [*self._past], [*self._future], self._kept)
+        try:
+            yield
+        except OutputError:
+            self.edits, self.selection, self._past, self._future, self._kept = state
+            raise
 
     def _take_up_object(self) -> None:
         """The next object is like the current one, as the controls show it."""
@@ -346,9 +372,11 @@ class Session:
         """Keep the state for undo; a slider (or colour) that moves on adds no further entry."""
         if action != "select":
             self._check_unchanged()
+        self._history_changed = self._history_changed or bool(self._future)
         self._future = []
         if not (moving and self._past and self._past[-1][0] == action):
             self._past = [*self._past, (action, self.edits, self.selection)][-SETTINGS.undo_steps :]
+            self._history_changed = True
 
     def _region_of(self, edits: EditList) -> Selection:
         """The selection that the current step was made with."""
@@ -358,16 +386,45 @@ class Session:
         return Selection((region_of(self.scene, step),))
 
     def _check_unchanged(self) -> None:
-        """Raises InputError where another page, or a person, has written the edits since this page did."""
-        if self.project is not None and _content(self.workspace / EDITS) != self._kept:
+        """Take over what another studio, or a person, has written meanwhile. Raises InputError where they did."""
+        if self.take_over():
             raise InputError(
-                "These edits were changed in another place; reload the page to go on with those."
+                "These edits were changed in another place meanwhile; here they are. Do it again."
             )
 
-    def save(self) -> None:
-        """Write edits.yaml, and forget the glass that is no longer in it.
+    def take_over(self) -> bool:
+        """Read the list of edits again where its file is not as this session left it; undo goes back to its own.
 
-        Raises InputError where another page, or a person, has written it since.
+        Returns whether it was another. Raises InputError where it cannot be read.
+        """
+        with self.lock:
+            if self.project is None:
+                return False
+            file = self.workspace / EDITS
+            content = _content(file)
+            if content == self._kept:
+                return False
+            steps = () if content is None else read_steps(self.workspace, file)
+            self._past = [*self._past, ("", self.edits, self.selection)][-SETTINGS.undo_steps :]
+            self._future = []
+            self.edits = EditList(steps)
+            self._kept = content
+            self._history_changed = True
+            self._note_history()
+            return True
+
+    def _note_history(self) -> None:
+        """Keep what undo goes back to, and tell the pages of the change. Raises OutputError."""
+        self.changed()
+        if self._history_changed and self.project is not None:
+            kept = History(self._past, self._future, self.edits.current, self.selection)
+            write_history(self.workspace, kept)
+            self._history_changed = False
+
+    def save(self) -> None:
+        """Write edits.yaml and the history, and forget the glass that is no longer in the list.
+
+        Raises InputError where another studio, or a person, has written it since; OutputError on a full disk.
         """
         if self.project is None:
             return
@@ -380,13 +437,7 @@ class Session:
         else:
             file.unlink(missing_ok=True)
         self._kept = _content(file)
-
-
-def _slides(value: Any) -> bool:
-    """Whether an option's value is one that sliders and colour pickers set."""
-    if isinstance(value, list):
-        return all(isinstance(item, str) and _slides(item) for item in value)
-    return _SLIDES.fullmatch(str(value)) is not None
+        self._note_history()
 
 
 def _content(file: Path) -> bytes | None:

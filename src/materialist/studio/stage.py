@@ -13,9 +13,9 @@ from materialist.errors import MaterialistError
 from materialist.io import display
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS, glass
-from materialist.studio.edit_list import EditList, step_summary
+from materialist.studio.edit_list import EditList
 from materialist.studio.live_preview import is_shaded
-from materialist.studio.selection import Selection, data_url
+from materialist.studio.selection import data_url
 from materialist.studio.session import EDITS, Session
 from materialist.studio.tasks import before_of
 from materialist.types import Array, Scene
@@ -43,6 +43,7 @@ _WORDS = {
     "rerender": "Rendering the result",
     "save": "Saving",
     "load": "Loading",
+    "removal": "Filling what it hid",
     "shadow": "Taking its shadow away",
     "render": "Path tracing",
     "frames": "Path tracing the frames",
@@ -51,10 +52,10 @@ _WORDS = {
 
 
 def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) -> dict[str, Any]:
-    """The picture as a data URL, the outlines of the selection, the lamps, and what the picture is.
+    """The picture as a data URL, the lamps, and what the picture is.
 
     Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
-    page keeps the one it shows, and `tab_open` sends it then. Where they cannot be applied it is the photo, with the
+    page keeps the one it shows, and asks again then. Where they cannot be applied it is the photo, with the
     reason on it. The glass of the current step is asked for; `waiting` says whether its picture is still to come. The
     page ignores a picture with an older `serial` than the one it shows. `before` is the photo, shown while a key is
     held; empty where `picture` is the photo itself, which the page keeps for live previews (None). At rest the page
@@ -67,9 +68,8 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
         edits = session.edits
         final = session.final
         # Taken together under the lock; the picture is made without it.
-        masks = session.selection.pictures
         client = session.glass
-    shown = {**_EMPTY, "serial": serial, "before": None, **masks}
+    shown = {**_EMPTY, "serial": serial, "before": None}
     if live is None:
         return shown
     camera = live.scene.camera
@@ -102,12 +102,6 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     badge = _badge(steps, client, waiting) + off
     shown |= {"before": None if steps else "", "badge": badge, "waiting": waiting, "coarse": coarse}
     return {**shown, "picture": jpeg_url(linear)}
-
-
-def waiting_photo(file: Path) -> dict[str, Any]:
-    """A photo (JPEG) that is being taken apart, without anything to click."""
-    shown = {**_EMPTY, **Selection().pictures, "serial": time(), "before": ""}
-    return {**shown, "picture": jpeg_file(file), "badge": "Your photo, being taken apart"}
 
 
 def _lamps(edits: EditList) -> list[list[float]]:
@@ -215,13 +209,6 @@ def words(stage: str) -> str:
     return _WORDS.get(stage) or _WORDS.get(
         stage.replace(":", " ").partition(" ")[0], stage.capitalize()
     )
-
-
-def steps(session: Session) -> list[dict[str, Any]]:
-    return [
-        {"text": step_summary(step), "on": not step.skipped, "current": k == session.edits.current}
-        for k, step in enumerate(session.edits.steps)
-    ]
 
 
 def commands(session: Session) -> str:

@@ -16,13 +16,14 @@ from typing import Any
 
 import psutil
 
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
 from materialist.studio.live_preview import free_memory
+from materialist.studio.page import Page
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
 
@@ -50,14 +51,14 @@ class Studio:
     seed: int = 0
     device: str = "auto"
     last: dict[str, str] = field(default_factory=dict)
-    """Person -> the project last opened or begun; a page that is loaded again goes on with it."""
+    """Person -> the project last opened or begun; a page goes on with it, after a restart, too."""
     files: HandedFiles = field(default_factory=HandedFiles)
     """What requests may name: uploads, and results that were handed over."""
     senders: dict[str, str] = field(default_factory=dict)
     """Person -> the address of their last request."""
-    _sessions: dict[str, Session] = field(default_factory=dict)
+    _pages: dict[str, Page] = field(default_factory=dict)
     _left: list[Session] = field(default_factory=list)
-    """Sessions of closed pages, whose memory is not given back yet."""
+    """Sessions that no page shows any more, whose memory is not given back yet."""
     _closer: ThreadPoolExecutor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer")
     )
@@ -65,52 +66,57 @@ class Studio:
 
     def __post_init__(self) -> None:
         self.quota = Quota(self.work.cache, self.work.root)
+        self.last = self.work.read_last()
 
     def person(self, token: Any) -> str:
         """The name of a page's person, from the cookie that their browser keeps. Raises InputError for none of ours."""
         return LOCAL_PERSON if self.single_user else person_of(token)
 
-    def session(self, page: str | None, person: str, *, beats: bool = False) -> Session:
-        """The session of a page, by Gradio's session hash; `beats` where the page holds a request until it is closed.
+    def page(self, name: str | None, person: str) -> Page:
+        """The page of a name, new where there is none. Forgets pages that were not heard of for a while.
 
-        Forgets pages that never did so, a while after their last request. Raises InputError for another person's page.
+        Raises InputError for no name, another person's page, and too many pages.
         """
-        now = time.monotonic()
-        self.leave_idle(page)
+        self.leave_idle(name)
         with self._lock:
-            known = self._sessions.get(page or "")
-            if known is None and page:
+            known = self._pages.get(name or "")
+            if known is None and name:
                 self._check_pages(person)
-                known = self._sessions[page] = self._new_session(person)
-            if known is not None and known.person == person:
-                known.seen = now
-                known.beats = known.beats or beats
-        if known is None or known.person != person:
-            raise InputError(LOST)
+                known = self._pages[name] = Page(person, self._new_session(person))
+            if known is None or known.person != person:
+                raise InputError(LOST)
+            known.seen = time.monotonic()
         return known
 
-    def leave_idle(self, page: str | None = None) -> None:
-        """Forget the pages that never held a request, and were not heard of for a while, but for one."""
+    def leave_idle(self, name: str | None = None) -> None:
+        """Forget the pages that ask for nothing, and were not heard of for a while, but for one."""
         last = time.monotonic() - SETTINGS.page_seconds
         with self._lock:
             gone = [
-                name
-                for name, session in self._sessions.items()
-                if not session.beats and session.seen < last and name != page
+                known
+                for known, page in self._pages.items()
+                if not page.is_open and page.seen < last and known != name
             ]
-        for name in gone:
-            self.leave(name)
+        for known in gone:
+            self.leave(known)
 
     def _check_pages(self, person: str) -> None:
         """Raise InputError where a person's sender has too many pages open."""
         sender = self.sender(person)
-        if (
-            sum(self.sender(session.person) == sender for session in self._sessions.values())
-            >= SETTINGS.pages
-        ):
+        count = sum(self.sender(page.person) == sender for page in self._pages.values())
+        if count >= SETTINGS.pages:
             raise InputError(
                 f"There are {SETTINGS.pages} pages open from your address; close some."
             )
+
+    def session_on(self, project: Project, person: str) -> Session | None:
+        """The session in which pages of a person show a photo; None where none does."""
+        with self._lock:
+            return self._session_on(project, person)
+
+    def _session_on(self, project: Project, person: str) -> Session | None:
+        sessions = (page.session for page in self._pages.values() if page.person == person)
+        return next((one for one in sessions if one.shows(project)), None)
 
     def _new_session(self, person: str) -> Session:
         allowance = Allowance(self.quota, lambda: self.sender(person))
@@ -151,28 +157,76 @@ class Studio:
                 return project
         raise InputError("This photo is no longer in the work folder; open it again.")
 
-    def open(self, session: Session, name: str) -> None:
-        """Open a project of this person on a page. Raises InputError where the memory would not suffice."""
-        project = self.project(name, session.person)
-        if session.left:
+    def open(self, page: Page, name: str) -> None:
+        """Show a project of this person on a page; where another page of theirs shows it, both share the session.
+
+        Raises InputError where the memory would not suffice.
+        """
+        project = self.project(name, page.person)
+        if page.left:
             raise InputError("The page was closed.")
-        # The old scene goes first: both at once may not fit into memory.
-        had_scene = session.live is not None
-        session.close()
-        if had_scene:
-            free_memory().result()
-        if psutil.virtual_memory().available < _memory_of(project):
-            raise InputError(
-                "This machine has no memory left for another scene; close one in another tab."
-            )
-        session.open(project)
-        self.note_last(session.person, name)
+        with self._lock:
+            session = self._session_on(project, page.person)
+        if session is not page.session or session is None:
+            # The old scene goes first: both at once may not fit into memory.
+            self.put_away(page)
+        with self._lock:
+            session = self._session_on(project, page.person) or page.session
+            session.expected = project
+            page.session = session
+        try:
+            # Whoever comes second waits until it is open.
+            with session.lock:
+                if session.live is None:
+                    _check_memory(project)
+                    session.open(project)
+                else:
+                    session.take_over()
+        except Exception:
+            self.put_away(page)
+            raise
+        self.note_last(page.person, name)
+
+    def put_away(self, page: Page) -> None:
+        """Give a page an empty session; the scene of the one before goes when no other page shows it."""
+        with self._lock:
+            before = page.session
+            page.session = self._new_session(page.person)
+            shared = any(other.session is before for other in self._pages.values())
+        if not shared:
+            had_scene = before.live is not None
+            before.stop(self.jobs, *ENDING)
+            before.close()
+            if had_scene:
+                free_memory().result()
+
+    def discard(self, project: Project) -> None:
+        """Delete a project: its jobs are stopped, and the pages that show it have none."""
+        for job in self.jobs.unfinished():
+            if job.folder == project.folder or job.folder.parent == project.folder:
+                self.jobs.stop(job)
+        with self._lock:
+            pages = [page for page in self._pages.values() if page.session.shows(project)]
+        for page in pages:
+            self.put_away(page)
+        self.work.discard(project)
 
     def note_last(self, person: str, name: str) -> None:
         """Note the project that a person opened or began last; those who did so longest ago are forgotten."""
         # Put back last: the oldest entries go first.
         self.last.pop(person, None)
         self.last = dict([*self.last.items(), (person, name)][-SETTINGS.people :])
+        self._write_last()
+
+    def forget_last(self, person: str) -> None:
+        """Forget which project a person had: they went back to the choice of photos."""
+        if self.last.pop(person, None) is not None:
+            self._write_last()
+
+    def _write_last(self) -> None:
+        # Without it people choose their photo after a restart: no reason to refuse one on a full disk.
+        with suppress(OutputError):
+            self.work.write_last(self.last)
 
     def submit(self, session: Session, task: tasks.Task, folder: Path, **arguments: Any) -> Job:
         """Put a job for a page in the queue: a function of `tasks`, which writes into `folder`.
@@ -239,25 +293,29 @@ class Studio:
             raise
         return project
 
-    def leave(self, page: str | None) -> None:
-        """Forget a page that was closed, and its renderings; its work and its inversions go on.
+    def leave(self, name: str | None) -> None:
+        """Forget a page that was closed; its work, its inversions and final pictures go on.
 
-        Its memory is given back later, in another thread, together with that of other pages.
+        The memory of a session that no page shows any more is given back later, in another thread, together with that
+        of others.
         """
         with self._lock:
-            session = self._sessions.pop(page or "", None)
-            if session is not None:
-                session.left = True
-                self._left.append(session)
-                # One closing takes all who left meanwhile: many tabs are often closed together.
-                first = len(self._left) == 1
-        if session is not None:
-            session.stop(self.jobs, *ENDING)
-            if first:
-                self._closer.submit(self.close_left)
+            page = self._pages.pop(name or "", None)
+            if page is None:
+                return
+            page.left = True
+            session = page.session
+            if any(other.session is session for other in self._pages.values()):
+                return
+            self._left.append(session)
+            # One closing takes all who left meanwhile: many tabs are often closed together.
+            first = len(self._left) == 1
+        session.stop(self.jobs, *ENDING)
+        if first:
+            self._closer.submit(self.close_left)
 
     def close_left(self) -> None:
-        """Close the sessions of the pages that were closed, and give their memory back, once for all of them."""
+        """Close the sessions that no page shows, and give their memory back, once for all of them."""
         with self._lock:
             sessions = self._left
             self._left = []
@@ -284,6 +342,14 @@ class Studio:
             # A copy: the original may be replaced while somebody downloads it.
             copy = Path(shutil.copyfile(file, folder / (name or file.name)))
         return self.files.hand_out(person, copy, str(copy))
+
+
+def _check_memory(project: Project) -> None:
+    """Raise InputError where too little memory is free for a scene."""
+    if psutil.virtual_memory().available < _memory_of(project):
+        raise InputError(
+            "This machine has no memory left for another scene; close one in another tab."
+        )
 
 
 def _memory_of(project: Project) -> float:

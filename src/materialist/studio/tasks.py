@@ -4,6 +4,8 @@ import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +27,12 @@ Task = Callable[..., None]
 """task(report, **arguments)."""
 PHOTO = "photo"
 """The name under which an inversion shows its photo, before anything is found."""
+PICTURES = {"jpg": "-full.jpg", "png": ".png", "tif": ".tif", "exr": ".exr"}
+"""Kind of a path-traced picture -> what its file is called after the name of the picture."""
 KINDS = {
-    "png": ("Picture, PNG (path traced)", ".png"),
+    "jpg": ("Picture, JPEG", ".jpg"),
+    "png": ("Picture, PNG", ".png"),
+    "tif": ("Picture, TIFF", ".tif"),
     "exr": ("Picture, EXR: linear, for further work", ".exr"),
     "edits": ("edits.yaml with its masks (zip)", ".zip"),
     "scene": ("The edited scene, a package (zip)", ".zip"),
@@ -38,6 +44,18 @@ KINDS = {
     "turn": ("A video: the light goes round", ".mp4"),
 }
 """Kind of result -> its title, and the suffix of the file."""
+_NEEDED = {"usd": "pxr", "turn": "imageio_ffmpeg"}
+"""Kind -> the module that it does not work without."""
+
+
+@cache
+def kinds_here() -> dict[str, tuple[str, str]]:
+    """The kinds of results that this machine can make."""
+    return {kind: facts for kind, facts in KINDS.items() if _works(kind)}
+
+
+def _works(kind: str) -> bool:
+    return kind not in _NEEDED or find_spec(_NEEDED[kind]) is not None
 
 
 def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> None:
@@ -111,6 +129,37 @@ def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
         write_jpeg(file, shown, longest=2048)
 
 
+def converted(report: Reporter, scene: str, source: str, output: str) -> None:
+    """A path-traced picture, SOURCE.exr of `final`, in another format, as the photo's own file would be."""
+    from materialist.edits.composite.composite import write_composite
+    from materialist.io.exr import read_exr
+
+    report("export", 0, 1)
+    photo = mt.load_scene(scene).photo
+    # An EXR is in the unit of the photo's file.
+    picture = read_exr(source) * np.float32(2.0**photo.stops)
+    write_composite(output, picture, photo, force=True)
+
+
+def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
+    """Fill what the last of the steps hides, and keep that in the folder `fillings`: `apply` takes it from there.
+
+    Steps before it that neither move a surface nor change the photo are left out: they change nothing of the hole.
+    """
+    from materialist.edits.recipe import apply, options_of, region_of
+    from materialist.edits.remove.patches import remembered
+    from materialist.edits.remove.remove import disclosed
+
+    report("load", 0, 1)
+    loaded = mt.load_scene(scene)
+    earlier = [step for step in steps[:-1] if step.operation.preview is not PreviewMode.SHADED]
+    with remembered(Path(fillings)):
+        before = apply(loaded, earlier)
+        report("removal", 0, 1)
+        step = steps[-1]
+        disclosed(before, region_of(loaded, step), options_of(step), loaded)
+
+
 def before_of(output: Path) -> Path:
     """The photo beside a path-traced picture, of its size."""
     return output.with_name(f"{output.name}-before.jpg")
@@ -157,7 +206,10 @@ def take(report: Reporter, scene: str, steps: Steps, output: str, kind: str) -> 
         _turntable(report, loaded, edited, file)
     elif kind == "scene":
         with _zipped(file) as folder:
-            _package(report, loaded, edited, folder)
+            report("save", 0, 1)
+            mt.save_scene(_developed(report, loaded, edited), folder, force=True)
+    elif kind == "html":
+        _page(_developed(report, loaded, edited), edited, loaded, file)
     else:
         report("export", 0, 1)
         if file.suffix != ".zip":
@@ -170,20 +222,35 @@ def take(report: Reporter, scene: str, steps: Steps, output: str, kind: str) -> 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     from materialist.edits.recipe import apply
+    from materialist.edits.remove.patches import remembered
 
     report("load", 0, 1)
     loaded = mt.load_scene(scene)
-    return loaded, apply(loaded, list(steps)) if steps else loaded
+    if not steps:
+        return loaded, loaded
+    # What the pages have filled lies beside the masks.
+    with remembered(steps[0].folder):
+        return loaded, apply(loaded, list(steps))
 
 
-def _package(report: Reporter, loaded: Scene, edited: Scene, folder: Path) -> None:
-    """The edited scene as a package, its photo the composite."""
+def _developed(report: Reporter, loaded: Scene, edited: Scene) -> Scene:
+    """The edited scene with the composite as its photo."""
     from materialist.edits.composite.composite import developed
 
-    if edited is not loaded:
-        edited = developed(loaded, edited, mt.composite(loaded, edited, progress=report))
-    report("save", 0, 1)
-    mt.save_scene(edited, folder, force=True)
+    if edited is loaded:
+        return loaded
+    return developed(loaded, edited, mt.composite(loaded, edited, progress=report))
+
+
+def _page(shown: Scene, edited: Scene, loaded: Scene, output: Path) -> None:
+    """A page of the edited picture, with the photo before it, and the edited scene."""
+    from materialist.exporters.page import page
+    from materialist.exporters.parts import body_parts, scene_parts
+    from materialist.exporters.run import PAGE_TRIANGLES
+
+    parts = [*scene_parts(edited, PAGE_TRIANGLES), *body_parts(edited)]
+    before = None if edited is loaded else loaded.photo.linear
+    write_whole(output, page(shown, parts, before))
 
 
 def _turntable(report: Reporter, loaded: Scene, edited: Scene, output: Path) -> None:

@@ -33,6 +33,8 @@ from materialist.types import Array
 CARD = "project.json"
 """The file that makes a folder a project: title, owner, where the scene is."""
 SCENE = "photo.scene"
+LAST = "last.json"
+"""The file of the work folder that says which project each person had last."""
 LOST = "The page has lost its session; reload it."
 _NAME = re.compile(r"photo-\d{3,6}")
 _CACHE = "materialist-cache-"
@@ -91,7 +93,8 @@ class WorkFolder:
     def __init__(self, root: str | Path):
         self.root = Path(root).resolve()
         self._lock = threading.Lock()
-        self.kept: set[Path] = set()  # what stays in the cache: pictures of the page itself
+        self._highest = 0
+        """Largest number of a project: none is given twice, as long as somebody may still mean the one before."""
         with writing(root):
             make_folder(self.root)
             tempfile.TemporaryFile(dir=self.root).close()
@@ -102,7 +105,6 @@ class WorkFolder:
             """Uploads and results that are handed over; they go with this object."""
             (self.cache / _CACHE_MARK).touch()
             lock = _hold(self.cache)
-        self.kept.add(self.cache / _CACHE_MARK)
         self._end = weakref.finalize(self, _remove, self.cache, lock)
 
     def _sweep_caches(self) -> None:
@@ -141,10 +143,11 @@ class WorkFolder:
         with self._lock:  # two people may ask at once
             # Numbers are never used again while a folder has them.
             taken = [int(p.name[6:]) for p in self.root.iterdir() if _NAME.fullmatch(p.name)]
-            for number in count(max(taken, default=0) + 1):
+            for number in count(max(*taken, self._highest, 0) + 1):
                 folder = self.root / f"photo-{number:03d}"
                 with writing(folder), suppress(FileExistsError):  # another studio was faster
                     folder.mkdir()
+                    self._highest = number
                     break
         project = Project(
             folder, _shown(title), owner, scene.resolve() if scene else folder / SCENE
@@ -163,6 +166,17 @@ class WorkFolder:
         write_whole(project.folder / CARD, json.dumps(card, indent=1))
         return replace(project, title=card["title"])
 
+    def write_last(self, last: dict[str, str]) -> None:
+        """Keep which project each person had last, for a studio that is started again. Raises OutputError."""
+        write_whole(self.root / LAST, json.dumps(last))
+
+    def read_last(self) -> dict[str, str]:
+        """What `write_last` kept; nothing where it cannot be read: people then choose a photo."""
+        with suppress(OSError, ValueError, AttributeError):
+            kept = json.loads((self.root / LAST).read_text("utf-8"))
+            return {str(person): str(name) for person, name in kept.items()}
+        return {}
+
     def discard(self, project: Project) -> None:
         """Take a project, its edits included, out of the list; its folder goes a day later (`sweep`)."""
         with writing(project.folder):
@@ -170,19 +184,19 @@ class WorkFolder:
             project.folder.rename(bin_folder)
             os.utime(bin_folder)
 
+    def drop(self, project: Project) -> None:
+        """Remove the folder of a photo that was not taken apart to the end, unless it is another photo's by now."""
+        if _read(project.folder) == project and not project.ready:
+            shutil.rmtree(project.folder, ignore_errors=True)
+
     def sweep(self) -> None:
         """Remove what lies idle: folders of photos that were not taken apart to the end, uploads, and results."""
         for folder in self.root.glob(f"{_DISCARDED}photo-*"):
             if time.time() - folder.stat().st_mtime > SETTINGS.unfinished_seconds:
                 shutil.rmtree(folder, ignore_errors=True)
-        for place in {*self.cache.iterdir()} - self.kept:
-            with suppress(
-                OSError
-            ):  # it goes by itself meanwhile; path-traced pictures go with their page
-                if (
-                    time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds
-                    and place.name[:6] != "final-"
-                ):
+        for place in {*self.cache.iterdir()} - {self.cache / _CACHE_MARK}:
+            with suppress(OSError):  # it goes by itself meanwhile
+                if time.time() - place.stat().st_mtime > SETTINGS.unfinished_seconds:
                     shutil.rmtree(place) if place.is_dir() else place.unlink()
         for project in self.projects():
             # Only folders of the studio's own, without edits of anybody.

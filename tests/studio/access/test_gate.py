@@ -7,32 +7,24 @@ import pytest
 
 pytest.importorskip("starlette", reason="needs the studio extra")
 from starlette.applications import Starlette
-from starlette.responses import JSONResponse, PlainTextResponse
+from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 from starlette.testclient import TestClient
 
 from materialist.errors import InputError
-from materialist.studio import StudioSettings, server
-from materialist.studio.access import gate, quota
+from materialist.studio import StudioSettings
+from materialist.studio.access import gate
 from materialist.studio.access.gate import Gate
 from materialist.studio.server import password_of
-from materialist.studio.studio import PERSON
 
 ALONE = "127.0.0.1"
 
 
 async def echo(scope, receive, send):
-    """Says what it heard of proxies, and allows everything to everyone, as Gradio's CORS does."""
+    """Says what it heard of proxies, and allows everything to everyone."""
     heard = [f"{k.decode()}={v.decode()}" for k, v in scope["headers"] if b"forwarded" in k]
     answer = PlainTextResponse(" ".join(heard), headers={"access-control-allow-origin": "*"})
     await answer(scope, receive, send)
-
-
-async def takes_uploads(scope, receive, send):
-    """Answers as Gradio does where it has stored an upload."""
-    while (await receive()).get("more_body"):
-        pass
-    await JSONResponse(["/nowhere/a.png"])(scope, receive, send)
 
 
 def client(shared, base="http://studio.example", app=echo, address="1.2.3.4", **options):
@@ -121,7 +113,7 @@ def test_forwarded_headers_count_behind_a_proxy_only(shared):
 
 def test_no_preflight_of_another_site_is_answered(shared):
     asked = {"access-control-request-method": "POST", "origin": "http://evil.example"}
-    answer = client(shared).options("/gradio_api/queue/join", headers=asked)
+    answer = client(shared).options("/api/set", headers=asked)
     assert answer.status_code == 403 and "access-control-allow-origin" not in answer.headers
 
 
@@ -143,7 +135,7 @@ def test_sockets_are_closed_and_the_lifespan_passes(shared):
         sent.append(message)
 
     for kind in ("websocket", "lifespan"):
-        call = Gate(app, shared)({"type": kind, "headers": []}, None, send)
+        call = Gate(app, shared)({"type": kind, "path": "/api/state", "headers": []}, None, send)
         with ThreadPoolExecutor(
             1
         ) as thread:  # browser tests leave an event loop running in this one
@@ -158,14 +150,14 @@ def test_a_password_closes_every_door(shared, monkeypatch):
     def enter(word):
         return page.post("/login", data={"password": word})
 
-    for place in ("/", "/config", "/assets/a.js", "/gradio_api/heartbeat/abc"):
+    for place in ("/", "/api/state", "/assets/a.js"):
         assert page.get(place).status_code == 401
-    assert "password" in page.get("/").text and page.post("/gradio_api/upload").status_code == 401
+    assert "password" in page.get("/").text and page.post("/api/upload").status_code == 401
     assert enter("x" * 5000).status_code == 413
     assert enter("wrong").status_code == 401 and page.get("/").status_code == 401
     answer = enter("open sesame ü")
     assert answer.status_code == 303 and "SameSite=Lax" in answer.headers["set-cookie"]
-    assert "HttpOnly" in answer.headers["set-cookie"] and page.get("/config").status_code == 200
+    assert "HttpOnly" in answer.headers["set-cookie"] and page.get("/api/state").status_code == 200
     other, elsewhere = (
         TestClient(page.app, follow_redirects=False, client=(address, 1))
         for address in ("1.2.3.4", "5.6.7.8")
@@ -177,37 +169,6 @@ def test_a_password_closes_every_door(shared, monkeypatch):
     assert other.post("/login", data=right).status_code == 429  # not even the right one
     assert elsewhere.post("/login", data=right).status_code == 303  # others are not locked out
     assert page.get("/").status_code == 200
-
-
-def test_a_page_belongs_to_the_browser_that_used_it_first(shared):
-    anna = client(shared)
-    bert = client(shared)
-    anna.get("/")
-    person = shared.person(anna.cookies[PERSON])
-    assert anna.get("/gradio_api/queue/data?session_hash=abc").status_code == 200
-    assert shared.session("abc", person).person == person
-    for place in ("heartbeat/abc", "queue/data?session_hash=abc"):
-        assert bert.get(f"/gradio_api/{place}").status_code == 403
-    with pytest.raises(InputError, match="reload"):
-        shared.session("abc", shared.person(bert.cookies[PERSON]))
-
-
-def test_uploads_have_a_quota(shared, monkeypatch):
-    monkeypatch.setattr(quota, "SETTINGS", StudioSettings(storage_quota=1000))
-    page = client(shared, app=takes_uploads)
-
-    def send(size, browser=page):
-        return browser.post("/gradio_api/upload", content=b"x" * size)
-
-    monkeypatch.setattr(quota, "MIN_BYTES", 1)
-    monkeypatch.setattr(shared.quota, "settle", lambda claim, stored: None)  # as if all was stored
-    assert send(600).status_code == 200
-    assert send(300).status_code == 200
-    assert send(200).status_code == 403 and "within an hour" in send(200).text
-    another_browser = client(shared, app=takes_uploads)
-    assert send(200, another_browser).status_code == 403  # a new cookie is no new sender
-    monkeypatch.setattr(quota, "SETTINGS", StudioSettings(disk_left=10**18))
-    assert "full" in send(10).text
 
 
 def test_the_password_need_not_be_an_argument(tmp_path, refused):
@@ -232,36 +193,6 @@ def test_the_password_need_not_be_an_argument(tmp_path, refused):
     )
 
 
-@pytest.mark.parametrize(
-    ("method", "place", "status"),
-    [
-        ("GET", "/", 200),
-        ("HEAD", "/", 200),
-        ("GET", "/gradio_api/queue/data", 200),
-        ("GET", "/runs", 404),
-        ("POST", "/", 404),
-        ("POST", "/gradio_api/queue/join", 200),
-        ("GET", "/gradio_api/info", 404),
-        ("POST", "/gradio_api/process_recording", 404),
-        ("GET", "/gradio_api/deep_link", 404),
-        ("GET", "/gradio_api/proxy=http://a.example/b", 404),
-        ("GET", "/gradio_api/file=http://a.example/b.png", 403),
-        ("GET", "/gradio_api/file=/etc/passwd", 403),
-        ("GET", "/gradio_api/file=%00", 404),
-        ("GET", "/gradio_api/file=CACHE/../../etc/passwd", 403),
-        ("GET", "/gradio_api/file=CACHE/a/b.png", 200),
-        ("GET", "/gradio_api/heartbeat/a/b", 404),
-        ("POST", "/gradio_api/heartbeat/a", 404),
-        ("HEAD", "/gradio_api/heartbeat/a", 200),
-    ],
-)
-def test_only_what_the_page_asks_for_is_answered(shared, method, place, status):
-    place = place.replace("CACHE", str(shared.work.cache))
-    body = b'{"data": []}' if method == "POST" else None
-    assert client(shared).request(method, place, content=body).status_code == status
-    assert not any(one.beats for one in shared._sessions.values())
-
-
 def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
     monkeypatch.setattr(
         gate, "SETTINGS", StudioSettings(request_bytes=1000, upload_megabytes=0.001)
@@ -270,42 +201,16 @@ def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
     async def read(request):
         return PlainTextResponse(str(len(await request.body())))
 
-    async def stored(request):
-        return JSONResponse([str(len(await request.body()))])
-
-    routes = [
-        Route("/gradio_api/upload", stored, methods=["POST"]),
-        Route("/{path:path}", read, methods=["POST"]),
-    ]
-    reader = Starlette(routes=routes)
+    reader = Starlette(routes=[Route("/{path:path}", read, methods=["POST"])])
     page, closed = (
-        TestClient(Gate(reader, shared, password=word)) for word in (None, "open sesame")
+        TestClient(Gate(reader, shared, password=word), headers={gate.PAGE_HEADER: "a"})
+        for word in (None, "open sesame")
     )
 
     def chunks(count):
-        return iter([b'{"data": []}'.ljust(100), *[b" " * 100] * (count - 1)])
+        return iter([b"x" * 100] * count)
 
-    assert page.post("/gradio_api/queue/join", content=chunks(10)).status_code == 200
-    assert page.post("/gradio_api/queue/join", content=chunks(11)).status_code == 413
-    assert page.post("/gradio_api/upload", content=b"x" * 2000).status_code == 200
-    assert page.post("/gradio_api/upload", content=b"x" * 2001).status_code == 403
-    assert page.post("/gradio_api/upload", content=chunks(2)).status_code == 403  # without a length
+    for place, most in (("set", 10), ("upload", 20)):
+        assert page.post(f"/api/{place}", content=chunks(most)).status_code == 200
+        assert page.post(f"/api/{place}", content=chunks(most + 1)).status_code == 413
     assert closed.post("/login", content=chunks(50)).status_code == 413
-
-
-def test_gradio_fetches_nothing(shared, monkeypatch):
-    processing = pytest.importorskip("gradio", reason="needs gradio").processing_utils
-    for name in ("async_ssrf_protected_get", "async_ssrf_protected_download"):
-        monkeypatch.setattr(processing, name, getattr(processing, name))  # as it was, afterwards
-    server._fetch_nothing()
-    with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
-        thread.submit(
-            processing.save_url_to_cache, "http://127.0.0.1:9/a.png", str(shared.work.cache)
-        ).result()
-
-    def asked():
-        return processing.async_ssrf_protected_download("http://127.0.0.1:9/a.png", cache_dir="x")
-
-    with pytest.raises(InputError, match="fetches nothing"), ThreadPoolExecutor(1) as thread:
-        thread.submit(lambda: asyncio.run(asked())).result()
-    assert set(shared.work.cache.iterdir()) == shared.work.kept  # nothing was stored

@@ -6,17 +6,16 @@ import threading
 import time
 from contextlib import ExitStack
 
+import cv2
 import numpy as np
 import pytest
 
-pytest.importorskip("gradio", reason="needs gradio")
+pytest.importorskip("starlette", reason="needs the studio extra")
 import io
 import zipfile
 
 from made_meshes import box_file
 from made_tasks import wait
-from starlette.responses import PlainTextResponse
-from starlette.testclient import TestClient
 from studio_scenes import zipped_package
 
 from materialist.errors import InputError
@@ -24,51 +23,11 @@ from materialist.io.decode import image_size
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
 from materialist.io.photo import example_path
-from materialist.jobs.queue import Job
-from materialist.studio import SETTINGS, StudioSettings, archives, server, uploads
+from materialist.studio import SETTINGS, StudioSettings, archives, uploads
 from materialist.studio.access import quota
-from materialist.studio.access.gate import Gate
-from materialist.studio.widgets import PageContext
 from materialist.studio.workspace import WorkFolder, person_of
 
 COOKIE = "0123456789abcdef" * 2
-FORM = b'--B\r\nContent-Disposition: form-data; name="files"; filename="a.png"\r\n\r\nSECRET\r\n--B--\r\n'
-
-
-@pytest.fixture
-def page(shared):
-    return server.application(shared, host="0.0.0.0", port=0)
-
-
-def browser(page):
-    client = TestClient(page, base_url="http://studio.example", client=("1.2.3.4", 1))
-    assert client.get("/").status_code == 200
-    return client
-
-
-def test_an_upload_that_says_zero_and_is_chunked_is_refused(page):
-    """Such bytes would not count: h11 reads the chunks, whatever the length says."""
-    kind = {"content-type": "multipart/form-data; boundary=B"}
-    lengths = {"content-length": "0", "transfer-encoding": "chunked"}
-    answer = browser(page).post("/gradio_api/upload", content=FORM, headers=kind | lengths)
-    assert answer.status_code in (400, 403)
-
-
-def test_a_promise_that_is_larger_than_an_upload_takes_nothing_from_the_neighbours(page, shared):
-    """A header alone, without a body, would use up the hour of everybody behind one address."""
-    thief = browser(page)
-    kind = {"content-type": "multipart/form-data; boundary=B"}
-    thief.post("/gradio_api/upload", content=b"", headers=kind | {"content-length": "2999999999"})
-    assert shared.quota._stored("1.2.3.4") == 0
-
-
-def test_what_was_promised_and_never_came_is_given_back(page, shared):
-    """The next one finds the whole hour again."""
-    kind = {"content-type": "multipart/form-data; boundary=B"}
-    browser(page).post(
-        "/gradio_api/upload", content=FORM, headers=kind | {"content-length": "50000000"}
-    )
-    assert shared.quota._stored("1.2.3.4") <= quota.MIN_BYTES
 
 
 def test_a_folder_of_the_user_is_never_swept(tmp_path):
@@ -168,10 +127,10 @@ def test_jobs_are_counted_by_address(shared, tmp_path):
     for number in range(SETTINGS.jobs_a_person):
         person = f"person{number}"
         shared.note_sender(person, "1.2.3.4")
-        shared.submit(shared.session(f"page{number}", person), wait, tmp_path)
+        shared.submit(shared.page(f"page{number}", person).session, wait, tmp_path)
     shared.note_sender("another", "1.2.3.4")
     with pytest.raises(InputError, match="6 jobs waiting or running"):
-        shared.submit(shared.session("page", "another"), wait, tmp_path)
+        shared.submit(shared.page("page", "another").session, wait, tmp_path)
 
 
 def test_a_promise_is_settled_with_the_address_that_made_it(shared):
@@ -184,26 +143,12 @@ def test_a_promise_is_settled_with_the_address_that_made_it(shared):
     assert shared.quota._stored("5.6.7.8") == 0
 
 
-def test_a_page_follows_a_job_once_and_not_after_it_was_closed(shared, tmp_path):
-    """Else every reload would keep a thread of the page until the job ends."""
-    context = PageContext(shared)
-    session = shared.session("page", "anna")
-    job = Job("invert", "anna", tmp_path, print)
-    first = context.following(session, job)
-    second = context.following(session, job)
-    assert "progress" in next(first) and "progress" in next(second)
-    assert next(second) == {}  # the thread is free between two looks
-    assert [*first] == []
-    shared.leave("page")
-    assert [*second] == []
-
-
 def test_pages_and_changes_of_one_address_are_limited(shared):
     for number in range(SETTINGS.pages):
-        shared.session(f"page{number}", "anna")
+        shared.page(f"page{number}", "anna")
     with pytest.raises(InputError, match="close some"):
-        shared.session("one more", "anna")
-    assert shared.session("another", "bert")
+        shared.page("one more", "anna")
+    assert shared.page("another", "bert")
     with ExitStack() as held:
         for _ in range(SETTINGS.requests):
             held.enter_context(shared.quota.request("1.2.3.4"))
@@ -212,17 +157,6 @@ def test_pages_and_changes_of_one_address_are_limited(shared):
         with shared.quota.request("5.6.7.8"):
             pass
     assert not shared.quota._running
-
-
-def test_a_page_ends_with_the_request_that_it_holds(shared):
-    async def held(scope, receive, send):
-        assert "mine" in shared._sessions
-        await PlainTextResponse("beat")(scope, receive, send)
-
-    gate = Gate(held, shared)
-    client = TestClient(gate, base_url="http://studio.example")
-    assert client.get("/gradio_api/heartbeat/mine").status_code == 200
-    assert "mine" not in shared._sessions
 
 
 def test_a_large_texture_is_shrunk_before_the_server_reads_it(tmp_path, monkeypatch):
@@ -246,15 +180,15 @@ def test_a_mesh_of_many_faces_is_refused(tmp_path, monkeypatch):
         uploads.checked_upload(None, tmp_path / "box.ply", uploads.MESH)
 
 
+def test_a_large_thumbnail_in_a_small_scene_is_refused(tmp_path):
+    """The server itself opens it, and a few kilobytes of PNG can stand for gigabytes."""
+    large = cv2.imencode(".png", np.zeros((4000, 4000, 3), np.uint8))[1].tobytes()
+    file = zipped_package(tmp_path, **{"photo.png": large})
+    with pytest.raises(InputError, match=r"photo\.png is 4000 x 4000"):
+        archives.extract_scene(None, file, tmp_path / "target")
+
+
 def test_a_large_scene_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(scene_pixels=100))
     with pytest.raises(InputError, match="Invert its photo again"):
         archives.extract_scene(None, zipped_package(tmp_path), tmp_path / "target")
-
-
-def test_gradio_is_not_asked_to_tell_of_closed_pages(page):
-    """It makes the whole state of a page anew for that, on the loop of all requests: 200 pages stop it for 16 s."""
-    events = browser(page).get("/config").json()["dependencies"]
-    assert not [
-        one["id"] for one in events if any(event == "unload" for _, event in one["targets"])
-    ]

@@ -1,15 +1,17 @@
 """`bench studio`: what a person at the page waits for, measured in a real browser, and what the server holds.
 
 A studio in a process of its own, and Chromium through Playwright on the same machine. Page load is the median of five
-fresh pages, from the address to a stage that can be seen. Drop to first slider runs from handing the photo to the page
-to the first live picture of a moved slider: reading, fit, preview, a click that selects, a move. Slider to preview is
-the time in the browser from the event of a slider (hue, saturation, brightness, roughness and metallic in turn) to the
-decoded picture on the page. Glass: from the button to the first traced picture, which includes its process, its body
-and the background behind it; then the median time from the event of a slider (index of refraction, roughness) to the
-decoded picture of that value. Memory is the resident set of the server.
-Kept is by how much it has grown, from one page that was opened on the scene and closed to 20 more.
+fresh pages, from the address to a stage that can be seen. A photo is then dropped: first map and ready run from handing
+it to the page to the first picture of a map, and to a picture that can be clicked with its preview built. What a
+change takes is the time in the browser from the event of a control to another picture on the canvas: a slider of the
+material (hue, saturation, brightness, roughness and metallic in turn), the light turned. A drag moves the handle of an
+object, or a lamp, for three seconds: pictures a second. Glass: from the button to the first traced picture, which
+includes its process, its body and the background behind it; then the median from a slider's event (index of refraction,
+roughness) to the traced picture. Final: from the button to the path-traced picture, with a changed material, then with
+glass. Memory is the resident set of the server alone: without a photo, with one, and a while after the page was closed.
 """
 
+import base64
 import contextlib
 import shutil
 import socket
@@ -25,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import psutil
+from PIL import Image
 
 from materialist.errors import InputError, MaterialistError, SetupError
 from materialist.install import install_command
@@ -33,34 +36,62 @@ from materialist.option_kinds import option
 from materialist_lab.bench.benchmark import SIZE, Benchmark, Row
 from materialist_lab.bench.report import Column, Report
 
-_MOVE = """([name, value, waits]) => new Promise((done, fail) => {
-  const view = document.querySelector('#stage .view'), picture = view.querySelector('.photo'), before = picture.src;
+_WATCH = """() => {
+  // A small copy of the picture, sixty times a second: when it last changed, and how often.
+  const small = document.createElement('canvas'); small.width = small.height = 64;
+  const paper = small.getContext('2d', {willReadFrequently: true});
+  const seen = window.seen = {changes: 0, at: 0};
+  let before = 0;
+  const look = () => {
+    const canvas = document.querySelector('#stage canvas');
+    paper.drawImage(canvas, 0, 0, 64, 64);
+    let now = 0;
+    for (const pixel of new Uint32Array(paper.getImageData(0, 0, 64, 64).data.buffer))
+      now = (Math.imul(now, 31) + pixel) | 0;
+    if (now !== before) { seen.changes += 1; seen.at = performance.now(); before = now; }
+    requestAnimationFrame(look);
+  };
+  look();
+}"""
+_MOVE = """([name, value, traced]) => new Promise((done, fail) => {
   const slider = document.querySelector(`#${name} input[type=range]`), start = performance.now();
+  const badge = () => document.querySelector('#stage .badge')?.textContent ?? '';
+  const changes = window.seen.changes;
   let asked = false;
   slider.value = value; slider.dispatchEvent(new Event('input', {bubbles: true}));
   const look = () => {
-    const waiting = view.dataset.waiting === 'yes';
-    asked = asked || waiting;
-    if (waits ? asked && !waiting : picture.src !== before && picture.complete)
-      picture.decode().then(() => done(performance.now() - start), fail);
-    else if (performance.now() - start > 300000) fail(new Error('no picture'));
+    asked = asked || badge().startsWith('Glass: tracing');
+    const changed = window.seen.changes > changes;
+    if (changed && (!traced || (asked && badge().startsWith('Glass traced')))) done(window.seen.at - start);
+    else if (performance.now() - start > 120000) fail(new Error(`no picture of ${name} ${value}: ${badge()}`));
     else requestAnimationFrame(look);
   };
   look();
 })"""
-"""Moves a slider; milliseconds until its picture is decoded. `waits`: the page says when the picture is traced."""
+"""Moves a slider; milliseconds until its picture is on the canvas. `traced`: that of the glass, not its sketch."""
 _GLASS_MOVES = (
     ("glass_ior", 1.3),
     ("glass_ior", 1.7),
-    ("glass_ior", 1.15),
     ("glass_roughness", 0.2),
-    ("glass_roughness", 0.4),
-    ("glass_roughness", 0.1),
     ("glass_roughness", 0.0),
     ("glass_ior", 1.45),
 )
-CYCLES = 20
-"""Pages that are opened and closed again before the memory is measured that is kept."""
+_CLEAR = """async () => {
+  const headers = {'x-materialist-page': sessionStorage.getItem('page')};
+  const post = (place, body) =>
+    fetch(`/api/${place}`, {method: 'POST', headers, body: JSON.stringify(body)}).then((a) => a.json());
+  let state = await post('deselect', {});
+  while (state.steps.length) state = await post('act', {action: 'remove', index: 0});
+}"""
+"""Takes all edits, and the selection, away."""
+_DROP = """([name, data]) => {
+  const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0)), carried = new DataTransfer();
+  carried.items.add(new File([bytes], name));
+  for (const kind of ['dragenter', 'dragover', 'drop'])
+    document.body.dispatchEvent(new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: carried}));
+}"""
+DRAG = 3.0
+"""Seconds of a drag."""
 _RANGES = {
     "hue": (-170, 170),
     "saturation": (-0.8, 1),
@@ -68,27 +99,34 @@ _RANGES = {
     "roughness": (0, 1),
     "metallic": (0, 1),
 }
+FORGOTTEN = 85.0
+"""Seconds after which the server has forgotten a closed page: `StudioSettings.page_seconds`, and its sweeps."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudioBench(Benchmark):
-    """Measure the studio on one photo, or on a scene that is there, without the drop.
+    """Measure the studio on one photo.
 
     Raises SetupError where Playwright or Chromium are missing. `data` and `device` are not used.
     """
 
     columns = (
+        Column("size", "pixels", "", 0),
         Column("load_s", "page load s", "lower", 2),
-        Column("drop_s", "drop to first slider s", "lower", 1),
-        Column("reopen_s", "reopen to slider s", "lower", 1),
-        Column("median_ms", "slider to preview ms", "lower", 0),
+        Column("map_s", "drop to first map s", "lower", 1),
+        Column("ready_s", "drop to ready s", "lower", 1),
+        Column("median_ms", "slider ms", "lower", 0),
         Column("p95_ms", "p95 ms", "lower", 0),
-        Column("light_ms", "other light ms", "lower", 0),
+        Column("light_ms", "light turned ms", "lower", 0),
+        Column("object_hz", "object dragged, pictures a s", "higher", 1),
+        Column("lamp_hz", "lamp dragged", "higher", 1),
+        Column("final_s", "final s", "lower", 1),
         Column("body_s", "glass, first picture s", "lower", 1),
-        Column("glass_s", "glass slider to picture s", "lower", 2),
+        Column("glass_s", "glass slider s", "lower", 2),
+        Column("final_glass_s", "final with glass s", "lower", 1),
         Column("idle_mb", "idle MB", "lower", 0),
-        Column("scene_mb", "MB more with a scene", "lower", 0),
-        Column("kept_mb", f"MB kept after {CYCLES} pages", "lower", 0),
+        Column("scene_mb", "MB with a photo", "lower", 0),
+        Column("closed_mb", "MB after closing", "lower", 0),
     )
     plotted = ()
 
@@ -101,7 +139,6 @@ class StudioBench(Benchmark):
         kind="numbers",
         count=2,
     )
-    scene: str = option("", "A scene package that is opened in place of the photo.", kind="name")
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         # Checked before the server and the browser start.
@@ -111,33 +148,25 @@ class StudioBench(Benchmark):
         with (
             tempfile.TemporaryDirectory() as folder,
             _browser() as browser,
-            _server(Path(folder), self.scene) as (server, address),
+            _server(Path(folder)) as (server, address),
         ):
-            measured = self._measured(server, address, browser, photo)
-        yield {"method": "studio", "sample": self.photo, **measured}
+            shown = _enlarged(photo, self.size, Path(folder))
+            measured = self._measured(server, address, browser, shown)
+        yield {"method": "studio", "sample": self.photo, "size": self.size, **measured}
 
     def _measured(
         self, server: psutil.Process, address: str, browser: Any, photo: Path
     ) -> dict[str, float]:
-        # --- Page load, and memory without a scene ---
-        row = {"idle_mb": _resident(server)}
-        if not self.scene:  # else every page would open the scene
-            row["load_s"] = float(np.median([_load(browser, address) for _ in range(5)]))
-            row["idle_mb"] = max(row["idle_mb"], _resident(server))
-        # --- From the photo or the scene to the first slider ---
-        page = browser.new_page(viewport={"width": 1280, "height": 1000})
-        page.set_default_timeout(900_000)
-        start = time.perf_counter()
+        # --- Page load, and memory without a photo ---
+        row = {"load_s": float(np.median([_load(browser, address) for _ in range(5)]))}
+        row["idle_mb"] = _resident(server)
+        # --- From the photo to a picture that can be clicked ---
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.set_default_timeout(300_000)
         page.goto(address)
-        if not self.scene:
-            start = _dropped(page, photo, self.size)
-        page.wait_for_selector("text=Ready: click an object")
-        view = page.locator("#stage .view")
-        box = view.bounding_box()
-        view.click(position={"x": self.click[0] * box["width"], "y": self.click[1] * box["height"]})
-        page.wait_for_selector("#stage .view[data-selected=yes]")
-        page.evaluate(_MOVE, ["hue", 40, False])
-        row["reopen_s" if self.scene else "drop_s"] = time.perf_counter() - start
+        row |= _dropped(page, photo, self.size)
+        page.evaluate(_WATCH)
+        self._select(page)
         # --- Sliders of the material, then of the light ---
         stand = {name: float(page.input_value(f"#{name} input[type=range]")) for name in _RANGES}
         times = [
@@ -145,50 +174,106 @@ class StudioBench(Benchmark):
             for move in slider_moves(self.moves, self.seed, stand)
         ]
         row |= {"median_ms": float(np.median(times)), "p95_ms": float(np.quantile(times, 0.95))}
-        page.get_by_role("tab", name="Light").click()
-        row["light_ms"] = float(
-            np.median([page.evaluate(_MOVE, ["rotate", 30 * k, False]) for k in (1, 2, 3)])
-        )
-        page.evaluate(_MOVE, ["rotate", 0, False])
-        # --- Memory with the scene; glass ---
-        row["scene_mb"] = _resident(server) - row["idle_mb"]
+        page.locator("#tab-light").click()
+        turned = [page.evaluate(_MOVE, ["rotate", 30 * k, False]) for k in (1, 2, 3)]
+        row["light_ms"] = float(np.median(turned))
+        row["final_s"] = _final(page)
+        row["scene_mb"] = _resident(server)
+        # --- An object and a lamp, dragged ---
+        row |= {"object_hz": self._dragged(page, "thing"), "lamp_hz": self._dragged(page, "lamp")}
+        # --- Glass ---
+        page.evaluate(_CLEAR)
+        page.wait_for_selector("#stage:not([data-selected=yes])")
+        self._select(page)
         row |= _glass(page)
+        row["final_glass_s"] = _final(page)
         page.close()
-        # --- What closed pages leave behind; the first one may fill caches ---
-        for k in range(CYCLES + 1):
-            page = browser.new_page()
-            page.goto(address)
-            if not self.scene:
-                page.click("#continue")
-            page.wait_for_selector("text=Ready: click an object", timeout=300_000)
-            page.close()
-            if k in (0, CYCLES):
-                # Until the server noticed that the page is gone.
-                time.sleep(3)
-                row["kept_mb"] = _resident(server) - row.get("kept_mb", 0.0)
+        time.sleep(FORGOTTEN)
+        row["closed_mb"] = _resident(server)
         return row
+
+    def _place(self, page: Any, x: float, y: float) -> tuple[float, float]:
+        """Where a share of the photo's width and height is on the page."""
+        box = page.locator(".marks").bounding_box()
+        return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+    def _select(self, page: Any) -> None:
+        page.locator("#tab-material").click()
+        page.mouse.click(*self._place(page, *self.click))
+        page.wait_for_selector("#stage[data-selected=yes]")
+        page.wait_for_selector("#hue")
+
+    def _dragged(self, page: Any, kind: str) -> float:
+        """Pictures a second while an object, or a lamp, that is put into the photo is dragged to and fro."""
+        if kind == "thing":
+            page.locator("#tab-object").click()
+            page.get_by_role("button", name="Ball").click()
+            page.wait_for_selector(".stage.place")
+        else:
+            page.locator("#stage").focus()
+            page.keyboard.press("4")
+            page.wait_for_selector(".stage.lamp")
+        page.mouse.click(*self._place(page, 0.5, 0.8))
+        page.wait_for_selector(f".handle.{kind}")
+        page.wait_for_timeout(1500)
+        page.mouse.move(*self._place(page, 0.5, 0.8))
+        page.mouse.down()
+        before = page.evaluate("window.seen.changes")
+        start = time.perf_counter()
+        while (spent := time.perf_counter() - start) < DRAG:
+            page.mouse.move(*self._place(page, 0.5 + 0.2 * float(np.sin(3 * spent)), 0.8))
+            page.wait_for_timeout(10)
+        seen = page.evaluate("window.seen.changes") - before
+        page.mouse.up()
+        page.wait_for_timeout(1000)
+        return seen / spent
+
+
+def _enlarged(photo: Path, size: int, folder: Path) -> Path:
+    """The photo, enlarged where it is smaller than the working size: the page enlarges nothing."""
+    with Image.open(photo) as image:
+        scale = size / max(image.size)
+        if scale <= 1:
+            return photo
+        large = image.convert("RGB").resize(
+            (round(image.width * scale), round(image.height * scale))
+        )
+    large.save(folder / "photo.png")
+    return folder / "photo.png"
 
 
 def _load(browser: Any, address: str) -> float:
     page = browser.new_page()
     start = time.perf_counter()
     page.goto(address)
-    page.wait_for_selector("#stage .view")
+    page.wait_for_selector("#stage")
     seconds = time.perf_counter() - start
     page.close()
     return seconds
 
 
-def _dropped(page: Any, photo: Path, size: int) -> float:
-    """Hand a photo over and start; returns when that was."""
-    page.wait_for_selector("#start")
-    page.get_by_label("Working size").click()
-    page.get_by_role("option", name=f"{size} pixels").click()
+def _dropped(page: Any, photo: Path, size: int) -> dict[str, float]:
+    """Drop a photo on the page; seconds to the first picture of a map, and until the picture can be clicked."""
+    page.wait_for_selector("#stage")
+    # The page asks for a working size in a list that is folded away; what it keeps of it is plain.
+    page.evaluate("(size) => sessionStorage.setItem('view', JSON.stringify({size}))", size)
+    page.reload()
+    data = base64.b64encode(photo.read_bytes()).decode()
     start = time.perf_counter()
-    page.set_input_files("#file input[type=file]", str(photo))
-    page.wait_for_selector("#facts >> text=is ready")
-    page.click("#start")
-    return start
+    page.evaluate(_DROP, [photo.name, data])
+    page.wait_for_selector(".found img")
+    first = time.perf_counter() - start
+    page.wait_for_selector(".marks")
+    page.wait_for_selector("#progress", state="hidden")
+    return {"map_s": first, "ready_s": time.perf_counter() - start}
+
+
+def _final(page: Any) -> float:
+    """Seconds from the button to the path-traced picture."""
+    start = time.perf_counter()
+    page.locator("#final").click()
+    page.wait_for_selector("#stage[data-kind=final]")
+    return time.perf_counter() - start
 
 
 def slider_moves(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tuple[str, float]]:
@@ -210,22 +295,18 @@ def slider_moves(moves: int, seed: int, stand: dict[str, float]) -> Iterator[tup
 def _glass(page: Any) -> dict[str, float]:
     """The selection as glass: its first picture, and its sliders."""
     # --- The first traced picture: the page waits, then no longer ---
-    page.get_by_role("tab", name="Objects").click()
-    page.get_by_role("button", name="Turn the selection to glass").click()
     start = time.perf_counter()
-    page.click("#glass")
-    for state in ("[data-waiting=yes]", ":not([data-waiting=yes])"):
-        page.wait_for_selector(f"#stage .view{state}")
+    page.get_by_role("button", name="Glass", exact=True).click()
+    page.wait_for_selector("#stage .badge >> text=/^Glass traced/")
     body = time.perf_counter() - start
-    page.evaluate(
-        _MOVE, ["glass_roughness", 0.3, True]
-    )  # kernels of another kind are compiled once
+    # Kernels of another kind are compiled once.
+    page.evaluate(_MOVE, ["glass_roughness", 0.3, True])
     times = [page.evaluate(_MOVE, [*move, True]) for move in _GLASS_MOVES]
     return {"body_s": body, "glass_s": float(np.median(times)) / 1000}
 
 
 @contextlib.contextmanager
-def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
+def _server(folder: Path) -> Iterator[tuple[psutil.Process, str]]:
     """A studio, and its address once it answers."""
     # A port that is free now; the studio binds it a moment later.
     with socket.socket() as probe:
@@ -236,7 +317,6 @@ def _server(folder: Path, scene: str) -> Iterator[tuple[psutil.Process, str]]:
         "-m",
         "materialist",
         "studio",
-        *([scene] if scene else []),
         "--port",
         str(port),
     ]

@@ -5,9 +5,15 @@ go on through the hole. They come from the surfaces that go on there or from nea
 guide prefers those of the same surface.
 """
 
+import hashlib
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
+from pathlib import Path
 
+import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_to_linear
@@ -15,6 +21,7 @@ from materialist.errors import SetupError
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
 from materialist.install import install_command
+from materialist.io.atomic import write_whole
 from materialist.predict import resample
 from materialist.types import Array
 
@@ -34,6 +41,7 @@ class PatchSettings:
 SETTINGS = PatchSettings()
 _LOCK = threading.Lock()
 """The library has one seed for all threads."""
+_FOLDER: ContextVar[Path | None] = ContextVar("fillings", default=None)
 
 
 def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 0) -> Array:
@@ -59,7 +67,7 @@ def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 
     levels = np.maximum(np.round(255 * _encoded(picture, top)), 1).astype(np.uint8)
     surface = resample.values((SETTINGS.guide_step * label).astype(np.float32), shape)
     guide = np.stack([surface, 0 * surface, 0 * surface], -1)
-    filled = _inpainted(levels, gap, excluded, guide, seed).astype(np.float32) / 255
+    filled = _kept(levels, gap, excluded, guide, seed).astype(np.float32) / 255
     # --- Where no patch fitted, a smooth surface ---
     plain = gap & (filled == 0).all(-1)
     if plain.any():
@@ -76,6 +84,35 @@ def _encoded(linear: Array, top: float) -> Array:
 def _decoded(values: Array, top: float) -> Array:
     floor = SETTINGS.floor
     return srgb_to_linear(values) if top <= 1 else floor * np.expm1(values * np.log1p(top / floor))
+
+
+@contextmanager
+def remembered(folder: Path) -> Iterator[None]:
+    """Within it a hole that was filled before is not filled anew: fillings are kept as files of a folder."""
+    token = _FOLDER.set(folder)
+    try:
+        yield
+    finally:
+        _FOLDER.reset(token)
+
+
+def _kept(levels: Array, gap: Array, excluded: Array, guide: Array, seed: int) -> Array:
+    """`_inpainted`, once for equal arguments where fillings are remembered."""
+    folder = _FOLDER.get()
+    if folder is None:
+        return _inpainted(levels, gap, excluded, guide, seed)
+    # By content: whatever made the hole, equal holes are filled alike.
+    digest = hashlib.sha256(repr((seed, SETTINGS, levels.shape)).encode())
+    for array in (levels, gap, excluded, guide):
+        digest.update(array.tobytes())
+    file = folder / f"filling-{digest.hexdigest()[:32]}.png"
+    if file.is_file():
+        filled = cv2.imread(str(file), cv2.IMREAD_COLOR)
+        if filled is not None and filled.shape == levels.shape:
+            return np.asarray(filled)
+    filled = _inpainted(levels, gap, excluded, guide, seed)
+    write_whole(file, cv2.imencode(".png", filled)[1].tobytes())
+    return filled
 
 
 def _inpainted(levels: Array, gap: Array, excluded: Array, guide: Array, seed: int) -> Array:

@@ -10,8 +10,8 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import denoised
 from materialist.edits.remove.background import picture_behind
-from materialist.edits.remove.behind import behind
-from materialist.edits.remove.hole import evidence_notes, make_hole
+from materialist.edits.remove.behind import HiddenGeometry, behind
+from materialist.edits.remove.hole import Hole, evidence_notes, make_hole
 from materialist.edits.remove.options import Removal, RemovalKeywords
 from materialist.geometry.build import rebuilt
 from materialist.geometry.membrane import membrane
@@ -45,19 +45,7 @@ def remove(
     """
     options = Removal.merged(options, **values)
     fitted = fitted or scene
-    photographed = replace(scene, bodies=fitted.bodies)
-    bodies = (
-        body_coverage(photographed) > 0
-        if photographed.bodies
-        else np.zeros(scene.depth.shape, bool)
-    )
-    # --- What is taken away, and what stands behind it ---
-    hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow, bodies=bodies)
-    front = np.where(hole.object, scene.depth, 0)
-    hidden = behind(
-        scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera
-    )
-    picture, method, warnings = picture_behind(scene, options, hole.painted, ~bodies, hidden)
+    hole, hidden, (picture, method, warnings) = disclosed(scene, mask, options, fitted)
     # --- The photo, maps and re-rendering are filled alike ---
     photo = with_hole(scene.photo, picture, hole.painted)
     old = scene.materials
@@ -86,6 +74,25 @@ def remove(
     if method == "patches":
         warnings += evidence_notes(hole)
     return noted(warned(removed, *warnings), "remove", facts)
+
+
+def disclosed(
+    scene: Scene, mask: Array, options: Removal, fitted: Scene
+) -> tuple[Hole, HiddenGeometry, tuple[Array, str, list[str]]]:
+    """The hole that a removal leaves, the surfaces behind it, and what `picture_behind` gives: most of its work."""
+    photographed = replace(scene, bodies=fitted.bodies)
+    bodies = (
+        body_coverage(photographed) > 0
+        if photographed.bodies
+        else np.zeros(scene.depth.shape, bool)
+    )
+    # --- What is taken away, and what stands behind it ---
+    hole = make_hole(scene, mask, grow=options.grow, shadow=options.shadow, bodies=bodies)
+    front = np.where(hole.object, scene.depth, 0)
+    hidden = behind(
+        scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera
+    )
+    return hole, hidden, picture_behind(scene, options, hole.painted, ~bodies, hidden)
 
 
 def carried(values: Array, photo: Array, hole: Array) -> Array:

@@ -16,7 +16,7 @@ from materialist.io.atomic import ensure_writable, whole_file
 from materialist.io.exr import write_exr
 from materialist.io.out.colours import SRGB, PhotoColours, photo_colours
 from materialist.io.out.depth import is_deep
-from materialist.io.out.exif import copied_exif
+from materialist.io.out.exif import copied_exif, exr_attributes
 from materialist.io.out.tiff import tiff_bytes
 from materialist.types import Array, Photo, Scene
 
@@ -58,7 +58,8 @@ def save_image(
     """Write a picture to PATH.png, .jpg, .tif, .webp, .avif (display values) or .exr (linear float32).
 
     With the `photo` that it was made of, the file has that photo's colour space and profile, its bits a channel and its
-    EXIF (upright; the software is this program), and an EXR the unit of an HDR photo. A pixel that is still the photo's
+    EXIF (upright; the software is this program); an EXR the unit of an HDR photo, and of its EXIF what has a standard
+    attribute. A pixel that is still the photo's
     has the photo's own levels in formats that lose nothing: PNG, TIFF, and WebP of quality 100.
 
     Args:
@@ -87,7 +88,8 @@ def save_image(
         light = colours.whole(picture)
         stops = 0 if photo is None else photo.stops
         with whole_file(path, force) as temporary:
-            write_exr(temporary, light * np.float32(2.0**-stops) if stops else light)
+            shown = light * np.float32(2.0**-stops) if stops else light
+            write_exr(temporary, shown, exr_attributes(photo))
         return ()
     # --- Display files: levels in the photo's own colours ---
     deep = kind in ("PNG", "TIFF") and (

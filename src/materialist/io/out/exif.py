@@ -40,6 +40,19 @@ _NUMBER = {name: number for number, name in ExifTags.TAGS.items()}
 _SIDES = (_NUMBER["ExifImageWidth"], _NUMBER["ExifImageHeight"])
 _TURNED = (5, 6, 7, 8)
 """Orientations whose upright picture has the file's sides exchanged."""
+_ATTRIBUTES: dict[str, tuple[str, type]] = {
+    "Make": ("cameraMake", str),
+    "Model": ("cameraModel", str),
+    "LensModel": ("lensModel", str),
+    "DateTimeOriginal": ("capDate", str),
+    "Artist": ("owner", str),
+    "ImageDescription": ("comments", str),
+    "ExposureTime": ("expTime", float),
+    "FNumber": ("aperture", float),
+    "ISOSpeedRatings": ("isoSpeed", float),
+    "FocalLength": ("nominalFocalLength", float),
+}
+"""EXIF -> the standard attribute of OpenEXR of the same meaning and unit."""
 SOFTWARE = f"Materialist {__version__}"
 
 
@@ -71,6 +84,17 @@ def copied_exif(photo: Photo | None, *, srgb: bool = True) -> Image.Exif:
     new[ExifTags.Base.Orientation] = 1
     new[ExifTags.Base.Software] = SOFTWARE
     return new
+
+
+def exr_attributes(photo: Photo | None) -> dict[str, str | float]:
+    """What the photo's EXIF says, as the standard attributes of an EXR; those that it lacks are absent."""
+    exif = copied_exif(photo)
+    values = {**exif, **_directory(exif, ExifTags.IFD.Exif)}
+    found: dict[str, str | float] = {}
+    for name, (attribute, kind) in _ATTRIBUTES.items():
+        with suppress(KeyError, TypeError, ValueError, ZeroDivisionError):  # absent, or damaged
+            found[attribute] = kind(values[_NUMBER[name]])
+    return found
 
 
 def _of_file(photo: Photo | None) -> Image.Exif:

@@ -1,10 +1,5 @@
-"""The files that requests may name: each by an id of ours, each for one person.
+"""The files that requests may name: each by an id of ours, each for one person. No path from a request is opened."""
 
-Gradio takes a path of the server in place of an uploaded file. No path from a request reaches it: ids of files that
-the studio took from this person, or handed to them, are replaced by the paths, and everything else is refused.
-"""
-
-import json
 import secrets
 import threading
 from pathlib import Path
@@ -12,8 +7,6 @@ from typing import Any
 
 from materialist.errors import InputError
 
-_FILE_KEYS = frozenset({"path", "url", "meta", "_type", "is_stream"})
-"""Keys that make Gradio take an object for a file, or for a part of one."""
 _LOOKED_AFTER = 500
 """Files after which those that were cleared away are looked for."""
 _GONE = "That file is not here any more; give it again."
@@ -51,45 +44,3 @@ class HandedFiles:
         """Forget the files that were cleared away."""
         with self._lock:
             self._files = {name: entry for name, entry in self._files.items() if entry[1].is_file()}
-
-
-def with_known_files(body: bytes, person: str, files: HandedFiles) -> bytes:
-    """The JSON body of an event, with the path of each file that the person may name in place of its id.
-
-    What an event tells of itself (`event_data`) keeps no file. Raises InputError for a body that is no JSON object,
-    or names another file.
-    """
-    try:
-        content = json.loads(body)
-        if not isinstance(content, dict):
-            raise ValueError("no object")
-        content["data"] = _located(content.get("data"), person, files)
-        content["event_data"] = _without_files(content.get("event_data"))
-        return json.dumps(content).encode()
-    except (ValueError, RecursionError) as error:
-        raise InputError("The request cannot be read; reload the page.") from error
-
-
-def _located(value: Any, person: str, files: HandedFiles) -> Any:
-    if isinstance(value, list):
-        return [_located(item, person, files) for item in value]
-    if not isinstance(value, dict):
-        return value
-    # Any such key makes Gradio treat the object as a file.
-    if not _FILE_KEYS & value.keys():
-        return {key: _located(item, person, files) for key, item in value.items()}
-    # Only what is known of the file itself; nothing of what the request says of it.
-    path = files.path(person, value.get("path"))
-    shown = str(value.get("orig_name") or path.name)
-    kind = {"_type": "gradio.FileData"}
-    return {"path": str(path), "orig_name": shown, "size": path.stat().st_size, "meta": kind}
-
-
-def _without_files(value: Any) -> Any:
-    if isinstance(value, list):
-        return [_without_files(item) for item in value]
-    if not isinstance(value, dict):
-        return value
-    if _FILE_KEYS & value.keys():
-        return None
-    return {key: _without_files(item) for key, item in value.items()}

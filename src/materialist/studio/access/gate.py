@@ -1,63 +1,61 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
-import asyncio
+import base64
+import hashlib
 import hmac
-import json
 import re
 import secrets
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
-from functools import partial
-from pathlib import Path
+from functools import cache
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect, Request
+from starlette.requests import Request
 from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 
 from materialist.errors import InputError
 from materialist.studio import SETTINGS, asset
-from materialist.studio.access.files import with_known_files
-from materialist.studio.access.quota import Claim, sender_of
+from materialist.studio.access.quota import sender_of
 from materialist.studio.studio import PERSON, PERSON_HEADER, Studio
 
 Application = Callable[[Any, Any, Any], Awaitable[None]]
 LOCAL = ("localhost", "127.0.0.1", "::1")
-_API = "/gradio_api/"
-_BEAT = f"{_API}heartbeat/"
-"""A page holds a request to this place, and its name, as long as it is open."""
-_UPLOAD = f"{_API}upload"
-_FILE = f"{_API}file="
-_EVENTS = (f"{_API}queue/join", f"{_API}run/predict")
-"""Places whose bodies may name files."""
-_READ = re.compile(
-    rf"/|/(config|theme\.css|favicon\.ico|robots\.txt)|/(assets|static)/.+|{_FILE}[^\0]+|{_BEAT}\w+"
-    rf"|{_API}(queue/data|upload_progress|app_id)"
-)
-_PLACES = {
-    "GET": _READ,
-    "HEAD": _READ,
-    "POST": re.compile(rf"{_API}(queue/join|run/predict|upload)"),
-}
-"""Method -> what the page asks for. Gradio has more: places that fetch from other machines, record and write."""
+CHANNEL = "/api/channel"
+"""The websocket."""
+UPLOAD = "/api/upload"
+"""The one place that takes bodies as large as an upload."""
+PAGE_HEADER = "x-materialist-page"
+"""The name of a page. No form and no foreign page can send a header of that name without being asked first."""
+_READ = re.compile(r"/|/favicon\.svg|/assets/[\w.-]+|/api/[\w./-]+")
+_PLACES = {"GET": _READ, "HEAD": _READ, "POST": re.compile(r"/api/[\w-]+")}
+"""Method -> what the page asks for."""
 _FORM_BYTES = 4096
-_LENGTHS = (b"content-length", b"transfer-encoding")
+FOREIGN = ("cross-site", "same-site")
+"""What a browser says of a request that a page of another place began."""
+
+
+@cache
+def policy() -> str:
+    """What a browser may load: scripts, styles and connections of this server alone, and the style of the form."""
+    style = re.search(r"<style>(.*?)</style>", asset("login.html"), re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(style[1].encode() if style else b"").digest())
+    return (
+        "default-src 'none'; script-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+        f"style-src 'self' 'sha256-{digest.decode()}'; base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+    )
+
+
 HEADERS = {
-    # Gradio makes functions of texts and styles of its own; whatever they do, it stays between page and studio.
-    "content-security-policy": (
-        "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; style-src 'self' 'unsafe-inline'; "
-        "img-src 'self' data: blob:; media-src 'self' data: blob:; font-src 'self' data:; worker-src 'self' blob:; "
-        "connect-src 'self' data: blob:; object-src 'none'; base-uri 'self'; form-action 'self'; frame-ancestors 'none'"
-    ),
     "x-content-type-options": "nosniff",
+    "cross-origin-opener-policy": "same-origin",
     "cross-origin-resource-policy": "same-origin",
     "referrer-policy": "same-origin",
 }
-"""Of every answer."""
+"""Of every answer, beside the policy."""
 
 
 class Gate:
@@ -67,12 +65,8 @@ class Gate:
     page asks of another place; it must be the place that is asked. Where the studio serves this machine only, that
     place must have one of its names, too: a site that lets its own name point to 127.0.0.1 (DNS rebinding) is of the
     same origin, but not of ours. Behind a proxy it must be the proxy's. With a password nothing but the form for it is
-    shown before it was given. The name of a page (Gradio's session hash) belongs to the browser that used it first.
+    shown before it was given. A change must name its page in a header; a websocket must name its origin.
     """
-
-    headers = HEADERS
-    upload_place = _UPLOAD
-    """Headers of every answer, and the one place that takes bodies as large as an upload."""
 
     def __init__(
         self,
@@ -102,11 +96,13 @@ class Gate:
         if scope["type"] == "lifespan":
             return await self.app(scope, receive, send)
         if scope["type"] != "http":
+            if self._admits_socket(scope):
+                return await self.app(scope, receive, send)
             return await send({"type": "websocket.close", "code": 1008})
         address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
         max_bytes = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
-        if scope["path"] == self.upload_place:
+        if scope["path"] == UPLOAD:
             max_bytes = largest_upload()
         request = Request(scope, _limited(receive, max_bytes))
         cookies: dict[str, str] = {}
@@ -115,7 +111,7 @@ class Gate:
         async def answer(message: Any) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                headers.update(self.headers)
+                headers.update({"content-security-policy": policy(), **HEADERS})
                 for name, value in cookies.items():
                     secure = (
                         "; Secure"
@@ -153,10 +149,7 @@ class Gate:
         # DNS rebinding: a foreign name that points to this machine.
         if self.names is not None and place[0] not in self.names:
             return False
-        if (
-            values.get("sec-fetch-site") in ("cross-site", "same-site")
-            and values.get("sec-fetch-mode") != "navigate"
-        ):
+        if values.get("sec-fetch-site") in FOREIGN and values.get("sec-fetch-mode") != "navigate":
             return False
         return not origin or (_place(origin) == place and "" not in place)
 
@@ -178,7 +171,10 @@ class Gate:
 
     async def _answer(self, request: Request, cookies: dict[str, str], address: str) -> Any:
         """The application that answers: the page, or a refusal; with cookies to set."""
-        if not self.allows(dict(request.scope["headers"])):
+        headers = request.headers
+        # A link of another site leads to the page, to nothing else.
+        led = headers.get("sec-fetch-site") in FOREIGN and request.url.path != "/"
+        if led or not self.allows(dict(request.scope["headers"])):
             return PlainTextResponse("The studio answers its own pages only.\n", 403)
         # --- Who asks ---
         login = request.cookies.get(self._cookie, "")
@@ -189,30 +185,34 @@ class Gate:
         person = self._person(request, cookies, login)
         self.studio.note_sender(person, address)
         request.scope["headers"].append((PERSON_HEADER.encode(), person.encode()))
-        return await self._admitted(request, person)
-
-    async def _admitted(self, request: Request, person: str) -> Any:
-        """The application that answers a person who may come in: only what the page itself asks for."""
-        path = request.scope["path"]
-        if request.method not in _PLACES or not _PLACES[request.method].fullmatch(path):
+        # --- Only what the page itself asks for ---
+        places = _PLACES.get(request.method)
+        if places is None or not places.fullmatch(request.scope["path"]):
             return PlainTextResponse("The studio has no such place.\n", 404)
-        # Files by id, each for its person.
-        if path.startswith(_FILE):
-            return self._file(request.scope, path.removeprefix(_FILE), person)
-        try:
-            if page := request.query_params.get("session_hash"):
-                self.studio.session(page, person)
-            if path.startswith(_BEAT) and request.method == "GET":
-                page = path.removeprefix(_BEAT)
-                self.studio.session(page, person, beats=True)
-                return partial(_held, self.app, self.studio, page)
-            if path == _UPLOAD:
-                return partial(_upload, self.app, self.studio, person, promised_size(request))
-            if path in _EVENTS:
-                return await self._event(request, person)
-        except InputError as error:
-            return PlainTextResponse(f"{error}\n", 403)
+        if request.method == "POST" and PAGE_HEADER not in request.headers:
+            return PlainTextResponse("The studio answers its own pages only.\n", 403)
         return self.app
+
+    def _admits_socket(self, scope: Any) -> bool:
+        """Whether a websocket is of a page of ours, whose browser is known; its person goes into a header."""
+        address = self._address(scope)
+        scope["headers"] = self._heard(scope["headers"])
+        headers = dict(scope["headers"])
+        # A browser always names the origin of a websocket; nobody else has anything to do here.
+        if scope["path"] != CHANNEL or b"origin" not in headers or not self.allows(headers):
+            return False
+        cookies = Request({**scope, "type": "http"}).cookies
+        login = cookies.get(self._cookie, "")
+        if self.password and login not in self._logins:
+            return False
+        try:
+            token = self._logins[login] if self.password else cookies.get(PERSON)
+            person = self.studio.person(token)
+        except InputError:
+            return False
+        self.studio.note_sender(person, address)
+        scope["headers"].append((PERSON_HEADER.encode(), person.encode()))
+        return True
 
     def _person(self, request: Request, cookies: dict[str, str], login: str) -> str:
         """Whose request it is: the person of its login where there are logins, else the person of its cookie."""
@@ -225,43 +225,6 @@ class Gate:
             if self.password:
                 self._logins[login] = token
             return self.studio.person(token)
-
-    def _file(self, scope: Any, name: str, person: str) -> Any:
-        """The application that serves a file: one of the cache, or an upload of this person by its id."""
-        with suppress(InputError):
-            # An upload by its id; else only what lies in the cache.
-            path = self.studio.files.path(person, name)
-            scope["path"] = f"{_FILE}{path}"
-            scope["raw_path"] = scope["path"].encode()
-            return self.app
-        if not Path(name).resolve().is_relative_to(self.studio.work.cache.resolve()):
-            return PlainTextResponse("The studio serves no such file.\n", 403)
-        return self.app
-
-    async def _event(self, request: Request, person: str) -> Any:
-        """The application that gets an event of the page, with the files that the person may name."""
-        try:
-            sent_body = await request.body()
-        except HTTPException as error:
-            return PlainTextResponse(f"{error.detail}\n", error.status_code)
-        body = with_known_files(sent_body, person, self.studio.files)
-        scope = request.scope
-        scope["headers"] = [header for header in scope["headers"] if header[0] not in _LENGTHS]
-        scope["headers"].append((b"content-length", str(len(body)).encode()))
-
-        async def app(scope: Any, receive: Any, send: Any) -> None:
-            sent = False
-
-            async def receive_body() -> Any:
-                nonlocal sent
-                if sent:
-                    return await receive()
-                sent = True
-                return {"type": "http.request", "body": body, "more_body": False}
-
-            await self.app(scope, receive_body, send)
-
-        return app
 
     async def _log_in(self, request: Request, cookies: dict[str, str], address: str) -> Response:
         """The page where the password is right, else the form again.
@@ -301,80 +264,23 @@ class Gate:
         return HTMLResponse(asset("login.html").replace("MESSAGE", message), status)
 
 
-async def _held(
-    app: Application, studio: Studio, page: str, scope: Any, receive: Any, send: Any
-) -> None:
-    """Let a page hold its request; it is closed when that ends."""
-    try:
-        await app(scope, receive, send)
-    finally:
-        studio.leave(page)
-
-
 def largest_upload() -> int:
-    """Bytes of the largest body of an upload: a file, and what surrounds it in a form."""
+    """Bytes of the largest body of an upload: of a file, with some room."""
     return int(SETTINGS.upload_megabytes * 1e6) + SETTINGS.request_bytes
 
 
 def promised_size(request: Request) -> int:
     """The length that an upload gives. Raises InputError for none, another way of saying it, and too much."""
     size = request.headers.get("content-length", "")
-    if not size.isdigit() or "transfer-encoding" in request.headers:
+    if not re.fullmatch("[0-9]{1,15}", size) or "transfer-encoding" in request.headers:
         raise InputError("An upload must say how long it is.")
     if int(size) > largest_upload():
         raise InputError(f"An upload may have up to {SETTINGS.upload_megabytes} MB.")
     return int(size)
 
 
-async def _upload(
-    app: Application, studio: Studio, person: str, size: int, scope: Any, receive: Any, send: Any
-) -> None:
-    """Let Gradio store an upload of a promised size, and answer with ids of ours in place of its paths."""
-    quota = studio.quota
-    sender = studio.sender(person)
-    try:
-        with quota.uploading(sender):
-            await _stored_upload(
-                app, studio, person, quota.claim(sender, size), scope, receive, send
-            )
-    except InputError as error:
-        await PlainTextResponse(f"{error}\n", 403)(scope, receive, send)
-
-
-async def _stored_upload(
-    app: Application, studio: Studio, person: str, claim: Claim, scope: Any, receive: Any, send: Any
-) -> None:
-    messages: list[Any] = []
-
-    async def collect(message: Any) -> None:
-        messages.append(message)
-
-    stored = 0
-
-    async def next_part() -> Any:
-        return await asyncio.wait_for(receive(), SETTINGS.body_seconds)
-
-    try:
-        await app(scope, next_part, collect)  # until the files are where it says
-        # --- Its answer, with ids of ours in place of paths of this machine ---
-        start = messages[0]
-        body = b"".join(message.get("body", b"") for message in messages[1:])
-        if start["status"] == 200:
-            paths = [Path(path) for path in json.loads(body)]
-            stored = sum(path.stat().st_size for path in paths if path.is_file())
-            body = json.dumps([studio.files.add(person, path) for path in paths]).encode()
-    except (ClientDisconnect, TimeoutError):  # nobody waits for an answer
-        return
-    finally:
-        studio.quota.settle(claim, stored)
-    headers = [header for header in start["headers"] if header[0] not in _LENGTHS]
-    length = (b"content-length", str(len(body)).encode())
-    await send({**start, "headers": [*headers, length]})
-    await send({"type": "http.response.body", "body": body})
-
-
 def _limited(receive: Any, max_bytes: int) -> Any:
-    """`receive` that raises an HTTPException, which Gradio answers with, after so many bytes, promised or not."""
+    """`receive` that raises an HTTPException, after so many bytes, promised or not."""
     got = 0
 
     async def counted() -> Any:

@@ -1,0 +1,58 @@
+"""An object is taken away: what it hid is filled by a job, which takes seconds and can be stopped."""
+
+from dataclasses import replace
+from typing import Any
+
+from materialist.darkroom.desk import Desk, Followed
+from materialist.edits.recipe import Step, options_of
+from materialist.edits.remove.operation import REMOVE
+from materialist.jobs.worker import DONE
+from materialist.studio import tasks
+from materialist.studio.edit_list import EditList, with_options
+from materialist.studio.session import Session
+
+
+def take_away(desk: Desk, options: dict[str, Any]) -> None:
+    """Begin to take the selection away, or to do that in another way; the list has the edit when that is done.
+
+    Raises InputError where nothing is selected, and for values that are not valid.
+    """
+    session = desk.session
+    project = session.opened
+    with session.lock:
+        planned = session.planned(REMOVE.name)
+        index = planned.current or 0
+        before = planned.steps[index]
+        step = with_options(before, **options)
+        options_of(step)
+        if planned is session.edits and step == before:
+            return
+        # Only the newest counts.
+        session.stop(desk.studio.jobs, tasks.removal.__name__)
+        earlier = [one for one in planned.steps[:index] if not one.skipped]
+    job = desk.studio.submit(
+        session,
+        tasks.removal,
+        session.workspace,
+        scene=str(project.scene),
+        steps=(*earlier, replace(step, options={**step.options, "skip": "false"})),
+        fillings=str(session.workspace),
+    )
+
+    def then(entry: Followed) -> None:
+        if entry.job.state != DONE or session.live is None or not session.shows(project):
+            return
+        # Applied once before the lock: other requests go on meanwhile.
+        session.live.edited(_with(session, before, step).active)
+        with session.lock:
+            session.change(REMOVE.name, _with(session, before, step))
+
+    desk.follow(job, then)
+
+
+def _with(session: Session, before: Step, step: Step) -> EditList:
+    """The edits, as they are by now, with a step in place of the one before, or at their end."""
+    steps = session.edits.steps
+    if before in steps:
+        return session.edits.put(steps.index(before), step)
+    return session.edits.add(step)
