@@ -33,6 +33,7 @@ from materialist.io.colour_space import (
     rgb_to_xyz,
     to_rec709,
 )
+from materialist.io.decode import decode
 from materialist.io.photo import read_photo
 
 REPORTED = "data/reported"
@@ -412,3 +413,17 @@ def test_reported_crop_of_a_dng(real_data):
         39.6, abs=0.05
     )
     assert_right(photo, 0.02)
+
+
+def test_primaries_of_a_float_tiff_without_a_profile(tmp_path):
+    light = (2 * quadrants() @ TO_2020.T).astype(np.float32)
+    rationals = [round(value * 100_000) for value in REC2020]
+    pairs = [number for value in rationals for number in (value, 100_000)]
+    tifffile.imwrite(
+        tmp_path / "a.tif",
+        light,
+        photometric="rgb",
+        extratags=[(319, 5, 6, pairs[:12], True), (318, 5, 2, pairs[12:], True)],
+    )
+    found = decode(tmp_path / "a.tif").linear
+    assert found[0, 0] == pytest.approx(2 * quadrants()[0, 0], abs=1e-3)

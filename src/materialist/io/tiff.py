@@ -38,6 +38,9 @@ _ICCLAB = 9
 FOURTH = "The file says of its last channel that it is no transparency; it is left out."
 
 
+_PRIMARY_TAGS = ("PrimaryChromaticities", "WhitePoint")
+
+
 @dataclass(frozen=True)
 class _Layout:
     """What the tags of the first page say."""
@@ -107,7 +110,6 @@ def read_tiff(path: Path) -> Decoded:
 def _shallow(path: Path, layout: _Layout) -> Decoded:
     decoded = read_bitmap(path)
     # --- Transparency: only where the file says that the last channel is one ---
-    # --- Transparency: only where the file says that the last channel is one ---
     if layout.extra[0] == _UNSPECIFIED:
         decoded.warnings.append(FOURTH)
     return decoded
@@ -133,7 +135,11 @@ def _space(
 ) -> ColourSpace | None:
     """What the values mean; None for sRGB, and for floats that are linear Rec.709."""
     if layout.profile is None:
-        return None if is_float else exif_space(tags, warnings)
+        if not is_float:
+            return exif_space(tags, warnings)
+        # Floats are light: of what tags say only the primaries count.
+        stated = {name: tags[name] for name in _PRIMARY_TAGS if name in tags}
+        return exif_space({**stated, "Gamma": 1}, warnings)
     if not is_float:
         return deep_space(layout.profile, warnings)
     space = matrix_profile(layout.profile)
