@@ -140,6 +140,18 @@ export function Colour({ label, value, changed }: { label: string; value: string
   );
 }
 
+export function Switch({ label, on, changed, hidden, id }: { label: string; on: boolean; changed: (on: boolean) => void; hidden?: boolean; id?: string }) {
+  return (
+    <label class="switch-line">
+      {!hidden && <span>{label}</span>}
+      <span class="switch">
+        <input id={id} type="checkbox" role="switch" aria-label={label} checked={on} onChange={(event) => changed(event.currentTarget.checked)} />
+        <i />
+      </span>
+    </label>
+  );
+}
+
 export function Choice({
   label,
   value,

@@ -35,6 +35,8 @@ export function shortcuts(): () => void {
     else if (key === "b") set({ before: true });
     else if (key === "c") set({ comparing: !view.comparing });
     else if (key === "f") void change("final");
+    else if (key === "z") view.zoomOwn();
+    else if (key === "m") set({ mesh: !view.mesh });
     else if (event.key === "Delete" && state.current !== null)
       void change("act", { action: "remove", index: state.current });
   };
@@ -51,6 +53,7 @@ export function shortcuts(): () => void {
 
 function escape(): void {
   if (view.message) set({ message: "" });
+  else if (view.mesh) set({ mesh: false });
   else if (view.sheet && (view.state?.project || view.state?.expected)) set({ sheet: "" });
   else if (view.sheet === "help") set({ sheet: view.state?.project ? "" : "open" });
   else if (view.tool !== "click") set({ tool: "click" });

@@ -18,7 +18,7 @@ interface Gesture {
 const sized = (image: HTMLImageElement): Size => ({ width: image.naturalWidth, height: image.naturalHeight });
 
 export function Stage() {
-  const { state, tool, brush, comparing, split, before, dropped, jobs, working } = useView();
+  const { state, tool, brush, comparing, split, before, dropped, jobs, working, exposure, clipped, panel } = useView();
   const frame = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const picture = useRef<Picture | null>(null);
@@ -73,8 +73,10 @@ export function Stage() {
   }, [stage?.picture, project, dropped, on.length, stage?.bad]);
   useEffect(() => {
     const replaced = on.some((step) => !["edit", "relight"].includes(step.kind));
-    picture.current!.show({ split: before ? 2 : comparing ? split : 0, whole: final, replaced });
-  }, [before, comparing, split, final, steps]);
+    // Exposure and clipping are looked at, not changed: other panels show the picture as it is.
+    const looked = panel === "look" ? { exposure, clipped } : { exposure: 0, clipped: false };
+    picture.current!.show({ split: before ? 2 : comparing ? split : 0, whole: final, replaced, ...looked });
+  }, [before, comparing, split, final, steps, panel, exposure, clipped]);
 
   // --- Where it lies ---
   useLayoutEffect(() => {
@@ -85,11 +87,28 @@ export function Stage() {
     watcher.observe(frame.current!);
     return () => watcher.disconnect();
   }, []);
-  useLayoutEffect(() => setBox(fitted(photo, room)), [photo.width, photo.height, room.width, room.height]);
+  // The same photo with more pixels stays where it is.
+  const proportions = photo.height ? Math.round((200 * photo.width) / photo.height) : 0;
+  useLayoutEffect(() => setBox(fitted(photo, room)), [project || expected || dropped, proportions, room.width, room.height]);
   useLayoutEffect(() => picture.current?.place(box), [box]);
 
   const look = (factor: number, x: number, y: number, dx = 0, dy = 0) =>
     setBox((now) => (now.width ? zoomed(now, photo, room, factor, x, y, dx, dy) : now));
+  // --- The photo's own pixels ---
+  const own = state?.original && project && !dropped ? state.original[0] : photo.width;
+  const native = own / devicePixelRatio; // width at which one pixel of the photo is one of the screen
+  const percent = (box.width / Math.max(native, 1)) * 100;
+  useEffect(() => {
+    // Pictures that are larger than what came first are asked for when somebody looks closely.
+    const close = box.width * devicePixelRatio > photo.width * 1.2 && own > photo.width;
+    if (close && project && !dropped) picture.current!.load("native", address("photo", { project, full: "1" }));
+  }, [box.width, own, photo.width, project, dropped]);
+  const toOwn = () => {
+    const close = Math.abs(percent - 100) < 1;
+    if (close) setBox(fitted(photo, room));
+    else look(native / box.width, room.width / 2, room.height / 2);
+  };
+  view.zoomOwn = toOwn;
   const zoom = room.width ? box.width / Math.max(fitted(photo, room).width, 1) : 1;
 
   useEffect(() => {
@@ -265,10 +284,17 @@ export function Stage() {
       {comparing && usable && !empty && <Divider box={box} frame={frame} />}
       {usable && stage?.badge && !before && <span class="badge">{stage.badge}</span>}
       {before && <span class="badge">{t.beforeLabel}</span>}
-      {zoom > 1.01 && (
-        <div class="zoom">
-          <button onClick={() => setBox(fitted(photo, room))}>{t.fit}</button>
-          <span>{t.zoom(Math.round((box.width / Math.max(photo.width, 1)) * 100))}</span>
+      {usable && !empty && (
+        <div class="zoom" onPointerDown={(event) => event.stopPropagation()}>
+          {zoom > 1.01 && (
+            <button title={`${t.fit} (0)`} onClick={() => setBox(fitted(photo, room))}>
+              {t.fitShort}
+            </button>
+          )}
+          <button id="own-pixels" title={`${t.ownPixels} (Z)`} aria-label={t.ownPixels} aria-pressed={Math.abs(percent - 100) < 1} onClick={toOwn}>
+            1:1
+          </button>
+          <span>{t.zoom(Math.round(percent))}</span>
         </div>
       )}
     </div>

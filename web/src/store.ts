@@ -34,6 +34,13 @@ export interface View {
   results: Result[];
   lamp: { kelvin: number; power: number };
   sam: boolean;
+  /** Whether the mesh is shown in place of the picture. */
+  mesh: boolean;
+  /** Exposure of what is seen, stops; it changes no picture. */
+  exposure: number;
+  clipped: boolean;
+  /** Show the photo's own pixels, or the whole picture again. */
+  zoomOwn: () => void;
   size: number;
   predictor: string;
   fov: string;
@@ -63,6 +70,10 @@ export const view: View = {
   results: [],
   lamp: { kelvin: 2700, power: 1 },
   sam: false,
+  mesh: false,
+  exposure: 0,
+  clipped: false,
+  zoomOwn: () => undefined,
   size: 512,
   predictor: "auto",
   fov: "auto",
@@ -101,7 +112,7 @@ function remark(note: string): void {
   noteTimer = window.setTimeout(() => set({ note: "" }), 5000);
 }
 
-function tell(error: unknown): void {
+export function tell(error: unknown): void {
   say(error instanceof Refusal ? error.message : t.lost);
 }
 
