@@ -5,7 +5,7 @@ import { Picture, type Box } from "./picture";
 import { fitted, zoomed, type Size } from "./sight";
 import { pointing } from "./pointing";
 import { address } from "./api";
-import { change, set, useView, view, type Mode } from "./store";
+import { change, drop, set, useView, view, type Mode } from "./store";
 import { t } from "./strings";
 
 type Point = [number, number];
@@ -18,7 +18,7 @@ interface Gesture {
 const sized = (image: HTMLImageElement): Size => ({ width: image.naturalWidth, height: image.naturalHeight });
 
 export function Stage() {
-  const { state, tool, brush, comparing, split, before, dropped, jobs, working, exposure, clipped, panel } = useView();
+  const { state, tool, brush, comparing, split, before, dropped, jobs, working, exposure, clipped, panel, dropper } = useView();
   const frame = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const picture = useRef<Picture | null>(null);
@@ -175,7 +175,7 @@ export function Stage() {
     if (!event.isPrimary || !usable) return;
     setRing(tool === "brush" && inside(event) ? at(event) : null);
     if (gesture) return setGesture({ ...gesture, path: [...gesture.path, at(event)] });
-    if (tool === "click" && event.pointerType === "mouse" && inside(event)) pointing.over(at(event));
+    if (tool === "click" && !dropper && event.pointerType === "mouse" && inside(event)) pointing.over(at(event));
     else pointing.out();
   };
   const up = (event: PointerEvent) => {
@@ -190,7 +190,8 @@ export function Stage() {
     const last = path[path.length - 1]!;
     // A swipe is no click: whoever meant to scroll, or to zoom, selects nothing.
     const far = (Math.hypot(last[0] - first[0], last[1] - first[1]) * box.width) / width;
-    if (tool === "box") {
+    if (view.dropper) void drop(first);
+    else if (tool === "box") {
       if (far > 4) void change("pick", { tool, mode, at: [...first, ...last] }, "", t.selecting);
     } else if (tool === "brush") {
       const points = path.slice(0, 20000);
@@ -241,7 +242,7 @@ export function Stage() {
   useEffect(() => {
     pointing.changed = () => redraw((count) => count + 1);
   }, []);
-  useEffect(() => pointing.out(), [project, tool, dropped]);
+  useEffect(() => pointing.out(), [project, tool, dropped, dropper]);
 
   const empty = !photo.width;
   const hint = working && working !== t.working ? working : "";
@@ -249,7 +250,7 @@ export function Stage() {
     <div
       ref={frame}
       id="stage"
-      class={`stage ${usable ? tool : "idle"} ${hint ? "busy" : ""}`}
+      class={`stage ${usable ? (dropper ? "dropper" : tool) : "idle"} ${hint ? "busy" : ""}`}
       tabIndex={0}
       role="application"
       aria-label={t.stage}
@@ -282,7 +283,8 @@ export function Stage() {
         />
       )}
       {comparing && usable && !empty && <Divider box={box} frame={frame} />}
-      {usable && stage?.badge && !before && <span class="badge">{stage.badge}</span>}
+      {usable && stage?.badge && !before && !dropper && <span class="badge">{stage.badge}</span>}
+      {dropper && <span class="badge hint">{t.dropperHint}</span>}
       {before && <span class="badge">{t.beforeLabel}</span>}
       {usable && !empty && (
         <div class="zoom" onPointerDown={(event) => event.stopPropagation()}>

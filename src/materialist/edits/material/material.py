@@ -96,9 +96,7 @@ def _base_colour(
         if isinstance(picture, str | Path):
             picture = np.clip(decode_photo(Path(picture)).exposed(), 0, 1)
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
-        laid = projected(
-            scene, region, picture, changes.texture_scale, turn=changes.texture_turn
-        )
+        laid = projected(scene, region, picture, changes.texture_scale, turn=changes.texture_turn)
         return laid, list(np.shape(picture))
     if changes.albedo is not None:
         return np.broadcast_to(
