@@ -105,8 +105,11 @@ export function Stage() {
   }, [box.width, own, photo.width, project, dropped]);
   const toOwn = () => {
     const close = Math.abs(percent - 100) < 1;
-    if (close) setBox(fitted(photo, room));
-    else look(native / box.width, room.width / 2, room.height / 2);
+    if (close || !box.width) return setBox(fitted(photo, room));
+    if (native >= fitted(photo, room).width) return look(native / box.width, room.width / 2, room.height / 2);
+    // A photo that is smaller than the window lies in its middle.
+    const height = (native * photo.height) / photo.width;
+    setBox({ left: (room.width - native) / 2, top: (room.height - height) / 2, width: native, height });
   };
   view.zoomOwn = toOwn;
   const zoom = room.width ? box.width / Math.max(fitted(photo, room).width, 1) : 1;
@@ -288,7 +291,7 @@ export function Stage() {
       {before && <span class="badge">{t.beforeLabel}</span>}
       {usable && !empty && (
         <div class="zoom" onPointerDown={(event) => event.stopPropagation()}>
-          {zoom > 1.01 && (
+          {Math.abs(zoom - 1) > 0.01 && (
             <button title={`${t.fit} (0)`} onClick={() => setBox(fitted(photo, room))}>
               {t.fitShort}
             </button>

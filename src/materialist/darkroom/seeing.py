@@ -59,13 +59,18 @@ def mesh_bytes(desk: Desk) -> bytes:
 def _surface(scene: Scene) -> tuple[Array, Array]:
     """([V, 3], [F, 3]): the photo's surface without the planes that continue it, with at most some MESH_FACES."""
     mesh = scene.geometry.mesh
-    faces = mesh.faces[mesh.face_plane < 0]
+    # Faces of one place in the picture continue the ground behind what hides it: they were never seen.
+    seen = np.ptp(mesh.uv[mesh.faces], axis=1).max(1) > 0
+    faces = mesh.faces[(mesh.face_plane < 0) & seen]
     if len(faces) <= MESH_FACES:
         return mesh.vertices, faces
     # Vertices of one cell of the picture, and of about one depth, become one: borders between things stay cuts.
     camera = scene.camera
     cell = np.sqrt(len(faces) / MESH_FACES)
     places = np.floor(mesh.uv * (camera.width, camera.height) / cell).astype(np.int64)
+    unused = np.ones(len(places), bool)
+    unused[faces] = False
+    places[unused] = -1
     layers = np.round(np.log(np.maximum(-mesh.vertices[:, 2], 1e-6)) / 0.04).astype(np.int64)
     keys = (places[:, 1] * 100_000 + places[:, 0]) * 4096 + layers % 4096
     _, merged, counts = np.unique(keys, return_inverse=True, return_counts=True)
