@@ -78,7 +78,8 @@ def _contact(body: Body, points: Array, scene: Scene) -> Array:
     """[H, W] factor of the shadow that a body casts around its foot under light from all around."""
     # The body as an ellipsoid: in a space where that is a unit ball, it hides n.d / d^2 of the sky.
     low, high = body.vertices.min(0), body.vertices.max(0)
-    half = np.maximum((high - low) / 2 * _WIDER, 1e-6)
+    half = (high - low) / 2 * _WIDER
+    half = np.maximum(half, max(0.1 * float(half.max()), 1e-6))  # what is flat, too, has a shadow
     way = ((low + high) / 2 - points) / half
     normal = unit(scene.normal * half)
     distance = np.maximum((way**2).sum(-1), 1.0)
