@@ -14,7 +14,7 @@ export function Bar() {
   const release = () => set({ before: false });
   return (
     <header class="bar">
-      <button class="photos" aria-expanded={sheet === "open"} onClick={() => set({ sheet: sheet === "open" ? "" : "open" })}>
+      <button class="photos" aria-label={t.photos} title={t.photos} aria-expanded={sheet === "open"} onClick={() => set({ sheet: sheet === "open" ? "" : "open" })}>
         <Icon name="photos" />
         <span>{t.photos}</span>
       </button>
