@@ -22,6 +22,15 @@ def test_click_add_and_remove():
     assert one.click(scene, 50, 40, "remove") is one
 
 
+def test_a_piece_of_one_colour_is_taken_out_of_a_selection():
+    scene = room()
+    whole = Selection((scene.depth > 0,))
+    left = whole.click(scene, 25, 24, "remove").mask
+    assert left is not None and not left[block()].any()
+    assert left[(scene.depth > 0) & ~block()].mean() > 0.95
+    assert Selection((block(),)).click(scene, 25, 24, "remove").mask is None
+
+
 def test_box_and_brush():
     scene = room()
     boxed = Selection().box(scene, [12, 12, 40, 36], "new")

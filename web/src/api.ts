@@ -30,6 +30,12 @@ export async function post<T>(place: string, body: object = {}): Promise<T> {
   return read<T>(await fetch(`/api/${place}`, { method: "POST", headers, body: JSON.stringify(body) }));
 }
 
+/** What is not text. */
+export async function bytes(place: string): Promise<ArrayBuffer> {
+  const answer = await fetch(`/api/${place}`, { headers: HEADERS });
+  return answer.ok ? answer.arrayBuffer() : read(answer);
+}
+
 /** Send a file; returns the id by which requests may name it. */
 export function upload(file: File, progress: (part: number) => void): Promise<string> {
   return new Promise((done, failed) => {

@@ -6,6 +6,7 @@ import { Icon } from "./icons";
 import { shortcuts } from "./keys";
 import { OpenSheet } from "./opening";
 import { Light } from "./panels/light";
+import { Mesh } from "./mesh";
 import { Look } from "./panels/look";
 import { Material } from "./panels/material";
 import { Things } from "./panels/object";
@@ -27,7 +28,7 @@ const HOMES: Record<string, Panel> = {
 };
 
 export function App() {
-  const { state, panel, sheet, message, note, online } = useView();
+  const { state, panel, sheet, message, note, online, mesh } = useView();
   const dropping = useDrops();
   useEffect(shortcuts, []);
   useEffect(() => {
@@ -49,7 +50,8 @@ export function App() {
       <Bar />
       <main>
         <Stage />
-        {usable && <Tools />}
+        {usable && !mesh && <Tools />}
+        {usable && mesh && state.ready && <Mesh />}
         <Progress />
         {message && (
           <div class="message" role="alert" id="message">

@@ -1,6 +1,7 @@
 // The bar: photos, the title, undo, compare, the final picture, taking away.
 import { Icon } from "./icons";
 import { undo } from "./keys";
+import { chooseTheme, shownTheme } from "./theme";
 import { change, set, useView, working } from "./store";
 import { t } from "./strings";
 
@@ -9,10 +10,11 @@ export function Bar() {
   const usable = !!state?.project;
   const edited = !!state?.steps.some((step) => step.on);
   const title = state?.project?.title ?? state?.expected?.title ?? t.title;
+  const dark = shownTheme() === "dark";
   const release = () => set({ before: false });
   return (
     <header class="bar">
-      <button class="photos" aria-expanded={sheet === "open"} onClick={() => set({ sheet: sheet === "open" ? "" : "open" })}>
+      <button class="photos" aria-label={t.photos} title={t.photos} aria-expanded={sheet === "open"} onClick={() => set({ sheet: sheet === "open" ? "" : "open" })}>
         <Icon name="photos" />
         <span>{t.photos}</span>
       </button>
@@ -71,6 +73,12 @@ export function Bar() {
           </button>
         </>
       )}
+      <button class="icon-only theme" id="theme" aria-label={t.otherTheme(dark)} title={t.otherTheme(dark)} onClick={() => {
+        chooseTheme(dark ? "light" : "dark");
+        set({});
+      }}>
+        <Icon name={dark ? "light" : "moon"} />
+      </button>
       <button class="icon-only help" aria-label={t.help} title={`${t.help} (?)`} onClick={() => set({ sheet: "help" })}>
         <Icon name="help" />
       </button>

@@ -1,5 +1,8 @@
 // Sliders, colours, files: the parts that panels are made of.
 import type { ComponentChildren } from "preact";
+import { Icon } from "./icons";
+import { set, useView } from "./store";
+import { t } from "./strings";
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
 
 interface SliderProps {
@@ -131,11 +134,36 @@ export function FileButton({
 }
 
 export function Colour({ label, value, changed }: { label: string; value: string; changed: (value: string) => void }) {
+  const { dropper } = useView();
+  const mine = useRef<((value: string) => void) | null>(null);
+  const on = dropper !== null && dropper === mine.current;
+  const pick = () => {
+    mine.current = (colour) => changed(colour);
+    set({ dropper: on ? null : mine.current, mesh: false });
+    document.getElementById("stage")?.focus();
+  };
   return (
-    <label class="colour">
-      <span>{label}</span>
-      <input type="color" value={value} onInput={(event) => changed(event.currentTarget.value)} />
-      <code>{value}</code>
+    <div class="colour">
+      <label>
+        <span>{label}</span>
+        <input type="color" value={value} onInput={(event) => changed(event.currentTarget.value)} />
+        <code>{value}</code>
+      </label>
+      <button class="icon-only" aria-pressed={on} aria-label={`${t.dropper}: ${label}`} title={t.dropper} onClick={pick}>
+        <Icon name="dropper" />
+      </button>
+    </div>
+  );
+}
+
+export function Switch({ label, on, changed, hidden, id }: { label: string; on: boolean; changed: (on: boolean) => void; hidden?: boolean; id?: string }) {
+  return (
+    <label class="switch-line">
+      {!hidden && <span>{label}</span>}
+      <span class="switch">
+        <input id={id} type="checkbox" role="switch" aria-label={label} checked={on} onChange={(event) => changed(event.currentTarget.checked)} />
+        <i />
+      </span>
     </label>
   );
 }

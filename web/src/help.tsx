@@ -1,3 +1,5 @@
+import { Choice } from "./controls";
+import { chooseTheme, chosenTheme, type Theme } from "./theme";
 import { Dialog } from "./dialog";
 import { set, useView } from "./store";
 import { t } from "./strings";
@@ -16,6 +18,18 @@ export function HelpSheet() {
           </div>
         ))}
       </dl>
+      <section class="choose-theme">
+        <h3>{t.theme}</h3>
+        <Choice
+          label={t.theme}
+          value={chosenTheme()}
+          options={[["system", t.themeSystem], ["dark", t.themeDark], ["light", t.themeLight]]}
+          changed={(value) => {
+            chooseTheme(value as Theme);
+            set({});
+          }}
+        />
+      </section>
       <p class="soft">
         {t.title} {about?.version}
       </p>

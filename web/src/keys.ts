@@ -1,7 +1,10 @@
 // Keys that work anywhere on the page but where text is typed.
-import { change, set, view, type Tool } from "./store";
+import { change, set, view, type Panel, type Tool } from "./store";
 
 const TOOLS: Tool[] = ["click", "box", "brush", "lamp", "place"];
+
+/** With Shift; by place on the keyboard, as what Shift makes of a digit differs. */
+const PANELS: Record<string, Panel> = { Digit1: "material", Digit2: "light", Digit3: "object", Digit4: "look" };
 
 export function undo(again: boolean): void {
   if (again ? view.state?.redo : view.state?.undo) void change("undo", { again });
@@ -31,10 +34,14 @@ export function shortcuts(): () => void {
     if (event.key === "?") set({ sheet: "help" });
     if (!state?.project) return;
     const tool = TOOLS[Number(event.key) - 1];
-    if (tool) set({ tool });
+    const panel = PANELS[event.code];
+    if (event.shiftKey && panel) set({ panel });
+    else if (tool) set({ tool, dropper: null });
     else if (key === "b") set({ before: true });
     else if (key === "c") set({ comparing: !view.comparing });
     else if (key === "f") void change("final");
+    else if (key === "z") view.zoomOwn();
+    else if (key === "m") set({ mesh: !view.mesh });
     else if (event.key === "Delete" && state.current !== null)
       void change("act", { action: "remove", index: state.current });
   };
@@ -51,6 +58,8 @@ export function shortcuts(): () => void {
 
 function escape(): void {
   if (view.message) set({ message: "" });
+  else if (view.dropper) set({ dropper: null });
+  else if (view.mesh) set({ mesh: false });
   else if (view.sheet && (view.state?.project || view.state?.expected)) set({ sheet: "" });
   else if (view.sheet === "help") set({ sheet: view.state?.project ? "" : "open" });
   else if (view.tool !== "click") set({ tool: "click" });

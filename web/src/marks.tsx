@@ -1,7 +1,7 @@
 // What is drawn over the picture: outlines, strokes, handles of objects and lamps.
-import { useLayoutEffect, useRef } from "preact/hooks";
+import { useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { Box } from "./picture";
-import { change, optionsOf, useView, view, type Mode } from "./store";
+import { change, optionsOf, pending, useView, view, type Mode } from "./store";
 import { t } from "./strings";
 
 type Point = [number, number];
@@ -75,16 +75,45 @@ interface HandleProps {
   unit: number;
   kind: string;
   label: string;
-  moved: (place: Point) => void;
+  /** Where it was dragged, or moved by keys; resolves when the server has answered. */
+  moved: (place: Point, from: Point) => Promise<void> | void;
   toPlace: (event: PointerEvent) => Point;
+  /** Where it may be shown for a place of the pointer: on a ring, on a line. */
+  bound?: (place: Point) => Point;
+  removed?: () => void;
+  colour?: string;
 }
 
-/** A handle that is dragged in the picture; what it moves follows. */
-function Handle({ at, unit, kind, label, moved, toPlace }: HandleProps) {
+/** A handle that is dragged in the picture; it follows the pointer at once, and what it moves as the server answers. */
+function Handle({ at, unit, kind, label, moved, toPlace, bound = (place) => place, removed, colour }: HandleProps) {
   const { width, height } = view.state!.stage;
+  const [held, setHeld] = useState<Point | null>(null);
+  // What a drag does is reckoned from where it began, whatever the server has made of it meanwhile.
+  const grip = useRef<{ from: Point; by: Point; start: Point; moved: HandleProps["moved"] } | null>(null);
+  const asked = useRef(0);
+  const knob = useRef<SVGCircleElement>(null);
+  const shown = held ?? at;
+  useLayoutEffect(() => void (knob.current!.style.fill = colour ?? ""), [colour]);
+  const send = (place: Point, from: Point, by = moved) => {
+    const mine = ++asked.current;
+    setHeld(bound(place));
+    // It lies where it was put until what was put there is known.
+    void Promise.resolve(by(place, from)).then(() => mine === asked.current && !grip.current && setHeld(null));
+  };
   const drag = (event: PointerEvent) => {
-    const handle = event.currentTarget as SVGGElement;
-    if (handle.hasPointerCapture(event.pointerId)) moved(toPlace(event));
+    const start = grip.current;
+    if (!start) return;
+    const [x, y] = toPlace(event);
+    // A press is no drag: who only points at it moves nothing.
+    if (!held && Math.hypot(x - start.start[0], y - start.start[1]) < 3 * unit) return;
+    send([x + start.by[0], y + start.by[1]], start.from, start.moved);
+  };
+  const release = (event: PointerEvent) => {
+    drag(event);
+    grip.current = null;
+    const mine = asked.current;
+    // The answer to the last place may have come while the pointer was still down.
+    requestAnimationFrame(() => mine === asked.current && !pending() && setHeld(null));
   };
   const steps: Record<string, Point> = {
     ArrowLeft: [-1, 0],
@@ -101,29 +130,107 @@ function Handle({ at, unit, kind, label, moved, toPlace }: HandleProps) {
       onPointerDown={(event) => {
         event.stopPropagation();
         (event.currentTarget as SVGGElement).setPointerCapture(event.pointerId);
+        const start = toPlace(event);
+        grip.current = { from: at, by: [shown[0] - start[0], shown[1] - start[1]], start, moved };
       }}
       onPointerMove={drag}
+      onPointerUp={release}
+      onPointerCancel={() => {
+        grip.current = null;
+        setHeld(null);
+      }}
       onKeyDown={(event) => {
+        if (removed && (event.key === "Delete" || event.key === "Backspace")) {
+          event.preventDefault();
+          return removed();
+        }
         const step = steps[event.key];
         if (!step) return;
         event.stopPropagation();
         event.preventDefault();
         const far = event.ctrlKey ? 1 : 4;
         const clamp = (value: number, top: number) => Math.min(Math.max(value, 0), top);
-        moved([clamp(at[0] + step[0] * far, width), clamp(at[1] + step[1] * far, height)]);
+        send([clamp(shown[0] + step[0] * far, width - 0.01), clamp(shown[1] + step[1] * far, height - 0.01)], at);
       }}
     >
-      <circle class="reach" cx={at[0]} cy={at[1]} r={18 * unit} />
-      <circle class="knob" cx={at[0]} cy={at[1]} r={8 * unit} />
-      {kind === "lamp" && <circle class="glow" cx={at[0]} cy={at[1]} r={14 * unit} />}
+      <title>{label}</title>
+      <circle class="reach" cx={shown[0]} cy={shown[1]} r={16 * unit} />
+      <circle ref={knob} class="knob" cx={shown[0]} cy={shown[1]} r={(kind === "thing" || kind === "lamp" ? 8 : 6) * unit} />
       {kind === "thing" && (
-        <path
-          class="arrows"
-          d={`M${at[0] - 15 * unit} ${at[1]}h${30 * unit}M${at[0]} ${at[1] - 15 * unit}v${30 * unit}`}
-        />
+        <path class="arrows" d={`M${shown[0] - 15 * unit} ${shown[1]}h${30 * unit}M${shown[0]} ${shown[1] - 15 * unit}v${30 * unit}`} />
       )}
     </g>
   );
+}
+
+interface LampProps {
+  lamp: number[];
+  index: number;
+  unit: number;
+  toPlace: (event: PointerEvent) => Point;
+}
+
+const LEAST_RING = 18; // pixels of the screen
+const RING = 18; // more, for a lamp of strength 1
+
+/** A lamp in the picture: it is moved; the ring around it is its strength, the knob below how far away it hangs. */
+function LampMarks({ lamp, index, unit, toPlace }: LampProps) {
+  const { panel } = useView();
+  const [x = 0, y = 0, depth = 1, kelvin = 2700, power = 1] = lamp;
+  const ring = (LEAST_RING + RING * Math.sqrt(power)) * unit;
+  const colour = kelvinColour(kelvin);
+  const glow = useRef<SVGCircleElement>(null);
+  useLayoutEffect(() => void (glow.current!.style.stroke = colour), [colour]);
+  const strength = (place: Point) => {
+    const far = Math.hypot(place[0] - x, place[1] - y) / unit;
+    return Math.min(Math.max((Math.max(far - LEAST_RING, 0) / RING) ** 2, 0.05), 5);
+  };
+  return (
+    <>
+      <circle ref={glow} class="glow" cx={x} cy={y} r={ring} />
+      {panel === "light" && (
+        <>
+          <Handle
+            kind="strength"
+            label={t.lampStrength(index + 1)}
+            at={[x + ring, y]}
+            unit={unit}
+            toPlace={toPlace}
+            bound={(place) => [Math.max(place[0], x + LEAST_RING * unit), y]}
+            moved={(place) => setLamp(index, [x, y, depth, kelvin, strength([Math.max(place[0], x), y])])}
+          />
+          <Handle
+            kind="depth"
+            label={t.lampDistance(index + 1)}
+            at={[x, y + ring]}
+            unit={unit}
+            toPlace={toPlace}
+            bound={(place) => [x, place[1]]}
+            moved={(place, from) => setLamp(index, [x, y, depth * Math.exp((from[1] - place[1]) / (150 * unit)), kelvin, power])}
+          />
+        </>
+      )}
+      <Handle
+        kind="lamp"
+        label={t.lampNumber(index + 1)}
+        at={[x, y]}
+        unit={unit}
+        colour={colour}
+        toPlace={toPlace}
+        moved={([right, down]) => setLamp(index, [right, down, depth, kelvin, power])}
+        removed={() => void setLamp(index, null)}
+      />
+    </>
+  );
+}
+
+/** About the colour of a black body, as CSS has it. */
+function kelvinColour(kelvin: number): string {
+  const t = kelvin / 100;
+  const red = t <= 66 ? 255 : 329.7 * (t - 60) ** -0.1332;
+  const green = t <= 66 ? 99.47 * Math.log(t) - 161.12 : 288.12 * (t - 60) ** -0.0755;
+  const blue = t >= 66 ? 255 : t <= 19 ? 0 : 138.52 * Math.log(t - 10) - 305.04;
+  return `rgb(${[red, green, blue].map((value) => Math.round(Math.min(Math.max(value, 0), 255))).join(" ")})`;
 }
 
 function Lamps({ unit, toPlace }: { unit: number; toPlace: (event: PointerEvent) => Point }) {
@@ -132,15 +239,7 @@ function Lamps({ unit, toPlace }: { unit: number; toPlace: (event: PointerEvent)
   return (
     <>
       {lamps.map((lamp, index) => (
-        <Handle
-          key={index}
-          kind="lamp"
-          label={t.lampNumber(index + 1)}
-          at={[lamp[0]!, lamp[1]!]}
-          unit={unit}
-          toPlace={toPlace}
-          moved={([x, y]) => setLamp(index, [x, y, ...lamp.slice(2)])}
-        />
+        <LampMarks key={index} lamp={lamp} index={index} unit={unit} toPlace={toPlace} />
       ))}
     </>
   );
@@ -158,14 +257,55 @@ export function setLamp(index: number, lamp: number[] | null): Promise<void> {
   return change("lamps", { lamps: after }, "lamps");
 }
 
+const FLAT = 0.4; // of the ring on the ground around an object, as it is seen
+
 function Thing({ unit, toPlace }: { unit: number; toPlace: (event: PointerEvent) => Point }) {
   const { state } = useView();
   const step = state?.current == null ? undefined : state.steps[state.current];
   if (!step || !["insert", "drop"].includes(step.kind) || !step.on) return null;
   const at = placeOf(step.options.at);
   if (!at) return null;
-  const moved = (place: Point) => void change("place", { at: place }, "place");
-  return <Handle kind="thing" label={t.placeHint} at={at} unit={unit} toPlace={toPlace} moved={moved} />;
+  const scale = Number(step.options.scale ?? 1) || 1;
+  const turn = Number(step.options.turn ?? 0) || 0;
+  const ring = Math.max((scale * state!.stage.width) / 10, 30 * unit);
+  const angleOf = (place: Point) => Math.atan2((place[1] - at[1]) / FLAT, place[0] - at[0]);
+  const onRing = (angle: number): Point => [at[0] + ring * Math.cos(angle), at[1] + ring * FLAT * Math.sin(angle)];
+  const far = (place: Point) => Math.max(Math.hypot(place[0] - at[0], place[1] - at[1]), 4 * unit);
+  const set = (options: object, key: string) => change("set", { kind: "insert", options }, key);
+  // In front is 0; it turns to the right, as its front does seen from above.
+  const turned = (place: Point) => {
+    const degrees = Math.round(90 - (angleOf(place) * 180) / Math.PI);
+    return set({ turn: ((degrees + 540) % 360) - 180 }, "turn");
+  };
+  const scaled = (place: Point, from: Point) => {
+    const value = (scale * far(place)) / far(from);
+    return set({ scale: Math.round(Math.min(Math.max(value, 0.1), 5) * 100) / 100 }, "scale");
+  };
+  return (
+    <>
+      <ellipse class="ground-ring" cx={at[0]} cy={at[1]} rx={ring} ry={ring * FLAT} />
+      {step.kind === "insert" && (
+        <Handle
+          kind="turn"
+          label={t.turnHandle}
+          at={onRing(Math.PI / 2 - (turn * Math.PI) / 180)}
+          unit={unit}
+          toPlace={toPlace}
+          bound={(place) => onRing(angleOf(place))}
+          moved={turned}
+        />
+      )}
+      <Handle kind="scale" label={t.scaleHandle} at={[at[0] + ring * 0.8, at[1] - ring * 0.8]} unit={unit} toPlace={toPlace} moved={scaled} />
+      <Handle
+        kind="thing"
+        label={t.moveHandle}
+        at={at}
+        unit={unit}
+        toPlace={toPlace}
+        moved={(place) => change("place", { at: place }, "place")}
+      />
+    </>
+  );
 }
 
 function placeOf(value: unknown): Point | null {

@@ -16,6 +16,8 @@ precision highp float;
 uniform sampler2D native, plain, edited;
 uniform float split;   // left of it the photo is shown
 uniform bool whole;    // the edited picture has its own detail
+uniform float gain;    // exposure of what is seen
+uniform bool clipped;  // what has no detail left is marked
 uniform bool replaced; // something stands where the photo's detail was
 in vec2 at;
 out vec4 colour;
@@ -30,7 +32,10 @@ void main() {
     if (replaced && max(max(moved.r, moved.g), moved.b) > 0.02) factor = vec3(0.0);
     seen = whole ? after : after + factor * (photo - before);
   }
-  seen = clamp(seen, 0.0, 1.0);
+  float most = max(max(seen.r, seen.g), seen.b) * gain;
+  seen = clamp(seen * gain, 0.0, 1.0);
+  if (clipped && most > 0.985) seen = vec3(1.0, 0.05, 0.05);
+  if (clipped && most < 0.0006) seen = vec3(0.05, 0.1, 1.0);
   vec3 low = seen * 12.92;
   vec3 high = 1.055 * pow(seen, vec3(1.0 / 2.4)) - 0.055;
   colour = vec4(mix(high, low, lessThan(seen, vec3(0.0031308))), 1.0);
@@ -48,6 +53,9 @@ export interface Shown {
   split: number;
   whole: boolean;
   replaced: boolean;
+  /** Stops. */
+  exposure: number;
+  clipped: boolean;
 }
 
 type Layer = "native" | "plain" | "edited";
@@ -60,7 +68,7 @@ export class Picture {
   private images = new Map<Layer, HTMLImageElement>();
   private addresses = new Map<Layer, string>();
   private box: Box = { left: 0, top: 0, width: 0, height: 0 };
-  private shown: Shown = { split: 0, whole: false, replaced: false };
+  private shown: Shown = { split: 0, whole: false, replaced: false, exposure: 0, clipped: false };
   private frame = 0;
   onload: (layer: Layer, image: HTMLImageElement) => void = () => undefined;
 
@@ -175,6 +183,8 @@ export class Picture {
     gl.uniform1f(place("split"), edited ? this.shown.split : 2);
     gl.uniform1i(place("whole"), Number(this.shown.whole));
     gl.uniform1i(place("replaced"), Number(this.shown.replaced));
+    gl.uniform1f(place("gain"), 2 ** this.shown.exposure);
+    gl.uniform1i(place("clipped"), Number(this.shown.clipped));
     [native, plain, edited ?? plain].forEach((texture, unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);

@@ -19,7 +19,7 @@ export interface Preset {
 
 /** A material of one colour; null keeps the thing's own colours. */
 function paint(name: string, ball: string, albedo: string | null, metallic: number, roughness: number): Preset {
-  const plain = { texture: null, hue: null, saturation: null, value: null };
+  const plain = { texture: null, texture_scale: null, texture_turn: null, hue: null, saturation: null, value: null };
   return { name, ball, kind: "edit", options: { ...plain, albedo, metallic, roughness } };
 }
 

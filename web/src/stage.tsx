@@ -5,7 +5,7 @@ import { Picture, type Box } from "./picture";
 import { fitted, zoomed, type Size } from "./sight";
 import { pointing } from "./pointing";
 import { address } from "./api";
-import { change, set, useView, view, type Mode } from "./store";
+import { change, drop, set, useView, view, type Mode } from "./store";
 import { t } from "./strings";
 
 type Point = [number, number];
@@ -18,7 +18,7 @@ interface Gesture {
 const sized = (image: HTMLImageElement): Size => ({ width: image.naturalWidth, height: image.naturalHeight });
 
 export function Stage() {
-  const { state, tool, brush, comparing, split, before, dropped, jobs, working } = useView();
+  const { state, tool, brush, comparing, split, before, dropped, jobs, working, exposure, clipped, panel, dropper } = useView();
   const frame = useRef<HTMLDivElement>(null);
   const canvas = useRef<HTMLCanvasElement>(null);
   const picture = useRef<Picture | null>(null);
@@ -73,8 +73,10 @@ export function Stage() {
   }, [stage?.picture, project, dropped, on.length, stage?.bad]);
   useEffect(() => {
     const replaced = on.some((step) => !["edit", "relight"].includes(step.kind));
-    picture.current!.show({ split: before ? 2 : comparing ? split : 0, whole: final, replaced });
-  }, [before, comparing, split, final, steps]);
+    // Exposure and clipping are looked at, not changed: other panels show the picture as it is.
+    const looked = panel === "look" ? { exposure, clipped } : { exposure: 0, clipped: false };
+    picture.current!.show({ split: before ? 2 : comparing ? split : 0, whole: final, replaced, ...looked });
+  }, [before, comparing, split, final, steps, panel, exposure, clipped]);
 
   // --- Where it lies ---
   useLayoutEffect(() => {
@@ -85,11 +87,31 @@ export function Stage() {
     watcher.observe(frame.current!);
     return () => watcher.disconnect();
   }, []);
-  useLayoutEffect(() => setBox(fitted(photo, room)), [photo.width, photo.height, room.width, room.height]);
+  // The same photo with more pixels stays where it is.
+  const proportions = photo.height ? Math.round((200 * photo.width) / photo.height) : 0;
+  useLayoutEffect(() => setBox(fitted(photo, room)), [project || expected || dropped, proportions, room.width, room.height]);
   useLayoutEffect(() => picture.current?.place(box), [box]);
 
   const look = (factor: number, x: number, y: number, dx = 0, dy = 0) =>
     setBox((now) => (now.width ? zoomed(now, photo, room, factor, x, y, dx, dy) : now));
+  // --- The photo's own pixels ---
+  const own = state?.original && project && !dropped ? state.original[0] : photo.width;
+  const native = own / devicePixelRatio; // width at which one pixel of the photo is one of the screen
+  const percent = (box.width / Math.max(native, 1)) * 100;
+  useEffect(() => {
+    // Pictures that are larger than what came first are asked for when somebody looks closely.
+    const close = box.width * devicePixelRatio > photo.width * 1.2 && own > photo.width;
+    if (close && project && !dropped) picture.current!.load("native", address("photo", { project, full: "1" }));
+  }, [box.width, own, photo.width, project, dropped]);
+  const toOwn = () => {
+    const close = Math.abs(percent - 100) < 1;
+    if (close || !box.width) return setBox(fitted(photo, room));
+    if (native >= fitted(photo, room).width) return look(native / box.width, room.width / 2, room.height / 2);
+    // A photo that is smaller than the window lies in its middle.
+    const height = (native * photo.height) / photo.width;
+    setBox({ left: (room.width - native) / 2, top: (room.height - height) / 2, width: native, height });
+  };
+  view.zoomOwn = toOwn;
   const zoom = room.width ? box.width / Math.max(fitted(photo, room).width, 1) : 1;
 
   useEffect(() => {
@@ -156,7 +178,7 @@ export function Stage() {
     if (!event.isPrimary || !usable) return;
     setRing(tool === "brush" && inside(event) ? at(event) : null);
     if (gesture) return setGesture({ ...gesture, path: [...gesture.path, at(event)] });
-    if (tool === "click" && event.pointerType === "mouse" && inside(event)) pointing.over(at(event));
+    if (tool === "click" && !dropper && event.pointerType === "mouse" && inside(event)) pointing.over(at(event));
     else pointing.out();
   };
   const up = (event: PointerEvent) => {
@@ -171,7 +193,8 @@ export function Stage() {
     const last = path[path.length - 1]!;
     // A swipe is no click: whoever meant to scroll, or to zoom, selects nothing.
     const far = (Math.hypot(last[0] - first[0], last[1] - first[1]) * box.width) / width;
-    if (tool === "box") {
+    if (view.dropper) void drop(first);
+    else if (tool === "box") {
       if (far > 4) void change("pick", { tool, mode, at: [...first, ...last] }, "", t.selecting);
     } else if (tool === "brush") {
       const points = path.slice(0, 20000);
@@ -222,7 +245,7 @@ export function Stage() {
   useEffect(() => {
     pointing.changed = () => redraw((count) => count + 1);
   }, []);
-  useEffect(() => pointing.out(), [project, tool, dropped]);
+  useEffect(() => pointing.out(), [project, tool, dropped, dropper]);
 
   const empty = !photo.width;
   const hint = working && working !== t.working ? working : "";
@@ -230,7 +253,7 @@ export function Stage() {
     <div
       ref={frame}
       id="stage"
-      class={`stage ${usable ? tool : "idle"} ${hint ? "busy" : ""}`}
+      class={`stage ${usable ? (dropper ? "dropper" : tool) : "idle"} ${hint ? "busy" : ""}`}
       tabIndex={0}
       role="application"
       aria-label={t.stage}
@@ -263,12 +286,20 @@ export function Stage() {
         />
       )}
       {comparing && usable && !empty && <Divider box={box} frame={frame} />}
-      {usable && stage?.badge && !before && <span class="badge">{stage.badge}</span>}
+      {usable && stage?.badge && !before && !dropper && <span class="badge">{stage.badge}</span>}
+      {dropper && <span class="badge hint">{t.dropperHint}</span>}
       {before && <span class="badge">{t.beforeLabel}</span>}
-      {zoom > 1.01 && (
-        <div class="zoom">
-          <button onClick={() => setBox(fitted(photo, room))}>{t.fit}</button>
-          <span>{t.zoom(Math.round((box.width / Math.max(photo.width, 1)) * 100))}</span>
+      {usable && !empty && (
+        <div class="zoom" onPointerDown={(event) => event.stopPropagation()}>
+          {Math.abs(zoom - 1) > 0.01 && (
+            <button title={`${t.fit} (0)`} onClick={() => setBox(fitted(photo, room))}>
+              {t.fitShort}
+            </button>
+          )}
+          <button id="own-pixels" title={`${t.ownPixels} (Z)`} aria-label={t.ownPixels} aria-pressed={Math.abs(percent - 100) < 1} onClick={toOwn}>
+            1:1
+          </button>
+          <span>{t.zoom(Math.round(percent))}</span>
         </div>
       )}
     </div>

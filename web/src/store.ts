@@ -32,8 +32,17 @@ export interface View {
   dropped: string;
   sent: number | null;
   results: Result[];
-  lamp: { kelvin: number; power: number };
+  lamp: { kelvin: number; power: number; before: number };
   sam: boolean;
+  /** Whether the mesh is shown in place of the picture. */
+  mesh: boolean;
+  /** Exposure of what is seen, stops; it changes no picture. */
+  exposure: number;
+  clipped: boolean;
+  /** Who gets the colour that is clicked next. */
+  dropper: ((colour: string) => void) | null;
+  /** Show the photo's own pixels, or the whole picture again. */
+  zoomOwn: () => void;
   size: number;
   predictor: string;
   fov: string;
@@ -61,8 +70,13 @@ export const view: View = {
   dropped: "",
   sent: null,
   results: [],
-  lamp: { kelvin: 2700, power: 1 },
+  lamp: { kelvin: 2700, power: 1, before: 0.75 },
   sam: false,
+  mesh: false,
+  exposure: 0,
+  clipped: false,
+  dropper: null,
+  zoomOwn: () => undefined,
   size: 512,
   predictor: "auto",
   fov: "auto",
@@ -101,7 +115,7 @@ function remark(note: string): void {
   noteTimer = window.setTimeout(() => set({ note: "" }), 5000);
 }
 
-function tell(error: unknown): void {
+export function tell(error: unknown): void {
   say(error instanceof Refusal ? error.message : t.lost);
 }
 
@@ -128,6 +142,11 @@ export function change(place: string, body: object = {}, key = "", words = ""): 
     } else queue.push(entry);
     void drain();
   });
+}
+
+/** Whether a change is on its way. */
+export function pending(): boolean {
+  return running;
 }
 
 async function drain(): Promise<void> {
@@ -250,7 +269,7 @@ export async function arrive(): Promise<void> {
 
 export async function begin(): Promise<void> {
   const kept = JSON.parse(sessionStorage.getItem("view") ?? "{}") as Partial<View>;
-  Object.assign(view, kept);
+  Object.assign(view, { ...kept, lamp: { ...view.lamp, ...kept.lamp } });
   await arrive();
   connect();
 }
@@ -320,6 +339,18 @@ export async function editProjects(place: string, body: object): Promise<void> {
   try {
     set({ projects: await post<Project[]>(place, body) });
     await refresh();
+  } catch (error) {
+    tell(error);
+  }
+}
+
+/** Give the colour of a place, without the light on it, to whoever asked for one. */
+export async function drop(at: [number, number]): Promise<void> {
+  const use = view.dropper;
+  set({ dropper: null });
+  try {
+    const { colour } = await post<{ colour: string }>("colour", { at });
+    use?.(colour);
   } catch (error) {
     tell(error);
   }

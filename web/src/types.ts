@@ -39,6 +39,8 @@ export interface State {
   project: Project | null;
   expected: Project | null;
   ready: boolean;
+  /** Width and height of the photo as it was taken. */
+  original: [number, number] | null;
   stage: Stage;
   steps: Step[];
   current: number | null;

@@ -15,7 +15,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
-from materialist.darkroom import bodies, editing, opening, taking
+from materialist.darkroom import bodies, editing, opening, seeing, taking
 from materialist.darkroom.channel import channel
 from materialist.darkroom.desk import Desk, Desks
 from materialist.darkroom.endpoint import got, guarded, posted
@@ -48,6 +48,7 @@ _POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
     "pick": (bodies.Pick, editing.pick),
     "point": (bodies.Pointed, editing.point),
     "deselect": (bodies.Nothing, editing.deselect),
+    "colour": (bodies.Pointed, seeing.colour_at),
     # Changing.
     "set": (bodies.Options, editing.set_options),
     "use": (bodies.File, editing.use_file),
@@ -117,6 +118,7 @@ def _routes(desks: Desks) -> list[Any]:
         "/api/projects": lambda desk, request: _json(opening.listed(desk)),
         "/api/report": lambda desk, request: _json(report_of(desk)),
         "/api/photo": _photo,
+        "/api/mesh": _mesh,
         "/api/light/{name}": lambda desk, request: _jpeg(light_jpeg(request.path_params["name"])),
         "/api/example/{name}": _example,
         "/api/map/{name}": lambda desk, request: _jpeg(map_jpeg(desk, request.path_params["name"])),
@@ -165,8 +167,18 @@ def _state(desk: Desk, request: Request) -> Response:
 
 
 def _photo(desk: Desk, request: Request) -> Response:
-    """The open photo; `working=1` at working size."""
+    """The open photo; `working=1` at working size, `full=1` with all its pixels."""
+    if "full" in request.query_params:
+        return _jpeg(seeing.full_jpeg(desk))
     return _jpeg((working_jpeg if "working" in request.query_params else native_jpeg)(desk))
+
+
+def _mesh(desk: Desk, request: Request) -> Response:
+    return Response(
+        seeing.mesh_bytes(desk),
+        media_type="application/octet-stream",
+        headers={"cache-control": "no-store"},
+    )
 
 
 def _example(desk: Desk, request: Request) -> Response:

@@ -5,8 +5,11 @@ from typing import Any
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
 from materialist.darkroom.removing import take_away
+from materialist.darkroom.reopening import edit_at
 from materialist.darkroom.state import outline, settable, state
+from materialist.edits.core.operation import Target
 from materialist.edits.light import presets
+from materialist.edits.recipe import region_of
 from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.option_kinds import declarations
@@ -22,6 +25,12 @@ FILES = {"texture", "envmap", "gain", "mesh"}
 def pick(desk: Desk, body: bodies.Pick) -> State:
     """A click, a box or a brush stroke."""
     given = body.model_dump(exclude={"method"})
+    if body.tool == "click" and body.mode == "new" and len(body.at) == 2:
+        # What was edited already opens its edit, with the selection that it was made with.
+        index = edit_at(desk.session, *body.at)
+        if index is not None:
+            desk.session.act("choose", index)
+            return state(desk)
     known = None
     # What the page outlined under the pointer is what the click takes.
     if body.tool == "click" and body.method == "network" and len(body.at) == 2:
@@ -31,7 +40,13 @@ def pick(desk: Desk, body: bodies.Pick) -> State:
 
 
 def point(desk: Desk, body: bodies.Pointed) -> State:
-    """The outline of what a click would take."""
+    """The outline of what a click would take, or of the edit that it would open."""
+    session = desk.session
+    index = edit_at(session, *body.at)
+    if index is not None:
+        step = session.edits.steps[index]
+        placed = step.operation.target is Target.PLACE
+        return {"region": "" if placed else outline(region_of(session.scene, step))}
     return {"region": outline(desk.pointed(*body.at))}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from materialist import __version__
 from materialist.color import srgb_levels
 from materialist.darkroom.desk import Desk
+from materialist.darkroom.seeing import edited_scene
 from materialist.edits.light import presets
 from materialist.edits.registry import OPERATIONS
 from materialist.edits.select import sam
@@ -53,6 +54,7 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
             "project": project_facts(session.project),
             "expected": project_facts(desk.expected),
             "ready": session.live is not None and session.live.ready,
+            "original": _original(desk),
             "stage": {**shown, "region": outlined},
             "steps": [
                 {
@@ -76,6 +78,15 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
 def project_facts(project: Project | None) -> dict[str, Any] | None:
     """What a page shows of a project; None for none."""
     return None if project is None else {"name": project.name, "title": project.title}
+
+
+def _original(desk: Desk) -> list[int] | None:
+    """[width, height] of the open photo as it was taken."""
+    live = desk.session.live
+    if live is None:
+        return None
+    height, width = live.scene.photo.original.shape[:2]
+    return [width, height]
 
 
 def _of_selection(desk: Desk, selection: Selection) -> tuple[str, dict[str, Any] | None]:
@@ -222,7 +233,7 @@ def example_file(studio: Studio, name: str) -> Path:
 
 def map_jpeg(desk: Desk, name: str) -> bytes:
     """A map of what the page shows, by its place in `stage.named_maps`. Raises InputError for another name."""
-    maps = named_maps(_edited(desk))
+    maps = named_maps(edited_scene(desk))
     if not re.fullmatch("[0-9]{1,3}", name) or int(name) >= len(maps):
         raise InputError(f"There is no map {name!r}.")
     return display.encoded(maps[int(name)][0], "JPEG", quality=92)
@@ -231,15 +242,8 @@ def map_jpeg(desk: Desk, name: str) -> bytes:
 def report_of(desk: Desk) -> dict[str, Any]:
     """The names of the maps, the quality in words, and the warnings of the edits."""
     session = desk.session
-    scene = session.scene
+    scene = edited_scene(desk)
     return {
         "maps": [title for _, title in named_maps(scene)],
         "report": session.without_folders(report(scene)),
     }
-
-
-def _edited(desk: Desk) -> Scene:
-    """The scene with the edits that do not take long to be made, glass aside."""
-    session = desk.session
-    live = session.live
-    return session.scene if live is None else live.edited(session.edits.active)

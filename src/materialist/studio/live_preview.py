@@ -16,8 +16,6 @@ from typing import Any
 import cv2
 import numpy as np
 
-from materialist.camera import project
-from materialist.color import luminance
 from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step, apply, options_of, region_of
@@ -28,7 +26,8 @@ from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
 from materialist.studio.access.quota import Allowance
 from materialist.studio.edit_list import kept, key_of, step_summary
-from materialist.types import Array, Body, Scene
+from materialist.studio.sketch import draw_bodies, light_lamps
+from materialist.types import Array, Scene
 
 
 def _use_one_thread() -> None:
@@ -40,7 +39,6 @@ def _use_one_thread() -> None:
 
 _THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_use_one_thread)
 """The one thread that traces and shades: the renderer's variant belongs to a thread, and so do torch's helpers."""
-_LIGHT = np.array([0.35, 0.8, 0.5]) / np.linalg.norm([0.35, 0.8, 0.5])
 
 
 class LivePreview:
@@ -181,6 +179,9 @@ class LivePreview:
         if edited.photo is not self.scene.photo:
             filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
             picture = np.where(filled, edited.photo.linear, picture)
+        # --- Lamps: their light without its shadows ---
+        if edited.lamps:
+            picture = light_lamps(picture, edited)
         # --- Glass: its ground first, then bodies, then the glass before them ---
         for step, pane in known:
             if pane is None:
@@ -266,22 +267,6 @@ def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:
     )
 
 
-def draw_bodies(picture: Array, scene: Scene) -> Array:
-    """[H, W, 3] linear picture with the scene's bodies drawn where they are nearer than the surface."""
-    # About as bright as the photo.
-    exposure = 2 * float(luminance(scene.photo.linear).mean())
-    # The farthest first: nearer ones are drawn over them.
-    for body in sorted(scene.bodies, key=lambda body: float(body.vertices[:, 2].mean())):
-        colour, depth = _drawn(body, scene, exposure)
-        behind = (scene.depth > 0) & (scene.depth * 1.02 < depth)
-        # Glass is sketched as see-through.
-        share = 1 - 0.7 * body.surface.transmission
-        picture = np.where(
-            ((depth > 0) & ~behind)[..., None], picture + share * (colour - picture), picture
-        )
-    return picture.astype(np.float32)
-
-
 def sketch_glass(picture: Array, region: Array, tint: Colour) -> Array:
     """[H, W, 3] with the object under a region [H, W] bool blurred and tinted, until its glass is traced."""
     spread = 1 + int(1.5 * np.sqrt(region.sum()))  # pixels
@@ -292,34 +277,3 @@ def sketch_glass(picture: Array, region: Array, tint: Colour) -> Array:
 def lay_over(picture: Array, piece: Array, share: Array) -> Array:
     """[H, W, 3] with another picture laid over it, by its share [H, W]."""
     return picture + share[..., None] * (piece - picture)
-
-
-def _drawn(body: Body, scene: Scene, exposure: float) -> tuple[Array, Array]:
-    """Colour [H, W, 3] and depth [H, W] (0: nothing) of a body, far triangles drawn first."""
-    colour = np.zeros((*scene.depth.shape, 3), np.float32)
-    depth = np.zeros(scene.depth.shape, np.float32)
-    # --- Triangles on the screen, at most as many as can be drawn at once ---
-    stride = -(-len(body.faces) * len(scene.bodies) // SETTINGS.triangles)
-    corners = body.vertices[body.faces[::stride]]  # [F, 3, 3]
-    pixels, away = project(corners, scene.camera)
-    middle = away.mean(1)
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1)
-    seen = (away > 0).all(1) & (length > 0) & (np.einsum("fi,fi->f", normal, corners.mean(1)) < 0)
-    # --- Shading: a fixed light from above, and some from around ---
-    shade = 0.35 + 0.65 * np.clip(normal @ _LIGHT / np.maximum(length, 1e-20), 0, 1)
-    albedo = np.asarray(body.surface.albedo, np.float32).reshape(-1, 3).mean(0) * np.asarray(
-        body.surface.tint
-    )
-    points = np.round(np.clip(pixels, -1e5, 1e5) * 16).astype(np.int32)  # sixteenths of a pixel
-    # --- Painter's algorithm ---
-    for face in np.argsort(-middle):
-        if seen[face]:
-            tone = [float(v) for v in np.minimum(albedo * shade[face] * exposure, 1)]
-            cv2.fillConvexPoly(colour, points[face], tone, shift=4)
-            cv2.fillConvexPoly(depth, points[face], float(middle[face]), shift=4)
-    if stride > 1:
-        # Dilation closes the gaps of the triangles that were left out.
-        kernel = np.ones((3, 3), np.uint8)
-        return np.asarray(cv2.dilate(colour, kernel)), np.asarray(cv2.dilate(depth, kernel))
-    return colour, depth

@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from materialist.color import linear_to_srgb
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.types import Array, Scene
@@ -17,6 +18,8 @@ from materialist.types import Array, Scene
 REPLACE = "new"
 ADD = "add"
 REMOVE = "remove"
+_PIECE_COLOUR = 14.0
+"""How far colours of one piece may lie from that of its pixel, in each of L, a and b; tuned by eye."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +69,11 @@ class Selection:
         row = min(int(y), height - 1)
         column = min(int(x), width - 1)
         inside = any(part[row, column] for part in self.parts)
+        if mode == REMOVE:
+            return self._without(piece_at(scene, self.mask, row, column)) if inside else self
         # A second click on a selected object takes it out.
-        if (inside and mode != ADD) or mode == REMOVE:
-            return (
-                Selection(tuple(part for part in self.parts if not part[row, column]))
-                if inside
-                else self
-            )
+        if inside and mode != ADD:
+            return Selection(tuple(part for part in self.parts if not part[row, column]))
         if region is None:
             region = select(scene, click=(x, y), method=method)
         return self._with(region, mode)
@@ -108,6 +109,23 @@ class Selection:
     def _without(self, region: Array) -> Selection:
         left = tuple(p & ~region for p in self.parts)
         return Selection(tuple(p for p in left if p.any()))
+
+
+def piece_at(scene: Scene, mask: Array | None, row: int, column: int) -> Array:
+    """[H, W] bool: what is of one colour with a pixel of a selection [H, W] bool, and joined to it within that."""
+    if mask is None:
+        return np.zeros(scene.depth.shape, bool)
+    # By the colour without light: a shadow is no border. Differences are those that the eye sees (Lab).
+    lab = cv2.cvtColor(linear_to_srgb(scene.materials.albedo).astype(np.float32), cv2.COLOR_RGB2LAB)
+    lab = cv2.bilateralFilter(lab, 5, 10, 3)
+    barred = np.pad(np.where(mask, 0, 1).astype(np.uint8), 1, constant_values=1)
+    flags = 4 | cv2.FLOODFILL_FIXED_RANGE | cv2.FLOODFILL_MASK_ONLY | (2 << 8)
+    around = (_PIECE_COLOUR,) * 3
+    cv2.floodFill(lab, barred, (column, row), (0, 0, 0), around, around, flags)
+    found = (barred[1:-1, 1:-1] == 2).astype(np.uint8)
+    # Specks that are left between belong to it.
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+    return (cv2.morphologyEx(found, cv2.MORPH_CLOSE, kernel) > 0) & mask
 
 
 def read_pick(data: Any) -> dict[str, Any]:

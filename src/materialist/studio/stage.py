@@ -134,7 +134,7 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
     if panes or sketched:
         return "Sketch: path tracing shows the rest"
     if any("lamps" in step.options for step in steps):
-        return "Live preview: lamps show in path tracing"
+        return "Live preview: shadows of lamps show in the final picture"
     return "Live preview"
 
 

@@ -144,3 +144,18 @@ def test_a_texture_of_one_pixel_has_the_shape_of_the_photo(scale):
     albedo = projected(SCENE, MASK, pixel, scale)
     assert albedo.shape == SCENE.materials.albedo.shape
     np.testing.assert_allclose(albedo, np.broadcast_to(pixel, albedo.shape), atol=1e-6)
+
+
+def test_a_texture_is_turned_clockwise_in_its_plane():
+    scene = floor_scene(tilt=30.0)
+    ramp = np.linspace(0.9, 0.1, 16, dtype=np.float32)
+    bright_left = np.broadcast_to(ramp[None, :, None], (16, 16, 3))
+
+    def laid(turn):
+        changes = {"texture": bright_left, "texture_scale": 3, "texture_turn": turn}
+        return edit(scene, scene.depth > 0, **changes).materials.albedo[-14:-4, 4:-4, 0]
+
+    # Left goes up, then right; where the picture repeats it jumps.
+    assert (np.diff(laid(0), axis=1) < 0).mean() > 0.9
+    assert (np.diff(laid(90), axis=0) < 0).mean() > 0.9
+    assert (np.diff(laid(180), axis=1) > 0).mean() > 0.9

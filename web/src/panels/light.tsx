@@ -3,7 +3,7 @@ import { address } from "../api";
 import { FileButton, Group, Slider } from "../controls";
 import { Icon } from "../icons";
 import { lampsOf, setLamp } from "../marks";
-import { change, optionsOf, set, useFile, useView, view } from "../store";
+import { change, optionsOf, set, useFile, useView } from "../store";
 import { t } from "../strings";
 import { number } from "./material";
 
@@ -14,7 +14,7 @@ function light(options: Options, key = ""): Promise<void> {
 }
 
 export function Light() {
-  const { state, about, lamp } = useView();
+  const { state, about, lamp, tool } = useView();
   const options = optionsOf(state, "relight") as Record<string, string>;
   const chosen = /light-([a-z]+)\.exr/.exec(options.envmap ?? "")?.[1] ?? (options.envmap ? "own" : "");
   const lamps = lampsOf(options);
@@ -57,16 +57,18 @@ export function Light() {
         {lamps.map((one, index) => (
           <Lamp key={index} lamp={one} index={index} />
         ))}
-        {!lamps.length && view.tool === "lamp" && (
-          <Slider
-            label={t.kelvin}
-            unit=" K"
-            low={1700}
-            high={12000}
-            step={100}
-            value={lamp.kelvin}
-            changed={(kelvin) => set({ lamp: { ...lamp, kelvin: kelvin ?? 2700 } })}
-          />
+        {lamps.length > 1 && (
+          <button class="quiet" onClick={() => void change("lamps", { lamps: [] })}>
+            {t.noLamps}
+          </button>
+        )}
+        {tool === "lamp" && (
+          <div class="card" id="next-lamp">
+            <b>{t.nextLamp}</b>
+            <Slider label={t.kelvin} unit=" K" low={1700} high={12000} step={100} value={lamp.kelvin} changed={(value) => set({ lamp: { ...lamp, kelvin: value ?? 2700 } })} />
+            <Slider label={t.strength} low={0.05} high={5} step={0.05} value={lamp.power} changed={(value) => set({ lamp: { ...lamp, power: value ?? 1 } })} />
+            <Slider label={t.nearness} low={0.2} high={0.98} step={0.01} value={lamp.before} changed={(value) => set({ lamp: { ...lamp, before: value ?? about?.lamp_share ?? 0.75 } })} />
+          </div>
         )}
       </Group>
     </>

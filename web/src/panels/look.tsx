@@ -1,7 +1,9 @@
 import { useEffect, useState } from "preact/hooks";
 import { address, get } from "../api";
-import { Group } from "../controls";
-import { useView } from "../store";
+import { Group, Slider, Switch } from "../controls";
+import { Histogram } from "../histogram";
+import { Icon } from "../icons";
+import { set, useView } from "../store";
 import { t } from "../strings";
 
 interface Report {
@@ -10,19 +12,35 @@ interface Report {
 }
 
 export function Look() {
-  const { state } = useView();
+  const { state, exposure, clipped, mesh } = useView();
   const [facts, setFacts] = useState<Report | null>(null);
   const [large, setLarge] = useState<number | null>(null);
   const project = state?.project?.name;
   const edits = JSON.stringify(state?.steps);
   useEffect(() => {
-    if (project) void get<Report>("report").then(setFacts, () => setFacts(null));
-  }, [project]);
+    if (!project) return;
+    let wanted = true;
+    const shown = (report: Report | null) => wanted && setFacts(report);
+    void get<Report>("report").then(shown, () => shown(null));
+    return () => void (wanted = false);
+  }, [project, edits]);
   if (!project || !facts) return <div class="blank">{t.working}</div>;
   // Another list of edits has other maps.
   const map = (place: number) => address(`map/${place}`, { of: String(hash(project + edits)) });
   return (
     <>
+      <Group title={t.brightness}>
+        <Histogram />
+        <Slider id="exposure" label={t.exposure} low={-4} high={4} step={0.1} value={exposure} changed={(value) => set({ exposure: value ?? 0 })} />
+        <Switch label={t.clipped} on={clipped} changed={(on) => set({ clipped: on })} />
+        <p class="soft">{t.exposureHint}</p>
+      </Group>
+      <Group title={t.mesh}>
+        <button class="wide with-icon" id="show-mesh" aria-pressed={mesh} disabled={!state.ready} onClick={() => set({ mesh: !mesh })}>
+          <Icon name="object" />
+          {mesh ? t.hideMesh : t.showMesh}
+        </button>
+      </Group>
       <Group title={t.maps}>
         <div class="maps">
           {facts.maps.map((title, place) => {

@@ -1,10 +1,14 @@
-import { Colour, FileButton, Fold, Group, Slider } from "../controls";
+import { useState } from "preact/hooks";
+import { Colour, FileButton, Fold, Group, Slider, Switch } from "../controls";
 import { PRESETS, type Preset } from "../presets";
 import { change, optionsOf, useFile, useView, view } from "../store";
 import { t } from "../strings";
 import { Glass } from "./glass";
 
 type Options = Record<string, string | number | null>;
+
+/** A colour takes the place of a texture, and of how that lies. */
+const NO_TEXTURE = { texture: null, texture_scale: null, texture_turn: null };
 
 export function edit(options: Options, key = ""): Promise<void> {
   return change("set", { kind: "edit", options }, key);
@@ -45,17 +49,21 @@ export function Material() {
         </div>
       </Group>
       {isGlass ? <Glass /> : about && <Plain />}
-      <Fold title={t.takeAway}>
-        <button
-          id="remove"
-          class="wide"
-          onClick={() => void change("set", { kind: "remove", options: {} }, "", t.removing)}
-        >
-          {t.takeAway}
-        </button>
-        <p class="soft">{t.shadowToo}</p>
-      </Fold>
+      <Removal />
     </>
+  );
+}
+
+function Removal() {
+  const [shadow, setShadow] = useState(true);
+  const remove = () => change("set", { kind: "remove", options: shadow ? {} : { shadow: 0 } }, "", t.removing);
+  return (
+    <Fold title={t.takeAway}>
+      <Switch id="shadow" label={t.shadowToo} on={shadow} changed={setShadow} />
+      <button id="remove" class="wide" onClick={() => void remove()}>
+        {t.takeAway}
+      </button>
+    </Fold>
   );
 }
 
@@ -72,7 +80,7 @@ function Plain() {
   const colour = /^#[0-9a-f]{6}$/i.test(options.albedo ?? "") ? options.albedo! : (fitted?.colour ?? "#808080");
   // A picked colour appears as it was picked: nothing turns or fades it.
   const pick = (value: string) =>
-    void edit({ albedo: value, texture: null, hue: null, saturation: null, value: null }, "albedo");
+    void edit({ albedo: value, ...NO_TEXTURE, hue: null, saturation: null, value: null }, "albedo");
   const changed = ["albedo", "texture", "hue", "saturation", "value"].some((name) => name in options);
   return (
     <>
@@ -82,7 +90,7 @@ function Plain() {
           changed && (
             <button
               class="link"
-              onClick={() => void edit({ albedo: null, texture: null, hue: null, saturation: null, value: null })}
+              onClick={() => void edit({ albedo: null, ...NO_TEXTURE, hue: null, saturation: null, value: null })}
             >
               {t.ownColours}
             </button>
@@ -111,21 +119,33 @@ function Plain() {
         <div class="row">
           <FileButton label={t.chooseTexture} accept="image/*,.exr,.hdr" chosen={(file) => void useFile(file, "texture")} />
           {"texture" in options && (
-            <button class="quiet" onClick={() => void edit({ texture: null, texture_scale: null })}>
+            <button class="quiet" onClick={() => void edit(NO_TEXTURE)}>
               {t.noTexture}
             </button>
           )}
         </div>
         {"texture" in options && (
-          <Slider
-            id="texture_scale"
-            label={t.textureScale}
-            low={0.1}
-            high={4}
-            step={0.05}
-            value={number(options.texture_scale, 1)}
-            changed={slide("texture_scale")}
-          />
+          <>
+            <Slider
+              id="texture_scale"
+              label={t.textureScale}
+              low={0.1}
+              high={4}
+              step={0.05}
+              value={number(options.texture_scale, 1)}
+              changed={slide("texture_scale")}
+            />
+            <Slider
+              id="texture_turn"
+              label={t.textureTurn}
+              unit="°"
+              low={-180}
+              high={180}
+              step={1}
+              value={number(options.texture_turn)}
+              changed={slide("texture_turn")}
+            />
+          </>
         )}
       </Group>
       <Fold title={t.border} open={"grow" in options || "feather" in options}>

@@ -46,6 +46,16 @@ export function Things() {
               <Slider id="turn" label={t.turn} unit="°" low={-180} high={180} step={1} value={number(options.turn)} changed={(value) => thing({ turn: value }, "turn")} />
             )}
           </Group>
+          {!shape && !fallen && (
+            <Group title={t.upAxis}>
+              <Choice
+                label={t.upAxis}
+                value={String(options.up ?? "auto")}
+                options={[["auto", t.upAuto], ["y", "Y"], ["z", "Z"]]}
+                changed={(value) => thing({ up: value === "auto" ? null : value })}
+              />
+            </Group>
+          )}
           <Group title={t.madeOf}>
             <Choice
               label={t.madeOf}

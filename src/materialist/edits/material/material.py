@@ -96,7 +96,8 @@ def _base_colour(
         if isinstance(picture, str | Path):
             picture = np.clip(decode_photo(Path(picture)).exposed(), 0, 1)
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
-        return projected(scene, region, picture, changes.texture_scale), list(np.shape(picture))
+        laid = projected(scene, region, picture, changes.texture_scale, turn=changes.texture_turn)
+        return laid, list(np.shape(picture))
     if changes.albedo is not None:
         return np.broadcast_to(
             np.asarray(changes.albedo, np.float32), scene.materials.albedo.shape
@@ -116,11 +117,14 @@ def _mix(old: Array, new: Array, weight: Array) -> Array:
     return np.where(weight >= 1, new, old + (new - old) * weight).astype(np.float32)
 
 
-def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -> Array:
+def projected(
+    scene: Scene, region: Array, picture: Array, scale: float = 1.0, *, turn: float = 0.0
+) -> Array:
     """[H, W, 3] albedo: `picture` [h, w, 3] projected on the region [H, W] bool along its mean normal.
 
     The picture lies in the plane of the region's mean normal, upright as the camera sees it, and covers the region's
-    extent there (times `scale`; repeated beyond), so that flat surfaces carry it in right perspective.
+    extent there (times `scale`; repeated beyond), so that flat surfaces carry it in right perspective. turn: degrees
+    by which it is turned clockwise in that plane.
     Raises InputError for a picture without three channels, or with values outside [0, 1].
     """
     picture = np.asarray(picture, np.float32)
@@ -138,6 +142,9 @@ def projected(scene: Scene, region: Array, picture: Array, scale: float = 1.0) -
     # [H, W] scene units; `along` grows downwards as rows do.
     across = points @ right
     along = points @ -up
+    if turn:
+        cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        across, along = cos * across + sin * along, cos * along - sin * across
     height, width = picture.shape[:2]
     # The longer side of the region is covered once; the other keeps the picture's proportions.
     texel = max(np.ptp(across[use]) / width, np.ptp(along[use]) / height, 1e-9) * scale

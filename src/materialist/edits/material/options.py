@@ -37,6 +37,14 @@ class MaterialEdit(OperationOptions):
     texture_scale: float = option(
         1.0, "Its size; 1 covers the region once.", low=0, high=100, ends="(]", needs="texture"
     )
+    texture_turn: float = option(
+        0.0,
+        "Turn it clockwise in its plane, degrees.",
+        low=-3600,
+        high=3600,
+        unit="degrees",
+        needs="texture",
+    )
     # The other maps.
     roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **SHIFT)
     metallic: float | str | None = option(None, "The same for metallic.", **SHIFT)
@@ -61,6 +69,7 @@ class MaterialKeywords(TypedDict, total=False):
     albedo: Sequence[float] | str | None
     texture: Array | str | Path | None
     texture_scale: float
+    texture_turn: float
     roughness: float | str | None
     metallic: float | str | None
     grow: float

@@ -1,0 +1,70 @@
+"""A click on what was edited before opens its edit."""
+
+from typing import Any
+
+import numpy as np
+
+from materialist.camera import project
+from materialist.edits.core.operation import Target
+from materialist.edits.recipe import Step, region_of
+from materialist.errors import MaterialistError
+from materialist.studio.session import Session
+from materialist.types import Array, Body
+
+
+def edit_at(session: Session, x: float, y: float) -> int | None:
+    """The place in the list of the edit that a click at a pixel means; None for none, and for the current one.
+
+    What stands in front comes first: objects, then regions, each the latest first. A second click on the thing of the
+    current edit selects as ever.
+    """
+    live = session.live
+    if live is None:
+        return None
+    column, row = session.pixel(x, y)
+    edits = session.edits
+    found: list[tuple[bool, int]] = []
+    for index, step in enumerate(edits.steps):
+        if step.skipped:
+            continue
+        try:
+            if step.operation.target is Target.PLACE:
+                if _stands_at(session, index, column, row):
+                    found.append((True, index))
+            elif (
+                step.operation.target is Target.REGION and region_of(live.scene, step)[row, column]
+            ):
+                found.append((False, index))
+        except MaterialistError:
+            continue  # what cannot be applied is told by the picture
+    if not found or max(found)[1] == edits.current:
+        return None
+    return max(found)[1]
+
+
+def _stands_at(session: Session, index: int, column: int, row: int) -> bool:
+    """Whether an object of the list is seen at a pixel."""
+    live = session.live
+    assert live is not None
+    steps = session.edits.steps[: index + 1]
+    before: tuple[Step, ...] = tuple(step for step in steps[:-1] if not step.skipped)
+    known = {id(body) for body in live.edited(before).bodies}
+    added = [body for body in live.edited((*before, steps[-1])).bodies if id(body) not in known]
+    return any(_covers(body, live.scene.camera, column + 0.5, row + 0.5) for body in added)
+
+
+def _covers(body: Body, camera: Any, x: float, y: float) -> bool:
+    """Whether a triangle of a body lies over a place of the picture."""
+    pixels, away = project(body.vertices, camera)
+    corners = pixels[body.faces]  # [F, 3, 2]
+    place = np.array([x, y])
+    sides = [_side(corners[:, k], corners[:, (k + 1) % 3], place) for k in range(3)]
+    inside = np.all(np.stack(sides) >= 0, 0) | np.all(np.stack(sides) <= 0, 0)
+    return bool((inside & (away[body.faces] > 0).all(1)).any())
+
+
+def _side(a: Array, b: Array, place: Array) -> Array:
+    """[F] on which side of the lines from a to b [F, 2] a place lies, as a signed area."""
+    edge = b - a
+    to = place - a
+    return edge[:, 0] * to[:, 1] - edge[:, 1] * to[:, 0]
