@@ -163,3 +163,12 @@ def test_a_batch_behind_a_url_resumes_with_what_has_changed(tmp_path):
         {row["name"]: row["photo_hash"] for row in outcome.rows} for outcome in (first, again)
     ]
     assert hashes[0]["a"] == hashes[1]["a"] and hashes[0]["b"] != hashes[1]["b"]
+
+
+def test_one_file_under_several_names_is_one_photo(tmp_path):
+    photos(tmp_path, "a")
+    (tmp_path / "list.txt").write_text(f"a.png\n./a.png\n{tmp_path / 'a.png'}\n")
+    notes = []
+    listed = list_photos(tmp_path / "list.txt", runs="r", notes=notes)
+    assert [photo.id for photo in listed] == ["a.png"]
+    assert notes == ["More than one line of list.txt names a.png; each is done once."]

@@ -1,5 +1,6 @@
 """Colours that a file states, by anything: each gives the same four linear colours."""
 
+import io
 import struct
 
 import cv2
@@ -389,6 +390,7 @@ REPORTED_FILES = [
     ("hdr_primaries", 0.02),
     ("hdr_readonly_tmp", 0.02),
     ("batch_names", 0.02),
+    ("jpg_no_eoi", 0.012),
 ]
 
 
@@ -427,3 +429,38 @@ def test_primaries_of_a_float_tiff_without_a_profile(tmp_path):
     )
     found = decode(tmp_path / "a.tif").linear
     assert found[0, 0] == pytest.approx(2 * quadrants()[0, 0], abs=1e-3)
+
+
+def jpeg_of_noise(**options) -> bytes:
+    noise = np.random.default_rng(0).integers(0, 256, (48, 64, 3), np.uint8)
+    content = io.BytesIO()
+    Image.fromarray(noise).save(content, "JPEG", quality=90, **options)
+    return content.getvalue()
+
+
+@pytest.mark.parametrize("progressive", (False, True))
+def test_a_jpeg_without_its_end_marker_alone_is_whole(tmp_path, progressive):
+    content = jpeg_of_noise(progressive=progressive)
+    (tmp_path / "whole.jpg").write_bytes(content)
+    (tmp_path / "a.jpg").write_bytes(content[:-2])
+    found = decode(tmp_path / "a.jpg")
+    np.testing.assert_array_equal(found.linear, decode(tmp_path / "whole.jpg").linear)
+    assert found.warnings == ["The end marker of the JPEG is missing; all its pixels are there."]
+    for missing in (6, 20, len(content) // 2):
+        (tmp_path / "b.jpg").write_bytes(content[:-missing])
+        with pytest.raises(InputError, match="damaged or truncated"):
+            decode(tmp_path / "b.jpg")
+
+
+def test_colours_of_a_bmp_give_a_note(tmp_path):
+    Image.new("RGB", (16, 16), (200, 40, 40)).save(tmp_path / "plain.bmp")
+    assert decode(tmp_path / "plain.bmp").warnings == []
+    plain = (tmp_path / "plain.bmp").read_bytes()
+    # --- A header of version 4 in the place of that of 40 bytes ---
+    pixels = plain[54:]
+    for kind, notes in ((bytes(4), 1), (b"BGRs", 0)):
+        header = struct.pack("<I", 108) + plain[18:54] + bytes(16) + kind + bytes(48)
+        offset = 14 + len(header)
+        file = b"BM" + struct.pack("<IHHI", offset + len(pixels), 0, 0, offset) + header + pixels
+        (tmp_path / "v4.bmp").write_bytes(file)
+        assert len(decode(tmp_path / "v4.bmp").warnings) == notes

@@ -368,3 +368,18 @@ def test_plain_files_stay_bit_for_bit(tmp_path):
     decoded = read_exr_photo(tmp_path / "a.exr")
     np.testing.assert_array_equal(decoded.linear, quadrants().astype(np.float32))
     assert decoded.layer is None and decoded.warnings == []
+
+
+def test_channels_of_cie_xyz_are_colours(tmp_path):
+    linear = np.random.default_rng(0).uniform(0.1, 0.9, (12, 16, 3)).astype(np.float32)
+    matrix = np.array(
+        [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    )
+    xyz = (linear @ matrix.T).astype(np.float32)
+    # Equal energy is white in CIE XYZ, D65 in Rec.709: adapted, as for all primaries.
+    xyz /= (matrix.sum(1)).astype(np.float32)
+    channels = {name: np.ascontiguousarray(xyz[..., k]) for k, name in enumerate("XYZ")}
+    OpenEXR.File({}, channels).write(str(tmp_path / "a.exr"))
+    found = read_exr_photo(tmp_path / "a.exr")
+    assert "The channels X, Y and Z are taken as CIE XYZ." in found.warnings
+    assert np.abs(found.linear.mean((0, 1)) - linear.mean((0, 1))).max() < 0.05

@@ -120,12 +120,19 @@ def _of_list(file: Path, notes: list[str]) -> list[Listed]:
         ) from error
     entries = [re.split(r"(?:^|\s)#", line.strip(), maxsplit=1)[0].rstrip() for line in lines]
     listed = [_named(entry, file.parent) for entry in entries if entry]
-    repeated = [id for id, times in Counter(photo.id for photo in listed).items() if times > 1]
+    # One file may be named in several ways.
+    places: dict[str, Listed] = {}
+    repeated: dict[str, None] = {}
+    for photo in listed:
+        place = photo.location if is_url(photo.location) else os.path.realpath(photo.location)
+        if place in places:
+            repeated[places[place].id] = None
+        places.setdefault(place, photo)
     if repeated:
         notes.append(
-            f"More than one line of {file.name} names {_some(repeated)}; each is done once."
+            f"More than one line of {file.name} names {_some([*repeated])}; each is done once."
         )
-    return listed
+    return [*places.values()]
 
 
 def _named(entry: str, folder: Path) -> Listed:

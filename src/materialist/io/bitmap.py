@@ -33,6 +33,9 @@ MAX_ASPECT = 8
 _PIXEL_SHAPE = 8
 """Widest and narrowest pixel that is believed, width over height."""
 _LIMIT = threading.RLock()
+_JPEG_END = b"\xff\xd9"
+_ENTROPY = (b"\x01", b"\x55", b"\x24", b"\xaa", b"\xd3")
+"""Bytes that a JPEG decoder reads as coefficients; after some endings it takes a few of them for damage."""
 
 
 @dataclass
@@ -118,9 +121,18 @@ def read_bitmap(path: Path) -> Decoded:
     """Everything Pillow opens but deep TIFF: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
     with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
-        image.load()  # finds truncation, also for files whose pixels OpenCV reads below
+        notes = list[str]()
+        try:
+            image.load()  # finds truncation, also for files whose pixels OpenCV reads below
+        except OSError:
+            content = _with_end(path) if image.format in ("JPEG", "MPO") else None
+            if content is None:
+                raise
+            image = Image.open(io.BytesIO(content))
+            image.load()
+            notes.append("The end marker of the JPEG is missing; all its pixels are there.")
         one_picture = image.format in ("MPO", "HEIF", "JPEG")
-        warnings = frames_note(1 if one_picture else getattr(image, "n_frames", 1))
+        warnings = notes + frames_note(1 if one_picture else getattr(image, "n_frames", 1))
         tags = image_tags(image)
         chunks = png_chunks(path) if image.format == "PNG" else {}
         profile = None if b"cICP" in chunks else _profile(image, path)
@@ -152,6 +164,21 @@ def read_bitmap(path: Path) -> Decoded:
     )
     decoded.tags = tags
     return decoded
+
+
+def _with_end(path: Path) -> bytes | None:
+    """A JPEG of which the end marker alone is missing, with it; None where pixels are missing, too.
+
+    A decoder that has all pixels skips what follows; one that has not takes it for pixels.
+    """
+    content = path.read_bytes()
+    with Image.open(io.BytesIO(content + _JPEG_END)) as image:
+        picture = np.asarray(image)
+    for byte in _ENTROPY:
+        with Image.open(io.BytesIO(content + 64 * byte + _JPEG_END)) as image:
+            if not np.array_equal(picture, np.asarray(image)):
+                return None
+    return content + _JPEG_END
 
 
 def frames_note(frames: int) -> list[str]:

@@ -11,6 +11,10 @@ from materialist.io.colour_space import ColourSpace, Curve, Primaries, space
 
 _LARGEST_CHUNK = 1 << 20
 """Bytes of a PNG chunk that is kept; those of colour are small."""
+_BMP_CALIBRATED = bytes(4)
+_BMP_EMBEDDED = b"DEBM"
+_BMP_LINKED = b"KNIL"
+"""LCS_CALIBRATED_RGB, PROFILE_EMBEDDED ("MBED") and PROFILE_LINKED ("LINK") as they lie in the file."""
 _UNCALIBRATED = 65535
 _ADOBE_RGB = 2
 
@@ -57,6 +61,9 @@ def stated_space(
     """
     if kind == "PNG":
         stated, colours = _png_space(path, notes)
+    elif kind in ("BMP", "DIB") and _bmp_states_colours(path):
+        notes.append("The BMP states colours of its own, which are not read; it is taken as sRGB.")
+        return None
     else:
         # HEIC and AVIF state it in a box, PNG in chunks, others in EXIF alone.
         codes = nclx(path) if kind in ("AVIF", "HEIF") else None
@@ -184,3 +191,14 @@ def _of_gamma(chunks: Mapping[bytes, bytes]) -> ColourSpace | None:
 
 def _is_rec709(primaries: Sequence[float]) -> bool:
     return max(abs(a - b) for a, b in zip(primaries, spaces.REC709)) < 2e-3
+
+
+def _bmp_states_colours(path: Path) -> bool:
+    """Whether the header of a BMP (version 4 or 5) has primaries or a profile; most say sRGB or nothing."""
+    with path.open("rb") as file:
+        head = file.read(74)
+    start = 0 if head[:2] != b"BM" else 14
+    header = head[start:]
+    if len(header) < 60 or int.from_bytes(header[:4], "little") < 108:
+        return False
+    return header[56:60] in (_BMP_CALIBRATED, _BMP_EMBEDDED, _BMP_LINKED)

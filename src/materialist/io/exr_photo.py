@@ -12,7 +12,14 @@ import OpenEXR
 
 from materialist.errors import InputError
 from materialist.io.bitmap import Decoded, check_size, light_and_alpha, square_pixels
-from materialist.io.colour_space import REC709, Primaries, rgb_to_xyz, to_rec709, transformed
+from materialist.io.colour_space import (
+    CIE_XYZ,
+    REC709,
+    Primaries,
+    rgb_to_xyz,
+    to_rec709,
+    transformed,
+)
 from materialist.io.exr import (
     GREY,
     check_exr,
@@ -30,6 +37,10 @@ PLAIN = "RGB"
 """What channels without a layer are called."""
 _LIGHT = ("Y", "L")
 """Grey channels that may be a photo."""
+_RGB = ("R", "G", "B")
+_XYZ = ("X", "Y", "Z")
+_LUMINANCE_CHROMA = ("Y", "RY", "BY")
+"""Channels that are colours together."""
 _SHOWN = 8
 """Layers that a note names."""
 
@@ -98,13 +109,15 @@ def _layers(part_name: str, part: int, channels: dict[str, Array], parts: int) -
     # --- All layers that could be the photo, and the one that is ---
     layers = []
     for layer, values in layers_of(channels).items():
-        colours = {"R", "G", "B"} <= set(values) or {"Y", "RY", "BY"} <= set(values)
+        is_plain = parts == 1 and not layer
+        # Named layers of X, Y and Z are places, not colours.
+        colours = any(set(names) <= set(values) for names in (_RGB, _LUMINANCE_CHROMA))
+        colours |= is_plain and set(_XYZ) <= set(values)
         grey = next((name for name in _LIGHT if name in values), None)
         if not colours and grey is None and len(channels) == len(values) == 1:
             grey = next((name for name in values if name not in GREY), None)
         if colours or grey:
             name = _full_name(part_name if parts > 1 else "", layer)
-            is_plain = parts == 1 and not layer
             layers.append(_Layer(name, part, values, None if colours else grey, is_plain))
     return layers
 
@@ -144,6 +157,10 @@ def _light(layer: _Layer, header: dict[str, Any], path: Path, notes: list[str]) 
             pixels = np.concatenate([pixels, layer.channels["A"][..., None].astype(np.float32)], -1)
     elif "R" in layer.channels:
         pixels = stacked_channels(layer.channels, "RGB")
+    elif set(_XYZ) <= set(layer.channels):
+        primaries = CIE_XYZ
+        pixels = stacked_channels(layer.channels, "XYZ")
+        notes.append("The channels X, Y and Z are taken as CIE XYZ.")
     else:
         pixels = _from_luminance(layer.channels, primaries, exr_window(header, "dataWindow")[2:])
     pixels = displayed(pixels, header, path)
