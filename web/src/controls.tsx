@@ -31,15 +31,17 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
     setHeld(number);
     void Promise.resolve(changed(number)).then(() => mine === asked.current && setHeld(null));
   };
+  const digits = step < 0.01 ? 3 : step < 1 ? 2 : 0;
+  const text = `${shown.toFixed(digits)}${unit ?? ""}`;
   const commit = () => {
     if (typed === null) return;
-    const number = Number(typed.replace(",", "."));
+    setTyped(null);
+    if (typed === text) return;
+    const number = Number(typed.replace(",", ".").replace(unit ?? "", ""));
     // An empty box is no error: the option goes back to where it began.
     if (typed.trim() === "") send(null);
     else if (Number.isFinite(number)) send(Math.min(Math.max(number, low), high));
-    setTyped(null);
   };
-  const digits = step < 0.01 ? 3 : step < 1 ? 2 : 0;
   return (
     <div class="slider" id={id}>
       <label>
@@ -59,9 +61,10 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
         class="number"
         inputMode="decimal"
         aria-label={`${label}, number`}
-        value={typed ?? (unit ? `${shown.toFixed(digits)}${unit}` : shown.toFixed(digits))}
+        value={typed ?? text}
         onFocus={(event) => {
-          setTyped(String(Number(shown.toFixed(digits))));
+          // The text stays as it is: a change would undo what is selected in it.
+          setTyped(text);
           const box = event.currentTarget;
           requestAnimationFrame(() => box.select());
         }}
