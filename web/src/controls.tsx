@@ -22,6 +22,7 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
   const [held, setHeld] = useState<number | null>(null);
   const asked = useRef(0);
   const [typed, setTyped] = useState<string | null>(null);
+  const began = useRef("");
   const range = useRef<HTMLInputElement>(null);
   const shown = held ?? value;
   const share = ((Math.min(Math.max(shown, low), high) - low) / (high - low)) * 100;
@@ -31,11 +32,12 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
     setHeld(number);
     void Promise.resolve(changed(number)).then(() => mine === asked.current && setHeld(null));
   };
-  const commit = () => {
-    if (typed === null) return;
-    const number = Number(typed.replace(",", "."));
+  // What the box holds, and not what was last drawn: keys may come faster than drawings.
+  const commit = (text: string) => {
+    if (text === began.current) return setTyped(null);
+    const number = Number(text.replace(",", "."));
     // An empty box is no error: the option goes back to where it began.
-    if (typed.trim() === "") send(null);
+    if (text.trim() === "") send(null);
     else if (Number.isFinite(number)) send(Math.min(Math.max(number, low), high));
     setTyped(null);
   };
@@ -61,15 +63,17 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
         aria-label={`${label}, number`}
         value={typed ?? (unit ? `${shown.toFixed(digits)}${unit}` : shown.toFixed(digits))}
         onFocus={(event) => {
-          setTyped(String(Number(shown.toFixed(digits))));
+          began.current = event.currentTarget.value = String(Number(shown.toFixed(digits)));
+          setTyped(began.current);
           const box = event.currentTarget;
           requestAnimationFrame(() => box.select());
         }}
         onInput={(event) => setTyped(event.currentTarget.value)}
-        onBlur={commit}
+        onBlur={(event) => commit(event.currentTarget.value)}
         onKeyDown={(event) => {
           if (event.key === "Enter") event.currentTarget.blur();
           if (event.key === "Escape") {
+            event.currentTarget.value = began.current;
             setTyped(null);
             event.stopPropagation();
           }
