@@ -32,14 +32,14 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
     void Promise.resolve(changed(number)).then(() => mine === asked.current && setHeld(null));
   };
   const digits = step < 0.01 ? 3 : step < 1 ? 2 : 0;
-  const text = `${shown.toFixed(digits)}${unit ?? ""}`;
-  const commit = () => {
-    if (typed === null) return;
+  const shownText = `${shown.toFixed(digits)}${unit ?? ""}`;
+  // What the box holds, and not what was last drawn: keys may come faster than drawings.
+  const commit = (text: string) => {
     setTyped(null);
-    if (typed === text) return;
-    const number = Number(typed.replace(",", ".").replace(unit ?? "", ""));
+    if (text === shownText) return;
+    const number = Number(text.replace(",", ".").replace(unit ?? "", ""));
     // An empty box is no error: the option goes back to where it began.
-    if (typed.trim() === "") send(null);
+    if (text.trim() === "") send(null);
     else if (Number.isFinite(number)) send(Math.min(Math.max(number, low), high));
   };
   return (
@@ -61,18 +61,19 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
         class="number"
         inputMode="decimal"
         aria-label={`${label}, number`}
-        value={typed ?? text}
+        value={typed ?? shownText}
         onFocus={(event) => {
           // The text stays as it is: a change would undo what is selected in it.
-          setTyped(text);
+          setTyped(shownText);
           const box = event.currentTarget;
           requestAnimationFrame(() => box.select());
         }}
         onInput={(event) => setTyped(event.currentTarget.value)}
-        onBlur={commit}
+        onBlur={(event) => commit(event.currentTarget.value)}
         onKeyDown={(event) => {
           if (event.key === "Enter") event.currentTarget.blur();
           if (event.key === "Escape") {
+            event.currentTarget.value = shownText;
             setTyped(null);
             event.stopPropagation();
           }

@@ -208,7 +208,8 @@ export function Stage() {
       void change("place", { at: last }).then(() => set({ panel: "object", tool: "click" }));
     } else {
       const method = view.sam ? "sam2" : "network";
-      const place = pointing.place(first) ?? first;
+      // Where something was edited the very place counts: an edited thing may lie within what is outlined.
+      const place = (on.length ? null : pointing.place(first)) ?? first;
       pointing.out();
       void change("pick", { tool: "click", mode, at: place, method }, "", t.selecting).then(follow);
     }
@@ -245,7 +246,8 @@ export function Stage() {
   useEffect(() => {
     pointing.changed = () => redraw((count) => count + 1);
   }, []);
-  useEffect(() => pointing.out(), [project, tool, dropped, dropper]);
+  const listed = JSON.stringify([steps, state?.current]);
+  useEffect(() => pointing.out(), [project, tool, dropped, dropper, listed]);
 
   const empty = !photo.width;
   const hint = working && working !== t.working ? working : "";
