@@ -19,16 +19,6 @@ ADDRESS = "http://127.0.0.1:7860"
 CHANNEL = "ws://127.0.0.1:7860/api/channel?page=" + "b" * 32
 
 
-CLEAR = """async () => {
-  const headers = {'x-materialist-page': sessionStorage.getItem('page')};
-  const post = (place, body) =>
-    fetch(`/api/${place}`, {method: 'POST', headers, body: JSON.stringify(body)}).then((a) => a.json());
-  let state = await post('deselect', {});
-  while (state.steps.length) state = await post('act', {action: 'remove', index: 0});
-}"""
-"""Takes all edits, and the selection, away."""
-
-
 @pytest.fixture
 def shared(tmp_path):
     """A studio that several people reach, with the small scene for everybody."""
@@ -96,36 +86,6 @@ def running(tmp_path_factory):
     folder = tmp_path_factory.mktemp("browser")
     with studio_server.studio(folder, str(package(folder))) as (_, address):
         yield address, folder / "work"
-
-
-@pytest.fixture
-def page(browser, running):
-    """The small scene on a page, without edits; those that a test makes go with it."""
-    address, _ = running
-    context = browser.new_context(
-        viewport={"width": 1280, "height": 800}, accept_downloads=True, reduced_motion="reduce"
-    )
-    made = context.new_page()
-    made.requested = []
-    made.errors = []
-    made.on("request", lambda request: made.requested.append(request.url))
-    made.on("pageerror", lambda error: made.errors.append(str(error)))
-
-    def refused(message):
-        if "Content Security Policy" in message.text:
-            made.errors.append(message.text)
-
-    made.on("console", refused)
-    made.set_default_timeout(60_000)
-    made.goto(address)
-    made.wait_for_selector(".marks")
-    made.wait_for_selector("#progress", state="hidden")
-    # Edits and selection of the test before are kept, as they are for people.
-    made.evaluate(CLEAR)
-    made.wait_for_selector("#stage:not([data-selected=yes])")
-    made.wait_for_selector("#steps >> text=No edits yet")
-    yield made
-    context.close()
 
 
 @pytest.fixture

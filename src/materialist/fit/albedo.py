@@ -64,9 +64,9 @@ def solve_albedo(
             rises = error.detach() * gain + weight * (middle.detach() - before) > 0
             low = torch.where(rises, low, middle.detach())
             high = torch.where(rises, middle.detach(), high)
-        found = (low + high) / 2
-        maps[rows, :3] = decode(found, settings.encoding)
-        for k, encoded in enumerate((before, found)):
+        solution = (low + high) / 2
+        maps[rows, :3] = decode(solution, settings.encoding)
+        for k, encoded in enumerate((before, solution)):
             cost = error_at(encoded).square() + weight * (encoded - before).square()
             losses[k] += float(cost.sum()) / photo.numel()
     if progress is not None:
