@@ -169,7 +169,7 @@ def _state(desk: Desk, request: Request) -> Response:
 def _photo(desk: Desk, request: Request) -> Response:
     """The open photo; `working=1` at working size, `full=1` with all its pixels."""
     if "full" in request.query_params:
-        return _jpeg(seeing.full_jpeg(desk))
+        return _jpeg(native_jpeg(desk, seeing.FULL_SIDE, 95))
     return _jpeg((working_jpeg if "working" in request.query_params else native_jpeg)(desk))
 
 

@@ -23,23 +23,23 @@ def edit_at(session: Session, x: float, y: float) -> int | None:
         return None
     column, row = session.pixel(x, y)
     edits = session.edits
-    found: list[tuple[bool, int]] = []
+    candidates: list[tuple[bool, int]] = []
     for index, step in enumerate(edits.steps):
         if step.skipped:
             continue
         try:
             if step.operation.target is Target.PLACE:
                 if _stands_at(session, index, column, row):
-                    found.append((True, index))
+                    candidates.append((True, index))
             elif (
                 step.operation.target is Target.REGION and region_of(live.scene, step)[row, column]
             ):
-                found.append((False, index))
+                candidates.append((False, index))
         except MaterialistError:
             continue  # what cannot be applied is told by the picture
-    if not found or max(found)[1] == edits.current:
+    if not candidates or max(candidates)[1] == edits.current:
         return None
-    return max(found)[1]
+    return max(candidates)[1]
 
 
 def _stands_at(session: Session, index: int, column: int, row: int) -> bool:

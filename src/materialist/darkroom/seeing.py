@@ -3,13 +3,11 @@
 import json
 from typing import Any
 
-import cv2
 import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
-from materialist.io import display
 from materialist.types import Array, Body, Scene
 
 MESH_FACES = 160_000
@@ -90,15 +88,6 @@ def _of_body(body: Body) -> tuple[Array, Array, Array]:
     columns = (np.floor(body.uv[:, 0] * width) % width).astype(int)
     levels = srgb_levels(albedo[rows, columns] * np.asarray(body.surface.tint, np.float32))
     return body.vertices, body.faces, np.c_[levels, np.full(len(levels), 255, np.uint8)]
-
-
-def full_jpeg(desk: Desk) -> bytes:
-    """The open photo with all its pixels, up to FULL_SIDE a side."""
-    photo = desk.session.scene.photo.original
-    scale = min(1.0, FULL_SIDE / max(photo.shape[:2]))
-    if scale < 1:
-        photo = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return display.encoded(srgb_levels(np.asarray(photo)), "JPEG", quality=95)
 
 
 def colour_at(desk: Desk, body: bodies.Pointed) -> dict[str, Any]:

@@ -199,13 +199,13 @@ def photo_jpeg(path: str, changed: float, longest: int) -> bytes:
     return display.encoded(np.asarray(picture), "JPEG", quality=92)
 
 
-def native_jpeg(desk: Desk) -> bytes:
-    """The open photo at its own resolution, up to SHOWN_SIDE pixels, as a JPEG."""
+def native_jpeg(desk: Desk, longest: int = SHOWN_SIDE, quality: int = 93) -> bytes:
+    """The open photo at its own resolution, up to `longest` pixels a side, as a JPEG."""
     photo = desk.session.scene.photo.original
-    scale = min(1.0, SHOWN_SIDE / max(photo.shape[:2]))
+    scale = min(1.0, longest / max(photo.shape[:2]))
     if scale < 1:
         photo = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return display.encoded(srgb_levels(np.asarray(photo)), "JPEG", quality=93)
+    return display.encoded(srgb_levels(np.asarray(photo)), "JPEG", quality=quality)
 
 
 def working_jpeg(desk: Desk) -> bytes:

@@ -169,14 +169,16 @@ class Fit:
         model = material_field(
             held, settings, pixels, setup.photo.camera, inside=inside, seed=setup.seed
         )
+        # With cached transport, one stage, and nothing but albedo, each pixel is a problem of its own.
         separable = not isinstance(self.engine, PathEngine) and isinstance(model, MaterialMaps)
         separable &= settings.loss == "l2"
+        separable &= [stage.targets for stage in settings.stages] == [("albedo",)]
         for stage in settings.stages:
             if self.stop():
                 break
             start = time.perf_counter()
             problem = self.material_problem(state)
-            if separable and stage.targets == ("albedo",):
+            if separable:
                 state.maps, result = solve_albedo(
                     problem, photo, held, settings, progress=self.progress, stop=self.stop
                 )

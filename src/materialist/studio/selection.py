@@ -122,10 +122,10 @@ def piece_at(scene: Scene, mask: Array | None, row: int, column: int) -> Array:
     flags = 4 | cv2.FLOODFILL_FIXED_RANGE | cv2.FLOODFILL_MASK_ONLY | (2 << 8)
     around = (_PIECE_COLOUR,) * 3
     cv2.floodFill(lab, barred, (column, row), (0, 0, 0), around, around, flags)
-    found = (barred[1:-1, 1:-1] == 2).astype(np.uint8)
+    piece = (barred[1:-1, 1:-1] == 2).astype(np.uint8)
     # Specks that are left between belong to it.
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-    return (cv2.morphologyEx(found, cv2.MORPH_CLOSE, kernel) > 0) & mask
+    return (cv2.morphologyEx(piece, cv2.MORPH_CLOSE, kernel) > 0) & mask
 
 
 def read_pick(data: Any) -> dict[str, Any]:

@@ -90,11 +90,11 @@ def exr_attributes(photo: Photo | None) -> dict[str, str | float]:
     """What the photo's EXIF says, as the standard attributes of an EXR; those that it lacks are absent."""
     exif = copied_exif(photo)
     values = {**exif, **_directory(exif, ExifTags.IFD.Exif)}
-    found: dict[str, str | float] = {}
+    attributes: dict[str, str | float] = {}
     for name, (attribute, kind) in _ATTRIBUTES.items():
         with suppress(KeyError, TypeError, ValueError, ZeroDivisionError):  # absent, or damaged
-            found[attribute] = kind(values[_NUMBER[name]])
-    return found
+            attributes[attribute] = kind(values[_NUMBER[name]])
+    return attributes
 
 
 def _of_file(photo: Photo | None) -> Image.Exif:
