@@ -71,7 +71,9 @@ class TransportEngine:
         self.light_height = light_height
         self.radiance = radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
-        self.sky = np.setdiff1d(np.arange(camera.width * camera.height), self.cache.pixels)
+        seen = np.zeros(camera.width * camera.height, bool)
+        seen[self.cache.pixels] = True
+        self.sky = np.flatnonzero(~seen)
         self.guide = surface_guide(self.cache)
 
     def light_problem(self, materials: Materials, sent: Array | None = None) -> LightProblem:

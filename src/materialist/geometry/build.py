@@ -96,16 +96,18 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     normal: [H, W, 3] unit, camera frame.
     """
     pixel_normal = np.ascontiguousarray(normal[depth > 0], np.float32)  # [P, 3]
-    vertex = pixel_corners(mesh, depth > 0)[depth > 0].ravel()  # [4 P]
-    order = np.argsort(vertex, kind="stable")
-    sorted_vertex = vertex[order]
-    starts = np.flatnonzero(np.diff(sorted_vertex, prepend=-1))
-    place = np.empty_like(order)  # [4 P] which of its vertex's up to four pixels each one is
-    place[order] = np.arange(len(order)) - np.repeat(starts, np.diff(starts, append=len(order)))
-    around = np.full((len(mesh.vertices), 4), -1)
-    around[vertex, place] = np.repeat(
-        np.arange(len(pixel_normal)), 4
-    )  # [V, 4] pixels that meet in a vertex
+    corners = pixel_corners(mesh, depth > 0)[depth > 0]  # [P, 4]
+    vertex = corners.ravel()
+    place = np.empty_like(corners)  # which of its vertex's up to four pixels each one is, by row
+    around = np.full((len(mesh.vertices), 4), -1)  # [V, 4] pixels that meet in a vertex
+    met = np.zeros(len(mesh.vertices), np.int64)
+    # The upper left of the pixels around a vertex has it at its lower right corner.
+    for slot in (3, 2, 1, 0):
+        at = corners[:, slot]
+        place[:, slot] = met[at]
+        around[at, met[at]] = np.arange(len(corners))
+        met[at] += 1
+    place = place.ravel()
     cosine = np.cos(np.radians(CREASE))
     # Most vertices lie on no crease and stay as they are.
     flat = np.ones(len(around), bool)
@@ -167,6 +169,8 @@ def part(mesh: Mesh, plane: int, pixels: Array | None = None) -> Mesh:
 
 def _tidy(mesh: Mesh) -> Mesh:
     """The mesh without vertices that no face has."""
-    used, number = np.unique(mesh.faces, return_inverse=True)
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.faces] = True
+    number = np.cumsum(used, dtype=np.int32) - 1
     kept = {name: getattr(mesh, name)[used] for name in ("vertices", "normals", "uv")}
-    return replace(mesh, faces=number.reshape(-1, 3).astype(np.int32), **kept)
+    return replace(mesh, faces=number[mesh.faces], **kept)

@@ -101,6 +101,7 @@ def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Ar
     height, width = surface.shape
     angle_x = _edge_angle(points[:, :-1], points[:, 1:])  # [H, W-1] radians
     angle_y = _edge_angle(points[:-1], points[1:])  # [H-1, W] radians
+    wide = np.sqrt(2) * tau
     near_x = np.zeros((height, width - 1), bool)  # leg of a grazing triangle
     near_y = np.zeros((height - 1, width), bool)
     # Both diagonals of every 2x2 block, so that the result does not depend on how the block is split.
@@ -108,16 +109,20 @@ def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Ar
         corner = _block(points, row, column)  # the right-angled vertex; [H-1, W-1, 3]
         along_x = _block(points, row, 1 - column)
         along_y = _block(points, 1 - row, column)
-        whole = (
+        # A triangle decides about those of its legs alone that nearly graze themselves.
+        grazing = (
             _block(surface, row, column)
             & _block(surface, row, 1 - column)
             & _block(surface, 1 - row, column)
         )
-        grazing = whole & (_triangle_angle(corner, along_x, along_y) < tau)  # [H-1, W-1]
+        grazing &= (angle_x[row : row + height - 1] < wide) | (
+            angle_y[:, column : column + width - 1] < wide
+        )  # [H-1, W-1]
+        angle = _triangle_angle(corner[grazing], along_x[grazing], along_y[grazing])
+        grazing[grazing] = angle < tau
         near_x[row : row + height - 1] |= grazing
         near_y[:, column : column + width - 1] |= grazing
     # A pair below tau by itself is cut even where a thin structure leaves no whole triangle.
-    wide = np.sqrt(2) * tau
     return (angle_x < tau) | (near_x & (angle_x < wide)), (angle_y < tau) | (
         near_y & (angle_y < wide)
     )

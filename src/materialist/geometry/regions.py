@@ -20,6 +20,9 @@ def regions_without_strays(
     first, second = pairs
     region = connected_regions(pairs, linked, count)
     linked = linked.copy()
+    # Only pairs across a border can come to hold: the others are not looked at again.
+    apart = np.flatnonzero(region[first] != region[second])
+    first, second, step = first[apart], second[apart], step[apart]
     while True:
         ends = region[first], region[second]
         size = np.bincount(region)
@@ -27,10 +30,11 @@ def regions_without_strays(
         if (target == np.arange(len(size))).all():
             return region, linked
         for one, other in (ends, ends[::-1]):
-            linked |= (target[one] == other) & (step <= limit[one])
+            linked[apart] |= (target[one] == other) & (step <= limit[one])
         while (target[target] != target).any():  # one that joins may be joined itself
             target = target[target]
-        _, region = np.unique(target[region], return_inverse=True)
+        _, number = np.unique(target, return_inverse=True)
+        region = number[region]
 
 
 def connected_regions(pairs: tuple[Array, Array], linked: Array, count: int) -> Array:

@@ -5,6 +5,7 @@ same surface by normal and plane distance, has all of it. Radius and normal tole
 levels keep their detail.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,12 +19,14 @@ from materialist.types import Array
 
 _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
-_NORMAL_POWER = 32
-"""Power of the cosine between normals (by eye)."""
+_NORMAL_SQUARINGS = 5
+"""How often the cosine between normals is squared: its power is 32 (by eye)."""
 _MIN_ROUGHNESS = 0.2
 """Least roughness of a level that is filtered (by eye)."""
 _MIN_WEIGHT = 1e-4
 """Weight of a neighbour below which it is left out (derived: time)."""
+_STRIP_ROWS = 32
+"""Rows whose neighbours are weighed at once (derived: time, as what is computed of them stays in the cache)."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +40,18 @@ class Guide:
     scale: Array
     """[H, W] size of a pixel on the surface, scene units."""
 
-    def alike(self, dy: int, dx: int) -> Array:
-        """[H, W] similarity in [0, 1] of every pixel to its neighbour at (dy, dx); 0 beyond the frame."""
-        normal = self._shifted("normal", dy, dx)
-        position = self._shifted("position", dy, dx)
-        cosine = np.clip((self.normal * normal).sum(-1), 0, 1)
+    def alike(self, dy: int, dx: int, rows: slice) -> Array:
+        """[h, W] similarity in [0, 1] of pixels to their neighbours at (dy, dx); 0 beyond the frame."""
+        normal = self.normal[rows]
+        offset = self._shifted("position", dy, dx, rows) - self.position[rows]
+        cosine = np.einsum("hwk,hwk->hw", normal, self._shifted("normal", dy, dx, rows))
+        power = np.clip(cosine, 0, 1)
+        for _ in range(_NORMAL_SQUARINGS):
+            power *= power
         # Distance of the neighbour from the pixel's tangent plane, in pixel sizes.
-        away = (self.normal * (position - self.position)).sum(-1) / (
-            self.scale * np.sqrt(1 + dy * dy + dx * dx)
-        )
-        return cosine**_NORMAL_POWER * np.exp(-0.5 * away * away)
+        away = np.einsum("hwk,hwk->hw", normal, offset)
+        away /= self.scale[rows] * math.sqrt(1 + dy * dy + dx * dx)
+        return power * np.exp(-0.5 * away * away)
 
     @cached_property
     def _padded(self) -> dict[str, Array]:
@@ -55,11 +60,14 @@ class Guide:
         sides = [(reach, reach), (reach, reach), (0, 0)]
         return {name: np.pad(getattr(self, name), sides) for name in ("position", "normal")}
 
-    def _shifted(self, name: str, dy: int, dx: int) -> Array:
-        """[H, W, 3] a map with every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
-        h, w = self.scale.shape
+    def _shifted(self, name: str, dy: int, dx: int, rows: slice) -> Array:
+        """[h, W, 3] some rows of a map, every pixel replaced by its neighbour at (dy, dx); zero beyond the frame."""
+        w = self.scale.shape[1]
         reach = len(_TAPS) // 2
-        return self._padded[name][reach + dy : reach + dy + h, reach + dx : reach + dx + w]
+        first = reach + dx
+        return self._padded[name][
+            rows.start + reach + dy : rows.stop + reach + dy, first : first + w
+        ]
 
     @cached_property
     def mean(self) -> csr_array:
@@ -68,17 +76,21 @@ class Guide:
         taps = [
             (dy, dx, wy * wx) for dy, wy in enumerate(_TAPS, -2) for dx, wx in enumerate(_TAPS, -2)
         ]
-        weight = np.stack(
-            [share * self.alike(dy, dx).ravel() for dy, dx, share in taps], -1
-        ).astype(np.float32)
-        # A mean: the weights of the neighbours of each pixel sum to 1.
-        weight /= np.maximum(weight.sum(-1, keepdims=True), 1e-6)
-        column = np.arange(h * w, dtype=np.int32)[:, None] + np.array(
-            [dy * w + dx for dy, dx, _ in taps], np.int32
-        )
-        kept = weight > _MIN_WEIGHT
-        rows = np.concatenate([[0], kept.sum(-1).cumsum()]).astype(np.int32)
-        return csr_array((weight[kept], column[kept], rows), shape=(h * w, h * w))
+        steps = np.array([dy * w + dx for dy, dx, _ in taps], np.int32)
+        parts = []
+        for first in range(0, h, _STRIP_ROWS):
+            rows = slice(first, min(first + _STRIP_ROWS, h))
+            weight = np.stack(
+                [share * self.alike(dy, dx, rows).ravel() for dy, dx, share in taps], -1
+            )
+            # A mean: the weights of the neighbours of each pixel sum to 1.
+            weight /= np.maximum(weight.sum(-1, keepdims=True), 1e-6)
+            column = np.arange(first * w, rows.stop * w, dtype=np.int32)[:, None] + steps
+            kept = weight > _MIN_WEIGHT
+            parts.append((weight[kept], column[kept], kept.sum(-1, dtype=np.int32)))
+        weight, column, count = (np.concatenate(part) for part in zip(*parts, strict=True))
+        ends = np.concatenate([[0], count.cumsum()]).astype(np.int32)
+        return csr_array((weight, column, ends), shape=(h * w, h * w))
 
 
 def surface_guide(cache: TransportCache) -> Guide:
