@@ -16,6 +16,7 @@ from made_png import png_header
 from made_scene import make_scene
 from PIL import Image
 
+from materialist.color import srgb_to_linear
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import whole_file
 from materialist.io.bitmap import pixel_limit_lifted
@@ -208,20 +209,55 @@ def test_a_depth_is_no_photo(tmp_path):
     assert np.allclose(read_exr_photo(tmp_path / "parts.exr").linear, [0.25, 0.5, 0.75])
 
 
+RGB = np.linspace(0.1, 0.9, 20 * 30 * 3, dtype=np.float32).reshape(20, 30, 3)
+DEEP = np.round(RGB * 65535).astype(np.uint16)
+
+
+@pytest.mark.parametrize(
+    ("pixels", "settings", "light"),
+    [
+        (np.moveaxis(DEEP, -1, 0), {"planarconfig": "separate"}, srgb_to_linear(DEEP)),
+        (np.moveaxis(RGB, -1, 0), {"planarconfig": "separate"}, RGB),
+        (RGB.astype(np.float16), {}, RGB),
+        (DEEP.astype(np.uint32) * 65537, {}, srgb_to_linear(DEEP)),
+        (DEEP, {"compression": "lzma"}, srgb_to_linear(DEEP)),
+        (
+            65535 - DEEP[..., 0],
+            {"photometric": "miniswhite", "byteorder": ">"},
+            srgb_to_linear(DEEP[..., :1]),
+        ),
+        (
+            np.concatenate([DEEP, DEEP[..., :1], np.full_like(DEEP[..., :1], 65535)], -1),
+            {"extrasamples": ["unspecified", "unassalpha"]},
+            srgb_to_linear(DEEP),
+        ),
+    ],
+    ids=["planes", "planes of floats", "half", "32 bits", "lzma", "inverted", "five channels"],
+)
+def test_deep_tiffs_of_odd_layouts(tmp_path, pixels, settings, light):
+    tifffile.imwrite(tmp_path / "a.tif", pixels, **{"photometric": "rgb", **settings})
+    found = decode(tmp_path / "a.tif").linear
+    np.testing.assert_allclose(found, np.broadcast_to(light, found.shape), atol=1e-3)
+
+
+def test_the_alpha_of_a_deep_grey_tiff(tmp_path):
+    half = np.stack([DEEP[..., 0], np.full_like(DEEP[..., 0], 32768)], -1)
+    tifffile.imwrite(
+        tmp_path / "a.tif", half, photometric="minisblack", extrasamples=["unassalpha"]
+    )
+    decoded = decode(tmp_path / "a.tif")
+    expected = np.repeat(srgb_to_linear(DEEP[..., :1]) / 2 + 0.5, 3, -1)
+    np.testing.assert_allclose(decoded.linear, expected, atol=1e-3)
+    assert "over white" in " ".join(decoded.warnings)
+
+
 @pytest.mark.parametrize(
     ("pixels", "settings", "words"),
     [
-        (
-            np.zeros((3, 20, 30), np.uint16),
-            {"photometric": "rgb", "planarconfig": "separate"},
-            "one after the other",
-        ),
-        (
-            np.zeros((3, 20, 30), np.float32),
-            {"photometric": "rgb", "planarconfig": "separate"},
-            "one after the other",
-        ),
-        (np.zeros((20, 30), np.uint16), {"photometric": "miniswhite"}, "inverted"),
+        (np.zeros((20, 30), np.complex64), {}, "1 channels of complex64 .* not read"),
+        (np.zeros((20, 30, 3), np.int16), {"photometric": "rgb"}, "of int16 .* not read"),
+        (np.zeros((20, 30, 3), np.int8), {"photometric": "rgb"}, "of int8 .* not read"),
+        (np.zeros((20, 30), np.float32), {"photometric": "miniswhite"}, "float32, inverted"),
         (
             np.zeros((20, 30, 4), np.uint16),
             {"photometric": "rgb", "extrasamples": ["assocalpha"]},
@@ -229,7 +265,7 @@ def test_a_depth_is_no_photo(tmp_path):
         ),
     ],
 )
-def test_deep_tiffs_of_odd_layouts_are_refused(tmp_path, pixels, settings, words):
+def test_deep_tiffs_that_are_not_read_say_so(tmp_path, pixels, settings, words):
     tifffile.imwrite(tmp_path / "a.tif", pixels, **settings)
     with pytest.raises(InputError, match=words):
         decode(tmp_path / "a.tif")

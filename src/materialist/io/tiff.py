@@ -35,6 +35,10 @@ _RGB = 2
 _CIELAB = 8
 _ICCLAB = 9
 """What values mean, of PhotometricInterpretation."""
+_OWN = ("NONE", "ADOBE_DEFLATE", "DEFLATE", "LZMA")
+"""Compressions that tifffile decodes without other packages."""
+_OPENCV = ("uint16", "float32", "float64")
+"""Kinds of numbers deeper than 8 bits that OpenCV reads."""
 FOURTH = "The file says of its last channel that it is no transparency; it is left out."
 
 
@@ -54,6 +58,23 @@ class _Layout:
     frames: int
     samples: int
     """Channels of a pixel."""
+    numbers: str
+    """What NumPy calls their kind."""
+
+    @property
+    def for_tifffile(self) -> bool:
+        """Whether OpenCV would read it wrong, or not at all."""
+        usual = self.numbers in _OPENCV and self.samples in (1, 3, 4)
+        return (
+            not usual or self.planar == 2 or self.meaning == _INVERTED or self.compression == "LZMA"
+        )
+
+    @property
+    def is_readable(self) -> bool:
+        """Whether one of the two readers knows it; of grey and RGB."""
+        numbers = np.dtype(self.numbers) if self.numbers in np.sctypeDict else np.dtype(complex)
+        known = numbers.kind in ("u" if self.meaning == _INVERTED else "uf")
+        return not self.for_tifffile or (known and self.compression in _OWN)
 
     @classmethod
     def of(cls, page: Any, frames: int) -> "_Layout":
@@ -68,11 +89,12 @@ class _Layout:
             tags.valueof("InterColorProfile"),
             frames,
             int(tags.valueof("SamplesPerPixel", 1)),
+            str(page.dtype),
         )
 
 
 def read_tiff(path: Path) -> Decoded:
-    """A TIFF: scene-linear where it holds floats. What is deeper than 8 bits OpenCV reads, and turns upright itself.
+    """A TIFF: scene-linear where it holds floats. What is deeper than 8 bits OpenCV reads, and tifffile the rest.
 
     Raises InputError for layouts that would be read wrong.
     """
@@ -81,19 +103,15 @@ def read_tiff(path: Path) -> Decoded:
         layout = _Layout.of(page, len(file.pages))
         if layout.bits > 8 and layout.meaning in (_CIELAB, _ICCLAB):
             return _lab(page, layout, path)
-    if layout.bits <= 8:
-        return _shallow(path, layout)
-    _require_known(layout, path)
-    colour, alpha = rgb_levels(path)
-    tags = file_tags(path)
+        if layout.bits <= 8 and layout.numbers != "int8":
+            return _shallow(path, layout)
+        _require_known(layout, path)
+        tags = file_tags(path)
+        colour, alpha = _levels(page, layout, tags) if layout.for_tifffile else rgb_levels(path)
     warnings = frames_note(layout.frames)
     if layout.extra[0] == _UNSPECIFIED:
         warnings.append(FOURTH)
         alpha = None
-    elif layout.samples == 2 and alpha is None:  # OpenCV reads the grey channel alone, at 8 bits
-        warnings.append(
-            "The transparency of a deep grey TIFF is not read; save it as RGB with alpha to keep it."
-        )
     # --- Light for floats, display values for whole numbers ---
     space = _space(layout, tags, warnings, is_float=colour.dtype.kind == "f")
     premultiplied = _PREMULTIPLIED in layout.extra
@@ -116,18 +134,34 @@ def _shallow(path: Path, layout: _Layout) -> Decoded:
 
 
 def _require_known(layout: _Layout, path: Path) -> None:
-    """Refuse what OpenCV would read as something else."""
-    if layout.planar == 2:
-        raise InputError(
-            f"{path} has its channels one after the other; save it with interleaved channels."
-        )
-    if layout.meaning == _INVERTED:
-        raise InputError(f"{path} has inverted values; save it as plain 16-bit RGB.")
-    if layout.meaning not in (_GREY, _RGB):
+    """Refuse what neither OpenCV nor tifffile reads right."""
+    if layout.meaning not in (_GREY, _RGB, _INVERTED):
         raise InputError(
             f"{path} is neither grey nor RGB (its PhotometricInterpretation is {layout.meaning}) at {layout.bits} "
             "bits; save it as RGB."
         )
+    if not layout.is_readable:
+        order = " in planes" * (layout.planar == 2) + ", inverted" * (layout.meaning == _INVERTED)
+        raise InputError(
+            f"{path} is a TIFF of {layout.samples} channels of {layout.numbers}{order} with compression "
+            f"{layout.compression}, which is not read; save it as plain 16-bit RGB."
+        )
+
+
+def _levels(page: Any, layout: _Layout, tags: dict[str, Any]) -> tuple[Array, Array | None]:
+    """RGB [H, W, 3] and alpha [H, W, 1] or None as tifffile reads them, upright: uint16 or float32."""
+    pixels = np.atleast_3d(page.asarray())
+    if layout.planar == 2 and layout.samples > 1:
+        pixels = np.moveaxis(pixels, 0, -1)
+    if pixels.dtype.kind == "u":
+        pixels = (pixels >> (8 * pixels.dtype.itemsize - 16)).astype(np.uint16)
+        pixels = 65535 - pixels if layout.meaning == _INVERTED else pixels
+    pixels = turned_upright(
+        pixels.astype(np.float32 if pixels.dtype.kind == "f" else np.uint16), tags
+    )
+    colours = 1 if layout.samples < 3 else 3
+    alpha = pixels[..., colours : colours + 1] if layout.samples > colours else None
+    return np.broadcast_to(pixels[..., :colours], (*pixels.shape[:2], 3)), alpha
 
 
 def _space(
