@@ -19,7 +19,7 @@ from made_scene import make_scene
 from materialist.edits.light.relight import read_envmap, relight
 from materialist.errors import InputError
 from materialist.io import exr
-from materialist.io.colour_space import ACES_AP1, CIE_XYZ, REC2020
+from materialist.io.colour_space import ACES_AP0, ACES_AP1, CIE_XYZ, REC2020, to_rec709
 from materialist.io.exr import picture_rank, read_exr, write_exr
 from materialist.io.exr_photo import read_exr_photo
 from materialist.io.package import load_scene, save_scene
@@ -88,6 +88,14 @@ def test_stated_colours_that_cannot_be_used_are_told_of(tmp_path):
     assert any("cannot be used" in note for note in broken.warnings)
     odd = read_photo(write(tmp_path / "b.exr", pixels, colorInteropID="g22_rec709_display"))
     assert any("g22_rec709_display" in note for note in odd.warnings)
+
+
+def test_an_aces_container_without_chromaticities(tmp_path):
+    path = write(tmp_path / "a.exr", channels(quadrants()), acesImageContainerFlag=1)
+    decoded = read_exr_photo(path)
+    expected = quadrants() @ to_rec709(ACES_AP0).T
+    np.testing.assert_allclose(decoded.linear, expected, atol=1e-4)
+    assert any("ACES2065-1" in note for note in decoded.warnings)
 
 
 def test_the_name_of_a_colour_space(tmp_path):

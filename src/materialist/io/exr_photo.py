@@ -13,6 +13,7 @@ import OpenEXR
 from materialist.errors import InputError
 from materialist.io.bitmap import Decoded, check_size, light_and_alpha, square_pixels
 from materialist.io.colour_space import (
+    ACES_AP0,
     CIE_XYZ,
     REC709,
     Primaries,
@@ -183,6 +184,9 @@ def _primaries(header: dict[str, Any], notes: list[str]) -> Primaries:
             notes.append(
                 f"The EXR states the colour space {identity}, which is not known; it is taken as Rec.709."
             )
+    if stated is None and header.get("acesImageContainerFlag"):
+        notes.append("The EXR is marked as an ACES container: its colours are taken as ACES2065-1.")
+        return ACES_AP0
     if stated is None:
         return REC709
     try:
