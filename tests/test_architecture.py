@@ -30,7 +30,7 @@ BASE_MODULES = {
     "residual",
     "stopping",
 }
-BASE_MODULES |= {"option_kinds", "options", "keywords", "plain"}
+BASE_MODULES |= {"option_kinds", "options", "keywords", "plain", "spelling"}
 SCENE = {"io", "bsdf", "geometry", "transport", "render"}
 KINDS = ("select", "material", "light", "remove", "glass", "insert", "drop", "core", "composite")
 EDITING = {"edits", *(f"edits.{kind}" for kind in KINDS)}
@@ -121,6 +121,7 @@ LIGHT_START = (
         "option_kinds",
         "options",
         "keywords",
+        "spelling",
         "plain",
         "cli",
         "lab",

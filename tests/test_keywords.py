@@ -88,9 +88,21 @@ def test_a_misspelt_keyword_is_named_with_the_one_that_is_meant():
     with pytest.raises(
         InputError, match=r"edit has no option 'ruoghness'; .* Do you mean 'roughness'\?"
     ):
-        mt.MaterialEdit.merged(ruoghness=1)
+        mt.MaterialEdit(ruoghness=1)
     with pytest.raises(InputError, match=r"no option 'qqq'; it takes .*feather\.$"):
         mt.MaterialEdit.merged(qqq=1)
+    for function in (
+        mt.read_photo,
+        mt.save_image,
+        mt.select,
+        mt.composite,
+        mt.render_scene,
+        mt.Prior,
+    ):
+        with pytest.raises(InputError, match=f"^{function.__name__} has no option 'qqq'"):
+            function(qqq=1)
+    with pytest.raises(InputError, match=r"^batch has no option 'sizee'; .* Do you mean 'size'"):
+        mt.batch("photos", "runs", sizee=1)
 
 
 @pytest.mark.slow

@@ -3,7 +3,6 @@
 Values may be given as texts, as a YAML file or a command line has them: "0.3", "310,220", "#ff8800".
 """
 
-import difflib
 import inspect
 import math
 import re
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
 
 from materialist.errors import InputError
+from materialist.spelling import check_names
 
 Colour = tuple[float, float, float]
 """Linear R, G, B in [0, 1]."""
@@ -101,6 +101,11 @@ class OperationOptions:
         """Whether the result is a picture in the photo, which no rendering of the scene shows."""
         return False
 
+    def __new__(cls, **values: Any) -> Self:
+        """Raises InputError for a name that is no option."""
+        check_names(values, declarations(cls), getattr(cls, "operation", cls.__name__))
+        return super().__new__(cls)
+
     def __init_subclass__(cls) -> None:
         """The docstring of the class lists its options."""
         if cls.__doc__:
@@ -116,15 +121,6 @@ class OperationOptions:
     @classmethod
     def merged(cls, options: Self | None = None, **values: Any) -> Self:
         """`options`, or the defaults, with these values instead. Raises InputError for a name that is no option."""
-        known = declarations(cls)
-        for name in values:
-            if name not in known:
-                # A misspelt name: say which one is meant.
-                near = difflib.get_close_matches(name, known, 1)
-                meant = f" Do you mean '{near[0]}'?" if near else ""
-                raise InputError(
-                    f"{cls.operation} has no option '{name}'; it takes {', '.join(known)}.{meant}"
-                )
         return replace(options or cls(), **values)
 
     @classmethod

@@ -26,6 +26,7 @@ from materialist.option_kinds import documented
 from materialist.options import InvertOptions
 from materialist.render.envmap import is_peaked
 from materialist.residual import shading_residual
+from materialist.spelling import spelled
 from materialist.threads import fixed_threads
 from materialist.types import Array, FitReport, Photo, Prediction, Prior, Scene
 
@@ -212,6 +213,7 @@ def _prior(picture: Photo, choices: InvertOptions) -> tuple[Photo, Prediction]:
     return picture, result
 
 
+@spelled
 def render_scene(
     scene: Scene, *, spp: int = 64, denoise: bool = False, seed: int = 0, device: str = "auto"
 ) -> Array:

@@ -8,13 +8,14 @@ import base64
 import html
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, fields
+from typing import Any, Self
 
 import numpy as np
 
 from materialist.errors import InputError
 from materialist.records import Array, Record
+from materialist.spelling import check_names
 
 Progress = Callable[[str, int, int], None]
 """Called as progress(stage, done, total)."""
@@ -153,6 +154,23 @@ class Prior(Record):
     """[h, w, 3] unit, camera frame (+X right, +Y up, +Z to the viewer); a zero vector means unknown."""
     depth: Array | None = None
     """[h, w] planar depth along -Z, scene units; 0 where there is no surface."""
+
+    def __new__(cls, **values: Any) -> Self:
+        """Raises InputError for a name that is no map."""
+        check_names(values, [entry.name for entry in fields(cls)], cls.__name__)
+        return super().__new__(cls)
+
+    def __post_init__(self) -> None:
+        """Arrays of whatever was given. Raises InputError for another shape than the map has, or no numbers."""
+        for name, given in self.known.items():
+            values = np.asarray(given)
+            channels = (3,) if name in ("albedo", "normal") else ()
+            if values.dtype.kind not in "fiub" or values.ndim < 2 or values.shape[2:] != channels:
+                form = "[H, W, 3]" if channels else "[H, W]"
+                raise InputError(
+                    f"The prior's {name} is {values.dtype}{list(values.shape)}; give numbers of the shape {form}."
+                )
+            object.__setattr__(self, name, values)
 
     @property
     def known(self) -> dict[str, Array]:

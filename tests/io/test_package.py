@@ -4,8 +4,10 @@ import errno
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
+from collections import namedtuple
 from dataclasses import fields, is_dataclass, replace
 
 import numpy as np
@@ -18,7 +20,7 @@ from materialist.io import atomic
 from materialist.io.atomic import ensure_writable, whole_folder
 from materialist.io.exr import write_exr
 from materialist.io.meshes import read_ply, write_ply
-from materialist.io.package import load_scene, save_scene
+from materialist.io.package import check_room, load_scene, save_scene
 
 
 @pytest.fixture
@@ -251,6 +253,14 @@ def test_mesh_file_header_is_what_other_tools_expect(scene, tmp_path):
     (tmp_path / "m.ply").write_bytes((tmp_path / "m.ply").read_bytes()[:-1])
     with pytest.raises(SceneError, match="truncated"):
         read_ply(tmp_path / "m.ply")
+
+
+def test_a_disk_without_room_is_refused_before_the_work(scene, tmp_path, monkeypatch):
+    check_room(tmp_path / "a.scene", scene.photo)
+    usage = namedtuple("usage", "total used free")
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage(10**9, 10**9 - 1000, 1000))
+    with pytest.raises(OutputError, match=r"no space left .* takes about [\d,]+ bytes, and 1,000"):
+        check_room(tmp_path / "a.scene", scene.photo)
 
 
 def test_what_comes_to_the_target_in_the_meantime_is_not_replaced(tmp_path):

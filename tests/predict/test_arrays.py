@@ -81,6 +81,11 @@ def test_maps_that_cannot_be_meant(name, values, words, photo):
         get_predictor("constant", prior=mt.Prior(**{name: values})).predict(photo)
 
 
+def test_shapes_are_checked_at_once():
+    with pytest.raises(InputError, match=r"The prior's normal is float64\[2, 3\]"):
+        mt.Prior(normal=np.ones((2, 3)))
+
+
 def test_a_map_has_one_source():
     with pytest.raises(
         InputError, match="The depth is in the prior and has a predictor of its own"

@@ -15,7 +15,7 @@ INVERSION = "materialist.pipeline:invert"
 class BatchOptions(OperationOptions):
     """How a batch runs, beside the options of its inversions."""
 
-    operation = "The batch"
+    operation = "batch"
 
     apply: str | Path | None = option(
         None,

@@ -25,6 +25,7 @@ from materialist.jobs.process import LOST, Message
 from materialist.jobs.worker import DONE, FAILED, PROGRESS
 from materialist.keywords import BatchKeywords
 from materialist.option_kinds import documented
+from materialist.spelling import check_names
 
 Watch = Callable[[Status], None]
 
@@ -68,6 +69,7 @@ def batch(
     start = time.monotonic()
     batch_fields = {entry.name for entry in fields(BatchOptions)}
     values: dict[str, Any] = dict(options)
+    check_names(values, tuple(BatchKeywords.__annotations__), "batch")
     batch_options = BatchOptions(
         **{name: value for name, value in values.items() if name in batch_fields}
     )

@@ -20,6 +20,7 @@ from materialist.color import srgb_levels
 from materialist.errors import InputError
 from materialist.io.atomic import ensure_writable, write_whole
 from materialist.io.display import encoded
+from materialist.io.package import check_room
 from materialist.pipeline import peak_rss_mb
 from materialist.types import Array, Progress, Scene
 
@@ -126,6 +127,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     with local_copy(task.location) as file:
         source = file if str(file) != task.location else task.location
         photo = mt.read_photo(source, size=size, fov=fov, layer=layer)
+    check_room(task.scene, photo)
     place = task.id if is_url(task.location) else task.location
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
     report("start", 0, 1)

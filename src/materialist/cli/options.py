@@ -106,7 +106,7 @@ class PictureFile(Run):
     # How the file is encoded.
     quality: int | None = option(
         None,
-        "Of .jpg (default 95), .webp (90, 100 loses nothing) and .avif (85).",
+        "Of .jpg (default 95), .webp (90, colour blurred; 100 loses nothing) and .avif (85).",
         kind="whole",
         low=1,
         high=100,

@@ -26,10 +26,12 @@ def invert_command(
 ) -> None:
     """Decompose a photo into geometry, materials and light, and write it as a scene package."""
     from materialist.io.atomic import ensure_writable
+    from materialist.io.package import check_room
 
     # Everything that can be wrong is found before the work starts.
     ensure_writable(output, run.force)
     picture = mt.read_photo(photo, size=options.size, fov=options.fov, layer=options.layer)
+    check_room(output, picture)
     # Reading is quick, and wrong files show here; the clock is that of the inversion.
     start = time.monotonic()
     slow = options.preset == "paper" or options.engine == "path"

@@ -11,12 +11,14 @@ from materialist.edits.core.renderer import EditRenderer
 from materialist.errors import InputError
 from materialist.io.out.encode import check_image_output
 from materialist.io.out.layers import write_layers
+from materialist.spelling import spelled
 from materialist.types import Array, Camera, Scene
 
 RAYS = (48, 12)
 """Diffuse and specular rays a pixel that the light of the layers is gathered by; as previews have them."""
 
 
+@spelled
 def save_layers(
     path: str | Path,
     scene: Scene,

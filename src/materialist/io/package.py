@@ -1,8 +1,11 @@
 """The scene package: a folder that holds everything of a Scene (format: docs/conventions.md)."""
 
 import base64
+import errno
 import json
 import math
+import os
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from materialist import __version__
-from materialist.errors import SceneError
+from materialist.errors import OutputError, SceneError
 from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
@@ -28,6 +31,7 @@ from materialist.io.overview import overview
 from materialist.io.photo import decode_photo
 from materialist.plain import plain
 from materialist.residual import shading_residual
+from materialist.spelling import spelled
 from materialist.types import (
     Array,
     Camera,
@@ -43,8 +47,22 @@ from materialist.types import (
 FORMAT = "materialist-scene"
 VERSION = 1
 _JSON_BYTES = 64_000_000
+BYTES_A_PIXEL = 200
+"""Of the working size that a package takes, beside the photo's file; 230 to 265 of ten photos."""
 
 
+def check_room(path: str | Path, photo: Photo) -> None:
+    """Ask before an inversion whether the disk has room for the scene of a photo at PATH. Raises OutputError."""
+    needed = BYTES_A_PIXEL * photo.linear[..., 0].size + len(photo.source or b"")
+    free = shutil.disk_usage(Path(path).absolute().parent).free
+    if free < needed:
+        raise OutputError(
+            f"{path} cannot be written: {os.strerror(errno.ENOSPC).lower()}: the scene takes about {needed:,} bytes, "
+            f"and {free:,} are free."
+        )
+
+
+@spelled
 def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
     """Write the scene as a package folder at PATH, whole or not at all; `load_scene` gives every array back exactly.
 
@@ -55,6 +73,7 @@ def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
         _write(scene, folder)
 
 
+@spelled
 def load_scene(path: str | Path, *, most: float = MAX_BYTES) -> Scene:
     """Read a scene package of at most `most` bytes once decoded, by the headers of its files.
 

@@ -13,6 +13,7 @@ from materialist.io.bitmap import MIN_SIDE, Decoded
 from materialist.io.decode import decode
 from materialist.io.exif import horizontal_fov
 from materialist.options import InvertOptions
+from materialist.spelling import spelled
 from materialist.types import Array, Camera, Photo
 
 DEFAULT_FOV = 35.0
@@ -38,6 +39,7 @@ EXAMPLES = {
 PREFIX = "example:"
 
 
+@spelled
 def read_photo(
     path: str | Path, *, size: int = 512, fov: float | str | None = None, layer: str | None = None
 ) -> Photo:

@@ -93,25 +93,16 @@ class ArraysPredictor(Predictor):
     def parts(
         self, photo: Photo, names: Collection[str], *, seed: int = 0, normal: Array | None = None
     ) -> MapSet:
-        """The wanted maps. Raises InputError for another shape than the map has, and as `MapsPredictor.parts`."""
+        """The wanted maps. Raises InputError as `MapsPredictor.parts`."""
         size = photo.linear.shape[:2]
         warnings = list[str]()
         maps = {name: self._fitted(name, size, warnings) for name in names}
         return MapSet(maps, dict.fromkeys(names, self.name), tuple(warnings))
 
     def _fitted(self, name: str, size: tuple[int, int], warnings: list[str]) -> Array:
-        values = np.asarray(self.known[name])
         called = Path(f"The prior's {name}")
-        if (
-            values.dtype.kind not in "fiub"
-            or values.ndim < 2
-            or values.shape[2:] != _CHANNELS.get(name, ())
-        ):
-            form = "[H, W, 3]" if name in _CHANNELS else "[H, W]"
-            raise InputError(
-                f"{called} is {values.dtype}{list(values.shape)}; give numbers of the shape {form}."
-            )
-        checked = _CHECKS[name](np.ascontiguousarray(values, np.float32), called, warnings)
+        values = np.ascontiguousarray(self.known[name], np.float32)
+        checked = _CHECKS[name](values, called, warnings)
         return _fitted(np.asarray(checked, np.float32), name, size, called, warnings)
 
 

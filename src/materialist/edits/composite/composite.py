@@ -20,6 +20,7 @@ from materialist.io.out.depth import is_deep
 from materialist.io.out.encode import save_image
 from materialist.io.out.exif import copied_exif
 from materialist.options import PATHS
+from materialist.spelling import spelled
 from materialist.types import Array, Photo, Scene
 
 Upscale = Callable[[Array], Array]
@@ -29,6 +30,7 @@ RERENDERED = 64
 """Paths a pixel of the re-rendering of an edited scene that is kept."""
 
 
+@spelled
 def composite(
     scene: Scene,
     edited: Scene,

@@ -20,6 +20,7 @@ from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
 from materialist.option_kinds import documented
 from materialist.render.envmap import check_envmap, is_peaked
+from materialist.spelling import spelled
 from materialist.types import Array, Lamp, Scene
 
 
@@ -117,6 +118,7 @@ def resolved(scene: Scene, options: Relight, notes: list[str] | None = None) -> 
     return replace(options, envmap=envmap, gain=gain, lamps=lamps)
 
 
+@spelled
 def lamp(scene: Scene, x: float, y: float, depth: float, kelvin: float, power: float) -> Lamp:
     """A lamp at pixel (x, y) of the working size, `depth` scene units along the view axis.
 

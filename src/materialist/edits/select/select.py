@@ -19,11 +19,13 @@ from materialist.geometry.silhouette import window
 from materialist.io.image import read_mask
 from materialist.option_kinds import parse_numbers, several
 from materialist.predict.clicks.features import Box
+from materialist.spelling import spelled
 from materialist.types import Array, Scene
 
 METHODS = ("network", "grabcut", "sam2")
 
 
+@spelled
 def select(
     scene: Scene,
     *,

@@ -18,6 +18,7 @@ from materialist.io.out.colours import SRGB, PhotoColours, photo_colours
 from materialist.io.out.depth import is_deep
 from materialist.io.out.exif import copied_exif, exr_attributes
 from materialist.io.out.tiff import tiff_bytes
+from materialist.spelling import spelled
 from materialist.types import Array, Photo, Scene
 
 KINDS = {
@@ -46,6 +47,7 @@ _IN_PNG_BEFORE = 33
 """Bytes of a PNG's signature and header chunk."""
 
 
+@spelled
 def save_image(
     path: str | Path,
     picture: Array,
@@ -65,7 +67,8 @@ def save_image(
     Args:
         picture: [H, W, 3] float32 linear Rec.709, as `composite` and `render_scene` give it.
         photo: the photo, or the scene that has it; None for sRGB without EXIF.
-        quality: 1 to 100, of JPEG (default 95), WebP (90) and AVIF (85).
+        quality: 1 to 100, of JPEG (default 95), WebP (90) and AVIF (85). Below 100 WebP has colour at half the
+            resolution.
         bits: 8 or 16 a channel, of PNG and TIFF; None takes the photo's.
         force: replace a file that is there.
 
