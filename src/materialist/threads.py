@@ -8,15 +8,15 @@ TORCH_THREADS = 2
 
 
 @contextmanager
-def fixed_threads(count: int = TORCH_THREADS) -> Iterator[None]:
-    """Let torch compute with so many threads, so that a seed gives the same bits on any number of processors.
+def fixed_threads() -> Iterator[None]:
+    """Let torch compute with TORCH_THREADS threads, so that a seed gives the same bits on any number of processors.
 
     Also a decorator. Afterwards the number is what it was.
     """
     import torch
 
     before = torch.get_num_threads()
-    torch.set_num_threads(count)
+    torch.set_num_threads(TORCH_THREADS)
     try:
         yield
     finally:

@@ -9,16 +9,14 @@ from materialist.fit.engine import MaterialProblem
 from materialist.fit.losses import decode, encode, residual
 from materialist.fit.optimise import StageResult, Stop, never
 from materialist.fit.settings import MaterialSettings
-from materialist.threads import fixed_threads
 from materialist.types import Progress
 
 HALVINGS = 16
 """Of the range in which the encoded albedo lies: it is then known to 1/131072."""
-STRIP_PIXELS = 2**14
-"""Solved at once, by one thread: what is computed of them stays in its cache, and is too little to share out."""
+STRIP_PIXELS = 2**18
+"""Solved at once: what is computed of a whole large picture does not fit into memory that is at hand."""
 
 
-@fixed_threads(1)
 def solve_albedo(
     problem: MaterialProblem,
     photo: torch.Tensor,
