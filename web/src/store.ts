@@ -176,7 +176,7 @@ export function accept(state: State): void {
   const stage = { ...state.stage };
   // The server leaves a picture out while it has none: the page keeps the one it shows.
   const same = last?.project?.name === state.project?.name;
-  if (stage.picture === undefined && same) stage.picture = last?.stage.picture;
+  if (stage.picture === undefined && same) Object.assign(stage, { picture: last?.stage.picture, kept: true });
   if (!newer) Object.assign(stage, { ...last!.stage, region: state.stage.region });
   if (state.notes?.length) remark(state.notes.join(" "));
   set({ state: { ...state, stage }, ...(state.project && view.dropped ? { dropped: "" } : {}) });

@@ -62,6 +62,8 @@ class Options(RequestBody):
     kind: Literal["edit", "glass", "remove", "relight", "insert"]
     options: Annotated[dict[Name, Value], Field(max_length=20)]
     coarse: bool = False
+    quiet: bool = False
+    """The page draws the change itself; it wants no picture yet."""
 
 
 class File(RequestBody):
@@ -90,11 +92,12 @@ class Lamps(RequestBody):
     lamps: Annotated[
         list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(max_length=50)
     ]
-    coarse: bool = False
+    quiet: bool = False
 
 
 class Put(RequestBody):
     at: Place
+    quiet: bool = False
 
 
 class Fall(RequestBody):

@@ -68,7 +68,7 @@ def set_options(desk: Desk, body: bodies.Options) -> State:
         take_away(desk, options)
     else:
         session.set(body.kind, **options)
-    return state(desk, coarse=body.coarse)
+    return state(desk, coarse=body.coarse, quiet=body.quiet)
 
 
 def _text(kind: str, name: str, value: Any) -> Any:
@@ -129,7 +129,7 @@ def set_lamps(desk: Desk, body: bodies.Lamps) -> State:
         session.pixel(lamp[0], lamp[1])
     lamps = [[number_text(value) for value in lamp] for lamp in body.lamps]
     session.light(lamps=lamps or None)
-    return state(desk, coarse=body.coarse)
+    return state(desk, quiet=body.quiet)
 
 
 # Objects
@@ -147,7 +147,7 @@ def choose_object(desk: Desk, body: bodies.Chosen) -> State:
 def put_object(desk: Desk, body: bodies.Put) -> State:
     """Stand the current object, or a new one, at a place; a drag sends many."""
     objects.place(desk.session, *body.at)
-    return state(desk)
+    return state(desk, quiet=body.quiet)
 
 
 def let_fall(desk: Desk, body: bodies.Fall) -> State:

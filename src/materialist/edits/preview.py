@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
-from materialist.edits.composite.into_photo import onto_working
+from materialist.edits.composite.into_photo import onto_working, overall_factor
 from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_left
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
@@ -119,9 +119,31 @@ class Preview:
                 "The preview was built for another geometry; build one for this scene."
             )
         edited = self._seen(edited)
-        fitted = np.array_equal(edited.envmap, self.scene.envmap)
-        tables = self._tables if fitted else self._tables_under(edited, coarse)
+        tables = self._tables_of(edited, coarse)
         return self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
+
+    def _tables_of(self, seen: Scene, coarse: bool = False) -> Tables:
+        fitted = np.array_equal(seen.envmap, self.scene.envmap)
+        return self._tables if fitted else self._tables_under(seen, coarse)
+
+    def rows(self, edited: Scene, region: Array) -> dict[str, Array]:
+        """What shading the surface pixels of a region [H, W] bool of a scene takes, in the order of the picture.
+
+        `pixels` [P], row-major; `diffuse` [P, 9] and `specular` [L, P, 6] as of `transport.cache.Tables`; `base`
+        [P, 3], the fitted scene; under another light also `overall` [3], by how much that is brighter as a whole.
+        """
+        tables = self._tables_of(self._seen(edited))
+        rows = np.flatnonzero(region.ravel()[self._pixels])
+        pixels = self._pixels[rows]
+        found = {
+            "pixels": pixels,
+            "diffuse": tables.diffuse[rows].cpu().numpy(),
+            "specular": tables.specular[:, rows].cpu().numpy(),
+            "base": self._base.reshape(-1, 3)[pixels],
+        }
+        if is_relit(self.scene, edited):
+            found["overall"] = overall_factor(self._base, self.render(edited))
+        return found
 
     def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""

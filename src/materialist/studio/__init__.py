@@ -64,6 +64,7 @@ class StudioSettings:
     scenes_kept: int = 24  # edited scenes: moving the last step must not replay those before
     kept_bytes: float = 3e8  # of the bodies in them
     triangles: int = 12_000  # of all bodies in a sketch; of a finer mesh every n-th
+    drawn_pixels: int = 300_000  # of a region that the page shades, which takes 150 bytes of each
     jpeg_quality: int = 88  # of live pictures
     video_frames: int = 24  # of the turning light
     lamp_share: float = 0.75  # of the way from the camera to the surface: there a new lamp hangs
