@@ -1,7 +1,7 @@
 // What the page draws itself between two pictures of the server: a material, an object that is moved, lamps.
 // The formulas are those of `studio/drawn.py`, which sends what they take.
 import { bytes } from "./api";
-import type { Picture } from "./picture";
+import type { Crop, Picture } from "./picture";
 import { pending } from "./store";
 import type { State } from "./types";
 
@@ -189,7 +189,7 @@ class Thing {
   }
 
   /** The object at another place: nearer, and larger, as the ground there is. */
-  draw(options: Options, out: ImageData): void {
+  draw(options: Options, out: ImageData): Crop {
     const { header, arrays } = this.block;
     const { gain, added } = arrays as Record<string, Numbers>;
     const [left, top, width, height] = header.box as number[] as [number, number, number, number];
@@ -226,6 +226,7 @@ class Thing {
         light[place + 2] = level(LINEAR[light[place + 2]!]! * kept + blue);
       }
     }
+    return [x0, y0, Math.max(x1 - x0, 0), Math.max(y1 - y0, 0)];
   }
 
   private depth([x, y]: [number, number]): number {
@@ -345,6 +346,8 @@ class Drawn {
   private panel = "";
   /** Options of the material that the server has not answered for. */
   private moved: Options = {};
+  /** Where the object was drawn last. */
+  private covered: Crop = [0, 0, 0, 0];
 
   /** Get what the open panel's changes need, when nothing has moved for a moment. */
   follow(state: State | null, panel: string): void {
@@ -371,6 +374,8 @@ class Drawn {
   private async ask(): Promise<void> {
     const kind = this.wanted();
     if (!kind || this.asking) return;
+    // In the middle of a drag what it began with does.
+    if (pending() || performance.now() - (this.known.get(kind)?.used ?? 0) < HELD) return this.follow(this.state, this.panel);
     this.asking = true;
     try {
       const key = this.state!.drawn[kind]!;
@@ -422,21 +427,39 @@ class Drawn {
     if (!known) return false;
     const step = this.state!.steps[this.state!.current!]!;
     const tool = known.tool as Thing;
-    return this.over(known.under!, (out) => tool.draw({ ...step.options, ...options }, out));
+    const under = known.under!;
+    return this.picture!.paint([0, 0, under.width, under.height], (out, fresh) => {
+      // Taken away where it was, and drawn where it is.
+      const before = fresh ? ([0, 0, under.width, under.height] as Crop) : this.covered;
+      copy(under, out, before);
+      this.covered = tool.draw({ ...step.options, ...options }, out);
+      return union(before, this.covered);
+    });
   }
 
   lamps(lamps: number[][]): boolean {
     const known = this.use("lamps");
-    const tool = known?.tool as Lamps;
-    return !!known && this.over(known.under!, (out) => tool.draw(lamps, out));
-  }
-
-  private over(under: ImageData, draw: (out: ImageData) => void): boolean {
+    if (!known) return false;
+    const under = known.under!;
     return this.picture!.paint([0, 0, under.width, under.height], (out) => {
       out.data.set(under.data);
-      draw(out);
+      (known.tool as Lamps).draw(lamps, out);
     });
   }
+}
+
+function copy(from: ImageData, to: ImageData, [left, top, width, height]: Crop): void {
+  for (let y = top; y < top + height; y++) {
+    const first = 4 * (y * from.width + left);
+    to.data.set(from.data.subarray(first, first + 4 * width), first);
+  }
+}
+
+function union(one: Crop, two: Crop): Crop {
+  if (!one[2] || !two[2]) return one[2] ? one : two;
+  const [left, top] = [Math.min(one[0], two[0]), Math.min(one[1], two[1])];
+  const right = Math.max(one[0] + one[2], two[0] + two[2]);
+  return [left, top, right - left, Math.max(one[1] + one[3], two[1] + two[3]) - top];
 }
 
 export const drawn = new Drawn();

@@ -58,6 +58,9 @@ export interface Shown {
   clipped: boolean;
 }
 
+const SLOW = 45; // milliseconds between two frames of a drag
+const PAUSE = 300; // after which it rests
+
 type Layer = "native" | "plain" | "edited";
 /** left, top, width, height in working pixels. */
 export type Crop = [number, number, number, number];
@@ -77,6 +80,9 @@ export class Picture {
   private painted = 0;
   /** Whether only what was painted has changed since the last frame. */
   private onlyPatch = false;
+  private dirty: Crop = [0, 0, 0, 0];
+  /** When something was painted last, how often in a row that took long, and what ends that. */
+  private hurry = { last: 0, slow: 0, timer: 0 };
   onload: (layer: Layer, image: HTMLImageElement) => void = () => undefined;
 
   constructor(private canvas: HTMLCanvasElement) {
@@ -138,19 +144,25 @@ export class Picture {
     return !!this.gl && this.images.has("plain");
   }
 
-  /** Change a part of the edited picture, or of the photo where there is none; false where that is path traced. */
-  paint(crop: Crop, change: (pixels: ImageData) => void): boolean {
+  /**
+   * Change a part of the edited picture, or of the photo where there is none; false where that is path traced. `change`
+   * gets what it made of these pixels the last time, or those of the picture, which are `fresh`; it may return which of
+   * them it has changed.
+   */
+  paint(crop: Crop, change: (pixels: ImageData, fresh: boolean) => Crop | void): boolean {
     const plain = this.images.get("plain");
     const over = this.images.get("edited") ?? plain;
     if (!this.paints || !over || over.naturalWidth !== plain!.naturalWidth) return false;
     const known = this.patch;
     const same = known && known.over === over && known.crop.every((side, k) => side === crop[k]);
     const pixels = same ? known.pixels : pixelsOf(over, crop);
-    change(pixels);
+    const changed = change(pixels, !same) ?? crop;
     this.patch = { crop, pixels, over };
+    this.dirty = same ? changed : crop;
     this.painted += 1;
+    this.pace();
     if (!this.textures.has("edited")) this.fill("edited", plain!);
-    this.lay();
+    this.lay(this.dirty);
     // Together with anything else that has changed, all is drawn.
     const alone = !this.frame;
     this.draw();
@@ -158,14 +170,36 @@ export class Picture {
     return true;
   }
 
-  /** Put what was painted on the edited picture. */
-  private lay(): void {
+  /** Where frames of a drag take long, as without a graphics card, they have half the pixels until it rests. */
+  private pace(): void {
+    const { hurry } = this;
+    const since = performance.now() - hurry.last;
+    hurry.last += since;
+    hurry.slow = since > PAUSE ? 0 : since > SLOW ? hurry.slow + 1 : hurry.slow;
+    clearTimeout(hurry.timer);
+    if (!this.hurried) return;
+    hurry.timer = window.setTimeout(() => {
+      hurry.slow = 0;
+      this.draw();
+    }, PAUSE);
+  }
+
+  private get hurried(): boolean {
+    return this.hurry.slow >= 3;
+  }
+
+  /** Put what was painted, or a part of it, on the edited picture. */
+  private lay(part = this.patch!.crop): void {
     const gl = this.gl!;
-    const { crop, pixels } = this.patch!;
+    const { crop, pixels, over } = this.patch!;
+    const [left, top, width, height] = part;
     gl.bindTexture(gl.TEXTURE_2D, this.textures.get("edited")!);
-    gl.texSubImage2D(gl.TEXTURE_2D, 0, crop[0], crop[1], gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    gl.pixelStorei(gl.UNPACK_ROW_LENGTH, crop[2]);
+    const first = 4 * ((top - crop[1]) * crop[2] + left - crop[0]);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, left, top, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels.data, first);
+    gl.pixelStorei(gl.UNPACK_ROW_LENGTH, 0);
     // Smaller copies are for when it is seen smaller; to make them takes longer than all else.
-    if (this.box.width * devicePixelRatio < this.patch!.over.naturalWidth) gl.generateMipmap(gl.TEXTURE_2D);
+    if (this.box.width * devicePixelRatio < over.naturalWidth) gl.generateMipmap(gl.TEXTURE_2D);
   }
 
   has(layer: Layer): boolean {
@@ -215,10 +249,13 @@ export class Picture {
 
   private render(): void {
     const { canvas, gl, box } = this;
-    const scale = devicePixelRatio;
+    const scale = devicePixelRatio / (this.hurried ? 2 : 1);
     const width = Math.max(1, Math.round(canvas.clientWidth * scale));
     const height = Math.max(1, Math.round(canvas.clientHeight * scale));
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    if (canvas.width !== width || canvas.height !== height) {
+      Object.assign(canvas, { width, height });
+      this.onlyPatch = false;
+    }
     if (!gl) return this.paintFlat(scale);
     gl.viewport(0, 0, width, height);
     this.limit(scale);
@@ -259,7 +296,7 @@ export class Picture {
     const { gl, box, canvas, patch } = this;
     if (!this.onlyPatch || !patch) return;
     const unit = (box.width / patch.over.naturalWidth) * scale;
-    const [left, top, width, height] = patch.crop.map((side) => side * unit) as Crop;
+    const [left, top, width, height] = this.dirty.map((side) => side * unit) as Crop;
     const reach = 2 * unit + 2;
     gl!.enable(gl!.SCISSOR_TEST);
     gl!.scissor(

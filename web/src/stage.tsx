@@ -49,6 +49,7 @@ export function Stage() {
     picture.current.onload = (layer, image) => {
       if (layer === "native") setPhoto(sized(image));
       if (layer === "plain") setPhoto((known) => (known.width ? known : sized(image)));
+      if (layer === "plain") drawn.follow(view.state, view.panel);
     };
   }, []);
   useEffect(() => {

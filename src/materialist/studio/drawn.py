@@ -210,7 +210,7 @@ def _thing(drawing: Drawing) -> Made:
     shape = (*scene.depth.shape, 3)
     added = draw_bodies(np.zeros(shape, np.float32), scene)
     gain = (draw_bodies(np.ones(shape, np.float32), scene) - added)[..., :1]
-    reached = (gain[..., 0] < 1 - 1 / 512) | (added > 0).any(-1)
+    reached = (gain[..., 0] < 0.98) | (added > 0).any(-1)
     if not reached.any():
         return None
     box = window(reached)
