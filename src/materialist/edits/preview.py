@@ -34,6 +34,14 @@ MIN_AMBIENT = 1e-3
 """Factor on the fitted map below which the map cannot be scaled back."""
 
 
+def load() -> None:
+    """Import the renderer and the engine, which takes a second or two the first time."""
+    from materialist.render.variant import setup
+
+    setup()
+    import materialist.fit.engine  # noqa: F401
+
+
 class Preview:
     """A fitted scene whose rays are traced once; then a change of materials is one shading call.
 
@@ -46,9 +54,7 @@ class Preview:
     """
 
     def __init__(self, scene: Scene, file: Path | None = None):
-        from materialist.render.variant import setup
-
-        setup()
+        load()
         self.scene = scene
         self._file = file
         self._key = _key(scene)

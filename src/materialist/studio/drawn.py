@@ -36,6 +36,8 @@ MOVED = ("hue", "saturation", "value", "albedo", "roughness", "metallic")
 """Options of a material that the page draws; others, as a texture, are in what it is sent."""
 KELVINS = np.geomspace(1667, 25000, 48)
 """Colour temperatures whose colours are sent; the page interpolates."""
+FAINT = 0.03
+"""Share of the light whose loss in an object's shadow a drag does not show."""
 DEPTH_SIDE = 96
 """Longer side of the depth map by which an object that is dragged grows and shrinks, pixels."""
 
@@ -210,7 +212,9 @@ def _thing(drawing: Drawing) -> Made:
     shape = (*scene.depth.shape, 3)
     added = draw_bodies(np.zeros(shape, np.float32), scene)
     gain = (draw_bodies(np.ones(shape, np.float32), scene) - added)[..., :1]
-    reached = (gain[..., 0] < 0.98) | (added > 0).any(-1)
+    # The far end of the shadow is left out softly: the page draws what is changed anew for each frame.
+    gain = 1 - np.maximum(1 - gain - FAINT, 0) / (1 - FAINT)
+    reached = (gain[..., 0] < 1) | (added > 0).any(-1)
     if not reached.any():
         return None
     box = window(reached)
@@ -269,6 +273,6 @@ def _halves(values: Array) -> Array:
 
 
 def _jpeg(linear: Array) -> dict[str, Array]:
-    quality = SETTINGS.jpeg_quality
-    encoded = display.encoded(srgb_levels(linear), "JPEG", quality=quality)
+    # Finer than a live picture: what is drawn over it shows its blocks.
+    encoded = display.encoded(srgb_levels(linear), "JPEG", quality=95, subsampling=0)
     return {"under": np.frombuffer(encoded, np.uint8)}

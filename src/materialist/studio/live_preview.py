@@ -271,6 +271,17 @@ def _build(scene: Scene, file: Path | None) -> Any:
     return Preview(scene, file)
 
 
+def load_renderer() -> None:
+    """Load what previews need, on their thread, before there is a scene."""
+    _THREAD.submit(_load)
+
+
+def _load() -> None:
+    from materialist.edits.preview import load
+
+    load()
+
+
 class _Freeing:
     """Gives memory back on the thread of the previews: once for all who ask before it has begun."""
 
