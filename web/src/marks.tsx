@@ -256,7 +256,7 @@ export function lampsOf(options: Record<string, unknown>): number[][] {
 export function setLamp(index: number, lamp: number[] | null): Promise<void> {
   const lamps = lampsOf(optionsOf(view.state, "relight"));
   const after = lamps.flatMap((one, place) => (place !== index ? [one] : lamp ? [lamp] : []));
-  return change("lamps", { lamps: after, quiet: after.length > 0 && drawn.lamps(after) }, "lamps");
+  return change("lamps", { index, lamp, quiet: lamp !== null && drawn.lamps(after) }, lamp ? `lamp ${index}` : "");
 }
 
 const FLAT = 0.4; // of the ring on the ground around an object, as it is seen

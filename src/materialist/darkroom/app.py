@@ -56,7 +56,7 @@ _POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
     "use": (bodies.File, editing.use_file),
     "light": (bodies.Chosen, editing.choose_light),
     "lamp": (bodies.NewLamp, editing.add_lamp),
-    "lamps": (bodies.Lamps, editing.set_lamps),
+    "lamps": (bodies.MovedLamp, editing.set_lamp),
     "object": (bodies.Chosen, editing.choose_object),
     "place": (bodies.Put, editing.put_object),
     "fall": (bodies.Fall, editing.let_fall),
@@ -170,7 +170,9 @@ def _state(desk: Desk, request: Request) -> Response:
 
 
 def _photo(desk: Desk, request: Request) -> Response:
-    """The open photo; `working=1` at working size, `full=1` with all its pixels."""
+    """The open photo; `working=1` at working size, `full=1` with all its pixels; `edited=1` with edits, no objects."""
+    if "edited" in request.query_params:
+        return _jpeg(seeing.skin_jpeg(desk))
     if "full" in request.query_params:
         return _jpeg(native_jpeg(desk, seeing.FULL_SIDE, 95))
     return _jpeg((working_jpeg if "working" in request.query_params else native_jpeg)(desk))

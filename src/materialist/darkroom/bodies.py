@@ -86,12 +86,11 @@ class NewLamp(RequestBody):
     before: Annotated[float, Field(gt=0, lt=1)] = 0.75
 
 
-class Lamps(RequestBody):
-    """All lamps: [x, y, depth, kelvin, power] each."""
+class MovedLamp(RequestBody):
+    """A lamp moved or changed, [x, y, depth, kelvin, power], or taken away (None)."""
 
-    lamps: Annotated[
-        list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(max_length=50)
-    ]
+    index: Annotated[int, Field(ge=0, le=50)]
+    lamp: Annotated[list[Number], Field(min_length=5, max_length=5)] | None
     quiet: bool = False
 
 
