@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack, cast
@@ -60,7 +61,7 @@ def invert(
         options, values: see `options.InvertOptions`; `values` are fields of it, as in `invert(photo, size=256)`.
         progress: called as progress(stage, done, total).
         on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
-            soon as each is there.
+            soon as each is there; "materials" also before "prior", where the predictor has them before the depth.
         stop: asked after each step of the fit; True ends it there, and the scene has what was found until then.
 
     Raises:
@@ -100,7 +101,7 @@ def invert(
 
     # --- Predict the prior ---
     tick("predict", 0, 1)
-    picture, prior = _prior(picture, choices)
+    picture, prior = _prior(picture, choices, tell)
     lap("predict")
     if mask is not None and not (mask & (prior.depth > 0)).any():
         raise InputError("The mask lies wholly where there is no surface (sky); mark an object.")
@@ -171,7 +172,9 @@ def invert(
     )
 
 
-def _prior(picture: Photo, choices: InvertOptions) -> tuple[Photo, Prediction]:
+def _prior(
+    picture: Photo, choices: InvertOptions, tell: Callable[[str, Any], Any]
+) -> tuple[Photo, Prediction]:
     """The photo as the predictor sees it, and the prior."""
     known = choices.prior
     if known is not None and not isinstance(known, Prediction | Prior):
@@ -197,6 +200,7 @@ def _prior(picture: Photo, choices: InvertOptions) -> tuple[Photo, Prediction]:
     }
     source = get_predictor(choices.predictor, device=choices.device, prior=known, **parts)
     picture = _seen_by(source, picture)
+    source.on_materials = partial(tell, "materials")
     result = source.predict(picture, seed=choices.seed)
     if not (result.depth > 0).any():
         raise InputError(

@@ -330,6 +330,97 @@ def test_light_sun_and_lamps(page):
     page.wait_for_selector(".handle.lamp", state="detached")
 
 
+def seen(page, left, top, right, bottom):
+    """[h, w, 3] of a part of the picture, by shares of the photo."""
+    x0, y0 = place(page, left, top)
+    x1, y1 = place(page, right, bottom)
+    clip = {"x": x0, "y": y0, "width": x1 - x0, "height": y1 - y0}
+    return np.asarray(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")).astype(int)
+
+
+class Held:
+    """Requests to a place that are held back, so that the page is on its own."""
+
+    def __init__(self, page, place):
+        self.page = page
+        self.place = f"**/api/{place}"
+        self.routes = []
+        self.holds = True
+        page.route(self.place, self._take)
+
+    def _take(self, route):
+        if self.holds:
+            self.routes.append(route)
+        else:
+            route.continue_()
+
+    def release(self):
+        """Let them go, and wait for the server's picture."""
+        self.holds = False
+        with self.page.expect_response("**/api/state", timeout=60_000):
+            for route in self.routes:
+                route.continue_()
+        self.page.unroute(self.place)
+        self.page.wait_for_timeout(300)  # until it is decoded
+
+
+def test_the_page_draws_changes_as_the_server_does(page):
+    # --- A material: by the same formula, so but for the JPEG the same picture ---
+    select_block(page)
+    page.wait_for_selector("#stage[data-drawn=material]")
+    held = Held(page, "set")
+    inside = (0.3, 0.4, 0.48, 0.6)
+    slide(page, "hue", 120)
+    becomes(page, green)
+    for name, value in (
+        ("saturation", -0.3),
+        ("value", 0.4),
+        ("roughness", 0.2),
+        ("metallic", 0.5),
+    ):
+        slide(page, name, value)
+    until(
+        page,
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))",
+    )
+    mine = seen(page, *inside)
+    held.release()
+    page.wait_for_selector("#steps >> text=metallic 0.5")
+    theirs = seen(page, *inside)
+    assert np.abs(mine - theirs).max() <= 8 and np.abs(mine - theirs).mean() < 3
+    # --- A lamp that is dragged: without the server its light goes along ---
+    page.get_by_role("tab", name="Light").click()
+    page.locator("#stage").focus()
+    page.keyboard.press("4")
+    page.mouse.click(*place(page, 0.3, 0.75))
+    page.wait_for_selector("#stage[data-drawn=lamps]")
+    held = Held(page, "lamps")
+    wall = (0.6, 0.4, 0.95, 0.7)
+    before = seen(page, *wall)
+    drag(page, ".handle.lamp", 0.35 * page.locator(".marks").bounding_box()["width"], 0)
+    until(page, "() => new Promise((done) => setTimeout(() => done(true), 200))")
+    mine = seen(page, *wall)
+    assert (mine - before).mean() > 5
+    held.release()
+    theirs = seen(page, *wall)
+    assert np.quantile(np.abs(mine - theirs), 0.98) <= 14
+    assert np.abs(mine - theirs).mean() < 6
+    # --- An object: what was sketched at one place is seen at the other ---
+    page.get_by_role("tab", name="Objects").click()
+    page.get_by_role("button", name="Ball").click()
+    page.mouse.click(*place(page, 0.3, 0.9))
+    page.wait_for_selector("#stage[data-drawn=thing]")
+    held = Held(page, "place")
+    there = (0.72, 0.86, 0.74, 0.88)
+    before = seen(page, *there)
+    drag(page, ".handle.thing", 0.45 * page.locator(".marks").bounding_box()["width"], 0)
+    page.wait_for_timeout(200)
+    assert np.abs(seen(page, *there) - before).max() > 15
+    held.release()
+    assert np.abs(seen(page, *there) - before).max() > 15
+    assert not page.errors
+
+
 def test_final_picture_and_download(page, tmp_path):
     page.set_default_timeout(300_000)
     select_block(page)

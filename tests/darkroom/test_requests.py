@@ -2,6 +2,7 @@
 
 import base64
 import io
+import json
 import os
 import re
 import signal
@@ -82,13 +83,45 @@ def test_the_light_lamps_and_sun(client):
     state = client.post("/api/lamp", json={"at": [40, 40], "kelvin": 4000}).json()
     lamp = [float(value) for value in state["steps"][0]["options"]["lamps"][0]]
     assert lamp[:2] == [40, 40] and lamp[3] == 4000
-    moved = {"lamps": [[10, 40, *lamp[2:]]]}
-    state = client.post("/api/lamps", json=moved).json()
-    assert state["stage"]["lamps"] == [[10, 40]]
-    assert client.post("/api/lamps", json={"lamps": [[900, 4, 1, 1, 1]]}).status_code == 400
-    state = client.post("/api/lamps", json={"lamps": []}).json()
+    # Each is moved by itself: of two tabs that move one each, neither puts the other's back.
+    client.post("/api/lamp", json={"at": [50, 40]})
+    client.post("/api/lamps", json={"index": 0, "lamp": [10, 40, *lamp[2:]], "quiet": True})
+    state = client.post("/api/lamps", json={"index": 1, "lamp": [52, 40, *lamp[2:]]}).json()
+    assert state["stage"]["lamps"] == [[10, 40], [52, 40]]
+    for wrong in ({"index": 0, "lamp": [900, 4, 1, 1, 1]}, {"index": 2, "lamp": None}):
+        assert client.post("/api/lamps", json=wrong).status_code == 400
+    state = client.post("/api/lamps", json={"index": 0, "lamp": None}).json()
+    assert state["stage"]["lamps"] == [[52, 40]]
+    state = change(client, "relight", lamps=None).json()
     assert "lamps" not in state["steps"][0]["options"]
     assert client.post("/api/light", json={"name": "Moon"}).status_code == 400
+
+
+def test_a_page_gets_what_it_draws_itself_and_its_key_stays(client):
+    def key(kind):
+        return client.get("/api/state").json()["drawn"].get(kind)
+
+    def header(kind):
+        content = client.get(f"/api/drawn/{kind}").content
+        return json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
+
+    assert client.get("/api/drawn/material").status_code == 204
+    assert client.get("/api/drawn/all").status_code == 400
+    select_block(client)
+    before = key("material")
+    assert header("material")["key"] == before and header("material")["count"] > 100
+    # A slider changes nothing of it, and asks for no picture; another edit does.
+    body = {"kind": "edit", "options": {"hue": 40}, "quiet": True}
+    state = client.post("/api/set", json=body).json()
+    assert "picture" not in state["stage"] and state["stage"]["coarse"]
+    assert key("material") == before
+    change(client, grow=0.01)
+    assert key("material") not in (None, before)
+    client.post("/api/lamp", json={"at": [40, 40]})
+    before = key("lamps")
+    assert header("lamps")["key"] == before
+    client.post("/api/lamps", json={"index": 0, "lamp": [10, 40, 2, 2700, 1]})
+    assert key("lamps") == before
 
 
 def test_an_object_is_placed_moved_and_changed(client):

@@ -27,7 +27,9 @@ export async function get<T>(place: string): Promise<T> {
 
 export async function post<T>(place: string, body: object = {}): Promise<T> {
   const headers = { ...HEADERS, "content-type": "application/json" };
-  return read<T>(await fetch(`/api/${place}`, { method: "POST", headers, body: JSON.stringify(body) }));
+  const text = JSON.stringify(body);
+  // What is small arrives also when the page is closed meanwhile.
+  return read<T>(await fetch(`/api/${place}`, { method: "POST", headers, body: text, keepalive: text.length < 30_000 }));
 }
 
 /** What is not text. */

@@ -1,5 +1,7 @@
 // What is drawn over the picture: outlines, strokes, handles of objects and lamps.
 import { useLayoutEffect, useRef, useState } from "preact/hooks";
+import { drawn } from "./drawn";
+import { thing } from "./panels/object";
 import type { Box } from "./picture";
 import { change, optionsOf, pending, useView, view, type Mode } from "./store";
 import { t } from "./strings";
@@ -254,7 +256,7 @@ export function lampsOf(options: Record<string, unknown>): number[][] {
 export function setLamp(index: number, lamp: number[] | null): Promise<void> {
   const lamps = lampsOf(optionsOf(view.state, "relight"));
   const after = lamps.flatMap((one, place) => (place !== index ? [one] : lamp ? [lamp] : []));
-  return change("lamps", { lamps: after }, "lamps");
+  return change("lamps", { index, lamp, quiet: lamp !== null && drawn.lamps(after) }, lamp ? `lamp ${index}` : "");
 }
 
 const FLAT = 0.4; // of the ring on the ground around an object, as it is seen
@@ -271,15 +273,14 @@ function Thing({ unit, toPlace }: { unit: number; toPlace: (event: PointerEvent)
   const angleOf = (place: Point) => Math.atan2((place[1] - at[1]) / FLAT, place[0] - at[0]);
   const onRing = (angle: number): Point => [at[0] + ring * Math.cos(angle), at[1] + ring * FLAT * Math.sin(angle)];
   const far = (place: Point) => Math.max(Math.hypot(place[0] - at[0], place[1] - at[1]), 4 * unit);
-  const set = (options: object, key: string) => change("set", { kind: "insert", options }, key);
   // In front is 0; it turns to the right, as its front does seen from above.
   const turned = (place: Point) => {
     const degrees = Math.round(90 - (angleOf(place) * 180) / Math.PI);
-    return set({ turn: ((degrees + 540) % 360) - 180 }, "turn");
+    return thing({ turn: ((degrees + 540) % 360) - 180 }, "turn");
   };
   const scaled = (place: Point, from: Point) => {
     const value = (scale * far(place)) / far(from);
-    return set({ scale: Math.round(Math.min(Math.max(value, 0.1), 5) * 100) / 100 }, "scale");
+    return thing({ scale: Math.round(Math.min(Math.max(value, 0.1), 5) * 100) / 100 }, "scale");
   };
   return (
     <>
@@ -302,7 +303,7 @@ function Thing({ unit, toPlace }: { unit: number; toPlace: (event: PointerEvent)
         at={at}
         unit={unit}
         toPlace={toPlace}
-        moved={(place) => change("place", { at: place }, "place")}
+        moved={(place) => change("place", { at: place, quiet: drawn.thing({ at: place }) }, "place")}
       />
     </>
   );

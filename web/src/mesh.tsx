@@ -35,9 +35,9 @@ export function Mesh() {
     if (!ready || skin === "shape") return drawn.current?.lay(null);
     const image = new Image();
     image.onload = () => drawn.current?.lay(image);
-    image.src = skin === "colours" ? address("map/0", { of: String(ready) }) : state?.stage.picture || address("photo", { working: "1" });
+    image.src = skin === "colours" ? address("map/0", { of: String(ready) }) : address("photo", { edited: "1", of: String(ready) });
     return () => void (image.onload = null);
-  }, [ready, skin, skin === "picture" ? state?.stage.picture : ""]);
+  }, [ready, skin]);
   useEffect(() => {
     const shown = canvas.current!;
     const watcher = new ResizeObserver(() => drawn.current?.draw());

@@ -1,5 +1,6 @@
 // The stage: the picture, what is outlined on it, and what the pointer and the keys do there.
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
+import { drawn } from "./drawn";
 import { Marks } from "./marks";
 import { Picture, type Box } from "./picture";
 import { fitted, zoomed, type Size } from "./sight";
@@ -44,10 +45,11 @@ export function Stage() {
 
   // --- The picture's layers ---
   useEffect(() => {
-    picture.current = new Picture(canvas.current!);
+    drawn.picture = picture.current = new Picture(canvas.current!);
     picture.current.onload = (layer, image) => {
       if (layer === "native") setPhoto(sized(image));
       if (layer === "plain") setPhoto((known) => (known.width ? known : sized(image)));
+      if (layer === "plain") drawn.follow(view.state, view.panel);
     };
   }, []);
   useEffect(() => {
@@ -69,14 +71,16 @@ export function Stage() {
   useEffect(() => {
     if (!project || dropped) return;
     // Without edits the picture is the photo itself.
-    picture.current!.load("edited", on.length && !stage?.bad ? (stage?.picture ?? "") : "");
-  }, [stage?.picture, project, dropped, on.length, stage?.bad]);
+    picture.current!.load("edited", on.length && !stage?.bad ? (stage?.picture ?? "") : "", stage?.kept);
+  }, [stage, project, dropped, on.length]);
   useEffect(() => {
     const replaced = on.some((step) => !["edit", "relight"].includes(step.kind));
     // Exposure and clipping are looked at, not changed: other panels show the picture as it is.
     const looked = panel === "look" ? { exposure, clipped } : { exposure: 0, clipped: false };
     picture.current!.show({ split: before ? 2 : comparing ? split : 0, whole: final, replaced, ...looked });
   }, [before, comparing, split, final, steps, panel, exposure, clipped]);
+
+  useEffect(() => drawn.follow(state, panel), [state, panel]);
 
   // --- Where it lies ---
   useLayoutEffect(() => {

@@ -123,6 +123,7 @@ export function tell(error: unknown): void {
 interface Waiting {
   key: string;
   words: string;
+  quiet: boolean;
   run: () => Promise<State>;
   done: () => void;
 }
@@ -132,24 +133,35 @@ let running = false;
 let changes = 0;
 let rest = 0;
 
-export function change(place: string, body: object = {}, key = "", words = ""): Promise<void> {
+const SPARSE = 250; // milliseconds between two changes that the page has drawn itself
+let later = 0;
+
+/** Send a change; one that is `quiet`, which the page has drawn, waits for those that follow it at once. */
+export function change(place: string, body: { quiet?: boolean; [name: string]: unknown } = {}, key = "", words = ""): Promise<void> {
   return new Promise((done) => {
-    const entry = { key, words, run: () => post<State>(place, body), done };
+    const entry = { key, words, quiet: !!body.quiet, run: () => post<State>(place, body), done };
     const same = key ? queue.find((one) => one.key === key) : undefined;
     if (same) {
       same.done();
       queue = queue.map((one) => (one === same ? entry : one));
     } else queue.push(entry);
-    void drain();
+    if (!body.quiet) void drain();
+    else if (!running) wait();
   });
 }
 
-/** Whether a change is on its way. */
+function wait(): void {
+  later ||= window.setTimeout(() => void drain(), SPARSE);
+}
+
+/** Whether a change is on its way, or about to be. */
 export function pending(): boolean {
-  return running;
+  return running || queue.length > 0;
 }
 
 async function drain(): Promise<void> {
+  clearTimeout(later);
+  later = 0;
   if (running) return;
   running = true;
   for (let entry = queue.shift(); entry; entry = queue.shift()) {
@@ -166,8 +178,10 @@ async function drain(): Promise<void> {
     clearTimeout(timer);
     if (view.working) set({ working: "" });
     entry.done();
+    if (queue.every((one) => one.quiet)) break;
   }
   running = false;
+  if (queue.length) wait();
 }
 
 export function accept(state: State): void {
@@ -176,7 +190,7 @@ export function accept(state: State): void {
   const stage = { ...state.stage };
   // The server leaves a picture out while it has none: the page keeps the one it shows.
   const same = last?.project?.name === state.project?.name;
-  if (stage.picture === undefined && same) stage.picture = last?.stage.picture;
+  if (stage.picture === undefined && same) Object.assign(stage, { picture: last?.stage.picture, kept: true });
   if (!newer) Object.assign(stage, { ...last!.stage, region: state.stage.region });
   if (state.notes?.length) remark(state.notes.join(" "));
   set({ state: { ...state, stage }, ...(state.project && view.dropped ? { dropped: "" } : {}) });
@@ -188,7 +202,7 @@ async function load(): Promise<void> {
   const sent = changes;
   try {
     const state = await get<State>("state");
-    if (sent === changes) accept(state);
+    if (sent === changes && !queue.length) accept(state);
   } catch (error) {
     tell(error);
   }
@@ -196,7 +210,7 @@ async function load(): Promise<void> {
 
 /** Ask for the state. While a change is on its way its answer brings one. */
 export async function refresh(): Promise<void> {
-  if (!running) await load();
+  if (!pending()) await load();
 }
 
 // The channel
@@ -226,7 +240,7 @@ function hear(news: News): void {
   }
   const finer = news.fine && !view.fine && state?.steps.some((step) => step.on);
   set({ jobs: news.jobs, glass: news.glass, fine: news.fine });
-  if (!state || running) return;
+  if (!state || pending()) return;
   const ready = news.ready && !state.ready && state.project;
   if (news.revision > state.revision || ready || traced || finer) void refresh();
 }
@@ -270,6 +284,7 @@ export async function arrive(): Promise<void> {
 export async function begin(): Promise<void> {
   const kept = JSON.parse(sessionStorage.getItem("view") ?? "{}") as Partial<View>;
   Object.assign(view, { ...kept, lamp: { ...view.lamp, ...kept.lamp } });
+  window.addEventListener("pagehide", () => void drain());
   await arrive();
   connect();
 }

@@ -18,6 +18,8 @@ export interface Stage {
   bad: boolean;
   waiting: boolean;
   coarse: boolean;
+  /** The picture is one of before: the page draws the change itself. */
+  kept?: boolean;
   serial?: number;
   region: string;
 }
@@ -50,6 +52,8 @@ export interface State {
   redo: boolean;
   object: Record<string, string>;
   commands: string;
+  /** Kind of change that the page can draw itself -> the key of what it takes. */
+  drawn: Record<string, string>;
   notes?: string[];
 }
 

@@ -30,6 +30,8 @@ from materialist.darkroom.state import (
     state,
     working_jpeg,
 )
+from materialist.errors import InputError
+from materialist.studio import drawn
 from materialist.studio.access.gate import CHANNEL, UPLOAD, Gate
 from materialist.studio.studio import Studio
 
@@ -54,7 +56,7 @@ _POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
     "use": (bodies.File, editing.use_file),
     "light": (bodies.Chosen, editing.choose_light),
     "lamp": (bodies.NewLamp, editing.add_lamp),
-    "lamps": (bodies.Lamps, editing.set_lamps),
+    "lamps": (bodies.MovedLamp, editing.set_lamp),
     "object": (bodies.Chosen, editing.choose_object),
     "place": (bodies.Put, editing.put_object),
     "fall": (bodies.Fall, editing.let_fall),
@@ -119,6 +121,7 @@ def _routes(desks: Desks) -> list[Any]:
         "/api/report": lambda desk, request: _json(report_of(desk)),
         "/api/photo": _photo,
         "/api/mesh": _mesh,
+        "/api/drawn/{kind}": _drawn,
         "/api/light/{name}": lambda desk, request: _jpeg(light_jpeg(request.path_params["name"])),
         "/api/example/{name}": _example,
         "/api/map/{name}": lambda desk, request: _jpeg(map_jpeg(desk, request.path_params["name"])),
@@ -167,17 +170,30 @@ def _state(desk: Desk, request: Request) -> Response:
 
 
 def _photo(desk: Desk, request: Request) -> Response:
-    """The open photo; `working=1` at working size, `full=1` with all its pixels."""
+    """The open photo; `working=1` at working size, `full=1` with all its pixels; `edited=1` with edits, no objects."""
+    if "edited" in request.query_params:
+        return _jpeg(seeing.skin_jpeg(desk))
     if "full" in request.query_params:
         return _jpeg(native_jpeg(desk, seeing.FULL_SIDE, 95))
     return _jpeg((working_jpeg if "working" in request.query_params else native_jpeg)(desk))
 
 
 def _mesh(desk: Desk, request: Request) -> Response:
+    return _bytes(seeing.mesh_bytes(desk))
+
+
+def _drawn(desk: Desk, request: Request) -> Response:
+    """What the page needs to draw a change of a kind itself; nothing where it cannot."""
+    kind = request.path_params["kind"]
+    if kind not in drawn.KINDS:
+        raise InputError(f"The page draws no {kind!r}.")
+    content = drawn.content(desk.session, kind)
+    return Response(status_code=204) if content is None else _bytes(content)
+
+
+def _bytes(content: bytes) -> Response:
     return Response(
-        seeing.mesh_bytes(desk),
-        media_type="application/octet-stream",
-        headers={"cache-control": "no-store"},
+        content, media_type="application/octet-stream", headers={"cache-control": "no-store"}
     )
 
 

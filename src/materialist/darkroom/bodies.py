@@ -62,6 +62,8 @@ class Options(RequestBody):
     kind: Literal["edit", "glass", "remove", "relight", "insert"]
     options: Annotated[dict[Name, Value], Field(max_length=20)]
     coarse: bool = False
+    quiet: bool = False
+    """The page draws the change itself; it wants no picture yet."""
 
 
 class File(RequestBody):
@@ -84,17 +86,17 @@ class NewLamp(RequestBody):
     before: Annotated[float, Field(gt=0, lt=1)] = 0.75
 
 
-class Lamps(RequestBody):
-    """All lamps: [x, y, depth, kelvin, power] each."""
+class MovedLamp(RequestBody):
+    """A lamp moved or changed, [x, y, depth, kelvin, power], or taken away (None)."""
 
-    lamps: Annotated[
-        list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(max_length=50)
-    ]
-    coarse: bool = False
+    index: Annotated[int, Field(ge=0, le=50)]
+    lamp: Annotated[list[Number], Field(min_length=5, max_length=5)] | None
+    quiet: bool = False
 
 
 class Put(RequestBody):
     at: Place
+    quiet: bool = False
 
 
 class Fall(RequestBody):

@@ -14,11 +14,11 @@ from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.option_kinds import declarations
 from materialist.studio import objects, uploads
-from materialist.studio.lights import light_file, number_text, place_lamp
+from materialist.studio.lights import change_lamp, light_file, number_text, place_lamp
 from materialist.studio.selection import read_pick
 
 State = dict[str, Any]
-FILES = {"texture", "envmap", "gain", "mesh"}
+CLEARED = {"texture", "envmap", "gain", "mesh", "lamps"}
 """Options that a request may clear, and sets by other means."""
 
 
@@ -68,12 +68,12 @@ def set_options(desk: Desk, body: bodies.Options) -> State:
         take_away(desk, options)
     else:
         session.set(body.kind, **options)
-    return state(desk, coarse=body.coarse)
+    return state(desk, coarse=body.coarse, quiet=body.quiet)
 
 
 def _text(kind: str, name: str, value: Any) -> Any:
     """An option as the list of edits has it; None clears it. Raises InputError for one that no request may set."""
-    if name not in settable(kind) | (FILES if value is None else set()):
+    if name not in settable(kind) | (CLEARED if value is None else set()):
         raise InputError(f"'{name}' of {kind} cannot be set in this way.")
     # The default is left out of the list: it says nothing.
     if value is None or value == declarations(OPERATIONS[kind].options)[name][1]:
@@ -122,14 +122,13 @@ def add_lamp(desk: Desk, body: bodies.NewLamp) -> State:
     return state(desk)
 
 
-def set_lamps(desk: Desk, body: bodies.Lamps) -> State:
-    """Lamps moved, changed or taken away."""
+def set_lamp(desk: Desk, body: bodies.MovedLamp) -> State:
+    """One lamp moved, changed or taken away: the others stay as they are, whoever moves them meanwhile."""
     session = desk.session
-    for lamp in body.lamps:
-        session.pixel(lamp[0], lamp[1])
-    lamps = [[number_text(value) for value in lamp] for lamp in body.lamps]
-    session.light(lamps=lamps or None)
-    return state(desk, coarse=body.coarse)
+    if body.lamp is not None:
+        session.pixel(body.lamp[0], body.lamp[1])
+    change_lamp(session, body.index, body.lamp)
+    return state(desk, quiet=body.quiet)
 
 
 # Objects
@@ -147,7 +146,7 @@ def choose_object(desk: Desk, body: bodies.Chosen) -> State:
 def put_object(desk: Desk, body: bodies.Put) -> State:
     """Stand the current object, or a new one, at a place; a drag sends many."""
     objects.place(desk.session, *body.at)
-    return state(desk)
+    return state(desk, quiet=body.quiet)
 
 
 def let_fall(desk: Desk, body: bodies.Fall) -> State:

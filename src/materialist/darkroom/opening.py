@@ -129,6 +129,8 @@ def arrive(desk: Desk) -> State:
         session.take_over()
     except InputError as error:
         return {**state(desk), "notes": [session.without_folders(str(error))]}
+    if session.project is None:
+        studio.get_ready()
     return state(desk)
 
 
@@ -137,6 +139,7 @@ def close_project(desk: Desk, body: bodies.Nothing) -> State:
     desk.studio.put_away(desk.page)
     desk.expected = None
     desk.studio.forget_last(desk.person)
+    desk.studio.get_ready()
     return state(desk)
 
 

@@ -8,6 +8,9 @@ import numpy as np
 from materialist.color import srgb_levels
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
+from materialist.edits.core.operation import Target
+from materialist.io import display
+from materialist.studio import SETTINGS
 from materialist.types import Array, Body, Scene
 
 MESH_FACES = 160_000
@@ -52,6 +55,15 @@ def mesh_bytes(desk: Desk) -> bytes:
     text += b" " * (-len(text) % 4)
     blocks = [text, positions.tobytes(), colours.tobytes(), faces.astype("<u4").tobytes()]
     return len(text).to_bytes(4, "little") + b"".join(blocks)
+
+
+def skin_jpeg(desk: Desk) -> bytes:
+    """The edited picture without the objects in it, which the mesh has as such."""
+    session = desk.session
+    steps = tuple(s for s in session.edits.active if s.operation.target is not Target.PLACE)
+    live = session.live
+    picture = session.scene.photo.linear if live is None else live.picture(steps, session.glass)
+    return display.encoded(srgb_levels(picture), "JPEG", quality=SETTINGS.jpeg_quality)
 
 
 def _surface(scene: Scene) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ from materialist.io.decode import SUFFIXES
 from materialist.io.photo import EXAMPLES, example_path
 from materialist.option_kinds import declarations
 from materialist.options import InvertOptions
-from materialist.studio import SETTINGS, objects, uploads
+from materialist.studio import SETTINGS, drawn, objects, uploads
 from materialist.studio.edit_list import step_summary
 from materialist.studio.selection import Selection
 from materialist.studio.stage import commands, named_maps, report, stage
@@ -36,14 +36,16 @@ SHOWN_SIDE = 2048
 """Longest side of the photo as the page shows it, pixels."""
 
 
-def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[str, Any]:
+def state(
+    desk: Desk, *, with_edits: bool = True, coarse: bool = False, quiet: bool = False
+) -> dict[str, Any]:
     """Everything that the page shows but jobs, whose progress comes by the channel.
 
-    with_edits: False gives the photo at once, while the preview is still being built.
+    with_edits: False gives the photo at once, while the preview is still being built. quiet: without a picture.
     """
     session = desk.session
     revision = desk.revision
-    shown = stage(session, with_edits=with_edits, coarse=coarse)
+    shown = stage(session, with_edits=with_edits, coarse=coarse, quiet=quiet)
     with session.lock:
         edits = session.edits
         selection = session.selection
@@ -56,6 +58,7 @@ def state(desk: Desk, *, with_edits: bool = True, coarse: bool = False) -> dict[
             "ready": session.live is not None and session.live.ready,
             "original": _original(desk),
             "stage": {**shown, "region": outlined},
+            "drawn": drawn.keys(session),
             "steps": [
                 {
                     "text": step_summary(step),

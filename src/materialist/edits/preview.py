@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
-from materialist.edits.composite.into_photo import onto_working
+from materialist.edits.composite.into_photo import onto_working, overall_factor
 from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_left
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
@@ -28,10 +28,21 @@ if TYPE_CHECKING:
 
 RAYS = (48, 12)
 """Diffuse and specular rays a pixel, three quarters of the fit's: a new light is gathered sooner."""
-VERSION = 1
+SHARPEST = 0.1
+"""Least roughness at which reflections are filtered: unfiltered, the few rays of the level above it show as a grid of
+dots on metal, four times as strong as after the filter (4 x 4 pixels, relief 0.059 and 0.018 of log radiance)."""
+VERSION = 2
 """Of the tables on disk; another one where the same scene gives other tables."""
 MIN_AMBIENT = 1e-3
 """Factor on the fitted map below which the map cannot be scaled back."""
+
+
+def load() -> None:
+    """Import the renderer and the engine, which takes a second or two the first time."""
+    from materialist.render.variant import setup
+
+    setup()
+    import materialist.fit.engine  # noqa: F401
 
 
 class Preview:
@@ -46,9 +57,7 @@ class Preview:
     """
 
     def __init__(self, scene: Scene, file: Path | None = None):
-        from materialist.render.variant import setup
-
-        setup()
+        load()
         self.scene = scene
         self._file = file
         self._key = _key(scene)
@@ -100,7 +109,9 @@ class Preview:
         if self._quick.trace_next() or self._engine.cache.trace_next():
             return True
         if self._coarse:
-            kept = _stored(self._engine.cache, self._engine.tables(self.scene.envmap))
+            cache = self._engine.cache
+            tables = self._filtered(cache, self.scene.envmap, self.scene.rerender)
+            kept = _stored(cache, tables)
             self._coarse = False
             self._use(kept)
             if self._file is not None:
@@ -119,9 +130,31 @@ class Preview:
                 "The preview was built for another geometry; build one for this scene."
             )
         edited = self._seen(edited)
-        fitted = np.array_equal(edited.envmap, self.scene.envmap)
-        tables = self._tables if fitted else self._tables_under(edited, coarse)
+        tables = self._tables_of(edited, coarse)
         return self._image(self._shaded(edited.materials, tables), self._sky(edited.envmap))
+
+    def _tables_of(self, seen: Scene, coarse: bool = False) -> Tables:
+        fitted = np.array_equal(seen.envmap, self.scene.envmap)
+        return self._tables if fitted else self._tables_under(seen, coarse)
+
+    def rows(self, edited: Scene, region: Array) -> dict[str, Array]:
+        """What shading the surface pixels of a region [H, W] bool of a scene takes, in the order of the picture.
+
+        `pixels` [P], row-major; `diffuse` [P, 9] and `specular` [L, P, 6] as of `transport.cache.Tables`; `base`
+        [P, 3], the fitted scene; under another light also `overall` [3], by how much that is brighter as a whole.
+        """
+        tables = self._tables_of(self._seen(edited))
+        rows = np.flatnonzero(region.ravel()[self._pixels])
+        pixels = self._pixels[rows]
+        found = {
+            "pixels": pixels,
+            "diffuse": tables.diffuse[rows].cpu().numpy(),
+            "specular": tables.specular[:, rows].cpu().numpy(),
+            "base": self._base.reshape(-1, 3)[pixels],
+        }
+        if is_relit(self.scene, edited):
+            found["overall"] = overall_factor(self._base, self.render(edited))
+        return found
 
     def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""
@@ -169,7 +202,8 @@ class Preview:
         """Tables of a light by the rays of one cache, without noise."""
         from materialist.transport.filter import filter_tables
 
-        return filter_tables(cache, cache.gather(envmap, passed_on), self._engine.guide)
+        tables = cache.gather(envmap, passed_on)
+        return filter_tables(cache, tables, self._engine.guide, sharpest=SHARPEST)
 
     def _shaded(self, materials: Materials, tables: Tables):
         """[P, 3] torch radiance of the surface pixels."""

@@ -5,6 +5,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -68,6 +69,25 @@ class JobQueue:
         self._threads = ThreadPoolExecutor(limit, thread_name_prefix="job")
         self._lock = threading.Lock()
         self._jobs: list[Job] = []
+        self._spare: Worker | None = None
+        """A process that has loaded what jobs need, for the next one."""
+
+    def warm(self, task: Callable[..., Any], seconds: float) -> None:
+        """Start a process for the next job, and do a task in it, unless there is one; it ends after idle seconds."""
+        with self._lock:
+            if self._spare is not None and self._spare.running:
+                return
+            # Without it the next job starts its own.
+            with suppress(OSError):
+                self._spare = Worker(niceness=NICENESS, memory=self._memory, idle=seconds)
+                self._spare.begin(task, {})
+
+    def _worker(self) -> Worker:
+        """The spare process, or a new one; the lock is held. Raises OSError."""
+        spare, self._spare = self._spare, None
+        if spare is not None and spare.running:
+            return spare
+        return Worker(niceness=NICENESS, memory=self._memory)
 
     def submit(self, job: Job) -> Job:
         with self._lock:
@@ -102,6 +122,9 @@ class JobQueue:
     def close(self) -> None:
         for job in self.unfinished():
             self.stop(job)
+        with self._lock:
+            if self._spare is not None:
+                self._spare.close()
         self._threads.shutdown(cancel_futures=True)
 
     def _run(self, job: Job) -> None:
@@ -112,12 +135,12 @@ class JobQueue:
             job.stage = "start"
             job.began = time.monotonic()
             try:
-                job.worker = worker = Worker(niceness=NICENESS, memory=self._memory)
+                job.worker = worker = self._worker()
             except OSError as error:
                 job.end(FAILED, f"The work cannot be started: {error}.")
                 return
         # --- The task, with a timer that ends it where it takes too long ---
-        worker.begin(job.task, job.arguments)
+        number = worker.begin(job.task, job.arguments)
         too_long = threading.Timer(self._seconds, worker.kill)
         too_long.daemon = True
         if self._seconds:
@@ -125,6 +148,8 @@ class JobQueue:
         try:
             # --- Its messages, until it is done, fails or is lost ---
             for message in worker.messages():
+                if message.number != number:
+                    continue  # of the task that warmed it
                 if message.kind in (DONE, FAILED, LOST):
                     worker.kill()
                     break

@@ -1,8 +1,9 @@
 """What a predictor is: names of the maps, the base class, the constant predictor, and a prior from several of them."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +40,9 @@ class Predictor(ABC):
     """Names of the maps that the predictor can give."""
     field_of_view: float | None = None
     """Horizontal, degrees, where the predictor knows it."""
+
+    on_materials: Callable[[Materials], Any] | None = None
+    """Called with the materials by a predictor that has them long before the rest."""
 
     name: str
     """What the report calls it: name, file or folder, and the start of the weights' checksum."""

@@ -54,6 +54,8 @@ class StudioSettings:
     free_for_scene: float = 0.8e9  # before another scene is opened, and
     free_a_pixel: float = 2600.0  # for each of its pixels at working size; from 1.2 megapixels
     free_for_glass: float = 2.0e9  # before glass is traced
+    # The process that waits for the next photo.
+    ready_seconds: float = 300.0  # after which it ends
     # The process that traces glass.
     glass_idle: float = 900.0  # seconds without a request after which it ends
     glass_niceness: int = 3  # between previews and inversions: somebody waits at a slider
@@ -64,6 +66,7 @@ class StudioSettings:
     scenes_kept: int = 24  # edited scenes: moving the last step must not replay those before
     kept_bytes: float = 3e8  # of the bodies in them
     triangles: int = 12_000  # of all bodies in a sketch; of a finer mesh every n-th
+    drawn_pixels: int = 300_000  # of a region that the page shades, which takes 150 bytes of each
     jpeg_quality: int = 88  # of live pictures
     video_frames: int = 24  # of the turning light
     lamp_share: float = 0.75  # of the way from the camera to the surface: there a new lamp hangs

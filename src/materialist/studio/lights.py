@@ -1,6 +1,7 @@
 """Lights that a page adds: lamps before a surface, and computed environments as files."""
 
 import math
+from typing import Any
 
 from materialist.edits.light import presets
 from materialist.errors import InputError
@@ -31,9 +32,23 @@ def place_lamp(
         raise InputError("There is no surface to hang the lamp before; click on an object.")
     # The lamp hangs between the camera and the clicked surface.
     new = [str(column), str(row), *(number_text(v) for v in (depth * before, kelvin, power))]
+    with session.lock:
+        session.light(lamps=[*_lamps(session), new])
+
+
+def change_lamp(session: Session, index: int, lamp: list[float] | None) -> None:
+    """Another [x, y, depth, kelvin, power] for one lamp; None takes it away. Raises InputError where it is gone."""
+    with session.lock:
+        lamps = _lamps(session)
+        if index >= len(lamps):
+            raise InputError("That lamp is no longer there.")
+        lamps[index : index + 1] = [] if lamp is None else [[number_text(v) for v in lamp]]
+        session.light(lamps=lamps or None)
+
+
+def _lamps(session: Session) -> list[Any]:
     place = session.edits.light
-    known = session.edits.steps[place].options.get("lamps", []) if place is not None else []
-    session.light(lamps=[*known, new])
+    return [] if place is None else [*session.edits.steps[place].options.get("lamps", [])]
 
 
 def light_file(session: Session, name: str) -> str:

@@ -18,6 +18,7 @@ import numpy as np
 
 from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
+from materialist.edits.core.surfaces import KEY
 from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.edits.remove.patches import remembered
 from materialist.errors import InputError
@@ -60,6 +61,8 @@ class LivePreview:
         self._later: threading.Timer | None = None
         self._kept: dict[str, Any] = {}
         """What steps make: scenes, and what a sketch needs of glass."""
+        self._shaded: tuple[Scene, tuple[bool, bool], Array] | None = None
+        """The last scene that was shaded, with which rays, and its picture."""
         self._preview: Future[Any] = _THREAD.submit(_build, scene, file)
         _THREAD.submit(self._prepare, self._preview)
 
@@ -164,23 +167,62 @@ class LivePreview:
         """
         if not steps:
             return self.scene.photo.linear
+        shaded = self.shaded(steps, coarse=coarse)
+        return self.laid_over(shaded, self.edited(steps), steps, client)
+
+    def shaded(self, steps: tuple[Step, ...], *, coarse: bool = False) -> Array:
+        """[H, W, 3]: the surfaces of the photo after the steps, without what is laid over them."""
         preview = self._preview.result()
         self._asked = time.monotonic()
         edited = self.edited(steps)
+        scene = self._surfaces(steps)
+        # A thing or a lamp that moves changes nothing of them.
+        known = self._shaded
+        fine = (preview.coarse, coarse)
+        if known is None or known[1] != fine or not _look_alike(known[0], scene):
+            picture = _THREAD.submit(preview.picture, scene, coarse=coarse).result()
+            known = self._shaded = (scene, fine, picture)
+        picture = known[2]
+        # --- What was taken away is filled as in the photo ---
+        if edited.photo is not self.scene.photo:
+            picture = np.where(self.filled(edited)[..., None], edited.photo.linear, picture)
+        return picture
+
+    def filled(self, edited: Scene) -> Array:
+        """[H, W] bool: where the photo of an edited scene is filled in."""
+        return (edited.photo.linear != self.scene.photo.linear).any(-1)
+
+    def rows(self, steps: tuple[Step, ...], region: Array) -> dict[str, Array]:
+        """`Preview.rows` of the scene after the steps."""
+        preview = self._preview.result()
+        self._asked = time.monotonic()
+        return _THREAD.submit(preview.rows, self._surfaces(steps), region).result()
+
+    def _surfaces(self, steps: tuple[Step, ...]) -> Scene:
+        """The scene as it is shaded: the cache knows only the geometry of the fit."""
+        edited = self.edited(steps)
+        if edited.geometry is self.scene.geometry:
+            return edited
+        return self.edited(tuple(step for step in steps if is_shaded(step)))
+
+    def laid_over(
+        self,
+        picture: Array,
+        edited: Scene,
+        steps: tuple[Step, ...],
+        client: glass.GlassClient | None = None,
+        *,
+        lamps: bool = True,
+    ) -> Array:
+        """A picture [H, W, 3] with the lamps' light, glass and bodies of an edited scene, in which they are made.
+
+        Where all glass has a pane it is a linear function of each pixel.
+        """
         known = [
             (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
         ]
-        # --- Shading: the cache knows only the geometry of the fit ---
-        shaded = edited
-        if edited.geometry is not self.scene.geometry:
-            shaded = self.edited(tuple(step for step in steps if is_shaded(step)))
-        picture = _THREAD.submit(preview.picture, shaded, coarse=coarse).result()
-        # --- What was taken away is filled as in the photo ---
-        if edited.photo is not self.scene.photo:
-            filled = (edited.photo.linear != self.scene.photo.linear).any(-1, keepdims=True)
-            picture = np.where(filled, edited.photo.linear, picture)
         # --- Lamps: their light without its shadows ---
-        if edited.lamps:
+        if edited.lamps and lamps:
             picture = light_lamps(picture, edited)
         # --- Glass: its ground first, then bodies, then the glass before them ---
         for step, pane in known:
@@ -205,6 +247,17 @@ class LivePreview:
         # For whoever still waits for it.
         self._preview.set_exception(InputError("This photo was closed; open it again."))
         self._kept.clear()
+        self._shaded = None
+
+
+def _look_alike(scene: Scene, other: Scene) -> bool:
+    """Whether shading, which knows no bodies, makes the same picture of two edits of a scene."""
+    maps = [(*vars(one.materials).values(), one.envmap) for one in (scene, other)]
+    return (
+        bool(scene.lamps) == bool(other.lamps)
+        and scene.provenance.get(KEY) == other.provenance.get(KEY)
+        and all(one is two or np.array_equal(one, two) for one, two in zip(*maps, strict=True))
+    )
 
 
 def is_shaded(step: Step) -> bool:
@@ -216,6 +269,17 @@ def _build(scene: Scene, file: Path | None) -> Any:
     from materialist.edits.preview import Preview
 
     return Preview(scene, file)
+
+
+def load_renderer() -> None:
+    """Load what previews need, on their thread, before there is a scene."""
+    _THREAD.submit(_load)
+
+
+def _load() -> None:
+    from materialist.edits.preview import load
+
+    load()
 
 
 class _Freeing:

@@ -146,4 +146,5 @@ def new_studio(
         single_user,
         seed=seed,
         device=device,
+        keeps_ready=True,
     )

@@ -51,7 +51,9 @@ _WORDS = {
 }
 
 
-def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) -> dict[str, Any]:
+def stage(
+    session: Session, *, with_edits: bool = True, coarse: bool = False, quiet: bool = False
+) -> dict[str, Any]:
     """The picture as a data URL, the lamps, and what the picture is.
 
     Without edits it is the photo, at once. Where there are any, it has no picture until the preview is ready: the
@@ -59,7 +61,7 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     reason on it. The glass of the current step is asked for; `waiting` says whether its picture is still to come. The
     page ignores a picture with an older `serial` than the one it shows. `before` is the photo, shown while a key is
     held; empty where `picture` is the photo itself, which the page keeps for live previews (None). At rest the page
-    asks for the full picture after a `coarse` one.
+    asks for the full picture after a `coarse` one. A `quiet` one is none at all: the page has drawn the change itself.
     """
     # Pictures may arrive out of order: the page keeps the newest.
     serial = time()
@@ -92,16 +94,26 @@ def stage(session: Session, *, with_edits: bool = True, coarse: bool = False) ->
     if steps and not live.ready:
         del shown["picture"]
         return {**shown, "badge": "Getting the live preview ready …"}
+    badge = _badge(steps, client, waiting) + off
+    shown |= {"before": None if steps else "", "badge": badge, "waiting": waiting}
+    if quiet:
+        del shown["picture"]
+        return {**shown, "coarse": True}
     try:
         linear = live.picture(steps, client, coarse=coarse)
     except MaterialistError as error:
         photo = jpeg_url(live.scene.photo.linear)
         why = session.without_folders(str(error))
         badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
-        return {**shown, "picture": photo, "before": "", "badge": badge, "bad": True}
-    badge = _badge(steps, client, waiting) + off
-    shown |= {"before": None if steps else "", "badge": badge, "waiting": waiting, "coarse": coarse}
-    return {**shown, "picture": jpeg_url(linear)}
+        return {
+            **shown,
+            "picture": photo,
+            "before": "",
+            "badge": badge,
+            "waiting": False,
+            "bad": True,
+        }
+    return {**shown, "picture": jpeg_url(linear), "coarse": coarse}
 
 
 def _lamps(edits: EditList) -> list[list[float]]:

@@ -22,7 +22,7 @@ from materialist.jobs.queue import Job, JobQueue
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
-from materialist.studio.live_preview import free_memory
+from materialist.studio.live_preview import free_memory, load_renderer
 from materialist.studio.page import Page
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
@@ -50,6 +50,8 @@ class Studio:
     """The scene to open first, or the photo to show on the opening tab."""
     seed: int = 0
     device: str = "auto"
+    keeps_ready: bool = False
+    """Whether a process gets ready for the next photo as soon as somebody is about to choose one."""
     last: dict[str, str] = field(default_factory=dict)
     """Person -> the project last opened or begun; a page goes on with it, after a restart, too."""
     files: HandedFiles = field(default_factory=HandedFiles)
@@ -251,6 +253,13 @@ class Studio:
         session.note_job(job)
         return job
 
+    def get_ready(self) -> None:
+        """Let a process load what taking a photo apart needs, while somebody chooses one."""
+        if self.keeps_ready and not self.jobs.unfinished():
+            self.jobs.warm(
+                partial(tasks.on_device, self.device, tasks.warm), SETTINGS.ready_seconds
+            )
+
     def begin(
         self, session: Session, source: Path, predictor: str, size: int, fov: str
     ) -> tuple[Project, Job]:
@@ -281,6 +290,8 @@ class Studio:
         except Exception:
             shutil.rmtree(project.folder, ignore_errors=True)
             raise
+        if self.keeps_ready:
+            load_renderer()  # the preview comes next
         return project, job
 
     def unpack(self, session: Session, file: Path) -> Project:

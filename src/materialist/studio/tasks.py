@@ -27,6 +27,8 @@ Task = Callable[..., None]
 """task(report, **arguments)."""
 PHOTO = "photo"
 """The name under which an inversion shows its photo, before anything is found."""
+WARM_SIDE = 64
+"""Pixels a side of the picture with which a process gets ready."""
 PICTURES = {"jpg": "-full.jpg", "png": ".png", "tif": ".tif", "exr": ".exr"}
 """Kind of a path-traced picture -> what its file is called after the name of the picture."""
 KINDS = {
@@ -65,6 +67,13 @@ def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> No
 
         setup(device)
     task(report, **arguments)
+
+
+def warm(report: Reporter) -> None:
+    """Load all that `invert` needs, by an inversion of a few pixels."""
+    grey = np.full((WARM_SIDE, WARM_SIDE, 3), 0.5, np.float32)
+    grey[: WARM_SIDE // 2] = 0.3
+    mt.invert(grey, encoded=False, size=WARM_SIDE, progress=report)
 
 
 def invert(

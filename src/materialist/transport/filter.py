@@ -21,7 +21,7 @@ _TAPS = (0.5, 1.0, 1.0, 1.0, 0.5)
 """5-tap box of width TILE."""
 _NORMAL_SQUARINGS = 5
 """How often the cosine between normals is squared: its power is 32 (by eye)."""
-_MIN_ROUGHNESS = 0.2
+MIN_ROUGHNESS = 0.2
 """Least roughness of a level that is filtered (by eye)."""
 _MIN_WEIGHT = 1e-4
 """Weight of a neighbour below which it is left out (derived: time)."""
@@ -107,10 +107,12 @@ def joint_filter(values: torch.Tensor, guide: Guide) -> torch.Tensor:
     return placed(guide.mean @ flat).view(values.shape)
 
 
-def filter_tables(cache: TransportCache, tables: Tables, guide: Guide) -> Tables:
-    """The tables with the diffuse lobe and the specular levels wider than a pixel's neighbourhood filtered."""
+def filter_tables(
+    cache: TransportCache, tables: Tables, guide: Guide, *, sharpest: float = MIN_ROUGHNESS
+) -> Tables:
+    """The tables with the diffuse lobe and the specular levels from the roughness `sharpest` on filtered."""
     # Sharper levels are nearly noise-free and carry reflected detail.
-    wide = [roughness[:, None] >= _MIN_ROUGHNESS for roughness in cache.roughness]
+    wide = [roughness[:, None] >= sharpest for roughness in cache.roughness]
     filtered = [k for k, pixels in enumerate(wide) if pixels.any()]
     # --- All tables that are filtered, side by side on the image grid: one product filters them ---
     stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in filtered)], -1)

@@ -58,7 +58,7 @@ export function Light() {
           <Lamp key={index} lamp={one} index={index} />
         ))}
         {lamps.length > 1 && (
-          <button class="quiet" onClick={() => void change("lamps", { lamps: [] })}>
+          <button class="quiet" onClick={() => void light({ lamps: null })}>
             {t.noLamps}
           </button>
         )}

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import { Colour, FileButton, Fold, Group, Slider, Switch } from "../controls";
+import { drawn } from "../drawn";
 import { PRESETS, type Preset } from "../presets";
 import { change, optionsOf, useFile, useView, view } from "../store";
 import { t } from "../strings";
@@ -11,7 +12,7 @@ type Options = Record<string, string | number | null>;
 const NO_TEXTURE = { texture: null, texture_scale: null, texture_turn: null };
 
 export function edit(options: Options, key = ""): Promise<void> {
-  return change("set", { kind: "edit", options }, key);
+  return change("set", { kind: "edit", options, quiet: drawn.material(options) }, key);
 }
 
 /** Shade the selection as a preset says; glass takes the place of another material, and the other way round. */
@@ -21,7 +22,8 @@ async function apply(preset: Preset): Promise<void> {
   const kind = current === null ? "" : state!.steps[current]!.kind;
   if (current !== null && kind === "glass" && preset.kind === "edit")
     await change("act", { action: "remove", index: current });
-  await change("set", { kind: preset.kind, options: preset.options }, "", preset.kind === "glass" ? t.working : "");
+  if (preset.kind === "edit") await edit(preset.options);
+  else await change("set", { kind: preset.kind, options: preset.options }, "", t.working);
 }
 
 export function Material() {

@@ -1,10 +1,12 @@
 import { Choice, Colour, FileButton, Fold, Group, Slider } from "../controls";
+import { drawn } from "../drawn";
 import { change, optionsOf, set, useFile, useView } from "../store";
 import { t } from "../strings";
 import { number } from "./material";
 
-function thing(options: Record<string, string | number | null>, key = ""): Promise<void> {
-  return change("set", { kind: "insert", options }, key);
+export function thing(options: Record<string, string | number | null>, key = ""): Promise<void> {
+  const quiet = Object.keys(options).join() === "scale" && drawn.thing(options);
+  return change("set", { kind: "insert", options, quiet }, key);
 }
 
 export function Things() {

@@ -216,14 +216,20 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     edited = np.maximum(layers.edited, 0)
     floor = SETTINGS.floor
     factor = (edited + floor) / (base + floor)
-    # g: the change of the light as a whole.
-    overall = np.exp(np.median(np.log(factor).reshape(-1, 3), axis=0))
+    overall = overall_factor(base, edited)
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
     dimmed = overall * held
     moved = np.clip(
         (held + floor) * factor - floor, np.minimum(dimmed, edited), np.maximum(dimmed, edited)
     )
     return moved - photo.linear, np.minimum(factor, SETTINGS.max_detail_factor) - 1, photo.linear
+
+
+def overall_factor(base: Array, edited: Array) -> Array:
+    """[3]: g of `_other_light`, the change of the light as a whole, of two renderings [H, W, 3]."""
+    floor = SETTINGS.floor
+    factor = (np.maximum(edited, 0) + floor) / (np.maximum(base, 0) + floor)
+    return np.exp(np.median(np.log(factor).reshape(-1, 3), axis=0))
 
 
 def _unclipped(photo: Array, base: Array) -> Array:

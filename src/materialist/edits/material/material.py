@@ -37,11 +37,9 @@ def edit(
     Raises InputError for a mask of another size or empty, or a value out of its range.
     """
     changes = MaterialEdit.merged(options, **values)
-    weight = reshaped(checked_region(scene, mask), changes.grow, changes.feather) * (
-        scene.depth > 0
-    )
+    weight = weight_of(scene, mask, changes)
     materials = scene.materials
-    colour, texture = _base_colour(scene, weight, changes)
+    colour, texture = base_colour(scene, weight, changes)
     if changes.hue or changes.saturation or changes.value:
         colour = shifted_hsv(colour, changes.hue, changes.saturation, changes.value)
     # Mixed by the weight, so that a feathered border fades.
@@ -83,7 +81,13 @@ def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> A
     return srgb_to_linear(np.clip(moved, 0, 1)).reshape(shape)
 
 
-def _base_colour(
+def weight_of(scene: Scene, mask: Array, changes: MaterialEdit) -> Array:
+    """[H, W] in [0, 1]: how much of the new material each pixel gets. Raises InputError as `edit` does."""
+    region = reshaped(checked_region(scene, mask), changes.grow, changes.feather)
+    return region * (scene.depth > 0)
+
+
+def base_colour(
     scene: Scene, weight: Array, changes: MaterialEdit
 ) -> tuple[Array, list[int] | None]:
     """([H, W, 3] albedo before hue, saturation and value act, shape of the texture that it has)."""

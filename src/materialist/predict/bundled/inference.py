@@ -1,5 +1,6 @@
 """From a photo of any size to maps: what happens around the bundled network."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -44,14 +45,19 @@ SETTINGS = InferenceSettings()
 
 
 def infer_bundled(
-    network: BundledNetwork, linear: Array, rays: Array, *, device: Any = "cpu"
+    network: BundledNetwork,
+    linear: Array,
+    rays: Array,
+    *,
+    device: Any = "cpu",
+    on_materials: Callable[[Materials], Any] | None = None,
 ) -> Prediction:
     """Maps of a photo [H, W, 3] float32 linear, white about 1, at its own size, as a Prediction without a name.
 
     The network, in evaluation mode on `device`, sees the photo, clipped to [0, 1], and its mirror image at two sizes;
     its answers are averaged and enlarged, geometry with the photo's edges. rays: [H, W, 2] float32 x and y of the
     camera rays at z = -1. Albedo is linear, depth has a fixed median and is 0 where there is no surface; light where
-    the network knows it.
+    the network knows it. on_materials: called with the materials, which are there long before the depth.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
@@ -66,13 +72,15 @@ def infer_bundled(
     albedo, roughness, metallic = (
         resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic")
     )
+    materials = Materials(
+        srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1)
+    )
+    if on_materials is not None:
+        on_materials(materials)
     depth, normal = with_edges(depth, maps["normal"], linear, rays)
     depth *= SETTINGS.median_depth / np.median(depth[depth > 0])
     normal = np.where((depth > 0)[..., None], unit(normal), np.array([0, 0, 1], np.float32)).astype(
         np.float32
-    )
-    materials = Materials(
-        srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1)
     )
     # --- Notes on what was taken for sky ---
     sky = float((depth == 0).mean())

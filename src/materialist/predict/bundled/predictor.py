@@ -43,7 +43,11 @@ class BundledPredictor(Predictor):
         sky. Raises WeightsError when the weights give values that are not finite.
         """
         prediction = infer_bundled(
-            self.network, photo.linear, pixel_rays(photo.camera)[..., :2].copy(), device=self.device
+            self.network,
+            photo.linear,
+            pixel_rays(photo.camera)[..., :2].copy(),
+            device=self.device,
+            on_materials=self.on_materials,
         )
         maps = {
             **vars(prediction.materials),

@@ -1,0 +1,278 @@
+"""What a page needs to draw a change itself, before the server's picture: of a material, an object, and lamps.
+
+Each kind is one block of bytes that stays good as long as its key does: a slider or a drag asks for nothing. The page
+draws them by the formulas of `edits.preview` and `studio.sketch`; a test in a browser compares the pictures.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+
+from materialist.bsdf.disney import DIELECTRIC_R0
+from materialist.color import srgb_levels
+from materialist.edits.composite.into_photo import SETTINGS as COMPOSITE
+from materialist.edits.core.operation import REGION
+from materialist.edits.insert.operation import INSERT
+from materialist.edits.light.relight import SETTINGS as LAMPS
+from materialist.edits.light.relight import kelvin_colour
+from materialist.edits.material.material import base_colour, weight_of
+from materialist.edits.material.operation import EDIT
+from materialist.edits.recipe import Step, options_of
+from materialist.geometry.silhouette import window
+from materialist.io import display
+from materialist.studio import SETTINGS, glass
+from materialist.studio.edit_list import key_of, with_options
+from materialist.studio.live_preview import LivePreview
+from materialist.studio.session import Session
+from materialist.studio.sketch import draw_bodies
+from materialist.types import Array, Materials, Scene
+
+MOVED = ("hue", "saturation", "value", "albedo", "roughness", "metallic")
+"""Options of a material that the page draws; others, as a texture, are in what it is sent."""
+KELVINS = np.geomspace(1667, 25000, 48)
+"""Colour temperatures whose colours are sent; the page interpolates."""
+FAINT = 0.03
+"""Share of the light whose loss in an object's shadow a drag does not show."""
+DEPTH_SIDE = 96
+"""Longer side of the depth map by which an object that is dragged grows and shrinks, pixels."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """One kind of change: the step that is changed, and the list of edits around it."""
+
+    live: LivePreview
+    client: Any
+    before: tuple[Step, ...]
+    own: Step
+    after: tuple[Step, ...]
+    fixed: Step
+    """The own step without what the page draws."""
+    region: Array | None = None
+
+    @property
+    def others(self) -> tuple[Step, ...]:
+        return (*self.before, *self.after)
+
+    def key(self) -> str:
+        """What the bytes depend on, as a short text."""
+        steps = (*self.before, self.fixed, *self.after)
+        panes = [id(self.client.pane(step)) for step in steps if glass.is_traced(step)]
+        region = b"" if self.region is None else np.packbits(self.region).tobytes()
+        parts = [id(self.live), self.live.fine, len(self.before), key_of(steps), panes]
+        return hashlib.sha1(json.dumps(parts).encode() + region).hexdigest()[:16]
+
+
+def keys(session: Session) -> dict[str, str]:
+    """Kind of change -> the key of what `content` would give for it; kinds that a page cannot draw now are left out."""
+    return {kind: drawing.key() for kind in KINDS if (drawing := _drawing(session, kind))}
+
+
+def content(session: Session, kind: str) -> bytes | None:
+    """The bytes of a kind of change, and their key in their header; None where the page cannot draw it now.
+
+    They begin with the length of a JSON header, uint32, and the header, filled up to a multiple of 4 bytes. Its
+    `arrays` are [name, type, shape] each; their bytes, each filled up likewise, follow in this order, little-endian.
+    """
+    drawing = _drawing(session, kind)
+    if drawing is None:
+        return None
+    key = drawing.key()
+    made = KINDS[kind](drawing)
+    if made is None:
+        return None
+    header, arrays = made
+    described = [[name, str(values.dtype), values.shape] for name, values in arrays.items()]
+    text = json.dumps({"key": key, **header, "arrays": described}).encode()
+    blocks = [text, *(values.tobytes() for values in arrays.values())]
+    padded = [block + b" " * (-len(block) % 4) for block in blocks]
+    return len(padded[0]).to_bytes(4, "little") + b"".join(padded)
+
+
+def _drawing(session: Session, kind: str) -> Drawing | None:
+    """What a change of that kind would be about now; None for nothing."""
+    with session.lock:
+        live = session.live
+        edits = session.edits
+        client = session.glass
+        mask = session.selection.mask
+    if live is None or not live.ready or client is None:
+        return None
+    active = edits.active
+    own = edits.current_step
+    if kind == "lamps" and edits.light is not None:
+        own = edits.steps[edits.light]
+    if kind == "material" and own is None and mask is not None:
+        # A new edit goes to the end of the list: with the first move of a slider nothing changes here.
+        own = Step(EDIT.name, {}, session.workspace)
+        active = (*active, own)
+    if own not in active:
+        return None
+    place = active.index(own)
+    around = (active[:place], own, active[place + 1 :])
+    if kind == "material" and own.kind == EDIT.name and mask is not None:
+        fixed = with_options(own, **dict.fromkeys((*MOVED, *REGION)))
+        return Drawing(live, client, *around, fixed, mask)
+    if kind == "thing" and own.kind == INSERT.name:
+        return Drawing(live, client, *around, own)
+    if kind == "lamps" and "lamps" in own.options:
+        return Drawing(live, client, *around, with_options(own, lamps=None))
+    return None
+
+
+Made = tuple[dict[str, Any], dict[str, Array]] | None
+
+
+def _material(drawing: Drawing) -> Made:
+    """Tables of the pixels of a region, row by row of the picture."""
+    live = drawing.live
+    from materialist.transport.cache import ROUGHNESS_LEVELS
+
+    steps = drawing.others
+    before = live.edited(drawing.before)
+    rest = live.edited(steps)
+    assert drawing.region is not None
+    options = options_of(drawing.fixed)
+    region = drawing.region & (before.depth == live.scene.depth)
+    weight = weight_of(before, region, options)
+    inside = (weight > 0) & ~live.filled(rest)
+    if not inside.any() or inside.sum() > SETTINGS.drawn_pixels:
+        return None
+    # What lies over the surfaces has to be known, and no later edit may change what this one makes.
+    waits = any(drawing.client.pane(step) is None for step in steps if glass.is_traced(step))
+    later = any(
+        (old != new)[inside].any()
+        for old, new in zip(vars(before.materials).values(), vars(rest.materials).values())
+    )
+    if waits or later:
+        return None
+    # --- The pixels, and their tables ---
+    rows = live.rows(steps, inside)
+    overall = rows.pop("overall", None)
+    pixels = rows.pop("pixels")
+    materials = before.materials
+    colour, texture = base_colour(before, weight, options)
+    box = window(inside)
+    top, left = box[0].start, box[1].start
+    height, width = inside[box].shape
+    at = (pixels // inside.shape[1] - top) * width + pixels % inside.shape[1] - left
+    maps = {
+        "photo": live.scene.photo.linear,
+        "colour": colour if texture is not None else materials.albedo,
+        "albedo": materials.albedo,
+        "roughness": materials.roughness,
+        "metallic": materials.metallic,
+        "fitted_metallic": live.scene.materials.metallic,
+        "weight": weight,
+    }
+    over = _over(drawing, rest)
+    rows |= {
+        name: values.reshape(inside.size, -1)[pixels] for name, values in (maps | over).items()
+    }
+    header = {
+        "box": [left, top, width, height],
+        "count": len(pixels),
+        "levels": ROUGHNESS_LEVELS,
+        "r0": DIELECTRIC_R0,
+        "floor": COMPOSITE.floor,
+        "clipped": None if live.scene.photo.hdr else COMPOSITE.clipped_photo,
+        "overall": None if overall is None else overall.tolist(),
+    }
+    return header, {"at": at.astype("<u4")} | {name: _halves(v) for name, v in rows.items()}
+
+
+def _over(drawing: Drawing, rest: Scene) -> dict[str, Array]:
+    """What lies over the surfaces: picture -> gain picture + lit albedo (1 - metallic) + added, [H, W, 3] each."""
+    if not rest.lamps and not rest.bodies and not any(map(glass.is_traced, drawing.others)):
+        return {}
+    shape = rest.depth.shape
+
+    def laid(value: float, matt: float) -> Array:
+        albedo = np.full((*shape, 3), matt, np.float32)
+        nothing = np.zeros(shape, np.float32)
+        scene = replace(rest, materials=Materials(albedo, nothing, nothing))
+        picture = np.full((*shape, 3), value, np.float32)
+        return drawing.live.laid_over(picture, scene, drawing.others, drawing.client)
+
+    added = laid(0, 0)
+    return {"gain": laid(1, 0) - added, "lit": laid(0, 1) - added, "added": added}
+
+
+def _thing(drawing: Drawing) -> Made:
+    """An object as it is sketched: what it leaves of the picture, what it adds; and the picture without it."""
+    live = drawing.live
+    before = live.edited(drawing.before)
+    alone = live.edited((*drawing.before, drawing.own)).bodies[len(before.bodies) :]
+    scene = replace(live.edited(drawing.others), bodies=alone)
+    shape = (*scene.depth.shape, 3)
+    added = draw_bodies(np.zeros(shape, np.float32), scene)
+    gain = (draw_bodies(np.ones(shape, np.float32), scene) - added)[..., :1]
+    # The far end of the shadow is left out softly: the page draws what is changed anew for each frame.
+    gain = 1 - np.maximum(1 - gain - FAINT, 0) / (1 - FAINT)
+    reached = (gain[..., 0] < 1) | (added > 0).any(-1)
+    if not reached.any():
+        return None
+    box = window(reached)
+    scale = DEPTH_SIDE / max(scene.depth.shape)
+    depth = cv2.resize(scene.depth, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
+    height, width = reached[box].shape
+    options = options_of(drawing.own)
+    header = {
+        "box": [box[1].start, box[0].start, width, height],
+        "at": [float(value) for value in drawing.own.options["at"]],
+        "scale": options.scale,
+        "size": [scene.camera.width, scene.camera.height],
+    }
+    arrays = {"gain": gain[box], "added": added[box], "depth": np.asarray(depth)}
+    without = live.picture(drawing.others, drawing.client)
+    return header, {name: _halves(values) for name, values in arrays.items()} | _jpeg(without)
+
+
+def _lamps(drawing: Drawing) -> Made:
+    """Surfaces as lamps light them, and the picture without the light of lamps."""
+    live = drawing.live
+    steps = (*drawing.before, drawing.own, *drawing.after)
+    edited = live.edited(steps)
+    shape = edited.depth.shape
+
+    def laid(picture: Array) -> Array:
+        return live.laid_over(picture, edited, steps, drawing.client, lamps=False)
+
+    ones = np.ones((*shape, 3), np.float32)
+    gain = np.clip(laid(ones) - laid(0 * ones), 0, 1)
+    matt = edited.materials.albedo * (1 - edited.materials.metallic[..., None]) * gain
+    middle = float(np.median(edited.depth[edited.depth > 0]))
+    header = {
+        "size": [edited.camera.width, edited.camera.height],
+        "focal": edited.camera.focal,
+        "flux": 4 * np.pi * np.pi * (LAMPS.lamp_unit * middle) ** 2,
+        "radius": LAMPS.lamp_radius * middle,
+        "kelvins": [[float(k), *kelvin_colour(float(k)).tolist()] for k in KELVINS],
+    }
+    return header, {
+        "depth": _halves(np.where(edited.depth > 0, edited.depth, 0)),
+        "normal": np.round(edited.normal * 127).astype(np.int8),
+        "matt": srgb_levels(matt),
+    } | _jpeg(laid(live.shaded(steps)))
+
+
+KINDS: dict[str, Callable[[Drawing], Made]] = {
+    "material": _material,
+    "thing": _thing,
+    "lamps": _lamps,
+}
+
+
+def _halves(values: Array) -> Array:
+    return np.clip(values, -6e4, 6e4).astype("<f2")
+
+
+def _jpeg(linear: Array) -> dict[str, Array]:
+    # Finer than a live picture: what is drawn over it shows its blocks.
+    encoded = display.encoded(srgb_levels(linear), "JPEG", quality=95, subsampling=0)
+    return {"under": np.frombuffer(encoded, np.uint8)}
