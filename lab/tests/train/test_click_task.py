@@ -8,6 +8,7 @@ import made_runs
 import numpy as np
 import pytest
 import torch
+from made_catalog import make_archive
 from made_samples import write_set
 
 from materialist.errors import InputError
@@ -44,13 +45,21 @@ def test_the_loss_has_a_closed_form():
     assert sure["entropy"].item() < 1e-6 and sure["overlap"].item() < 1e-6
 
 
+@pytest.fixture
+def small_set(tmp_path):
+    """Options of a set of single things, of a tiny catalogue."""
+    make_archive(tmp_path / "made.sh3f")
+    places = {"furniture": tmp_path, "cache": tmp_path / "cache"}
+    return {"size": 64, "spp": 1, "device": "cpu", "only": "single", **places}
+
+
 @pytest.mark.slow
-def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
+def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path, small_set):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):
         produce_set(
             data,
-            DataSetOptions(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"),
+            DataSetOptions(seed=11 + seed, **small_set),
             count=1,
         )
     views = tmp_path / "run" / "views"
@@ -69,12 +78,10 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
 
 
 @pytest.mark.slow
-def test_cut_outs_are_things_of_further_views(tmp_path):
+def test_cut_outs_are_things_of_further_views(tmp_path, small_set):
     data = tmp_path / "set"
     folder = tmp_path / "cutouts"
-    produce_set(
-        data, DataSetOptions(size=64, seed=11, spp=1, device="cpu", only="still-life"), count=1
-    )
+    produce_set(data, DataSetOptions(seed=11, **small_set), count=1)
     folder.mkdir()
     made_cutouts.write_disc(folder / "red.png")
     produce_views(data, tmp_path / "views", folder)

@@ -319,7 +319,6 @@ ceramic = Finish(
 )
 """Glazed pottery: white, coloured, decorated; matt clay now and then."""
 # --- Outdoors ---
-"""Leaves, fresh or autumnal."""
 paved = Finish(
     "speckle speckle bricks bricks cloudy tiling tiling",
     base=EARTH,
@@ -396,15 +395,6 @@ def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
     return replace(material, repeat=(width, depth), offset=(0.5, 0.5))
 
 
-def printed(rng: np.random.Generator, width: float, height: float) -> Material:
-    """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
-    kinds = "picture picture picture print ornament cloudy spots"
-    material = Finish(
-        kinds, base=(*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),)
-    )(rng)
-    return replace(material, repeat=(width, -height), offset=(0.5, 0.5))
-
-
 def light(rng: np.random.Generator, radiance: Colour) -> Material:
     """A luminous white surface of that radiance."""
     # Radiance is emission times albedo, and the albedo is 0.8.
@@ -413,23 +403,6 @@ def light(rng: np.random.Generator, radiance: Colour) -> Material:
 
 
 Maker = Callable[[np.random.Generator], Material]
-OBJECTS: tuple[tuple[float, Maker], ...] = (
-    (0.2, ceramic),
-    (0.2, plastic),
-    (0.26, metal),
-    (0.11, wood),
-    (0.07, fabric),
-    (0.07, stone),
-    (0.09, wall_paint),
-)
-
-
-def any_object(rng: np.random.Generator) -> Material:
-    """What a movable thing may be made of, at a scale that suits 10 to 40 centimetres."""
-    material = pick(rng, OBJECTS)(rng)
-    # Patterns made for walls and floors are too large for what stands on a table.
-    shrink = rng.uniform(0.15, 0.5) if max(material.repeat) > 0.5 else 1.0
-    return replace(material, repeat=(material.repeat[0] * shrink, material.repeat[1] * shrink))
 
 
 def one_of(rng: np.random.Generator, *makers: Callable[[np.random.Generator], T]) -> T:

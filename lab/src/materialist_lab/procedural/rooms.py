@@ -1,6 +1,7 @@
 """Rooms: walls, floor, ceiling, windows, lamps; and cameras that stand in them."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -8,27 +9,11 @@ from materialist.types import Array
 from materialist_lab.procedural import lights, walls, world
 from materialist_lab.procedural import materials as m
 from materialist_lab.procedural.objects import shapes as s
-from materialist_lab.procedural.objects import things
-from materialist_lab.procedural.objects.things import Meshes
 from materialist_lab.procedural.walls import RoomWall
 from materialist_lab.procedural.world import Parts, ScenePart, block, moved, placed, rod
 
 Size = Array
 """[3] width, depth and height of a room, metres; its floor is centred on the origin."""
-
-
-def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
-    """A room with things on its floor, seen by somebody who stands or sits in it."""
-    size = rng.uniform([2.6, 3.2, 2.3], [6.5, 8.0, 3.3])
-    standing = Furniture(size)
-    sizes = rng.uniform(0.3, 1.6, rng.integers(6, 16))
-    pieces = [things.thing(rng, size_of_thing, meshes) for size_of_thing in sizes]
-    # Large things stand by the walls as furniture does, small ones anywhere.
-    standing.along_walls(rng, [piece for piece, tall in zip(pieces, sizes > 0.8) if tall])
-    standing.in_the_middle(rng, [piece for piece, tall in zip(pieces, sizes > 0.8) if not tall])
-    parts, portals, envmap = shell(rng, size, captures)
-    parts += [*standing.parts, *lamps(rng, size, portals, envmap)]
-    return world.World(parts, envmap, view_of(rng, size, standing), portals, "room")
 
 
 def sides(size: Size) -> list[tuple[Array, float, float]]:
@@ -43,7 +28,7 @@ Hangings = Callable[[np.random.Generator, RoomWall, int], Parts]
 
 
 def shell(
-    rng: np.random.Generator, size: Size, captures: Meshes, hangings: Hangings = walls.hangings
+    rng: np.random.Generator, size: Size, captures: tuple[Path, ...], hangings: Hangings
 ) -> tuple[Parts, list[world.Portal], Array]:
     """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size

@@ -236,40 +236,6 @@ def _spots(rng):
     return first, second, noise(rng, 1.0), 0.3
 
 
-def _picture(rng):
-    """A painting or photograph of sorts: sky, hills and blocks in three colours."""
-    line = 0.3 + 0.4 * rng.random() + 0.15 * (noise(rng, 2.2)[:1] - 0.5) * 3
-    hills = _step(Y - line, 0.02)
-    first = np.clip(hills * noise(rng, 1.6) * 1.6, 0, 1)
-    second = np.clip((1 - hills) * (1 - Y) * rng.uniform(0.5, 1.5), 0, 1)
-    # Blocks, later ones before earlier ones.
-    for _ in range(int(rng.integers(0, 9))):
-        x = rng.random()
-        y = rng.random()
-        w = rng.uniform(0.03, 0.3)
-        h = rng.uniform(0.03, 0.3)
-        block = (np.abs(X - x) < w) & (np.abs(Y - y) < h)
-        first = np.where(block, rng.random(), first)
-        second = np.where(block, rng.random(), second)
-    return first, second, noise(rng, 1.3), 0.3
-
-
-def _print(rng):
-    """Lines of text, labels, book pages."""
-    first = np.zeros((SIZE, SIZE))
-    rows = int(rng.integers(8, 28))
-    height = np.abs((Y * rows) % 1 - 0.5) < 0.28
-    for r in range(rows):
-        # Empty lines now and then.
-        if rng.random() < 0.85:
-            words = np.repeat(rng.random(SIZE // 4) < 0.8, 4)
-            inside = (np.abs(X - 0.3) < rng.uniform(0.1, 0.22)) & (np.floor(Y * rows) == r)
-            first = np.maximum(first, inside * words[None] * height)
-    # A picture, often.
-    block = (np.abs(X - rng.random()) < 0.2) & (np.abs(Y - rng.random()) < 0.15)
-    return first * 0.9, block * (rng.random() < 0.6) * 0.9, noise(rng, 1.2), 0.5
-
-
 def _facade(rng):
     """Rows of windows in a wall; channel 1 is the pane, channel 3 where it shines."""
     n = int(rng.integers(2, 5))
@@ -325,8 +291,6 @@ _KINDS = {
     "carpet": _carpet,
     "ornament": _ornament,
     "spots": _spots,
-    "picture": _picture,
-    "print": _print,
     "facade": _facade,
     "grass": _grass,
     "rust": _rust,

@@ -287,25 +287,9 @@ def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 4
     return grounded(replace(body, uv=body.uv * half.mean()))
 
 
-def pot(control: Array, thickness: float) -> Solid:
-    """`vessel` with an eighth of its faces; texture coordinates in metres."""
-    radius = control[:, 0].mean()
-    height = control[-1, 1]
-    return metric(vessel(control, thickness, rows=18, n=40), np.pi * radius, 2 * height)
-
-
 def disc(radius: float) -> Solid:
     """A flat disc about the origin that faces upwards."""
     return lathe(np.array([[radius, 0], [1e-4, 0]]), 32)
-
-
-def drum(radius: float, height: float, top: float | None = None) -> Solid:
-    """A cylinder about the Y axis, its middle at the origin; or a cone, whose upper radius is `top`."""
-    h = height / 2
-    upper = radius if top is None else top
-    # (radius, height); the caps leave a hole of a millimetre around the axis.
-    profile = np.array([(1e-3, -h), (radius, -h), (upper, h), (1e-3, h)])
-    return lathe(profile, 24)
 
 
 def torus(major: float, minor: float, n: int) -> Solid:

@@ -35,7 +35,7 @@ OUR_FINISHES: dict[str, tuple[m.Maker, ...]] = {
     "cloth": (m.fabric, m.woven),
     "stone": (m.stone,),
     "ceramic": (m.ceramic,),
-    "other": (m.plastic, m.lacquer, m.any_object),
+    "other": (m.plastic, m.lacquer, m.ceramic),
 }
 """What a plain surface of a family may also be."""
 

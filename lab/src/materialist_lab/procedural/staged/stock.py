@@ -11,7 +11,6 @@ import numpy as np
 from materialist.types import Array
 from materialist_lab.procedural.catalog.cache import CatalogModel, Listing, as_roots, listing
 from materialist_lab.procedural.materials import ColourPicture
-from materialist_lab.procedural.objects.things import Meshes
 
 SMALLEST_CROP = 0.2
 """Smallest height of a crop as a share of the largest one that fits into the photograph."""
@@ -28,7 +27,7 @@ class Stock:
     listing: Listing
     held_out: bool = False
     """Whether it has only the models and photographs that are kept aside for testing; else only the others."""
-    meshes: Meshes = ()
+    meshes: tuple[Path, ...] = ()
     captures: tuple[Path, ...] = ()
 
     def _is_mine(self, name: str) -> bool:
@@ -110,7 +109,7 @@ def stock(
     folder: Path | None,
     *,
     held_out: bool = False,
-    meshes: Meshes = (),
+    meshes: tuple[Path, ...] = (),
     captures: tuple[Path, ...] = (),
 ) -> Stock:
     """The stock of archives and photographs, made once a process."""
