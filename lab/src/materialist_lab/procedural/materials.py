@@ -229,7 +229,7 @@ wall_paint = Finish(
     repeat=(0.8, 3),
 )
 wallpaper = Finish(
-    "ornament ornament ornament stripes stripes spots plaid",
+    "ornament ornament ornament stripes stripes plaid",
     base=((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))),
     second=(0.7, 0.5, 0.95),
     rougher=(0.2, 0.2),
@@ -306,11 +306,9 @@ woven = Finish(
     roughness=((1, 0.6, 1.0),),
     repeat=(0.08, 0.3),
 )
-printed_cloth = replace(
-    woven, tiles="plain plain stripes plaid ornament spots cloudy", repeat=(0.2, 0.9)
-)
+printed_cloth = replace(woven, tiles="plain plain stripes plaid ornament cloudy", repeat=(0.2, 0.9))
 ceramic = Finish(
-    "plain plain plain stripes ornament spots cloudy",
+    "plain plain plain stripes ornament cloudy",
     base=(*ANY_COLOUR, PALE),
     grain=(0, 0.15),
     roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)),
@@ -385,14 +383,6 @@ def metal(rng: np.random.Generator) -> Material:
     if kind == "rust":
         return replace(material, colours=(colour, *material.colours[1:]), metallic=(1.0, 0.0))
     return replace(material, colours=(colour,) * 3, metallic=(1.0, 1.0))
-
-
-def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
-    """A carpet of that size in metres, its tile fitted once."""
-    material = Finish(
-        "carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),)
-    )(rng)
-    return replace(material, repeat=(width, depth), offset=(0.5, 0.5))
 
 
 def light(rng: np.random.Generator, radiance: Colour) -> Material:

@@ -159,7 +159,7 @@ def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
 
 
 def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
-    """A rug from the catalogue, one of ours, or one printed with a picture."""
+    """A rug from the catalogue, or a plain or printed one."""
     # Half of the rooms have none.
     if rng.random() < 0.5:
         return []
@@ -169,7 +169,7 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     if model is not None:
         return placed(piece(rng, model, stock), at, turn)
     wide, deep = size[:2] * rng.uniform(0.3, 0.6, 2)
-    rug = m.rug(rng, wide, deep)
+    rug = m.woven(rng)
     picture = stock.printed(rng, wide / deep) if rng.random() < 0.3 else None
     if picture is not None:
         rug = replace(pictured(picture, np.ones(3), 0.9), repeat=(wide, deep), offset=(0.5, 0.5))
