@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 from scipy.ndimage import gaussian_filter
-from skimage.measure import marching_cubes
 
 from materialist.types import Array
 from materialist_lab.procedural import materials as m
 from materialist_lab.procedural import relief
 from materialist_lab.procedural.catalog.reading import from_the_sides
+from materialist_lab.procedural.objects import glassware
 from materialist_lab.procedural.objects import shapes as s
 from materialist_lab.procedural.objects.shapes import Solid
 from materialist_lab.procedural.staged.finishes import covered, relief_of
@@ -19,8 +19,6 @@ from materialist_lab.procedural.staged.stock import Stock
 from materialist_lab.procedural.world import Parts, ScenePart, one_thing
 
 Maker = Callable[[np.random.Generator, Stock], Solid]
-GRID = 84
-"""Samples on a side of the field of a body with limbs."""
 
 
 def sculpture(rng: np.random.Generator, stock: Stock) -> Parts:
@@ -109,57 +107,17 @@ def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
 
 
 def _body(rng: np.random.Generator, stock: Stock) -> Solid:
-    """Balls and limbs melted into each other: animals, figures, toys, roots."""
-    # --- A grid around the skeleton ---
-    ends, radii = _skeleton(rng)
-    low = (ends - radii[:, None, None]).min((0, 1)) - 0.1
-    high = (ends + radii[:, None, None]).max((0, 1)) + 0.1
-    step = float((high - low).max()) / GRID
-    counts = np.maximum(((high - low) / step).astype(int) + 2, 8)
-    axes = [low[k] + step * np.arange(counts[k]) for k in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).astype(np.float32)
-    # --- The sum of exp(-k d) over the limbs, d the distance from each: their smooth union at 1 ---
-    field = np.zeros(points.shape[:3], np.float32)
-    soft = np.float32(rng.uniform(14, 40))
-    for (a, b), radius in zip(ends.astype(np.float32), radii.astype(np.float32)):
-        along = b - a
-        t = np.clip((points - a) @ along / max(float(along @ along), 1e-9), 0, 1)
-        away = points - a
-        distance = np.sqrt(((away - t[..., None] * along) ** 2).sum(-1)) - radius
-        field += np.exp(-soft * np.clip(distance, -0.4, 1))
-    surface, faces, _, _ = marching_cubes(field, 1.0, spacing=(step,) * 3)
-    solid = _of(surface.astype(float) + low, faces[:, ::-1].astype(np.int32))
+    """Trunk and limbs melted into each other: animals, figures, toys, roots."""
+    rough = glassware.creature(rng)
+    # Four faces in place of one, rounded: enough to show weathering.
+    fine = trimesh.Trimesh(rough.vertices, rough.faces, process=False).subdivide_loop(1)
+    solid = _of(np.asarray(fine.vertices, float), np.asarray(fine.faces, np.int32))
     return _displaced(rng, solid, _depth(rng, 0.003, 0.025))
 
 
 def _of(vertices: Array, faces: Array) -> Solid:
     """The solid with smooth normals, without texture coordinates."""
     return Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
-
-
-def _skeleton(rng: np.random.Generator) -> tuple[Array, Array]:
-    """([n, 2, 3] ends, [n] radii) of a trunk with limbs, often the same on both sides."""
-    ends = []
-    radii = []
-    # --- The trunk, mostly upright ---
-    trunk = rng.uniform(0.15, 0.4)
-    along = rng.normal(size=3) * [0.5, 1.0, 0.5]
-    along *= rng.uniform(0.2, 1.0) / np.linalg.norm(along)
-    ends.append((-along / 2, along / 2))
-    radii.append(trunk)
-    # --- Limbs of two segments, from the trunk over a tip to a bend ---
-    mirrored = rng.random() < 0.65
-    for _ in range(int(rng.integers(1, 7))):
-        root = rng.uniform(-0.5, 0.5) * along + rng.normal(size=3) * 0.12
-        way = rng.normal(size=3)
-        tip = root + way / np.linalg.norm(way) * rng.uniform(0.2, 0.85)
-        bend = tip + rng.normal(size=3) * 0.25
-        thick = rng.uniform(0.05, 0.24)
-        for side in (1, -1) if mirrored else (1,):
-            flip = np.array([side, 1, 1])
-            ends += [(root * flip, tip * flip), (tip * flip, bend * flip)]
-            radii += [thick, thick * rng.uniform(0.5, 1.1)]
-    return np.array(ends), np.array(radii)
 
 
 def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
