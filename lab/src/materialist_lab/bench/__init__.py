@@ -40,7 +40,7 @@ def run(
     force: bool = False,
     **options: Any,
 ) -> Path:
-    """Run benchmark `name` and write report.json, report.md, plot.png and sheet.png into the folder `output`.
+    """Run benchmark `name` and write report.json, report.md and sheet.png into the folder `output`.
 
     `options` are the fields of the benchmark's class, as values or as texts. Returns the folder. Raises InputError
     for an unknown name or option, OutputError when `output` holds something and `force` is not given.

@@ -65,7 +65,6 @@ class EditBench(Benchmark):
         Column("seconds", "s", "lower", 2),
         Column("cpu_seconds", "CPU s", "lower", 2),
     )
-    plotted = ("inside", "outside")
 
     scenes: int = option(3, "Synthetic photos.", **COUNT_OR_0)
     size: int = option(96, "Their width and height.", **SIZE)

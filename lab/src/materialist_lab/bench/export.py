@@ -43,7 +43,6 @@ class ExportBench(Benchmark):
         Column("fitted", "... fitted maps", "higher", 1),
         Column("ours", "PSNR, re-rendering", "higher", 1),
     )
-    plotted = ("photo", "ours")
 
     photo: str = option("example:coffee", "As in `bench invert`.", kind="name")
     size: int = option(192, "Longer side.", **SIZE)

@@ -49,7 +49,6 @@ class GeometryBench(Benchmark):
         Column("rest", "rest", "lower", 4),
         Column("seconds", "mesh s", "lower", 1),
     )
-    plotted = ("angle", "pieces")
 
     predictor: str = option("auto", "Where the maps come from.", kind="name")
     size: int = option(512, "Longer side of the photos.", **SIZE)

@@ -63,7 +63,6 @@ class GlassBench(Benchmark):
         Column("seconds", "s", "lower", 2),
         Column("cpu_seconds", "CPU s", "lower", 2),
     )
-    plotted = ("psnr_symmetric", "psnr_asymmetric")
 
     shapes: int = option(2, "Objects of each group.", **COUNT_OR_0)
     envmaps: int = option(2, "Lights of each object.", **COUNT)

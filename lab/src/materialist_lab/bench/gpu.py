@@ -32,7 +32,6 @@ class GpuBench(Benchmark):
     """Time every stage of one photo; `data` is not used."""
 
     columns = (Column("cpu", "cpu s", digits=3), Column("cuda", "cuda s", digits=3))
-    plotted = ("cpu", "cuda")
 
     photo: str = option("example:coffee", "A file or example:NAME.", kind="name")
     click: str = option("150,230", "Where its object is, x and y at 512 pixels.", kind="name")

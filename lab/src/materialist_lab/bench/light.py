@@ -100,7 +100,6 @@ class LightBench(Benchmark):
         Column("seconds", "s", "lower", 1),
         Column("cpu_seconds", "CPU s", "lower", 1),
     )
-    plotted = ("sh_error_relative", "render_psnr", "seconds")
 
     scenes: int = option(
         3, "Scenes; the paper has 10. Every scene and view begins with another light.", **COUNT

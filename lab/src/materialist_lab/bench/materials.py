@@ -61,7 +61,6 @@ class MaterialsBench(Benchmark):
         *(Column(f"{name}_calibration", f"{name} within its spread") for name in MAPS),
         Column("seconds", "s", "lower", 2),
     )
-    plotted = ("albedo_psnr", "normal_angle")
 
     predictor: str = option("auto", "Names, with commas.", kind="name")
     limit: int = option(0, "At most so many samples, spread over the set; 0: all.", **COUNT_OR_0)

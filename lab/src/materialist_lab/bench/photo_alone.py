@@ -65,7 +65,6 @@ class PhotoAloneBench(Benchmark):
         ),
         Column("seconds", "fit s", "lower", 1),
     )
-    plotted = ("inside", "albedo", "light")
 
     scenes: int = option(24, "Photos.", **COUNT)
     size: int = option(256, "Their width and height.", **SIZE)

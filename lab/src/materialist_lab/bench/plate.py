@@ -44,7 +44,6 @@ class PlateBench(Benchmark):
         Column("around", "PSNR around", "higher", 2),
         Column("seconds", "s", "lower", 1),
     )
-    plotted = ("inside", "around")
 
     size: int = option(512, "Longer side.", **SIZE)
     spp: int = option(128, "Paths a pixel of the composite.", **COUNT)
