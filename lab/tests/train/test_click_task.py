@@ -15,7 +15,13 @@ from materialist.errors import InputError
 from materialist.predict.clicks.features import BOX, CHANNELS, SPOT
 from materialist_lab.procedural.dataset import produce as produce_set
 from materialist_lab.procedural.options import DataSetOptions
-from materialist_lab.train.clicks import PASTED, click_losses, draw_click, load_views, produce_views
+from materialist_lab.train.clicks import (
+    PASTED,
+    click_losses,
+    draw_click,
+    load_click_views,
+    produce_views,
+)
 
 
 def test_clicks_lie_on_what_they_ask_for():
@@ -64,7 +70,7 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path, small_s
         )
     views = tmp_path / "run" / "views"
     produce_views(sets[0], views)
-    (view,) = load_views(views)
+    (view,) = load_click_views(views)
     assert view["rgb"].shape == (64, 64, 3) and view["rgb"].dtype == np.uint8
     length = np.linalg.norm(view["normal"].astype(float) / 127, axis=-1)
     assert np.abs(length[view["depth"] > 0] - 1).max() < 0.03
@@ -85,7 +91,7 @@ def test_cut_outs_are_things_of_further_views(tmp_path, small_set):
     folder.mkdir()
     made_cutouts.write_disc(folder / "red.png")
     produce_views(data, tmp_path / "views", folder)
-    *pasted, plain = load_views(tmp_path / "views")
+    *pasted, plain = load_click_views(tmp_path / "views")
     assert len(pasted) == PASTED
     for view in pasted:
         new = view["thing"] > plain["thing"].max()
@@ -106,7 +112,7 @@ def test_input_that_cannot_be(tmp_path):
     made_runs.write_click_views(tmp_path / "views")
     os.truncate(tmp_path / "views" / "0000001.npz", 500)
     with pytest.raises(InputError, match=r"0000001\.npz cannot be read .*; delete it"):
-        load_views(tmp_path / "views")
+        load_click_views(tmp_path / "views")
     write_set(tmp_path / "set", 1)
     with pytest.raises(InputError, match="describes no data set"):
         produce_views(tmp_path / "set", tmp_path / "other")

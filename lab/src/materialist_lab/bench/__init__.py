@@ -73,7 +73,7 @@ def module_name(name: str) -> str:
     return f"{__name__}.{name.replace('-', '_')}"
 
 
-def about(name: str) -> str:
+def summary_of(name: str) -> str:
     """What a benchmark measures, in a sentence: the first line of its module, which is read but not imported."""
     spec = find_spec(module_name(name))
     assert spec is not None and spec.origin is not None

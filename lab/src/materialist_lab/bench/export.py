@@ -31,7 +31,7 @@ from materialist.option_kinds import option
 from materialist.types import Array, Materials, Mesh, Scene
 from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row
 from materialist_lab.bench.invert import photo_case
-from materialist_lab.bench.report import Column, Report, strip
+from materialist_lab.bench.report import Column, Report, side_by_side
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +65,7 @@ class ExportBench(Benchmark):
             exported = self._pictures(scene, Path(temporary) / "exported", residual=True)
             fitted = self._pictures(scene, Path(temporary) / "fitted", residual=False)
             for (name, picture), (_, plain) in zip(exported, fitted, strict=True):
-                report.sheet.append(strip(photo, ours, picture))
+                report.sheet.append(side_by_side(photo, ours, picture))
                 yield {
                     "method": name,
                     "sample": "",

@@ -49,7 +49,7 @@ class Report:
     """Name -> a larger picture, uint8 [h, w, 3] sRGB, which becomes pictures/NAME.png."""
 
 
-def strip(*pictures: Array) -> Array:
+def side_by_side(*pictures: Array) -> Array:
     """uint8 [H, n W, 3] sRGB: linear pictures [H, W, 3] side by side."""
     return np.round(linear_to_srgb(np.concatenate(pictures, 1)) * 255).astype(np.uint8)
 

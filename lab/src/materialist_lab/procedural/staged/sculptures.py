@@ -168,9 +168,9 @@ def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
     wave = np.cos(flutes * (phi[None] + rng.normal() * up[:, None])) * rng.uniform(0.0, 0.12)
     r = radius[:, None] * (1 + wave)
     points = np.stack([r * np.cos(phi), np.broadcast_to(up[:, None], r.shape), r * np.sin(phi)], -1)
-    faces = s.grid_faces(rows, columns)
+    faces = s.grid_triangles(rows, columns)
     solid = _of(points.reshape(-1, 3), faces)
-    lid = s.moved(s.disc(float(radius[-1]) * 0.95), (0, float(up[-1]) - 0.02, 0))
+    lid = s.moved(s.flat_disc(float(radius[-1]) * 0.95), (0, float(up[-1]) - 0.02, 0))
     return s.joined([_displaced(rng, solid, _depth(rng, 0.001, 0.012)), lid])
 
 
