@@ -1,4 +1,4 @@
-"""Rough sculptural shapes: lumps with limbs, weathered stones, carved plates and fluted vessels, with fine meshes."""
+"""Rough sculptural shapes, weathered and with fine meshes, and carved plates."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,15 +19,15 @@ from materialist_lab.procedural.staged.stock import Stock
 from materialist_lab.procedural.world import Parts, ScenePart, one_thing
 
 Maker = Callable[[np.random.Generator, Stock], Solid]
+FACES = 6000
+"""Fewest triangles of a weathered shape."""
 
 
 def sculpture(rng: np.random.Generator, stock: Stock) -> Parts:
     """A sculpture about 0.3 m high, standing on y = 0."""
     makers: tuple[tuple[float, Maker], ...] = (
-        (0.4, _body),
-        (0.2, _stone),
+        (0.74, _weathered),
         (0.16, _plate),
-        (0.14, _vessel),
         (0.1 if stock.meshes else 0.0, _captured),
     )
     solid = m.pick(rng, makers)(rng, stock)
@@ -89,29 +89,14 @@ def _depth(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
-    """A boulder, a nut, a head of coral: a ball pressed flat here and there."""
-    ball = trimesh.creation.icosphere(subdivisions=6)
-    vertices = np.asarray(ball.vertices, float)
-    # Each press moves what stands over a plane nine tenths of the way back to it.
-    for _ in range(int(rng.integers(0, 8))):
-        axis = rng.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        over = np.maximum(vertices @ axis - rng.uniform(0.55, 0.95), 0)
-        vertices = vertices - 0.9 * over[:, None] * axis
-    bump = s.lumps(rng, rng.uniform(0, 0.25), 0.35)
-    vertices = vertices * (1 + bump(vertices))[:, None] * rng.uniform(0.55, 1.0, 3)
-    faces = np.asarray(ball.faces, np.int32)
-    solid = Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
-    return _displaced(rng, solid, _depth(rng, 0.004, 0.03))
-
-
-def _body(rng: np.random.Generator, stock: Stock) -> Solid:
-    """Trunk and limbs melted into each other: animals, figures, toys, roots."""
-    rough = glassware.creature(rng)
-    # Four faces in place of one, rounded: enough to show weathering.
-    fine = trimesh.Trimesh(rough.vertices, rough.faces, process=False).subdivide_loop(1)
-    solid = _of(np.asarray(fine.vertices, float), np.asarray(fine.faces, np.int32))
+def _weathered(rng: np.random.Generator, stock: Stock) -> Solid:
+    """An animal, a vase, a stone, a turned or twisted thing: a shape of RefractionNet's, rounded and weathered."""
+    rough = glassware.any_shape(rng)
+    mesh = trimesh.Trimesh(rough.vertices, rough.faces)
+    # Vertices enough to show weathering.
+    while len(mesh.faces) < FACES:
+        mesh = mesh.subdivide_loop(1)
+    solid = _of(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int32))
     return _displaced(rng, solid, _depth(rng, 0.003, 0.025))
 
 
@@ -151,27 +136,6 @@ def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
     solid = _of(sheet.vertices + raised, sheet.faces)
     back = s.slab((1.0, float(np.ptp(sheet.vertices[:, 1])), 0.12))
     return s.joined([solid, s.moved(back, (0, 0, -0.18))])
-
-
-def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
-    """A vase, column or bell: fluted, twisted or hammered."""
-    rows = 150
-    columns = 260
-    levels = np.linspace(0, 1, int(rng.integers(4, 8)))
-    radius = np.interp(np.linspace(0, 1, rows), levels, rng.uniform(0.12, 0.5, len(levels)))
-    # Smoothed by a running mean of 25 rows.
-    radius = np.convolve(np.pad(radius, 12, mode="edge"), np.ones(25) / 25, "valid")
-    up = np.linspace(0, rng.uniform(0.7, 1.3), rows)
-    phi = np.linspace(0, 2 * np.pi, columns)
-    # Flutes around it, twisted along its height; none in half of them.
-    flutes = rng.choice([0, int(rng.integers(3, 24))])
-    wave = np.cos(flutes * (phi[None] + rng.normal() * up[:, None])) * rng.uniform(0.0, 0.12)
-    r = radius[:, None] * (1 + wave)
-    points = np.stack([r * np.cos(phi), np.broadcast_to(up[:, None], r.shape), r * np.sin(phi)], -1)
-    faces = s.grid_triangles(rows, columns)
-    solid = _of(points.reshape(-1, 3), faces)
-    lid = s.moved(s.flat_disc(float(radius[-1]) * 0.95), (0, float(up[-1]) - 0.02, 0))
-    return s.joined([_displaced(rng, solid, _depth(rng, 0.001, 0.012)), lid])
 
 
 def _captured(rng: np.random.Generator, stock: Stock) -> Solid:
