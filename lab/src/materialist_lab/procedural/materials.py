@@ -239,9 +239,6 @@ lacquer = Finish(
     "plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),)
 )
 """Of any colour, dull or shiny."""
-skin = replace(
-    lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),)
-)
 white_paint = replace(
     lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),)
 )
@@ -249,18 +246,17 @@ plastic = replace(
     lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT
 )
 # --- Wood ---
-raw_wood = Finish(
+wood = Finish(
     "wood",
     base=TIMBER,
     second=(1, 0.35, 0.75),
     third=(1, 0.15, 0.4),
     grain=(0.1, 0.5),
-    roughness=((1, 0.4, 0.8),),
+    roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)),
     rougher=(0.2, 0.2),
     repeat=(0.5, 1.4),
     stretch=(1, 2),
 )
-wood = replace(raw_wood, roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)))
 """Pale, brown, red or nearly black timber, raw or varnished."""
 floor_boards = replace(wood, tiles="planks", repeat=(0.9, 2.2))
 # --- Tiles, stone, bricks ---
