@@ -24,7 +24,7 @@ from materialist_lab.procedural.objects.shapes import Solid, face_normals, joine
 class ReadingSettings:
     """Limits of what is taken from a catalogue; tuned by eye."""
 
-    faces: int = 60_000  # triangles of a model; finer ones are left out (some 30 of 700)
+    faces: int = 60_000  # triangles of a model; finer ones are left out (21 of 820)
     picture: int = 512  # pixels along the longer side of a picture
     # radians: where a file has no normals, faces that meet at a sharper angle keep an edge
     crease: float = 0.7
