@@ -71,10 +71,10 @@ def capsule(radius: float, length: float) -> Solid:
     return lathe(np.concatenate([lower, upper]))
 
 
-def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Solid:
+def vessel(control: Array, thickness: float) -> Solid:
     """Open vase, cup or bowl: a smooth wall through `control` [K, 2] (radius, height), with an inside and a rim."""
     # A monotone cubic through the control points never overshoots them.
-    height = np.linspace(control[0, 1], control[-1, 1], rows)
+    height = np.linspace(control[0, 1], control[-1, 1], 48)
     radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
     inner = np.maximum(radius - thickness, np.minimum(0.02, radius / 2))
     # The inside begins above the bottom, which is as thick as the wall.
@@ -88,7 +88,7 @@ def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Sol
     inside = np.stack([inner, height], -1)[keep][::-1]
     bottom = np.stack([np.linspace(0, radius[0], 6), np.zeros(6)], -1)[:-1]
     floor = np.stack([np.linspace(inside[-1, 0], 0, 6), np.full(6, inside[-1, 1])], -1)[1:]
-    return lathe(np.concatenate([bottom, outside, rim, inside, floor]), n)
+    return lathe(np.concatenate([bottom, outside, rim, inside, floor]))
 
 
 def panel(origin: ArrayLike, right: Array, up: Array, repeat: tuple[float, float]) -> Solid:

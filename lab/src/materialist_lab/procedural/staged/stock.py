@@ -38,14 +38,14 @@ class Stock:
         return [name for name in names if self._is_mine(name)]
 
     def model(
-        self, rng: np.random.Generator, *roles: str, low: float = 0.0, high: float = 9.0
+        self, rng: np.random.Generator, *roles: str, high: float = 9.0
     ) -> CatalogModel | None:
-        """A model of one of the roles whose longest side is between two lengths, metres; None where there is none."""
+        """A model of one of the roles whose longest side is at most `high` metres; None where there is none."""
         keys = [key for role in roles for key in self._mine(self.listing.models.get(role, ()))]
         # A dozen tries: the sizes of all models are not known before they are loaded.
         for _ in range(12 if keys else 0):
             model = self.listing.model(keys[rng.integers(len(keys))])
-            if low <= max(model.entry.size) <= high:
+            if max(model.entry.size) <= high:
                 return model
         return None
 
