@@ -113,10 +113,11 @@ def block(
     material: Material,
     radius: float = 0.0,
     *,
+    turn: float = 0.0,
     tip: float = 0.0,
 ) -> ScenePart:
-    """A slab of `size` [3] standing at `at` [3], its edges rounded by `radius`; tipped about X."""
-    return ScenePart(shapes.moved(shapes.slab(size, radius), at, tip=tip), material)
+    """A slab of `size` [3] standing at `at` [3], its edges rounded by `radius`; tipped about X, turned about Y."""
+    return ScenePart(shapes.moved(shapes.slab(size, radius), at, turn, tip), material)
 
 
 def rod(points: ArrayLike, radius: ArrayLike, material: Material, n: int = 8) -> ScenePart:
