@@ -59,9 +59,14 @@ def arrays(folder, index):
 
 
 def test_every_sample_keeps_the_contract(data_set):
-    for k in range(6):
-        sample = arrays(data_set, k)
+    samples = [arrays(data_set, k) for k in range(6)]
+    # A picture out of focus has no shading that goes with its sharp maps.
+    assert any("shading" in sample for sample in samples)
+    for sample in samples:
+        assert CONTRACT.keys() - sample.keys() <= {"shading"}
         for name, (kind, channels) in CONTRACT.items():
+            if name not in sample:
+                continue
             assert sample[name].dtype == kind, name
             assert sample[name].shape == (SIZE, SIZE, *([channels] if channels else [])), name
         mask = sample["mask"] > 0
@@ -78,8 +83,9 @@ def test_every_sample_keeps_the_contract(data_set):
 def test_a_sample_depends_on_seed_and_number_alone(data_set, options, tmp_path):
     again = make_sample(4, options)
     stored = arrays(data_set, 4)
-    for name in CONTRACT:
+    for name in stored.keys() & CONTRACT.keys():
         assert np.array_equal(again[name], stored[name]), name
+    assert CONTRACT.keys() - again.keys() == CONTRACT.keys() - stored.keys()
     other = make_sample(4, replace(options, seed=12))
     assert not np.array_equal(other["albedo"], stored["albedo"])
 
