@@ -31,9 +31,7 @@ def rows(mitsuba, tmp_path_factory):
         device="cpu",
     )
     patch.undo()
-    assert (out / "plot.png").stat().st_size > 0 and "| 30 steps | 1 |" in (
-        out / "report.md"
-    ).read_text()
+    assert "| 30 steps | 1 |" in (out / "report.md").read_text()
     return {row["method"]: row for row in json.loads((out / "report.json").read_text())["rows"]}
 
 

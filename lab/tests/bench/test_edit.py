@@ -115,7 +115,7 @@ def test_a_run_writes_rows_with_their_ceilings(measured, fitted):
     assert scored[0] < min(scored[1:]) and scored[3] == pytest.approx(
         scored[2]
     )  # a fit without error
-    assert all((report.folder / name).stat().st_size > 1000 for name in ("plot.png", "sheet.png"))
+    assert (report.folder / "sheet.png").stat().st_size > 1000
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def test_one_colour_of_light_and_the_predicted_one_are_not_fitted(sample):
 
 
 def test_mirrors_are_photographed_under_the_same_light(sample):
-    polished = light.mirrored(sample)
+    polished = light.with_mirrors(sample)
     changed = np.abs(polished.photo.linear - sample.photo.linear).max(-1) > 0.05
     things = np.isin(sample.scene.seen, list(sample.scene.things))
     assert (polished.truth.materials.metallic == things).all() and np.array_equal(

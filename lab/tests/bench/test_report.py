@@ -25,7 +25,6 @@ REPORT = Report(
         {"method": "slow", "sample": "b", "psnr": float("inf"), "seconds": 50},
         {"method": "ceiling", "sample": "a", "psnr": 44.0},
     ],
-    plotted=("psnr", "seconds"),
 )
 
 
@@ -53,7 +52,7 @@ def test_methods_compete_within_their_part():
     )
 
 
-def test_a_report_is_three_files_of_valid_content(tmp_path):
+def test_a_report_is_two_files_of_valid_content(tmp_path):
     write(REPORT, tmp_path)
     content = json.loads((tmp_path / "report.json").read_text())
     assert content["rows"][3]["psnr"] is None
@@ -63,8 +62,7 @@ def test_a_report_is_three_files_of_valid_content(tmp_path):
         "ceiling": {"samples": 1, "psnr": 44.0},
     }
     assert (tmp_path / "report.md").read_text() == markdown(REPORT)
-    assert (tmp_path / "plot.png").read_bytes()[:4] == b"\x89PNG"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["plot.png", "report.json", "report.md"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["report.json", "report.md"]
 
 
 def test_larger_pictures_are_files_of_their_own(tmp_path):

@@ -18,4 +18,3 @@ def test_shapes_and_meshes_have_rows(tmp_path, untrained, measured):
     # Seen from near, rays to a ball's sides are not parallel, and its back is not quite its front in a mirror.
     assert network["back"] == pytest.approx(prior["back"], abs=0.01) and prior["back"] < 35
     assert prior["solid"] < network["solid"] < prior["solid"] + 0.2  # LEAST is added to it
-    assert (report.folder / "plot.png").is_file()

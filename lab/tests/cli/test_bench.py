@@ -8,7 +8,7 @@ from made_program import heavy_after, options_of
 
 from materialist.option_kinds import declarations
 from materialist_lab import bench
-from materialist_lab.bench import BENCHMARKS, about, benchmark_class
+from materialist_lab.bench import BENCHMARKS, benchmark_class, summary_of
 from materialist_lab.bench.light import LightBench
 from materialist_lab.cli.bench import app
 
@@ -73,12 +73,12 @@ def test_help_has_every_option_of_the_benchmark(run):
 def test_help_of_the_group_names_each_benchmark_and_what_it_measures(run):
     code, out, _ = run("bench", "--help")
     shown = " ".join(out.split())
-    assert code == 0 and all(f"{name} {about(name)}" in shown for name in BENCHMARKS)
+    assert code == 0 and all(f"{name} {summary_of(name)}" in shown for name in BENCHMARKS)
 
 
 def test_listing_the_commands_loads_nothing_heavy():
     """Help of the program, of bench and of train imports these two, and reads the benchmarks without importing them."""
-    statement = "from materialist_lab.cli import bench, train; bench.benchmarks.about('real')"
+    statement = "from materialist_lab.cli import bench, train; bench.benchmarks.summary_of('real')"
     assert not heavy_after(statement)
 
 

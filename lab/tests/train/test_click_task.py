@@ -8,13 +8,20 @@ import made_runs
 import numpy as np
 import pytest
 import torch
+from made_catalog import make_archive
 from made_samples import write_set
 
 from materialist.errors import InputError
 from materialist.predict.clicks.features import BOX, CHANNELS, SPOT
 from materialist_lab.procedural.dataset import produce as produce_set
 from materialist_lab.procedural.options import DataSetOptions
-from materialist_lab.train.clicks import PASTED, click_losses, draw_click, load_views, produce_views
+from materialist_lab.train.clicks import (
+    PASTED,
+    click_losses,
+    draw_click,
+    load_click_views,
+    produce_views,
+)
 
 
 def test_clicks_lie_on_what_they_ask_for():
@@ -44,18 +51,26 @@ def test_the_loss_has_a_closed_form():
     assert sure["entropy"].item() < 1e-6 and sure["overlap"].item() < 1e-6
 
 
+@pytest.fixture
+def small_set(tmp_path):
+    """Options of a set of single things, of a tiny catalogue."""
+    make_archive(tmp_path / "made.sh3f")
+    places = {"furniture": tmp_path, "cache": tmp_path / "cache"}
+    return {"size": 64, "spp": 1, "device": "cpu", "only": "single", **places}
+
+
 @pytest.mark.slow
-def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
+def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path, small_set):
     sets = tmp_path / "first", tmp_path / "second"
     for seed, data in enumerate(sets):
         produce_set(
             data,
-            DataSetOptions(size=64, seed=11 + seed, spp=1, device="cpu", only="still-life"),
+            DataSetOptions(seed=11 + seed, **small_set),
             count=1,
         )
     views = tmp_path / "run" / "views"
     produce_views(sets[0], views)
-    (view,) = load_views(views)
+    (view,) = load_click_views(views)
     assert view["rgb"].shape == (64, 64, 3) and view["rgb"].dtype == np.uint8
     length = np.linalg.norm(view["normal"].astype(float) / 127, axis=-1)
     assert np.abs(length[view["depth"] > 0] - 1).max() < 0.03
@@ -69,16 +84,14 @@ def test_views_are_made_from_a_data_set_as_the_package_sees_it(tmp_path):
 
 
 @pytest.mark.slow
-def test_cut_outs_are_things_of_further_views(tmp_path):
+def test_cut_outs_are_things_of_further_views(tmp_path, small_set):
     data = tmp_path / "set"
     folder = tmp_path / "cutouts"
-    produce_set(
-        data, DataSetOptions(size=64, seed=11, spp=1, device="cpu", only="still-life"), count=1
-    )
+    produce_set(data, DataSetOptions(seed=11, **small_set), count=1)
     folder.mkdir()
     made_cutouts.write_disc(folder / "red.png")
     produce_views(data, tmp_path / "views", folder)
-    *pasted, plain = load_views(tmp_path / "views")
+    *pasted, plain = load_click_views(tmp_path / "views")
     assert len(pasted) == PASTED
     for view in pasted:
         new = view["thing"] > plain["thing"].max()
@@ -99,7 +112,7 @@ def test_input_that_cannot_be(tmp_path):
     made_runs.write_click_views(tmp_path / "views")
     os.truncate(tmp_path / "views" / "0000001.npz", 500)
     with pytest.raises(InputError, match=r"0000001\.npz cannot be read .*; delete it"):
-        load_views(tmp_path / "views")
+        load_click_views(tmp_path / "views")
     write_set(tmp_path / "set", 1)
     with pytest.raises(InputError, match="describes no data set"):
         produce_views(tmp_path / "set", tmp_path / "other")

@@ -138,6 +138,6 @@ def test_errors_of_maps_are_those_of_their_spread():
     predicted["albedo"] = truth["albedo"] + torch.tensor([0.3, 0.0, 0.0]).view(1, 3, 1, 1)
     predicted["roughness"] = truth["roughness"] - 0.2
     predicted["normal"] = torch.tensor([1.0, 0.0, 1.0]).view(1, 3, 1, 1).expand(1, 3, 2, 2)
-    errors = losses.map_errors(predicted, truth, torch.ones(1, 1, 2, 2))
+    errors = losses.absolute_errors(predicted, truth, torch.ones(1, 1, 2, 2))
     expected = torch.tensor([0.1, 0.2, 0.0, math.pi / 4, 0.0])
     torch.testing.assert_close(errors.mean((0, 2, 3)), expected)

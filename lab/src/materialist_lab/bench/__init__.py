@@ -26,7 +26,6 @@ BENCHMARKS = (
     "plate",
     "studio",
     "paper",
-    "gpu",
     "export",
 )
 """Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""
@@ -40,7 +39,7 @@ def run(
     force: bool = False,
     **options: Any,
 ) -> Path:
-    """Run benchmark `name` and write report.json, report.md, plot.png and sheet.png into the folder `output`.
+    """Run benchmark `name` and write report.json, report.md and sheet.png into the folder `output`.
 
     `options` are the fields of the benchmark's class, as values or as texts. Returns the folder. Raises InputError
     for an unknown name or option, OutputError when `output` holds something and `force` is not given.
@@ -73,7 +72,7 @@ def module_name(name: str) -> str:
     return f"{__name__}.{name.replace('-', '_')}"
 
 
-def about(name: str) -> str:
+def summary_of(name: str) -> str:
     """What a benchmark measures, in a sentence: the first line of its module, which is read but not imported."""
     spec = find_spec(module_name(name))
     assert spec is not None and spec.origin is not None

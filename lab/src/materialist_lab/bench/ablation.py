@@ -55,7 +55,6 @@ class AblationBench(Benchmark):
         Column("relit_psnr", "relit PSNR", "higher", 2),
         Column("steps", "steps", "", 0),
     )
-    plotted = ("psnr", "loss")
 
     deltas: ClassVar = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0)  # paper, table delta_ab
     steps: ClassVar = (50, 200, 1000, 2000)  # paper, table steps_ab

@@ -49,7 +49,6 @@ class BatchBench(Benchmark):
         Column("overhead_percent", "overhead, % of s", "lower", 1),
         Column("cpu_overhead_percent", "overhead, % of processor s", "lower", 1),
     )
-    plotted = ("seconds", "cpu_seconds")
 
     photos: int = option(4, "How many, spread over those there are.", **COUNT)
     size: int = option(128, "Longer side.", **SIZE)

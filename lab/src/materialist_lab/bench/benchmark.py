@@ -35,8 +35,6 @@ class Benchmark(OperationOptions, ABC):
 
     operation = "The benchmark"
     columns: ClassVar[tuple[Column, ...]]
-    plotted: ClassVar[tuple[str, ...]]
-    """Keys of the columns in the plot."""
     write_every: ClassVar[float] = 20.0
     """Seconds after which a growing report is written again."""
 
@@ -59,7 +57,7 @@ class Benchmark(OperationOptions, ABC):
         ).partition("\n\n")
         settings = {name: None if value == "" else value for name, value in asdict(self).items()}
         settings["data"] = None if data is None else data.name
-        report = Report(title, note, settings, self.columns, self.plotted)
+        report = Report(title, note, settings, self.columns)
         # --- Rows as they come in; written at once, then every few seconds ---
         written = -self.write_every
         try:

@@ -43,7 +43,7 @@ from materialist_lab.bench.edits import (
     sample_and_light,
     true_scene,
 )
-from materialist_lab.bench.report import CEILING, Column, Report, strip
+from materialist_lab.bench.report import CEILING, Column, Report, side_by_side
 from materialist_lab.procedural.synthetic import SyntheticSample
 
 STRAY = 8 / 255
@@ -65,7 +65,6 @@ class EditBench(Benchmark):
         Column("seconds", "s", "lower", 2),
         Column("cpu_seconds", "CPU s", "lower", 2),
     )
-    plotted = ("inside", "outside")
 
     scenes: int = option(3, "Synthetic photos.", **COUNT_OR_0)
     size: int = option(96, "Their width and height.", **SIZE)
@@ -143,7 +142,7 @@ class EditBench(Benchmark):
             "fit_seconds": seconds,
             **cost,
         }
-        report.sheet.append(strip(photo, after, best, picture))
+        report.sheet.append(side_by_side(photo, after, best, picture))
 
     def _latencies(self, data: Path | None) -> Iterator[Row]:
         # --- The live preview, once everything is prepared ---

@@ -31,7 +31,7 @@ from materialist.option_kinds import option
 from materialist.types import Array, Materials, Mesh, Scene
 from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row
 from materialist_lab.bench.invert import photo_case
-from materialist_lab.bench.report import Column, Report, strip
+from materialist_lab.bench.report import Column, Report, side_by_side
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,6 @@ class ExportBench(Benchmark):
         Column("fitted", "... fitted maps", "higher", 1),
         Column("ours", "PSNR, re-rendering", "higher", 1),
     )
-    plotted = ("photo", "ours")
 
     photo: str = option("example:coffee", "As in `bench invert`.", kind="name")
     size: int = option(192, "Longer side.", **SIZE)
@@ -66,7 +65,7 @@ class ExportBench(Benchmark):
             exported = self._pictures(scene, Path(temporary) / "exported", residual=True)
             fitted = self._pictures(scene, Path(temporary) / "fitted", residual=False)
             for (name, picture), (_, plain) in zip(exported, fitted, strict=True):
-                report.sheet.append(strip(photo, ours, picture))
+                report.sheet.append(side_by_side(photo, ours, picture))
                 yield {
                     "method": name,
                     "sample": "",

@@ -27,7 +27,7 @@ from materialist.option_kinds import option
 from materialist.predict import get_predictor
 from materialist.types import Array, Mesh
 from materialist_lab.bench.benchmark import COUNT_OR_0, SIZE, Benchmark, Row, spread, timed
-from materialist_lab.bench.report import Column, Report, strip
+from materialist_lab.bench.report import Column, Report, side_by_side
 
 LEVEL = 0.7
 """Least upward part of a normal that faces up, as in `bench real`."""
@@ -49,7 +49,6 @@ class GeometryBench(Benchmark):
         Column("rest", "rest", "lower", 4),
         Column("seconds", "mesh s", "lower", 1),
     )
-    plotted = ("angle", "pieces")
 
     predictor: str = option("auto", "Where the maps come from.", kind="name")
     size: int = option(512, "Longer side of the photos.", **SIZE)
@@ -76,9 +75,9 @@ class GeometryBench(Benchmark):
                 photo.linear,
                 shown(maps.normal, surface),
                 shown(mesh_normals, surface),
-                coloured(piece),
+                _coloured(piece),
             )
-            report.sheet.append(strip(*(lowered(picture) for picture in pictures)))
+            report.sheet.append(side_by_side(*(lowered(picture) for picture in pictures)))
             yield {
                 "method": self.predictor,
                 "sample": file.stem,
@@ -143,7 +142,7 @@ def shown(normal: Array, surface: Array) -> Array:
     return np.where(surface[..., None], colours, 0).astype(np.float32)
 
 
-def coloured(piece: Array) -> Array:
+def _coloured(piece: Array) -> Array:
     """[H, W, 3] linear: a colour for each piece, the same in every run; black where there is none."""
     palette = np.random.default_rng(0).uniform(0.05, 1, (int(piece.max()) + 2, 3))
     palette[-1] = 0

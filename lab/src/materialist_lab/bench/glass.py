@@ -32,7 +32,7 @@ from materialist_lab.bench import glass_scenes as scenes
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, numbers, timed
 from materialist_lab.bench.edits import awaited, true_scene
 from materialist_lab.bench.glass_models import Background, Case
-from materialist_lab.bench.report import CEILING, Column, Report, strip
+from materialist_lab.bench.report import CEILING, Column, Report, side_by_side
 from materialist_lab.metrics.lpips import lpips
 from materialist_lab.procedural.synthetic import photographed
 
@@ -63,7 +63,6 @@ class GlassBench(Benchmark):
         Column("seconds", "s", "lower", 2),
         Column("cpu_seconds", "CPU s", "lower", 2),
     )
-    plotted = ("psnr_symmetric", "psnr_asymmetric")
 
     shapes: int = option(2, "Objects of each group.", **COUNT_OR_0)
     envmaps: int = option(2, "Lights of each object.", **COUNT)
@@ -92,7 +91,7 @@ class GlassBench(Benchmark):
                 room = behind["true"].picture
                 glass = [case.truth, *(shown[name] for name in DRAWN)]
                 pictures = [np.where(inside, picture, room) for picture in glass]
-                report.sheet.append(strip(case.scene.photo.linear, *pictures))
+                report.sheet.append(side_by_side(case.scene.photo.linear, *pictures))
         if self.latency:
             yield from self._latencies(data)
 
@@ -109,7 +108,7 @@ class GlassBench(Benchmark):
                 )
                 # One exposure for room, grey object and glass.
                 room = stage.room.render(light, self.reference, seed=1)
-                gain = scenes.exposure(room)
+                gain = scenes.room_exposure(room)
                 grey = stage.grey.render(light * gain, self.reference, seed=2)
                 scene = true_scene(photographed(stage.grey, grey, light * gain, thing.name))
                 behind = {

@@ -173,7 +173,7 @@ def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int =
     return np.minimum(small, PROTOCOL.brightest * luminance(small).mean()).astype(np.float32)
 
 
-def exposure(background: Array) -> float:
+def room_exposure(background: Array) -> float:
     """The factor that exposes a picture of the room as a camera would."""
     return PROTOCOL.exposed / max(float(np.percentile(luminance(background), 98)), 1e-6)
 

@@ -94,7 +94,6 @@ class InvertBench(Benchmark):
         Column("prb_step_s", "PRB step s", digits=1),
         Column("prb_per_cached", "PRB / cached", digits=0),
     )
-    plotted = ("seconds", "peak_mb")
 
     sizes: str = option("256,512", "Longer sides, pixels, with commas.", kind="name")
     photo: str = option(

@@ -100,7 +100,6 @@ class LightBench(Benchmark):
         Column("seconds", "s", "lower", 1),
         Column("cpu_seconds", "CPU s", "lower", 1),
     )
-    plotted = ("sh_error_relative", "render_psnr", "seconds")
 
     scenes: int = option(
         3, "Scenes; the paper has 10. Every scene and view begins with another light.", **COUNT
@@ -137,7 +136,7 @@ class LightBench(Benchmark):
                 "unseen": self.unseen,
             }
             sample, other = sample_and_light(scene, view, scene + view + light, **options)
-            sample = mirrored(sample) if self.mirrors else sample
+            sample = with_mirrors(sample) if self.mirrors else sample
             stage = _Stage(self, sample, other)
             for row in chain(stage.relit() if self.relight else (), stage.fitted(methods)):
                 yield {**row, "sample": sample.name}
@@ -301,7 +300,7 @@ def constant_light(problem: Any, photo: Any) -> Any:
     return colour.expand(problem.height, 2 * problem.height, 3)
 
 
-def mirrored(sample: SyntheticSample) -> SyntheticSample:
+def with_mirrors(sample: SyntheticSample) -> SyntheticSample:
     """The sample with its objects in polished metal, photographed under the same light."""
     # Ground and walls keep their materials.
     stage = sample.scene

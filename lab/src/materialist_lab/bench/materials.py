@@ -61,7 +61,6 @@ class MaterialsBench(Benchmark):
         *(Column(f"{name}_calibration", f"{name} within its spread") for name in MAPS),
         Column("seconds", "s", "lower", 2),
     )
-    plotted = ("albedo_psnr", "normal_angle")
 
     predictor: str = option("auto", "Names, with commas.", kind="name")
     limit: int = option(0, "At most so many samples, spread over the set; 0: all.", **COUNT_OR_0)
@@ -118,10 +117,10 @@ class MaterialsBench(Benchmark):
             # Procedural pictures are clean; InteriorVerse's are left as they are.
             spoilt = self.photographic and isinstance(source, SampleFolder)
             seen = as_photo(sample, np.random.default_rng((11, index))) if spoilt else sample
-            yield f"{index:07d}", photo_of(seen), sample.truth()
+            yield f"{index:07d}", sample_photo(seen), sample.truth()
 
 
-def photo_of(sample: Sample) -> Photo:
+def sample_photo(sample: Sample) -> Photo:
     """The picture of a sample as an ordinary photograph, clipped to [0, 1], with its true field of view."""
     linear = np.clip(sample.image, 0, 1).astype(np.float32)
     height, width = linear.shape[:2]

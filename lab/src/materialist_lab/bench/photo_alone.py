@@ -31,7 +31,7 @@ from materialist.option_kinds import option
 from materialist.types import Array, Prediction, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist_lab.bench.edits import KINDS, Edit, edits, sample_and_light, true_scene
-from materialist_lab.bench.report import CEILING, Column, Report, strip
+from materialist_lab.bench.report import CEILING, Column, Report, side_by_side
 from materialist_lab.bench.screen_space import screen_space
 from materialist_lab.metrics.maps import aligned_psnr, best_scale, score
 from materialist_lab.procedural.synthetic import SyntheticSample
@@ -65,7 +65,6 @@ class PhotoAloneBench(Benchmark):
         ),
         Column("seconds", "fit s", "lower", 1),
     )
-    plotted = ("inside", "albedo", "light")
 
     scenes: int = option(24, "Photos.", **COUNT)
     size: int = option(256, "Their width and height.", **SIZE)
@@ -95,7 +94,7 @@ class PhotoAloneBench(Benchmark):
                     yield {
                         "method": "maps: prior",
                         "sample": sample.name,
-                        **map_figures(fitted.prior, sample),
+                        **_map_figures(fitted.prior, sample),
                     }
                 maps = replace(
                     fitted.prior,
@@ -106,7 +105,7 @@ class PhotoAloneBench(Benchmark):
                 yield {
                     "method": f"maps: {name}",
                     "sample": sample.name,
-                    **map_figures(maps, sample),
+                    **_map_figures(maps, sample),
                     "light": light_error(fitted.envmap, sample.envmap),
                     **cost,
                 }
@@ -205,7 +204,7 @@ class PhotoAloneBench(Benchmark):
             shown.append(picture)
             method = f"{CEILING} {edit.kind}" if name == CEILING else f"{edit.kind}: {name}"
             yield {"method": method, **self._scores(edit, picture, after, *region)}
-        report.sheet.append(strip(*shown))
+        report.sheet.append(side_by_side(*shown))
 
     def _scores(
         self, edit: Edit, picture: Array, truth: Array, inside: Array, traces: Array
@@ -235,7 +234,7 @@ def with_truth(prior: Prediction, truth: Prediction, known: str) -> Prediction:
     return prior
 
 
-def map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:
+def _map_figures(maps: Prediction, sample: SyntheticSample) -> dict[str, float]:
     """Maps against the truth."""
     keys = {
         "albedo_psnr": "albedo",

@@ -25,7 +25,7 @@ from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.types import Array
 from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, timed
-from materialist_lab.bench.report import Column, Report, strip
+from materialist_lab.bench.report import Column, Report, side_by_side
 
 PLATE, PHOTO = (f"photos/tabletop/materialist_indoor{k}.png" for k in (1, 2))
 ALIGNED = np.array([[1.17386, 0.00042, 6.523], [0.00028, 1.17358, 3.178]])
@@ -44,7 +44,6 @@ class PlateBench(Benchmark):
         Column("around", "PSNR around", "higher", 2),
         Column("seconds", "s", "lower", 1),
     )
-    plotted = ("inside", "around")
 
     size: int = option(512, "Longer side.", **SIZE)
     spp: int = option(128, "Paths a pixel of the composite.", **COUNT)
@@ -68,9 +67,9 @@ class PlateBench(Benchmark):
         )
         shown = coverage[..., 0] > 0.999
         # --- The jug, and a ring around it for its shadow and reflection ---
-        mask = grown(orange(photo.linear), max(1, self.size // 170))
+        mask = _widened(orange(photo.linear), max(1, self.size // 170))
         inside = mask & shown
-        around = grown(mask, self.size // 16) & ~mask & shown
+        around = _widened(mask, self.size // 16) & ~mask & shown
         pictures = [photo.linear, truth]
 
         def row(method: str, picture: Array, **more: float) -> Row:
@@ -97,7 +96,7 @@ class PlateBench(Benchmark):
             picture, cost = timed(self._removed, photo, predictor, mask)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
             yield row(f"remove, {name}", picture, seconds=cost["seconds"])
-        report.sheet.append(strip(*pictures[:2], *pictures[3:]))
+        report.sheet.append(side_by_side(*pictures[:2], *pictures[3:]))
 
     def _removed(self, photo: Any, predictor: str, mask: Array) -> Array:
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
@@ -105,7 +104,7 @@ class PlateBench(Benchmark):
         return composite(scene, remove(scene, mask), spp=self.spp, **shared)
 
 
-def grown(mask: Array, pixels: int) -> Array:
+def _widened(mask: Array, pixels: int) -> Array:
     """The mask [H, W] bool and what is so near to it."""
     return binary_dilation(mask, np.ones((3, 3)), iterations=pixels)
 

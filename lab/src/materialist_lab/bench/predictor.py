@@ -32,7 +32,6 @@ class PredictorBench(Benchmark):
         Column("fastest_ms", "fastest ms", "lower", 1),
         Column("parameters_m", "million parameters", digits=2),
     )
-    plotted = ("median_ms",)
 
     predictor: str = option("auto", "Names, with commas.", kind="name")
     size: int = option(512, "Width and height of the photo.", **SIZE)

@@ -1,4 +1,4 @@
-"""Reports of benchmarks: all rows as JSON, the means as a Markdown table, a plot, and a sheet of pictures."""
+"""Reports of benchmarks: all rows as JSON, the means as a Markdown table, and a sheet of pictures."""
 
 import json
 import os
@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
-from materialist.io.atomic import make_folder, require_parent, whole_file, write_whole, writing
+from materialist.io.atomic import make_folder, require_parent, write_whole, writing
 from materialist.io.display import encoded, write_sheet
 from materialist.plain import plain
 from materialist.types import Array
@@ -43,8 +41,6 @@ class Report:
     """What was done and how to read the figures: the text above the table."""
     settings: dict[str, Any]
     columns: tuple[Column, ...]
-    plotted: tuple[str, ...] = ()
-    """Keys of the columns in the plot."""
     rows: list[dict[str, Any]] = field(default_factory=list)
     """Dicts with 'method', 'sample' and the columns' keys; a figure that does not apply is absent."""
     sheet: list[Array] = field(default_factory=list)
@@ -53,7 +49,7 @@ class Report:
     """Name -> a larger picture, uint8 [h, w, 3] sRGB, which becomes pictures/NAME.png."""
 
 
-def strip(*pictures: Array) -> Array:
+def side_by_side(*pictures: Array) -> Array:
     """uint8 [H, n W, 3] sRGB: linear pictures [H, W, 3] side by side."""
     return np.round(linear_to_srgb(np.concatenate(pictures, 1)) * 255).astype(np.uint8)
 
@@ -71,7 +67,7 @@ def claim(folder: Path, *, force: bool = False) -> Path:
 
 
 def write(report: Report, folder: Path) -> None:
-    """Write report.json, report.md, plot.png, sheet.png and pictures/; files of that run that are there are replaced.
+    """Write report.json, report.md, sheet.png and pictures/; files of that run that are there are replaced.
 
     Raises OutputError where they cannot be written.
     """
@@ -88,9 +84,6 @@ def write(report: Report, folder: Path) -> None:
     }
     write_whole(folder / "report.json", json.dumps(plain(content), indent=1))
     write_whole(folder / "report.md", markdown(report))
-    if report.rows and report.plotted:
-        with whole_file(folder / "plot.png", force=True) as file:
-            _plot(report, file)
     write_sheet(report.sheet, folder / "sheet.png")
     if report.pictures:
         make_folder(folder / "pictures")
@@ -154,29 +147,3 @@ def markdown(report: Report) -> str:
 def _part(method: str) -> str:
     """What comes before the colon of a method's name, as an edit; only methods of one part compete."""
     return method.partition(":")[0] if ":" in method else ""
-
-
-def _plot(report: Report, path: Path) -> None:
-    """One panel a plotted column: a dot for every sample, a bar for the mean of each method."""
-    table = means(report)
-    titles = {c.key: c.title for c in report.columns}
-    # Without pyplot: no window, no global state.
-    figure = Figure(
-        figsize=(3.6 * len(report.plotted), 0.45 * len(table) + 1.6), layout="constrained"
-    )
-    FigureCanvasAgg(figure)
-    axes = np.atleast_1d(figure.subplots(1, len(report.plotted), sharey=True))
-    for axis, key in zip(axes, report.plotted, strict=True):
-        for y, method in enumerate(table):
-            values = [
-                r[key]
-                for r in report.rows
-                if r["method"] == method and np.isfinite(r.get(key, np.nan))
-            ]
-            axis.barh(y, table[method].get(key, 0), color="#9db8d9", height=0.6)
-            axis.plot(values, [y] * len(values), "o", color="#1f3b5c", markersize=3, alpha=0.6)
-        axis.set_title(titles[key], fontsize=9)
-        axis.set_yticks(range(len(table)), list(table))
-        axis.tick_params(labelsize=8)
-    axes[0].invert_yaxis()  # they share one
-    figure.savefig(path, dpi=110)

@@ -60,7 +60,6 @@ class SelectBench(Benchmark):
         Column("mse", "MSE", "lower", 1),
         Column("fringe", "fringe", "lower", 1),
     )
-    plotted = ("iou",)
 
     scenes: int = option(
         12, "Pictures, and as many with captured meshes where DATA is given.", **COUNT

@@ -141,7 +141,6 @@ class StudioBench(Benchmark):
         Column("scene_mb", "MB with a photo", "lower", 0),
         Column("closed_mb", "MB after closing", "lower", 0),
     )
-    plotted = ()
 
     photo: str = option("example:astronaut", "A file, or example:NAME.", kind="name")
     size: int = option(512, "Working size.", **SIZE)

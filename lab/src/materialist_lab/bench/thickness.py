@@ -39,7 +39,6 @@ class ThicknessBench(Benchmark):
         Column("hollow", "walls", "lower"),
         Column("back", "back, degrees", "lower", 1),
     )
-    plotted = ("solid", "back")
 
     shapes: int = option(64, "Held-out shapes.", **COUNT)
     views: int = option(8, "Views of each.", **COUNT)

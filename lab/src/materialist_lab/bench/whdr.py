@@ -36,7 +36,6 @@ class WhdrBench(Benchmark):
         Column("judgements", "judgements", digits=0),
         Column("seconds", "s", "lower", 2),
     )
-    plotted = ("whdr",)
 
     predictor: str = option("auto", "Names, with commas.", kind="name")
     size: int = option(512, "Longer side that the predictor works at.", **SIZE)

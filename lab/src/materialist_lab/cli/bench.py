@@ -28,7 +28,7 @@ class BenchmarkGroup(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """The list in the help, by which no benchmark is imported."""
         with formatter.section("Benchmarks"):
-            formatter.write_dl([(name, benchmarks.about(name)) for name in BENCHMARKS])
+            formatter.write_dl([(name, benchmarks.summary_of(name)) for name in BENCHMARKS])
 
 
 def command_of(name: str) -> Any:
@@ -51,7 +51,7 @@ def command_of(name: str) -> Any:
         report_success("bench", as_json, [f"Look at {output}"], name=name, report=str(output))
 
     run.__annotations__["benchmark"] = benchmarks.benchmark_class(name)
-    run.__doc__ = benchmarks.about(name)
+    run.__doc__ = benchmarks.summary_of(name)
     single = group(name, "")
     add_command(single, run, name)
     return typer.main.get_command(single)

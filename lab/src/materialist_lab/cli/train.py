@@ -79,15 +79,10 @@ def data(
         )
         return
     from materialist.io.atomic import require_parent
-    from materialist_lab.procedural.catalog.packages import missing
     from materialist_lab.procedural.dataset import produce
 
-    # --- The set; what could be installed for a better one is said at the start ---
     require_parent(output)
     start = time.monotonic()
-    note = "" if options.real == 0 else missing(options.furniture)
-    if note and not computing.as_json:
-        typer.echo(note, err=True)
     with stage_progress(quiet=computing.as_json) as progress:
         rendered = produce(
             output, options, count=count, workers=workers, resume=resume, progress=progress

@@ -13,13 +13,13 @@ from materialist.io.display import strip, write_sheet
 from materialist.render.variant import setup
 from materialist.types import Progress
 from materialist_lab.data.samples import SampleFolder, claim_folder, described, make_missing
-from materialist_lab.procedural.catalog.cache import CREDITS, Listing, listing
+from materialist_lab.procedural.catalog.cache import CREDITS, listing
 from materialist_lab.procedural.objects import shapes
 from materialist_lab.procedural.options import DataSetOptions
 from materialist_lab.procedural.sample import make_sample
 
 FORMAT = 1
-CONTENT = 12
+CONTENT = 13
 """Counts the changes of what sample i of a set holds."""
 DESCRIPTION = "dataset.json"
 _IDENTITY = ("format", "size", "seed", "split", "options", "content")
@@ -48,24 +48,16 @@ def produce(
     for path in options.mesh_files:  # a damaged one must not end a long run
         shapes.load(path)
     # The catalogue is read here, not by every worker.
-    made_of = _listed(options, progress)
+    made_of = listing(options.archives, options.photographs, options.cache, progress)
     if not resume and folder.is_dir() and any(folder.iterdir()):
         raise InputError(
             f"{folder} exists and is not empty; add --resume to go on with it, or name another folder."
         )
     # A set is gone on with only where it was begun with the same options.
     claim_folder(folder, DESCRIPTION, _description(options), _IDENTITY)
-    if made_of:
-        write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
+    write_whole(folder / CREDITS, (made_of.folder / CREDITS).read_bytes())
     paths = [sample_path(folder, k) for k in range(count)]
     return make_missing(paths, partial(make_sample, options=options), "samples", progress, workers)
-
-
-def _listed(options: DataSetOptions, progress: Progress) -> Listing | None:
-    """The models and photographs that the set is made of, read now where that was never done; None without any."""
-    if not options.real_share:
-        return None
-    return listing(options.archives, options.photographs, options.cache, progress)
 
 
 def sample_path(folder: Path, index: int) -> Path:
@@ -79,12 +71,8 @@ def _description(options: DataSetOptions) -> dict[str, Any]:
     drawn: dict[str, Any] = {"spp": options.spp} | {
         name: [p.stem for p in paths] for name, paths in files.items()
     }
-    if options.real_share:
-        real = (*options.archives, *options.photographs)
-        drawn["real"] = {
-            "share": options.real_share,
-            "files": [f"{p.name} {p.stat().st_size}" for p in real],
-        }
+    real = (*options.archives, *options.photographs)
+    drawn["real"] = [f"{p.name} {p.stat().st_size}" for p in real]
     facts = {
         "format": FORMAT,
         "size": options.size,

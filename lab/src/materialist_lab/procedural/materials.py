@@ -229,7 +229,7 @@ wall_paint = Finish(
     repeat=(0.8, 3),
 )
 wallpaper = Finish(
-    "ornament ornament ornament stripes stripes spots plaid",
+    "ornament ornament ornament stripes stripes plaid",
     base=((0.6, (0.05, 0.17), (0.02, 0.35), (0.4, 0.95)), (0.4, ALL, (0.02, 0.4), (0.4, 0.95))),
     second=(0.7, 0.5, 0.95),
     rougher=(0.2, 0.2),
@@ -239,9 +239,6 @@ lacquer = Finish(
     "plain", second=(1, 1, 1), third=(1, 1, 1), grain=(0, 0.02), roughness=((1, 0.08, 0.5),)
 )
 """Of any colour, dull or shiny."""
-skin = replace(
-    lacquer, base=((1, (0.03, 0.08), (0.3, 0.6), (0.3, 0.95)),), roughness=((1, 0.4, 0.65),)
-)
 white_paint = replace(
     lacquer, base=((1, (0.08, 0.15), (0, 0.08), (0.82, 0.97)),), roughness=((1, 0.2, 0.6),)
 )
@@ -249,18 +246,17 @@ plastic = replace(
     lacquer, base=(*ANY_COLOUR, (0.5, ALL, (0.6, 1), (0.3, 0.95))), roughness=SHINY_OR_MATT
 )
 # --- Wood ---
-raw_wood = Finish(
+wood = Finish(
     "wood",
     base=TIMBER,
     second=(1, 0.35, 0.75),
     third=(1, 0.15, 0.4),
     grain=(0.1, 0.5),
-    roughness=((1, 0.4, 0.8),),
+    roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)),
     rougher=(0.2, 0.2),
     repeat=(0.5, 1.4),
     stretch=(1, 2),
 )
-wood = replace(raw_wood, roughness=((0.45, 0.12, 0.35), (0.55, 0.4, 0.8)))
 """Pale, brown, red or nearly black timber, raw or varnished."""
 floor_boards = replace(wood, tiles="planks", repeat=(0.9, 2.2))
 # --- Tiles, stone, bricks ---
@@ -306,11 +302,9 @@ woven = Finish(
     roughness=((1, 0.6, 1.0),),
     repeat=(0.08, 0.3),
 )
-printed_cloth = replace(
-    woven, tiles="plain plain stripes plaid ornament spots cloudy", repeat=(0.2, 0.9)
-)
+printed_cloth = replace(woven, tiles="plain plain stripes plaid ornament cloudy", repeat=(0.2, 0.9))
 ceramic = Finish(
-    "plain plain plain stripes ornament spots cloudy",
+    "plain plain plain stripes ornament cloudy",
     base=(*ANY_COLOUR, PALE),
     grain=(0, 0.15),
     roughness=((0.75, 0.06, 0.3), (0.25, 0.5, 0.9)),
@@ -319,7 +313,6 @@ ceramic = Finish(
 )
 """Glazed pottery: white, coloured, decorated; matt clay now and then."""
 # --- Outdoors ---
-"""Leaves, fresh or autumnal."""
 paved = Finish(
     "speckle speckle bricks bricks cloudy tiling tiling",
     base=EARTH,
@@ -388,23 +381,6 @@ def metal(rng: np.random.Generator) -> Material:
     return replace(material, colours=(colour,) * 3, metallic=(1.0, 1.0))
 
 
-def rug(rng: np.random.Generator, width: float, depth: float) -> Material:
-    """A carpet of that size in metres, its tile fitted once."""
-    material = Finish(
-        "carpet", second=(0.4, 0.4, 0.8), grain=(0.2, 0.9), roughness=((1, 0.8, 1.0),)
-    )(rng)
-    return replace(material, repeat=(width, depth), offset=(0.5, 0.5))
-
-
-def printed(rng: np.random.Generator, width: float, height: float) -> Material:
-    """A poster, book cover, label or painting fitted once to that size in metres, its upper edge up."""
-    kinds = "picture picture picture print ornament cloudy spots"
-    material = Finish(
-        kinds, base=(*ANY_COLOUR, PALE), grain=(0.1, 0.9), roughness=((1, 0.15, 0.7),)
-    )(rng)
-    return replace(material, repeat=(width, -height), offset=(0.5, 0.5))
-
-
 def light(rng: np.random.Generator, radiance: Colour) -> Material:
     """A luminous white surface of that radiance."""
     # Radiance is emission times albedo, and the albedo is 0.8.
@@ -413,23 +389,6 @@ def light(rng: np.random.Generator, radiance: Colour) -> Material:
 
 
 Maker = Callable[[np.random.Generator], Material]
-OBJECTS: tuple[tuple[float, Maker], ...] = (
-    (0.2, ceramic),
-    (0.2, plastic),
-    (0.26, metal),
-    (0.11, wood),
-    (0.07, fabric),
-    (0.07, stone),
-    (0.09, wall_paint),
-)
-
-
-def any_object(rng: np.random.Generator) -> Material:
-    """What a movable thing may be made of, at a scale that suits 10 to 40 centimetres."""
-    material = pick(rng, OBJECTS)(rng)
-    # Patterns made for walls and floors are too large for what stands on a table.
-    shrink = rng.uniform(0.15, 0.5) if max(material.repeat) > 0.5 else 1.0
-    return replace(material, repeat=(material.repeat[0] * shrink, material.repeat[1] * shrink))
 
 
 def one_of(rng: np.random.Generator, *makers: Callable[[np.random.Generator], T]) -> T:

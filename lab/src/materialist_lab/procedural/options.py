@@ -8,13 +8,8 @@ from materialist.errors import InputError
 from materialist.option_kinds import OperationOptions, option
 from materialist_lab.procedural.catalog import packages
 
-TOY_KINDS = ("room", "still-life")
-"""Kinds of scenes of procedural things."""
-REAL_KINDS = ("furnished", "laid", "single", "outside")
-"""Kinds of scenes of real things."""
-KINDS = (*TOY_KINDS, *REAL_KINDS)
-REAL_SHARE = 0.75
-"""Default share of scenes of real things, where their packages are installed."""
+KINDS = ("furnished", "laid", "single", "outside")
+"""Kinds of scenes."""
 SPLITS: dict[str, tuple[int, ...]] = {"train": (), "heldout": (1,)}
 """Split -> the numbers it adds to the random seed of a sample: no two splits show the same scenes."""
 HELD_OUT = frozenset(
@@ -76,12 +71,6 @@ class DataSetOptions(OperationOptions):
         kind="word",
         choices=tuple(SPLITS),
     )
-    real: float | None = option(
-        None,
-        f"Share of pictures of real things; default: {REAL_SHARE} where they are installed.",
-        low=0,
-        high=1,
-    )
     furniture: Path | None = option(
         None,
         "Folder of .sh3f catalogues; default: that of Debian's sweethome3d-furniture.",
@@ -110,30 +99,20 @@ class DataSetOptions(OperationOptions):
                 f"There is no kind '{self.only}' of scene; give one of {', '.join(KINDS)}, or none."
             )
         _ = self.mesh_files, self.envmap_files  # which raise where a folder cannot be used
-        if (self.real or self.only in REAL_KINDS) and not self.archives:
-            where = f"in {self.furniture}" if self.furniture else "installed"
-            raise InputError(
-                f"No 3D models are {where}; install them with: {packages.INSTALL}, or give --real 0."
-            )
 
     @cached_property
     def archives(self) -> tuple[Path, ...]:
-        """The catalogues of models, sorted; none where they are not installed."""
-        return packages.archives(self.furniture)
+        """The catalogues of models, sorted. Raises InputError where there are none."""
+        paths = packages.archives(self.furniture)
+        if not paths:
+            where = f"in {self.furniture}" if self.furniture else "installed"
+            raise InputError(f"No 3D models are {where}; install them with: {packages.INSTALL}.")
+        return paths
 
     @cached_property
     def photographs(self) -> tuple[Path, ...]:
         """Photographs of installed packages, sorted."""
-        return packages.photographs() if self.real_share else ()
-
-    @property
-    def real_share(self) -> float:
-        """Share of pictures of real things."""
-        # One kind alone is wholly of the one or of the other.
-        if self.only:
-            return float(self.only in REAL_KINDS)
-        default = REAL_SHARE if self.archives else 0.0
-        return default if self.real is None else self.real
+        return packages.photographs()
 
     @cached_property
     def mesh_files(self) -> tuple[Path, ...]:

@@ -1,6 +1,7 @@
 """Rooms: walls, floor, ceiling, windows, lamps; and cameras that stand in them."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
@@ -8,27 +9,11 @@ from materialist.types import Array
 from materialist_lab.procedural import lights, walls, world
 from materialist_lab.procedural import materials as m
 from materialist_lab.procedural.objects import shapes as s
-from materialist_lab.procedural.objects import things
-from materialist_lab.procedural.objects.things import Meshes
 from materialist_lab.procedural.walls import RoomWall
-from materialist_lab.procedural.world import Parts, ScenePart, block, moved, placed, rod
+from materialist_lab.procedural.world import Parts, ScenePart, block, moved, placed
 
 Size = Array
 """[3] width, depth and height of a room, metres; its floor is centred on the origin."""
-
-
-def room(rng: np.random.Generator, meshes: Meshes, captures: Meshes) -> world.World:
-    """A room with things on its floor, seen by somebody who stands or sits in it."""
-    size = rng.uniform([2.6, 3.2, 2.3], [6.5, 8.0, 3.3])
-    standing = Furniture(size)
-    sizes = rng.uniform(0.3, 1.6, rng.integers(6, 16))
-    pieces = [things.thing(rng, size_of_thing, meshes) for size_of_thing in sizes]
-    # Large things stand by the walls as furniture does, small ones anywhere.
-    standing.along_walls(rng, [piece for piece, tall in zip(pieces, sizes > 0.8) if tall])
-    standing.in_the_middle(rng, [piece for piece, tall in zip(pieces, sizes > 0.8) if not tall])
-    parts, portals, envmap = shell(rng, size, captures)
-    parts += [*standing.parts, *lamps(rng, size, portals, envmap)]
-    return world.World(parts, envmap, view_of(rng, size, standing), portals, "room")
 
 
 def sides(size: Size) -> list[tuple[Array, float, float]]:
@@ -43,7 +28,7 @@ Hangings = Callable[[np.random.Generator, RoomWall, int], Parts]
 
 
 def shell(
-    rng: np.random.Generator, size: Size, captures: Meshes, hangings: Hangings = walls.hangings
+    rng: np.random.Generator, size: Size, captures: tuple[Path, ...], hangings: Hangings
 ) -> tuple[Parts, list[world.Portal], Array]:
     """(walls, floor, ceiling and what hangs there; portals; envmap). The front wall is missing in some rooms."""
     w, d, h = size
@@ -143,7 +128,7 @@ def _glow(rng, power: float, area: float) -> m.Material:
 
 
 def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
-    """Ceiling panels, globes and shades; their power against the windows varies by a factor of a hundred.
+    """Ceiling panels and spots; their power against the windows varies by a factor of a hundred.
 
     At times it is evening: `envmap` is made darker in place.
     """
@@ -157,14 +142,7 @@ def lamps(rng, size: Size, portals: list[world.Portal], envmap: Array) -> Parts:
     # Evening.
     if portals and rng.random() < 0.12:
         envmap *= rng.uniform(0.005, 0.1)
-    # One or two kinds of lamps share the power.
-    makers = (_panels, _globes, _shade)
-    chosen = rng.permutation(3)[: int(rng.integers(1, 3))]
-    return [part for k in chosen for part in makers[k](rng, size, power / len(chosen))]
-
-
-def _panels(rng, size, power) -> Parts:
-    """A few long panels or several small spots on the ceiling."""
+    # A few long panels or several small spots.
     w, d, h = size
     spots = rng.random() < 0.5
     if spots:
@@ -182,36 +160,6 @@ def _panels(rng, size, power) -> Parts:
         panel = s.sheet((x - a / 2, h - 0.032, z - b / 2), (a, 0, 0), (0, 0, b))
         parts.append(ScenePart(panel, glow))
     return parts
-
-
-def _globes(rng, size, power) -> Parts:
-    """A row of luminous balls on cords."""
-    w, d, h = size
-    n = int(rng.integers(1, 4))
-    r = rng.uniform(0.06, 0.2)
-    drop = rng.uniform(0.3, 0.9)
-    glow = _glow(rng, power, n * 4 * np.pi * r * r)
-    cord = m.metal(rng)
-    x = rng.uniform(-0.2, 0.2) * w
-    z = rng.uniform(-0.3, 0.2) * d
-    row = [x + (k - n / 2) * 4 * r for k in range(n)]
-    balls = [world.orb((at, h - drop, z), r, glow) for at in row]
-    return balls + [rod([(at, h - drop + r, z), (at, h, z)], 0.006, cord, 5) for at in row]
-
-
-def _shade(rng, size, power) -> Parts:
-    """A standard lamp near the left or the right wall."""
-    w, d, _ = size
-    r, tall, height = rng.uniform([0.12, 1.1, 0.18], [0.25, 1.7, 0.35])
-    side = rng.choice([-1, 1])
-    at = np.array([side * (w / 2 - r - 0.1), 0, rng.uniform(-0.45, 0.2) * d])
-    # The shade's area, about that of a cylinder, shares the power out.
-    glow = _glow(rng, power, 2 * np.pi * r * height)
-    stand = m.metal(rng)
-    shade = s.lathe(np.array([(r, tall), (r * rng.uniform(0.5, 1), tall + height)]), 32)
-    pole = rod([(0, 0, 0), (0, tall + height / 2, 0)], 0.012, stand)
-    foot = block((0.28, 0.03, 0.28), (0, 0, 0), stand)
-    return placed([ScenePart(shade, glow), pole, foot], at)
 
 
 def view_of(rng: np.random.Generator, size: Size, standing: Furniture) -> world.Viewpoint:

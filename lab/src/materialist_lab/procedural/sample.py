@@ -10,7 +10,7 @@ from materialist.render.denoise import denoise
 from materialist.render.variant import setup
 from materialist.types import Array, Camera
 from materialist_lab.data.samples import LIGHT_ROWS
-from materialist_lab.procedural import packing, rooms
+from materialist_lab.procedural import packing
 from materialist_lab.procedural.defocus import defocused
 from materialist_lab.procedural.options import SPLITS, DataSetOptions
 from materialist_lab.procedural.staged.furnished import furnished_room
@@ -18,7 +18,6 @@ from materialist_lab.procedural.staged.laid import laid_table
 from materialist_lab.procedural.staged.outside import outside
 from materialist_lab.procedural.staged.single import single
 from materialist_lab.procedural.staged.stock import Stock, stock
-from materialist_lab.procedural.still_life import still_life
 from materialist_lab.procedural.tracer import CENTRE, SampleTracer
 from materialist_lab.procedural.world import World
 
@@ -30,19 +29,14 @@ LIGHT_HIDDEN = 0.1
 """Weight of the sky behind visible surfaces in the stored light, for kinds of worlds under an open sky."""
 ATTEMPTS = 6
 """Largest number of worlds that are drawn until a camera sees enough; the last one is taken as it is."""
-MAKERS: dict[str, tuple[Callable[..., World], float]] = {
-    "room": (rooms.room, 0.6),
-    "still-life": (still_life, 0.4),
-}
-"""Kind of scene -> its maker, and its share of the pictures of procedural things."""
-REAL_MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], float]] = {
+MAKERS: dict[str, tuple[Callable[[np.random.Generator, Stock], World], float]] = {
     "furnished": (furnished_room, 0.25),
     "laid": (laid_table, 0.3),
     "single": (single, 0.35),
     "outside": (outside, 0.1),
 }
-"""Kind of scene -> its maker, and its share of the pictures of real things."""
-OPEN_KINDS = ("still life", "single", "outside")
+"""Kind of scene -> its maker, and its share of the pictures."""
+OPEN_KINDS = ("single", "outside")
 """Kinds of worlds under an open sky."""
 SINGLE_COVERS = (0.08, 0.92)
 """Smallest and largest share of a picture that a single thing may cover."""
@@ -67,22 +61,9 @@ def make_sample(index: int, options: DataSetOptions) -> dict[str, Array]:
 
 def make_world(rng: np.random.Generator, options: DataSetOptions) -> World:
     """A random scene of the kinds' shares, or of the one kind that the options name."""
-    # No number is drawn where there is nothing to choose: old sets keep their samples.
-    share = options.real_share
-    if share and (share == 1 or rng.random() < share):
-        makers, shares = _chosen(REAL_MAKERS, options.only)
-        return makers[rng.choice(len(makers), p=shares)](rng, stock_of(options))
-    makers, shares = _chosen(MAKERS, options.only)
-    return makers[rng.choice(len(makers), p=shares)](rng, options.mesh_files, options.envmap_files)
-
-
-def _chosen(
-    makers: dict[str, tuple[Callable[..., World], float]], only: str
-) -> tuple[list[Callable], Array]:
-    """(makers, their probabilities): all, or the one that is named."""
-    kept = [makers[only]] if only else list(makers.values())
-    weight = np.array([share for _, share in kept])
-    return [maker for maker, _ in kept], weight / weight.sum()
+    kind = options.only or str(rng.choice(list(MAKERS), p=[share for _, share in MAKERS.values()]))
+    make, _ = MAKERS[kind]
+    return make(rng, stock_of(options))
 
 
 def stock_of(options: DataSetOptions) -> Stock:

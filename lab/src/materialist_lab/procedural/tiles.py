@@ -190,22 +190,6 @@ def _weave(rng):
     return mix, 0.0, 0.25 + 0.45 * thread, 0.5
 
 
-def _carpet(rng):
-    """Rug with borders and a mirrored ornament; the tile is the whole rug."""
-    # An ornament that is mirrored along both axes.
-    quarter = noise(rng, rng.uniform(1.2, 2.2))
-    field = (quarter + quarter[::-1] + quarter[:, ::-1] + quarter[::-1, ::-1]) / 4 - 0.5
-    # Striped bands around it.
-    edge = np.minimum(_from_line(X), _from_line(Y))
-    bands = np.floor(edge * rng.uniform(10, 24)).astype(int)
-    border = edge < rng.uniform(0.08, 0.2)
-    stripes = rng.random((2, 16)) < 0.5
-    second = _step(np.abs(field) - rng.uniform(0.06, 0.14), 0.02)
-    mix = np.where(border, stripes[0][bands], _step(field, 0.02))
-    third = np.where(border, stripes[1][bands], second)
-    return mix, third, noise(rng, 0.2), 0.5
-
-
 def _ornament(rng):
     """Wallpaper or print: repeated mirrored motifs."""
     n = int(2 ** rng.integers(1, 4))
@@ -216,58 +200,6 @@ def _ornament(rng):
     motif = _step(base - t, 0.04)
     inner = _step(base - t - 0.12, 0.04)
     return motif, inner, noise(rng, 0.6), 0.6 - 0.3 * motif
-
-
-def _spots(rng):
-    """Discs of two colours, anywhere."""
-    first = np.zeros((SIZE, SIZE))
-    second = np.zeros((SIZE, SIZE))
-    radius = rng.uniform(0.015, 0.08)
-    for _ in range(int(rng.integers(10, 60))):
-        x = rng.random()
-        y = rng.random()
-        r = radius * rng.uniform(0.5, 1.3)
-        # The nearest of the disc's repetitions: it goes on at the other side of the tile.
-        dx = (X - x + 0.5) % 1 - 0.5
-        dy = (Y - y + 0.5) % 1 - 0.5
-        disc = _step(r - np.hypot(dx, dy), 0.006)
-        first = np.maximum(first, disc)
-        second = np.maximum(second, disc * (rng.random() < 0.4))
-    return first, second, noise(rng, 1.0), 0.3
-
-
-def _picture(rng):
-    """A painting or photograph of sorts: sky, hills and blocks in three colours."""
-    line = 0.3 + 0.4 * rng.random() + 0.15 * (noise(rng, 2.2)[:1] - 0.5) * 3
-    hills = _step(Y - line, 0.02)
-    first = np.clip(hills * noise(rng, 1.6) * 1.6, 0, 1)
-    second = np.clip((1 - hills) * (1 - Y) * rng.uniform(0.5, 1.5), 0, 1)
-    # Blocks, later ones before earlier ones.
-    for _ in range(int(rng.integers(0, 9))):
-        x = rng.random()
-        y = rng.random()
-        w = rng.uniform(0.03, 0.3)
-        h = rng.uniform(0.03, 0.3)
-        block = (np.abs(X - x) < w) & (np.abs(Y - y) < h)
-        first = np.where(block, rng.random(), first)
-        second = np.where(block, rng.random(), second)
-    return first, second, noise(rng, 1.3), 0.3
-
-
-def _print(rng):
-    """Lines of text, labels, book pages."""
-    first = np.zeros((SIZE, SIZE))
-    rows = int(rng.integers(8, 28))
-    height = np.abs((Y * rows) % 1 - 0.5) < 0.28
-    for r in range(rows):
-        # Empty lines now and then.
-        if rng.random() < 0.85:
-            words = np.repeat(rng.random(SIZE // 4) < 0.8, 4)
-            inside = (np.abs(X - 0.3) < rng.uniform(0.1, 0.22)) & (np.floor(Y * rows) == r)
-            first = np.maximum(first, inside * words[None] * height)
-    # A picture, often.
-    block = (np.abs(X - rng.random()) < 0.2) & (np.abs(Y - rng.random()) < 0.15)
-    return first * 0.9, block * (rng.random() < 0.6) * 0.9, noise(rng, 1.2), 0.5
 
 
 def _facade(rng):
@@ -322,11 +254,7 @@ _KINDS = {
     "stripes": _stripes,
     "plaid": _plaid,
     "weave": _weave,
-    "carpet": _carpet,
     "ornament": _ornament,
-    "spots": _spots,
-    "picture": _picture,
-    "print": _print,
     "facade": _facade,
     "grass": _grass,
     "rust": _rust,

@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 
 from materialist_lab.procedural import materials as m
 from materialist_lab.procedural.objects import shapes as s
-from materialist_lab.procedural.objects import things
-from materialist_lab.procedural.world import Parts, ScenePart, block, one_thing, placed, rod
+from materialist_lab.procedural.world import Parts, ScenePart, block, one_thing, rod
 
 X = np.array([1.0, 0, 0])
 Y = np.array([0.0, 1, 0])
@@ -140,12 +139,8 @@ def _window(rng, hole: Opening, look, panes) -> Parts:
         board(left, bottom + y * (h - t), (w, t, 0.04), look, -deep)
         for y in np.linspace(0, 1, panes[1] + 1)
     ]
-    # --- Sill, something on it, mouldings around it ---
+    # --- Sill and mouldings around it ---
     parts.append(board(left - 0.06, bottom - 0.03, (w + 0.12, 0.03, 0.12), white))
-    if rng.random() < 0.3:
-        ornament = things.thing(rng, 0.25)
-        at = (rng.uniform(left + 0.2, right - 0.2), bottom, 0.05 - deep / 2)
-        parts += placed(ornament, at)
     if rng.random() < 0.6:
         parts = parts + frame(hole, rng.uniform(0.06, 0.12), 0.02, white)
     return parts
@@ -206,36 +201,3 @@ def door(rng: np.random.Generator, wall: RoomWall) -> Parts:
         parts.append(board(left + k * w + 0.09, r * h + 0.1, panel, look, 0.02))
     handle = left + (0.06 if rng.random() < 0.5 else width - 0.18)
     return [*parts, board(handle, 1.0, (0.12, 0.02, 0.05), m.metal(rng), 0.02)]
-
-
-def hangings(rng: np.random.Generator, wall: RoomWall, count: int) -> Parts:
-    """Pictures, mirrors, screens, posters and wall shelves, as far as there is room."""
-    parts: Parts = []
-    for _ in range(count):
-        width = rng.uniform(0.25, 1.2)
-        middle = wall.free(rng, width)
-        if middle is None:
-            continue
-        height = width * rng.uniform(0.6, 1.5)
-        left = middle - width / 2
-        # Its middle at eye level, as far as the wall allows.
-        highest = max(wall.height - height - 0.1, 0.9)
-        up = float(np.clip(rng.uniform(1.3, 1.7) - height / 2, 0.9, highest))
-        # A shelf with things.
-        if rng.random() < 0.25:
-            on = things.scattered(rng, int(rng.integers(1, 6)), (width / 2, 0.09), (0.08, 0.3))
-            parts += [
-                board(left, up, (width, 0.03, 0.22), m.wood(rng)),
-                *placed(on, (middle, up + 0.03, 0.11)),
-            ]
-            continue
-        # Or something flat, with a frame at times.
-        mirror = m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
-        screen = m.uniform(m.hsv(0.6, 0.1, 0.08), 0.1)
-        inner = m.pick(rng, ((0.1, mirror), (0.1, screen), (0.8, m.printed(rng, width, height))))
-        parts.append(board(left, up, (width, height, 0.012), inner))
-        if rng.random() < 0.8:
-            look = m.wood(rng) if rng.random() < 0.6 else m.metal(rng)
-            edge = Opening(left, left + width, up, up + height)
-            parts += frame(edge, rng.uniform(0.015, 0.07), 0.03, look)
-    return parts

@@ -103,7 +103,7 @@ class BundledTask(MapsTask):
         terms = {}
         if "spread" in out:
             true = {**batch, "albedo": albedo, "depth": depth}
-            errors = losses.map_errors(out, true, mask)
+            errors = losses.absolute_errors(out, true, mask)
             terms["spread"] = w.spread * losses.laplace(errors, out["spread"], mask)
         if "light" in out:
             likelihood, irradiance = losses.light(out["light"], batch["light"])

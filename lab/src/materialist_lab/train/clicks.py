@@ -129,7 +129,7 @@ def produce_views(
     make_missing([folder / name for name in names], view, "views", progress)
 
 
-def load_views(folder: Path) -> list[View]:
+def load_click_views(folder: Path) -> list[View]:
     """All views of a folder, in the order of their names. Raises InputError for one that is damaged."""
     return [
         read_arrays(path, "rgb", "normal", "depth", "thing")
@@ -270,7 +270,7 @@ class ClickTask(Task):
         architecture: UNetArchitecture | None = None,
     ):
         """Views to learn from and weights to begin from. Raises InputError for a folder without views."""
-        stored = load_views(views)
+        stored = load_click_views(views)
         if not stored:
             raise InputError(f"{views} holds no views to learn from.")
         # A small set is all trained on.

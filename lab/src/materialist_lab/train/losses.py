@@ -64,7 +64,7 @@ def laplace(error: Tensor, log_scale: Tensor, mask: Tensor) -> Tensor:
     return mean(error * (-log_scale).exp() + log_scale, mask)
 
 
-def map_errors(predicted: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
+def absolute_errors(predicted: dict[str, Tensor], true: dict[str, Tensor], mask: Tensor) -> Tensor:
     """[B, 5, H, W] absolute errors of maps, as `Prediction.spread` counts them; without gradients.
 
     albedo is sRGB-encoded, depth the natural logarithm of relative depth, each up to a constant of the picture.

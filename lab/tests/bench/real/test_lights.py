@@ -5,7 +5,7 @@ import pytest
 
 from materialist.camera import unit
 from materialist.envmap import environment, texel_directions
-from materialist_lab.bench.real.lights import ball_light, farthest, lamp_light, mean_direction
+from materialist_lab.bench.real.lights import ball_light, farthest_light, lamp_light, mean_direction
 
 
 @pytest.mark.parametrize("direction", [[0, 0, 1], [0.5, 0.5, 0.7], [-0.3, 0.2, -0.9]])
@@ -32,4 +32,4 @@ def test_a_mirror_ball_gives_back_the_light_around_it():
 
 def test_the_farthest_light():
     lamps = [lamp_light(direction) for direction in ([1, 0, 0.1], [0, 0, 1], [-1, 0, 0.2])]
-    assert [farthest(lamps, k) for k in range(3)] == [2, 0, 0]
+    assert [farthest_light(lamps, k) for k in range(3)] == [2, 0, 0]

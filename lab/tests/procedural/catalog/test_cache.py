@@ -90,15 +90,6 @@ def test_roots_are_real_albedos():
     np.testing.assert_allclose(linear[0, 0], [0.012, 0.22, 0.85], atol=0.01)
 
 
-def test_what_is_missing_is_said_with_the_command(tmp_path, monkeypatch):
-    monkeypatch.setattr(packages, "PHOTOGRAPHS", (tmp_path,))
-    said = packages.missing(tmp_path)
-    assert "sweethome3d-furniture" in said and "photographs" in said and "apt-get install" in said
-    make_archive(tmp_path / "made.sh3f")
-    make_photographs(tmp_path)
-    assert packages.missing(tmp_path) == ""
-
-
 def test_of_one_wallpaper_in_many_sizes_the_largest_is_taken(tmp_path, monkeypatch):
     images = tmp_path / "Lake" / "contents" / "images"
     images.mkdir(parents=True)

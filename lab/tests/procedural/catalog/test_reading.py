@@ -9,8 +9,7 @@ from made_catalog import grain, make_archive
 from materialist.errors import InputError
 from materialist_lab.procedural.catalog.archive import entries
 from materialist_lab.procedural.catalog.creases import creased
-from materialist_lab.procedural.catalog.decimate import decimated
-from materialist_lab.procedural.catalog.reading import read_catalog_model
+from materialist_lab.procedural.catalog.reading import ReadingSettings, read_catalog_model
 from materialist_lab.procedural.catalog.support import level_places
 from materialist_lab.procedural.objects import shapes as s
 
@@ -91,10 +90,7 @@ def test_edges_stay_sharp_and_round_bodies_smooth():
     assert np.abs((normals * ball.vertices[source]).sum(-1)).min() > 0.99
 
 
-def test_a_coarse_ball_is_still_a_ball():
-    ball = s.moved(s.ball(96), scale=2.0)
-    coarse = decimated(ball, 0.2)
-    assert 100 < len(coarse.faces) <= 0.2 * len(ball.faces)
-    radius = np.linalg.norm(coarse.vertices, axis=-1)
-    assert radius.min() > 1.8 and radius.max() < 2.05
-    assert np.abs((coarse.normals * coarse.vertices).sum(-1) / radius).min() > 0.9
+def test_what_is_too_fine_is_left_out(tmp_path):
+    path = make_archive(tmp_path / "made.sh3f")
+    with zipfile.ZipFile(path) as file, pytest.raises(InputError, match="too many faces"):
+        read_catalog_model(file, entries(path)[0], ReadingSettings(faces=10))

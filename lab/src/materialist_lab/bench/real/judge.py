@@ -49,7 +49,6 @@ class RealBench(Benchmark):
         Column("whdr", "WHDR", "lower", 3),
         Column("seconds", "s", "", 1),
     )
-    plotted = ("normal_angle", "albedo_psnr", "relit_psnr", "depth_abs_rel")
 
     predictor: str = option(
         "auto", "Names, with commas; bundled:FILE are other weights.", kind="name"

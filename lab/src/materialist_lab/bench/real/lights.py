@@ -33,12 +33,12 @@ def views(
     if len(files) < 2:
         raise InputError("A view has fewer than two lights, so that none is another one.")
     for index in spread(list(range(len(files))), count):
-        partner = farthest(envmaps, index)
+        partner = farthest_light(envmaps, index)
         other = OtherLight(envmaps[partner], read(files[partner]).linear)
         yield files[index].stem, read(files[index]), other
 
 
-def farthest(envmaps: Sequence[Array], index: int) -> int:
+def farthest_light(envmaps: Sequence[Array], index: int) -> int:
     """The map whose light comes from the direction that is farthest from that of map `index`."""
     # The smallest cosine is the largest angle; a map is not its own partner.
     directions = [mean_direction(envmap) for envmap in envmaps]

@@ -9,7 +9,7 @@ from materialist.errors import InputError
 from materialist.io.image import read_map
 from materialist.predict import resample
 from materialist.types import Array, Camera, Photo
-from materialist_lab.bench.real.smooth import smooth_normals
+from materialist_lab.bench.real.smooth import plane_normals
 
 MILLIMETRES = 1e-3
 """Metres in a millimetre."""
@@ -67,7 +67,7 @@ def with_depth(name: str, photo: Photo, depth: Array) -> RealPhoto:
     """A photo with a measured depth [h, w] of any size of its aspect; normals where the depth is smooth."""
     # Resampled first: normals belong to the photo's own pixels.
     at_size = resample.depth(depth, photo.linear.shape[:2])
-    normal = smooth_normals(at_size, photo.camera)
+    normal = plane_normals(at_size, photo.camera)
     return RealPhoto(name, photo, normal=normal, depth=at_size)
 
 

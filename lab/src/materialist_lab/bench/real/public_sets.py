@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.edits.light.relight import read_envmap
 from materialist.io.photo import decode_photo, read_photo
-from materialist_lab.bench.materials import photo_of
+from materialist_lab.bench.materials import sample_photo
 from materialist_lab.bench.real.captures import KINECT_FOV
 from materialist_lab.bench.real.lights import ball_light, views
 from materialist_lab.bench.real.photos import (
@@ -82,7 +82,7 @@ def interiorverse_photo(item: tuple[InteriorVerse, int], reading: Reading) -> It
     """A rendered room, at its own size."""
     source, index = item
     sample = source.read(index)
-    photo = photo_of(sample)
+    photo = sample_photo(sample)
     inside = sample.mask > 0
     yield RealPhoto(f"{index:07d}", photo, sample.albedo, sample.normal, sample.depth, mask=inside)
 

@@ -21,7 +21,7 @@ class SmoothSettings:
 SETTINGS = SmoothSettings()
 
 
-def smooth_normals(depth: Array, camera: Camera) -> Array:
+def plane_normals(depth: Array, camera: Camera) -> Array:
     """[H, W, 3] float32 unit normals of planar depth [H, W] (0: not measured), zero where no plane fits.
 
     On a plane the inverse depth is linear in the ray (X, Y, -1): q = a X + b Y + c, and the normal is along

@@ -25,7 +25,7 @@ from materialist_lab.procedural.catalog.support import LevelPlace, level_places
 from materialist_lab.procedural.materials import ColourPicture
 from materialist_lab.procedural.objects.shapes import Solid
 
-VERSION = 3
+VERSION = 4
 """Counts the changes of what the cache holds."""
 LIST = "catalog.json"
 CREDITS = "ATTRIBUTION.txt"
@@ -169,7 +169,7 @@ def _photograph(path: Path) -> Array:
 def _credits(used: Sequence[CatalogEntry]) -> str:
     # The licences ask for these credits.
     head = (
-        "3D models of Sweet Home 3D (http://www.sweethome3d.com), changed: stretched to size, decimated, repainted.\n"
+        "3D models of Sweet Home 3D (http://www.sweethome3d.com), changed: stretched to size, repainted.\n"
         "BlendSwap-CC-0: CC0 1.0. KatorLegaz, Reallusion: CC-BY 3.0 United States. BlendSwap-CC-BY, Scopia: CC-BY 3.0\n"
         "(http://creativecommons.org/licenses/by/3.0/).\n\n"
     )
@@ -187,7 +187,7 @@ def _store(folder: Path, entry: CatalogEntry, role: str, parts: ModelParts) -> N
         "looks": [asdict(look) for look in parts.looks],
     }
     facts["places"] = [list(place) for place in level_places(parts.solids)]
-    # --- Solids, no finer than a scene needs them, and pictures ---
+    # --- Solids and pictures ---
     arrays: dict[str, Array] = {"facts": np.array(json.dumps(facts))}
     for k, solid in enumerate(parts.solids):
         arrays[f"vertices{k}"] = solid.vertices.astype("f4")

@@ -40,18 +40,3 @@ def photographs() -> tuple[Path, ...]:
 
 def _plain(stem: str) -> str:
     return stem.split("_")[0]
-
-
-def missing(furniture: Path | None = None) -> str:
-    """What is not there and the command that installs it, in words; nothing where all is.
-
-    furniture: folder of catalogues, that of the package by default.
-    """
-    packages = (
-        ("3D models (sweethome3d-furniture)", archives(furniture)),
-        ("photographs", photographs()),
-    )
-    lacks = [name for name, installed in packages if not installed]
-    if not lacks:
-        return ""
-    return f"Pictures are made without {' and '.join(lacks)}; to have them: {INSTALL}"

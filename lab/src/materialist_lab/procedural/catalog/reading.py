@@ -16,7 +16,6 @@ from materialist.errors import InputError
 from materialist.types import Array
 from materialist_lab.procedural.catalog.archive import CatalogEntry
 from materialist_lab.procedural.catalog.creases import creased
-from materialist_lab.procedural.catalog.decimate import decimated
 from materialist_lab.procedural.catalog.look import CatalogLook, catalog_look
 from materialist_lab.procedural.objects.shapes import Solid, face_normals, joined
 
@@ -25,7 +24,7 @@ from materialist_lab.procedural.objects.shapes import Solid, face_normals, joine
 class ReadingSettings:
     """Limits of what is taken from a catalogue; tuned by eye."""
 
-    faces: int = 40_000  # triangles of a model; larger ones are decimated
+    faces: int = 60_000  # triangles of a model; finer ones are left out (21 of 820)
     picture: int = 512  # pixels along the longer side of a picture
     # radians: where a file has no normals, faces that meet at a sharper angle keep an edge
     crease: float = 0.7
@@ -81,8 +80,10 @@ def read_catalog_model(
         raise InputError("it has no faces")
     if holed > s.holes * whole:
         raise InputError("its picture has holes")
-    # --- Size, number of faces, texture coordinates where there is no picture ---
-    solids = _fitted(_lighter(solids, s), entry)
+    if sum(len(solid.faces) for solid in solids) > s.faces:
+        raise InputError("it has too many faces")
+    # --- Size, texture coordinates where there is no picture ---
+    solids = _fitted(solids, entry)
     textured = [bool(look.picture) for look in looks]
     return ModelParts(
         [
@@ -193,11 +194,6 @@ def _without_holes(solid: Solid, opacity: Array) -> tuple[Solid, float]:
     area = np.linalg.norm(face_normals(solid.vertices, solid.faces), axis=-1) / 2
     mixed = (share > 0.08) & (share < 0.92)
     return replace(solid, faces=solid.faces[share > 0.5]), float(area[mixed].sum())
-
-
-def _lighter(solids: list[Solid], s: ReadingSettings) -> list[Solid]:
-    total = sum(len(solid.faces) for solid in solids)
-    return solids if total <= s.faces else [decimated(solid, s.faces / total) for solid in solids]
 
 
 def _fitted(solids: list[Solid], entry: CatalogEntry) -> list[Solid]:

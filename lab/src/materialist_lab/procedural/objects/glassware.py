@@ -38,6 +38,12 @@ def make_shape(index: int, split: str = "train", seed: int = 0) -> Shape:
     return Shape(centred(make(rng)), hollow, upright)
 
 
+def any_shape(rng: np.random.Generator) -> Solid:
+    """A shape of any kind."""
+    make, *_ = _KINDS[rng.integers(KINDS)]
+    return centred(make(rng))
+
+
 def centred(solid: Solid) -> Solid:
     """The solid about the origin, its longest side 1."""
     low = solid.vertices.min(0)

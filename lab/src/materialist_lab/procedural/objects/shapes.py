@@ -71,10 +71,10 @@ def capsule(radius: float, length: float) -> Solid:
     return lathe(np.concatenate([lower, upper]))
 
 
-def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Solid:
+def vessel(control: Array, thickness: float) -> Solid:
     """Open vase, cup or bowl: a smooth wall through `control` [K, 2] (radius, height), with an inside and a rim."""
     # A monotone cubic through the control points never overshoots them.
-    height = np.linspace(control[0, 1], control[-1, 1], rows)
+    height = np.linspace(control[0, 1], control[-1, 1], 48)
     radius = PchipInterpolator(control[:, 1], control[:, 0])(height)
     inner = np.maximum(radius - thickness, np.minimum(0.02, radius / 2))
     # The inside begins above the bottom, which is as thick as the wall.
@@ -88,7 +88,7 @@ def vessel(control: Array, thickness: float, rows: int = 48, n: int = 96) -> Sol
     inside = np.stack([inner, height], -1)[keep][::-1]
     bottom = np.stack([np.linspace(0, radius[0], 6), np.zeros(6)], -1)[:-1]
     floor = np.stack([np.linspace(inside[-1, 0], 0, 6), np.full(6, inside[-1, 1])], -1)[1:]
-    return lathe(np.concatenate([bottom, outside, rim, inside, floor]), n)
+    return lathe(np.concatenate([bottom, outside, rim, inside, floor]))
 
 
 def panel(origin: ArrayLike, right: Array, up: Array, repeat: tuple[float, float]) -> Solid:
@@ -144,7 +144,7 @@ def placed(
 def _grid(points: Array) -> Solid:
     """Mesh of a parametric grid [n, m, 3] whose last column repeats the first; u along columns, v along rows."""
     n, m = points.shape[:2]
-    faces = grid_faces(n, m)
+    faces = _grid_triangles(n, m)
     vertices = points.reshape(-1, 3).astype(np.float64)
     # The triangles at poles have no area, and so no normal.
     area = np.linalg.norm(face_normals(vertices, faces), axis=-1)
@@ -154,7 +154,7 @@ def _grid(points: Array) -> Solid:
     return Solid(vertices, faces, _exact_normals(vertices, faces), uv)
 
 
-def grid_faces(n: int, m: int, flip: bool = False) -> Array:
+def _grid_triangles(n: int, m: int, flip: bool = False) -> Array:
     """[2 (n - 1)(m - 1), 3] int32 triangles of an n x m grid of vertices, rows along the first axis."""
     index = np.arange(n * m).reshape(n, m)
     a = index[:-1, :-1]
@@ -218,7 +218,7 @@ def slab(size: ArrayLike, radius: float = 0.0) -> Solid:
             vertices = inner.reshape(-1, 3) + radius * normal
             # Faces must look outwards, whichever way (u, v, axis) turns.
             mirrored = np.linalg.det(np.eye(3)[[u, v, axis]]) * sign < 0
-            faces = grid_faces(len(a), a.shape[1], mirrored)
+            faces = _grid_triangles(len(a), a.shape[1], mirrored)
             uv = np.stack([a, b], -1).reshape(-1, 2)
             sides.append(Solid(vertices, faces, normal, uv))
     return moved(joined(sides), (0, half[1], 0))
@@ -235,7 +235,7 @@ def sheet(origin: ArrayLike, right: ArrayLike, up: ArrayLike, n: int = 1) -> Sol
     normal = np.broadcast_to(normal / np.linalg.norm(normal), vertices.shape)
     # Texture coordinates in metres.
     uv = np.stack([a * np.linalg.norm(right), b * np.linalg.norm(up)], -1)
-    faces = grid_faces(n + 1, n + 1)
+    faces = _grid_triangles(n + 1, n + 1)
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3).copy(), uv.reshape(-1, 2))
 
 
@@ -287,27 +287,6 @@ def blob(rng: np.random.Generator, size: ArrayLike, roughness: float, n: int = 4
     return grounded(replace(body, uv=body.uv * half.mean()))
 
 
-def pot(control: Array, thickness: float) -> Solid:
-    """`vessel` with an eighth of its faces; texture coordinates in metres."""
-    radius = control[:, 0].mean()
-    height = control[-1, 1]
-    return metric(vessel(control, thickness, rows=18, n=40), np.pi * radius, 2 * height)
-
-
-def disc(radius: float) -> Solid:
-    """A flat disc about the origin that faces upwards."""
-    return lathe(np.array([[radius, 0], [1e-4, 0]]), 32)
-
-
-def drum(radius: float, height: float, top: float | None = None) -> Solid:
-    """A cylinder about the Y axis, its middle at the origin; or a cone, whose upper radius is `top`."""
-    h = height / 2
-    upper = radius if top is None else top
-    # (radius, height); the caps leave a hole of a millimetre around the axis.
-    profile = np.array([(1e-3, -h), (radius, -h), (upper, h), (1e-3, h)])
-    return lathe(profile, 24)
-
-
 def torus(major: float, minor: float, n: int) -> Solid:
     """A ring about the Y axis, its tube of n sides; texture coordinates in metres."""
     phi = np.linspace(0, 2 * np.pi, n + 1)
@@ -315,14 +294,14 @@ def torus(major: float, minor: float, n: int) -> Solid:
     return metric(ring, np.pi * major, 2 * np.pi * minor)
 
 
-def strip(line: ArrayLike, width: float, flip: bool = False) -> Solid:
+def band(line: ArrayLike, width: float, flip: bool = False) -> Solid:
     """A band of that width along Z over a line [P, 3] in the plane of X and Y; texture coordinates in metres."""
     line = np.asarray(line, float)
     edges = [[0, 0, -width / 2], [0, 0, width / 2]]
     vertices = (line[:, None] + edges).reshape(-1, 3)
     along = _lengths(line)[:, None]
     uv = np.stack(np.broadcast_arrays([0, width], along), -1).reshape(-1, 2)
-    faces = grid_faces(len(line), 2, flip)
+    faces = _grid_triangles(len(line), 2, flip)
     return Solid(vertices, faces, smooth_normals(vertices, faces), uv)
 
 
@@ -357,7 +336,7 @@ def tube(points: ArrayLike, radius: ArrayLike, n: int = 8) -> Solid:
     vertices = line[:, None] + width[:, None, None] * normal
     around = phi[..., 0] * width.mean()
     uv = np.stack(np.broadcast_arrays(around, _lengths(line)[:, None]), -1)
-    faces = grid_faces(len(line), n + 1, flip=True)
+    faces = _grid_triangles(len(line), n + 1, flip=True)
     return Solid(vertices.reshape(-1, 3), faces, normal.reshape(-1, 3), uv.reshape(-1, 2))
 
 

@@ -35,7 +35,7 @@ OUR_FINISHES: dict[str, tuple[m.Maker, ...]] = {
     "cloth": (m.fabric, m.woven),
     "stone": (m.stone,),
     "ceramic": (m.ceramic,),
-    "other": (m.plastic, m.lacquer, m.any_object),
+    "other": (m.plastic, m.lacquer, m.ceramic),
 }
 """What a plain surface of a family may also be."""
 
@@ -142,7 +142,7 @@ def finish(
     return replace(material, roughness=(rough, second), repeat=(0.6, 0.6), relief=relief)
 
 
-def pictured(picture: ColourPicture, gain: Array, rough: float, metallic: float = 0.0) -> Material:
+def pictured(picture: ColourPicture, gain: Array, rough: float) -> Material:
     """A material whose picture lies by the texture coordinates of a model: v points up."""
     # The picture is the albedo; the colour is a factor on it.
     colour = _triple(np.clip(gain, 0.3, 1.4))
@@ -151,7 +151,7 @@ def pictured(picture: ColourPicture, gain: Array, rough: float, metallic: float 
         (colour,) * 3,
         0.0,
         (rough, min(rough + 0.1, 1.0)),
-        (metallic, metallic),
+        (0.0, 0.0),
         repeat=(1.0, -1.0),
         offset=(0.0, 0.0),
         picture=picture,

@@ -37,6 +37,8 @@ BY_WALLS = (
 )
 """Roles of what stands by walls, one named twice as often."""
 IN_THE_MIDDLE = ("thing", "chair", "table", "person", "sofa")
+MIRRORS = 0.05
+"""Share of mirrors among what hangs on walls."""
 
 
 def furnished_room(rng: np.random.Generator, stock: Stock) -> World:
@@ -157,7 +159,7 @@ def _recovered(rng: np.random.Generator, parts: Parts, stock: Stock) -> Parts:
 
 
 def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
-    """A rug from the catalogue, one of ours, or one printed with a picture."""
+    """A rug from the catalogue, or a plain or printed one."""
     # Half of the rooms have none.
     if rng.random() < 0.5:
         return []
@@ -167,7 +169,7 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
     if model is not None:
         return placed(piece(rng, model, stock), at, turn)
     wide, deep = size[:2] * rng.uniform(0.3, 0.6, 2)
-    rug = m.rug(rng, wide, deep)
+    rug = m.woven(rng)
     picture = stock.printed(rng, wide / deep) if rng.random() < 0.3 else None
     if picture is not None:
         rug = replace(pictured(picture, np.ones(3), 0.9), repeat=(wide, deep), offset=(0.5, 0.5))
@@ -177,10 +179,10 @@ def _rug(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
 
 
 def _on_wall(stock: Stock) -> rooms.Hangings:
-    """What hangs on walls: framed photographs, models, and at times what toys have."""
+    """What hangs on walls: framed photographs, mirrors and models."""
 
     def hung(rng: np.random.Generator, wall: walls.RoomWall, count: int) -> Parts:
-        parts = walls.hangings(rng, wall, int(rng.random() < 0.3))
+        parts: Parts = []
         for _ in range(count):
             if rng.random() < 0.3:
                 parts += _hung_model(rng, stock, wall)
@@ -217,19 +219,19 @@ def _from_ceiling(rng: np.random.Generator, stock: Stock, size: Array) -> Parts:
 
 
 def _photograph(rng: np.random.Generator, stock: Stock, at: float, width: float) -> Parts:
-    """A framed photograph or a poster of that width, its middle `at` metres along the wall."""
+    """A framed photograph, poster or mirror of that width, its middle `at` metres along the wall."""
     height = width * float(rng.choice([0.66, 0.75, 1.0, 1.33, 1.5]))
-    picture = stock.printed(rng, width / height)
-    if picture is None:
-        return []
+    picture = None if rng.random() < MIRRORS else stock.printed(rng, width / height)
     bottom = max(rng.uniform(1.3, 1.7) - height / 2, 0.7)
     left = at - width / 2
-    # Behind glass, or matt paper.
-    gain = np.ones(3) * rng.uniform(0.8, 1.1)
-    rough = float(rng.choice([0.08, rng.uniform(0.3, 0.9)]))
-    paper = replace(pictured(picture, gain, rough), repeat=(width, -height), offset=(0.0, 0.0))
+    inner = m.uniform((0.9, 0.9, 0.9), 0.05, 1.0)
+    if picture is not None:
+        # Behind glass, or matt paper.
+        gain = np.ones(3) * rng.uniform(0.8, 1.1)
+        rough = float(rng.choice([0.08, rng.uniform(0.3, 0.9)]))
+        inner = replace(pictured(picture, gain, rough), repeat=(width, -height), offset=(0.0, 0.0))
     sheet = s.sheet((left, bottom, 0.014), (width, 0, 0), (0, height, 0))
-    parts = [ScenePart(sheet, paper)]
+    parts = [ScenePart(sheet, inner)]
     if rng.random() < 0.75:
         look = m.wood(rng) if rng.random() < 0.5 else m.one_of(rng, m.metal, m.lacquer)
         opening = walls.Opening(left, left + width, bottom, bottom + height)

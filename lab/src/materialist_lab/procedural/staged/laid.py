@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from materialist_lab.procedural import materials as m
 from materialist_lab.procedural import rooms, world
 from materialist_lab.procedural.catalog.support import LevelPlace
 from materialist_lab.procedural.staged.furnished import furnished_world, some_pieces
 from materialist_lab.procedural.staged.pieces import laid, piece
 from materialist_lab.procedural.staged.stock import Stock
-from materialist_lab.procedural.world import Parts, World, block, placed
+from materialist_lab.procedural.world import Parts, World, placed
 
 
 def laid_table(rng: np.random.Generator, stock: Stock) -> World:
@@ -47,9 +46,8 @@ def laid_table(rng: np.random.Generator, stock: Stock) -> World:
 
 def _table(rng: np.random.Generator, stock: Stock) -> tuple[Parts, LevelPlace]:
     """(a piece that things can stand on, its place)."""
-    draw = rng.random()
     # --- A model with a level place at a reachable height, large places preferred ---
-    for _ in range(6 if draw < 0.75 else 0):
+    for _ in range(6 if rng.random() < 0.85 else 0):
         model = stock.model(rng, "table", "table", "shelf", "storage", "storage")
         places = (
             []
@@ -60,21 +58,6 @@ def _table(rng: np.random.Generator, stock: Stock) -> tuple[Parts, LevelPlace]:
             areas = np.array([(p.right - p.left) * (p.front - p.back) for p in places])
             place = places[rng.choice(len(places), p=areas / areas.sum())]
             return piece(rng, model, stock), place
-    # --- A table of ours; else a place on the floor ---
-    if draw < 0.9:
-        parts = _own_table(rng)
-        low, high = world.bounds(parts[:1])
-        return parts, LevelPlace(float(high[1]), low[0], high[0], low[2], high[2], 10.0)
+    # --- Else a place on the floor ---
     wide, deep = rng.uniform(0.6, 1.4, 2)
     return [], LevelPlace(0.003, -wide / 2, wide / 2, -deep / 2, deep / 2, 10.0)
-
-
-def _own_table(rng: np.random.Generator) -> Parts:
-    """A top, which comes first, on four legs."""
-    width, depth, thick, leg = rng.uniform([0.8, 0.55, 0.02, 0.03], [2.0, 1.0, 0.05, 0.07])
-    # A coffee table, or one to sit at.
-    height = rng.uniform(0.35, 0.5) if rng.random() < 0.35 else rng.uniform(0.7, 0.78)
-    look = m.one_of(rng, m.wood, m.stone, m.plastic, m.wall_paint)
-    top = block((width, thick, depth), (0, height - thick, 0), look, rng.choice([0, 0.008]))
-    corners = [(x * (width - leg) / 2, 0, z * (depth - leg) / 2) for x in (-1, 1) for z in (-1, 1)]
-    return [top, *(block((leg, height - thick, leg), at, look) for at in corners)]

@@ -10,7 +10,6 @@ from materialist_lab.procedural import materials as m
 from materialist_lab.procedural.catalog.cache import CatalogModel, as_roots
 from materialist_lab.procedural.catalog.support import LevelPlace
 from materialist_lab.procedural.objects import shapes as s
-from materialist_lab.procedural.objects import things
 from materialist_lab.procedural.staged.finishes import finish, pictured, style
 from materialist_lab.procedural.staged.stock import Stock
 from materialist_lab.procedural.world import Parts, ScenePart, bounds, one_thing, orb, placed
@@ -67,10 +66,6 @@ def _screen(rng: np.random.Generator, solid: s.Solid, stock: Stock) -> m.Materia
 
 def small_thing(rng: np.random.Generator, stock: Stock, high: float, tall: float = 1.0) -> Parts:
     """Something to stand on a table or shelf, not longer than `high` nor taller than `tall` metres."""
-    # Procedural now and then, else a model.
-    if rng.random() < 0.15:
-        parts = things.thing(rng, rng.uniform(0.08, min(0.3, high)), stock.meshes, 0.5)
-        return parts if bounds(parts)[1][1] <= tall else []
     model = stock.model(rng, "small", "small", "small", "lamp", high=high)
     if model is None or model.entry.size[1] > tall:
         return []

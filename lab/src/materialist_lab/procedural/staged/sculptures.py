@@ -1,4 +1,4 @@
-"""Rough sculptural shapes: lumps with limbs, weathered stones, carved plates and fluted vessels, with fine meshes."""
+"""Rough sculptural shapes, weathered and with fine meshes, and carved plates."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 from scipy.ndimage import gaussian_filter
-from skimage.measure import marching_cubes
 
 from materialist.types import Array
 from materialist_lab.procedural import materials as m
 from materialist_lab.procedural import relief
 from materialist_lab.procedural.catalog.reading import from_the_sides
+from materialist_lab.procedural.objects import glassware
 from materialist_lab.procedural.objects import shapes as s
 from materialist_lab.procedural.objects.shapes import Solid
 from materialist_lab.procedural.staged.finishes import covered, relief_of
@@ -19,17 +19,15 @@ from materialist_lab.procedural.staged.stock import Stock
 from materialist_lab.procedural.world import Parts, ScenePart, one_thing
 
 Maker = Callable[[np.random.Generator, Stock], Solid]
-GRID = 84
-"""Samples on a side of the field of a body with limbs."""
+FACES = 6000
+"""Fewest triangles of a weathered shape."""
 
 
 def sculpture(rng: np.random.Generator, stock: Stock) -> Parts:
     """A sculpture about 0.3 m high, standing on y = 0."""
     makers: tuple[tuple[float, Maker], ...] = (
-        (0.4, _body),
-        (0.2, _stone),
+        (0.74, _weathered),
         (0.16, _plate),
-        (0.14, _vessel),
         (0.1 if stock.meshes else 0.0, _captured),
     )
     solid = m.pick(rng, makers)(rng, stock)
@@ -91,75 +89,20 @@ def _depth(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _stone(rng: np.random.Generator, stock: Stock) -> Solid:
-    """A boulder, a nut, a head of coral: a ball pressed flat here and there."""
-    ball = trimesh.creation.icosphere(subdivisions=6)
-    vertices = np.asarray(ball.vertices, float)
-    # Each press moves what stands over a plane nine tenths of the way back to it.
-    for _ in range(int(rng.integers(0, 8))):
-        axis = rng.normal(size=3)
-        axis /= np.linalg.norm(axis)
-        over = np.maximum(vertices @ axis - rng.uniform(0.55, 0.95), 0)
-        vertices = vertices - 0.9 * over[:, None] * axis
-    bump = s.lumps(rng, rng.uniform(0, 0.25), 0.35)
-    vertices = vertices * (1 + bump(vertices))[:, None] * rng.uniform(0.55, 1.0, 3)
-    faces = np.asarray(ball.faces, np.int32)
-    solid = Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
-    return _displaced(rng, solid, _depth(rng, 0.004, 0.03))
-
-
-def _body(rng: np.random.Generator, stock: Stock) -> Solid:
-    """Balls and limbs melted into each other: animals, figures, toys, roots."""
-    # --- A grid around the skeleton ---
-    ends, radii = _skeleton(rng)
-    low = (ends - radii[:, None, None]).min((0, 1)) - 0.1
-    high = (ends + radii[:, None, None]).max((0, 1)) + 0.1
-    step = float((high - low).max()) / GRID
-    counts = np.maximum(((high - low) / step).astype(int) + 2, 8)
-    axes = [low[k] + step * np.arange(counts[k]) for k in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).astype(np.float32)
-    # --- The sum of exp(-k d) over the limbs, d the distance from each: their smooth union at 1 ---
-    field = np.zeros(points.shape[:3], np.float32)
-    soft = np.float32(rng.uniform(14, 40))
-    for (a, b), radius in zip(ends.astype(np.float32), radii.astype(np.float32)):
-        along = b - a
-        t = np.clip((points - a) @ along / max(float(along @ along), 1e-9), 0, 1)
-        away = points - a
-        distance = np.sqrt(((away - t[..., None] * along) ** 2).sum(-1)) - radius
-        field += np.exp(-soft * np.clip(distance, -0.4, 1))
-    surface, faces, _, _ = marching_cubes(field, 1.0, spacing=(step,) * 3)
-    solid = _of(surface.astype(float) + low, faces[:, ::-1].astype(np.int32))
+def _weathered(rng: np.random.Generator, stock: Stock) -> Solid:
+    """An animal, a vase, a stone, a turned or twisted thing: a shape of RefractionNet's, rounded and weathered."""
+    rough = glassware.any_shape(rng)
+    mesh = trimesh.Trimesh(rough.vertices, rough.faces)
+    # Vertices enough to show weathering.
+    while len(mesh.faces) < FACES:
+        mesh = mesh.subdivide_loop(1)
+    solid = _of(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int32))
     return _displaced(rng, solid, _depth(rng, 0.003, 0.025))
 
 
 def _of(vertices: Array, faces: Array) -> Solid:
     """The solid with smooth normals, without texture coordinates."""
     return Solid(vertices, faces, s.smooth_normals(vertices, faces), np.zeros((len(vertices), 2)))
-
-
-def _skeleton(rng: np.random.Generator) -> tuple[Array, Array]:
-    """([n, 2, 3] ends, [n] radii) of a trunk with limbs, often the same on both sides."""
-    ends = []
-    radii = []
-    # --- The trunk, mostly upright ---
-    trunk = rng.uniform(0.15, 0.4)
-    along = rng.normal(size=3) * [0.5, 1.0, 0.5]
-    along *= rng.uniform(0.2, 1.0) / np.linalg.norm(along)
-    ends.append((-along / 2, along / 2))
-    radii.append(trunk)
-    # --- Limbs of two segments, from the trunk over a tip to a bend ---
-    mirrored = rng.random() < 0.65
-    for _ in range(int(rng.integers(1, 7))):
-        root = rng.uniform(-0.5, 0.5) * along + rng.normal(size=3) * 0.12
-        way = rng.normal(size=3)
-        tip = root + way / np.linalg.norm(way) * rng.uniform(0.2, 0.85)
-        bend = tip + rng.normal(size=3) * 0.25
-        thick = rng.uniform(0.05, 0.24)
-        for side in (1, -1) if mirrored else (1,):
-            flip = np.array([side, 1, 1])
-            ends += [(root * flip, tip * flip), (tip * flip, bend * flip)]
-            radii += [thick, thick * rng.uniform(0.5, 1.1)]
-    return np.array(ends), np.array(radii)
 
 
 def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
@@ -193,27 +136,6 @@ def _plate(rng: np.random.Generator, stock: Stock) -> Solid:
     solid = _of(sheet.vertices + raised, sheet.faces)
     back = s.slab((1.0, float(np.ptp(sheet.vertices[:, 1])), 0.12))
     return s.joined([solid, s.moved(back, (0, 0, -0.18))])
-
-
-def _vessel(rng: np.random.Generator, stock: Stock) -> Solid:
-    """A vase, column or bell: fluted, twisted or hammered."""
-    rows = 150
-    columns = 260
-    levels = np.linspace(0, 1, int(rng.integers(4, 8)))
-    radius = np.interp(np.linspace(0, 1, rows), levels, rng.uniform(0.12, 0.5, len(levels)))
-    # Smoothed by a running mean of 25 rows.
-    radius = np.convolve(np.pad(radius, 12, mode="edge"), np.ones(25) / 25, "valid")
-    up = np.linspace(0, rng.uniform(0.7, 1.3), rows)
-    phi = np.linspace(0, 2 * np.pi, columns)
-    # Flutes around it, twisted along its height; none in half of them.
-    flutes = rng.choice([0, int(rng.integers(3, 24))])
-    wave = np.cos(flutes * (phi[None] + rng.normal() * up[:, None])) * rng.uniform(0.0, 0.12)
-    r = radius[:, None] * (1 + wave)
-    points = np.stack([r * np.cos(phi), np.broadcast_to(up[:, None], r.shape), r * np.sin(phi)], -1)
-    faces = s.grid_faces(rows, columns)
-    solid = _of(points.reshape(-1, 3), faces)
-    lid = s.moved(s.disc(float(radius[-1]) * 0.95), (0, float(up[-1]) - 0.02, 0))
-    return s.joined([_displaced(rng, solid, _depth(rng, 0.001, 0.012)), lid])
 
 
 def _captured(rng: np.random.Generator, stock: Stock) -> Solid:

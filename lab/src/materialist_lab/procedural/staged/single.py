@@ -111,7 +111,7 @@ def _ground(
     bend = rng.uniform(0.4, 1.2) * reach
     curve = np.stack([-start - bend * np.sin(t), y + bend * (1 - np.cos(t)), 0 * t], -1)
     line = np.concatenate([[[half, y, 0]], curve, [[-start - bend, y + half, 0]]])
-    sweep = s.strip(line, 2 * half, flip=True)
+    sweep = s.band(line, 2 * half, flip=True)
     return [ScenePart(s.moved(sweep, turn=turn - np.pi / 2), material)]
 
 

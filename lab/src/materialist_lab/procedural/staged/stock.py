@@ -11,7 +11,6 @@ import numpy as np
 from materialist.types import Array
 from materialist_lab.procedural.catalog.cache import CatalogModel, Listing, as_roots, listing
 from materialist_lab.procedural.materials import ColourPicture
-from materialist_lab.procedural.objects.things import Meshes
 
 SMALLEST_CROP = 0.2
 """Smallest height of a crop as a share of the largest one that fits into the photograph."""
@@ -28,7 +27,7 @@ class Stock:
     listing: Listing
     held_out: bool = False
     """Whether it has only the models and photographs that are kept aside for testing; else only the others."""
-    meshes: Meshes = ()
+    meshes: tuple[Path, ...] = ()
     captures: tuple[Path, ...] = ()
 
     def _is_mine(self, name: str) -> bool:
@@ -39,14 +38,14 @@ class Stock:
         return [name for name in names if self._is_mine(name)]
 
     def model(
-        self, rng: np.random.Generator, *roles: str, low: float = 0.0, high: float = 9.0
+        self, rng: np.random.Generator, *roles: str, high: float = 9.0
     ) -> CatalogModel | None:
-        """A model of one of the roles whose longest side is between two lengths, metres; None where there is none."""
+        """A model of one of the roles whose longest side is at most `high` metres; None where there is none."""
         keys = [key for role in roles for key in self._mine(self.listing.models.get(role, ()))]
         # A dozen tries: the sizes of all models are not known before they are loaded.
         for _ in range(12 if keys else 0):
             model = self.listing.model(keys[rng.integers(len(keys))])
-            if low <= max(model.entry.size) <= high:
+            if max(model.entry.size) <= high:
                 return model
         return None
 
@@ -110,7 +109,7 @@ def stock(
     folder: Path | None,
     *,
     held_out: bool = False,
-    meshes: Meshes = (),
+    meshes: tuple[Path, ...] = (),
     captures: tuple[Path, ...] = (),
 ) -> Stock:
     """The stock of archives and photographs, made once a process."""

@@ -6,6 +6,9 @@ import torch
 from materialist.predict.refraction.crop import BACK_X, MASK, MIRROR, NORMAL_X
 from materialist.types import Array
 
+BATCH = 64
+"""Views at a time."""
+
 
 def relative_error(predicted: Array, truth: Array, inside: Array) -> Array:
     """[N] mean absolute error over mean true thickness, of maps [N, S, S] within inside [N, S, S]."""
@@ -23,7 +26,7 @@ def mean_errors(network, views: dict[str, Array]) -> dict[str, float]:
     return {name: float(np.nanmean(values)) for name, values in errors(network, views).items()}
 
 
-def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array]:
+def errors(network, views: dict[str, Array]) -> dict[str, Array]:
     """Figures [N] of every view (see `dataset.make_views`).
 
     `solid`, `hollow`: relative errors, the latter NaN for shapes that are not, and left out where none is; `symmetry`:
@@ -34,8 +37,8 @@ def errors(network, views: dict[str, Array], batch: int = 64) -> dict[str, Array
     target = views["target"].astype(np.float32)
     with torch.inference_mode():
         parts = [
-            network(torch.from_numpy(maps[k : k + batch])).numpy()
-            for k in range(0, len(maps), batch)
+            network(torch.from_numpy(maps[k : k + BATCH])).numpy()
+            for k in range(0, len(maps), BATCH)
         ]
     predicted = np.concatenate(parts)
     # Where the mask that the network got is wider than the object, there is nothing to compare with.
