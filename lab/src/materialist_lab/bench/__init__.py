@@ -26,6 +26,7 @@ BENCHMARKS = (
     "plate",
     "studio",
     "paper",
+    "gpu",
     "export",
 )
 """Names of modules, and of the classes in them: `photo-alone` is PhotoAloneBench."""
