@@ -55,7 +55,7 @@ def infer_bundled(
     """Maps of a photo [H, W, 3] float32 linear, white about 1, at its own size, as a Prediction without a name.
 
     The network, in evaluation mode on `device`, sees the photo, clipped to [0, 1], and its mirror image at two sizes;
-    its answers are averaged and enlarged, geometry with the photo's edges. rays: [H, W, 2] float32 x and y of the
+    its answers are averaged and enlarged, depth with the photo's edges. rays: [H, W, 2] float32 x and y of the
     camera rays at z = -1. Albedo is linear, depth has a fixed median and is 0 where there is no surface; light where
     the network knows it. on_materials: called with the materials, which are there long before the depth.
     """
@@ -68,7 +68,7 @@ def infer_bundled(
         surface[:] = True
     unsure = _unsure_sky(maps["mask"], surface)
     depth = _scaled(maps["depth"], surface)
-    # --- At the photo's size: materials by enlarging, geometry with the photo's edges ---
+    # --- At the photo's size: materials by enlarging, depth with the photo's edges ---
     albedo, roughness, metallic = (
         resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic")
     )
@@ -96,7 +96,7 @@ def infer_bundled(
 
 
 def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple[Array, Array]:
-    """Depth [h, w] and normals [h, w, 3] brought to the size of the photo [H, W, 3], with its edges.
+    """Depth [h, w] and normals [h, w, 3] brought to the size of the photo [H, W, 3], depth with its edges.
 
     rays: [H, W, 2] x and y of the photo's rays at z = -1.
     """
@@ -115,11 +115,6 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
     sharp = weighted_median(coarse, guide, known)
-    planes = [
-        weighted_median(np.ascontiguousarray(c), guide, known, bins=16)
-        for c in np.moveaxis(normal, -1, 0)
-    ]
-    normal = unit(np.stack(planes, -1))
     depth = integrated(np.where(known, np.exp(sharp), 0), normal, seen)
     if middle != size:
         depth = resample.depth(depth, size)
