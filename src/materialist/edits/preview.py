@@ -146,15 +146,15 @@ class Preview:
         tables = self._tables_of(self._seen(edited))
         rows = np.flatnonzero(region.ravel()[self._pixels])
         pixels = self._pixels[rows]
-        found = {
+        tables_of_rows = {
             "pixels": pixels,
             "diffuse": tables.diffuse[rows].cpu().numpy(),
             "specular": tables.specular[:, rows].cpu().numpy(),
             "base": self._base.reshape(-1, 3)[pixels],
         }
         if is_relit(self.scene, edited):
-            found["overall"] = overall_factor(self._base, self.render(edited))
-        return found
+            tables_of_rows["overall"] = overall_factor(self._base, self.render(edited))
+        return tables_of_rows
 
     def picture(self, edited: Scene, *, coarse: bool = False) -> Array:
         """[H, W, 3] float32 linear: the edit in the photo at working size, with borders as hard as the mask."""

@@ -64,9 +64,12 @@ class _Layout:
     @property
     def for_tifffile(self) -> bool:
         """Whether OpenCV would read it wrong, or not at all."""
-        usual = self.numbers in _OPENCV and self.samples in (1, 3, 4)
+        opencv_reads = self.numbers in _OPENCV and self.samples in (1, 3, 4)
         return (
-            not usual or self.planar == 2 or self.meaning == _INVERTED or self.compression == "LZMA"
+            not opencv_reads
+            or self.planar == 2
+            or self.meaning == _INVERTED
+            or self.compression == "LZMA"
         )
 
     @property

@@ -79,10 +79,14 @@ class GuidedFilter:
         return cv2.blur(plane, self.window, borderType=cv2.BORDER_REFLECT)
 
 
-def weighted_median(values: Array, guide: GuidedFilter, known: Array, *, bins: int = 32) -> Array:
+BINS = 32
+"""Steps between which a weighted median tells values apart."""
+
+
+def weighted_median(values: Array, guide: GuidedFilter, known: Array) -> Array:
     """[H, W] float32: at every pixel the median of the values around it, weighted by `guide`.
 
-    Values between their 0.5 and 99.5 percentiles are told apart by `bins` steps and by linear interpolation within.
+    Values between their 0.5 and 99.5 percentiles are told apart by BINS steps and by linear interpolation within.
     Those of pixels that are not known [H, W] bool do not count, and stay.
     """
     low, high = np.percentile(values[known], [0.5, 99.5]) if known.any() else (0.0, 0.0)
@@ -90,18 +94,18 @@ def weighted_median(values: Array, guide: GuidedFilter, known: Array, *, bins: i
         return values.astype(np.float32)
     # --- A histogram at every pixel: each value counts for its two neighbouring bins ---
     place = np.where(
-        known, np.clip((values - low) / (high - low) * (bins - 1), 0, bins - 1), -1
+        known, np.clip((values - low) / (high - low) * (BINS - 1), 0, BINS - 1), -1
     ).astype(np.float32)
     shares = np.stack(
-        [np.maximum(guide.share(np.maximum(1 - np.abs(place - k), 0)), 0) for k in range(bins)]
+        [np.maximum(guide.share(np.maximum(1 - np.abs(place - k), 0)), 0) for k in range(BINS)]
     )
     # --- The bin in which half of the weight is reached ---
-    total = np.cumsum(shares, axis=0)  # [bins, H, W]
+    total = np.cumsum(shares, axis=0)  # [BINS, H, W]
     half = total[-1] / 2
     index = np.argmax(total >= half, axis=0)
     weight_before = np.take_along_axis(total, index[None], 0)[0]
     bin_weight = np.take_along_axis(shares, index[None], 0)[0]
     # Within a step the weight is spread evenly over it, from half a step before to half a step after.
     position = index + 0.5 - (weight_before - half) / np.maximum(bin_weight, 1e-9)
-    median = low + np.clip(position, 0, bins - 1) / (bins - 1) * (high - low)
+    median = low + np.clip(position, 0, BINS - 1) / (BINS - 1) * (high - low)
     return np.where(known & (half > 0), median, values).astype(np.float32)
