@@ -20,7 +20,8 @@ RESET = """async () => {
     (await fetch(`/api/${place}`, {method: 'POST', headers, body: JSON.stringify(body)})).json();
   let state = await post('deselect');
   while (state.steps.length) state = await post('act', {action: 'remove', index: 0});
-  sessionStorage.removeItem('view'); localStorage.removeItem('theme'); }"""
+  localStorage.removeItem('theme');
+  addEventListener('pagehide', () => sessionStorage.removeItem('view')); }"""
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +182,7 @@ def test_sliders_numbers_colours_presets_and_the_divider(page):
     )
     page.locator(".colour input").first.evaluate(script)
     becomes(page, lambda rgb: rgb[2] > rgb[1] + 40 and rgb[2] > rgb[0] + 40)
-    assert "hue" not in page.inner_text("#steps")
+    page.wait_for_selector("#steps >> text=hue", state="hidden")
     # One from the photo, without the light on it: that of the grey wall.
     page.get_by_role("button", name="Take a colour from the photo").first.click()
     page.mouse.click(*place(page, 0.8, 0.6))

@@ -66,7 +66,8 @@ export function Slider({ id, label, value, low, high, step, unit, changed }: Sli
           // The text stays as it is: a change would undo what is selected in it.
           setTyped(shownText);
           const box = event.currentTarget;
-          requestAnimationFrame(() => box.select());
+          // Chromium focuses what it selects: a box that was left meanwhile stays left.
+          requestAnimationFrame(() => document.activeElement === box && box.select());
         }}
         onInput={(event) => setTyped(event.currentTarget.value)}
         onBlur={(event) => commit(event.currentTarget.value)}

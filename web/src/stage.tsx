@@ -207,9 +207,12 @@ export function Stage() {
     } else if (!mouse && far > 12) {
       return;
     } else if (tool === "lamp") {
-      void change("lamp", { at: first, ...view.lamp }).then(() => set({ panel: "light", tool: "click" }));
+      // At once, and not with the answer: by then another tool may have been taken.
+      set({ panel: "light", tool: "click" });
+      void change("lamp", { at: first, ...view.lamp });
     } else if (tool === "place") {
-      void change("place", { at: last }).then(() => set({ panel: "object", tool: "click" }));
+      set({ panel: "object", tool: "click" });
+      void change("place", { at: last });
     } else {
       const method = view.sam ? "sam2" : "network";
       // Where something was edited the very place counts: an edited thing may lie within what is outlined.

@@ -26,7 +26,10 @@ export function Things() {
             <button
               key={name}
               aria-pressed={shape === name.toLowerCase()}
-              onClick={() => void change("object", { name }).then(() => set({ tool: "place" }))}
+              onClick={() => {
+                set({ tool: "place" });
+                void change("object", { name });
+              }}
             >
               <Shape name={name} />
               <span>{name}</span>
