@@ -1,6 +1,7 @@
 """How the C library asks the system for memory."""
 
 import ctypes
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
@@ -25,6 +26,14 @@ def kept_memory() -> Iterator[None]:
         with suppress(OSError, AttributeError):
             _limits(mapped=65536, trimmed=64 * _MEGABYTE)
             ctypes.CDLL(None).malloc_trim(0)
+
+
+def give_back() -> None:
+    """Give the memory of what is not used any more back to the system; the C library would keep it."""
+    # Scenes are in cycles: only the collector frees them.
+    gc.collect()
+    with suppress(OSError, AttributeError):  # glibc has it
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _limits(mapped: int, trimmed: int) -> None:

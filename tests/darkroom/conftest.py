@@ -7,6 +7,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the studio extra")
 pytest.importorskip("pydantic", reason="needs the studio extra")
 import studio_server
+from live_here import live_here
 from starlette.testclient import TestClient
 from studio_scenes import package
 
@@ -55,7 +56,7 @@ def local(tmp_path_factory):
     studio.start = work.new("Room", "me", scene=package(folder))
     gate = application(studio, host="127.0.0.1", port=7860)
     headers = {"x-materialist-page": "b" * 32, "origin": ADDRESS}
-    with TestClient(gate, base_url=ADDRESS, headers=headers) as client:
+    with live_here(), TestClient(gate, base_url=ADDRESS, headers=headers) as client:
         # With the channel the page is open between the tests, too.
         client.get("/")
         state = client.get("/api/arrive").json()

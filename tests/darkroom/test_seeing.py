@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 from studio_scenes import HEIGHT, WIDTH
 
-from materialist.darkroom import seeing
+from materialist.studio import views
 
 
 def mesh(client):
@@ -44,7 +44,7 @@ def test_the_mesh_has_the_surface_and_what_was_put_in(client, monkeypatch):
     assert more.max() < after["vertices"] and len(more) == len(faces) + 12
     assert (painted[painted[:, 3] > 0] == (0, 255, 0, 255)).all()
     # A large one is thinned out, and keeps its borders: no face spans the block and the wall.
-    monkeypatch.setattr(seeing, "MESH_FACES", 800)
+    monkeypatch.setattr(views, "MESH_FACES", 800)
     client.post("/api/undo", json={})
     _, thin, _, few = mesh(client)
     assert 100 < len(few) < 1000

@@ -1,6 +1,7 @@
 """A session on a small scene, and a studio that several people reach."""
 
 import pytest
+from live_here import live_here
 from studio_scenes import package
 
 from materialist.jobs.queue import JobQueue
@@ -37,9 +38,10 @@ def shared(tmp_path):
 @pytest.fixture(scope="module")
 def opened(studio):
     page = studio.page("page", "me")
-    studio.open(page, studio.start.name)
-    page.session.live.wait()
-    return page.session
+    with live_here():
+        studio.open(page, studio.start.name)
+        page.session.live.wait()
+        yield page.session
 
 
 @pytest.fixture

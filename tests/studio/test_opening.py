@@ -124,4 +124,4 @@ def test_as_many_edits_as_are_allowed_can_be_applied(session, tmp_path):
     (tmp_path / "edits.yaml").write_text(step * 200)
     session.read_edits(tmp_path / "edits.yaml")
     assert len(session.edits.steps) == 200
-    assert session.live.edited(session.edits.active) is not session.scene
+    assert session.live.here.edited(session.edits.active) is not session.scene

@@ -1,45 +1,50 @@
 """Clicks, boxes and strokes."""
 
+from functools import partial
+
 import pytest
 from studio_scenes import block, room
 
 from materialist.edits.select.objects import overlap
+from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.studio.selection import Selection, read_pick
+
+CHOOSE = partial(select, room())
 
 
 def test_click_add_and_remove():
     scene = room()
-    one = Selection().click(scene, 25, 24, "new")
+    one = Selection().click(scene, 25, 24, "new", CHOOSE)
     assert one.mask is not None and overlap(one.mask, block()) > 0.9
-    both = one.click(scene, 50, 40, "add").mask
+    both = one.click(scene, 50, 40, "add", CHOOSE).mask
     assert both is not None and both[40, 50] and both[24, 25]
-    two = one.brush(scene, [[44, 40], [56, 40]], 4, "add")
-    again = two.click(scene, 25, 24, "add").mask
+    two = one.brush(scene, [[44, 40], [56, 40]], 4, "add", CHOOSE)
+    again = two.click(scene, 25, 24, "add", CHOOSE).mask
     assert again is not None and (again >= two.mask).all(), "adding takes nothing away"
-    assert two.click(scene, 25, 24, "new").mask[24, 25] == False  # noqa: E712 - on what is selected: taken away
-    assert one.click(scene, 25, 24, "new").mask is None
-    assert one.click(scene, 50, 40, "remove") is one
+    assert two.click(scene, 25, 24, "new", CHOOSE).mask[24, 25] == False  # noqa: E712 - on what is selected: taken away
+    assert one.click(scene, 25, 24, "new", CHOOSE).mask is None
+    assert one.click(scene, 50, 40, "remove", CHOOSE) is one
 
 
 def test_a_piece_of_one_colour_is_taken_out_of_a_selection():
     scene = room()
     whole = Selection((scene.depth > 0,))
-    left = whole.click(scene, 25, 24, "remove").mask
+    left = whole.click(scene, 25, 24, "remove", CHOOSE).mask
     assert left is not None and not left[block()].any()
     assert left[(scene.depth > 0) & ~block()].mean() > 0.95
-    assert Selection((block(),)).click(scene, 25, 24, "remove").mask is None
+    assert Selection((block(),)).click(scene, 25, 24, "remove", CHOOSE).mask is None
 
 
 def test_box_and_brush():
     scene = room()
-    boxed = Selection().box(scene, [12, 12, 40, 36], "new")
+    boxed = Selection().box(scene, [12, 12, 40, 36], "new", CHOOSE)
     assert boxed.mask is not None and overlap(boxed.mask, block()) > 0.8
-    rubbed = boxed.box(scene, [0, 0, 64, 24], "remove")
+    rubbed = boxed.box(scene, [0, 0, 64, 24], "remove", CHOOSE)
     assert rubbed.mask is not None and not rubbed.mask[:24].any() and rubbed.mask[26].any()
-    painted = Selection().brush(scene, [[10, 40], [30, 40]], 3, "add")
+    painted = Selection().brush(scene, [[10, 40], [30, 40]], 3, "add", CHOOSE)
     assert painted.mask is not None and painted.mask[40, 10:31].all() and not painted.mask[34].any()
-    assert painted.brush(scene, [[0, 40], [63, 40]], 8, "remove").mask is None
+    assert painted.brush(scene, [[0, 40], [63, 40]], 8, "remove", CHOOSE).mask is None
 
 
 @pytest.mark.parametrize(

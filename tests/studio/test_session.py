@@ -1,28 +1,27 @@
 """A page's session, on a small scene with a real preview."""
 
-import threading
-import weakref
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from live_here import LiveHere
 from made_meshes import floor_scene
 from studio_scenes import block, click, room
 
-from materialist.edits.preview import Preview
 from materialist.edits.recipe import Step, apply, read_recipe
 from materialist.errors import InputError, OutputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
+from materialist.io.package import save_scene
 from materialist.studio import SETTINGS, objects
 from materialist.studio.edit_list import EditList, step_summary
 from materialist.studio.finals import keep_final, kept_final, new_final
 from materialist.studio.history import read_history
 from materialist.studio.lights import place_lamp
-from materialist.studio.live_preview import LivePreview, free_memory
+from materialist.studio.reporting import named_maps, quality
 from materialist.studio.selection import Selection
 from materialist.studio.session import Session
-from materialist.studio.stage import commands, named_maps, report, stage
+from materialist.studio.stage import commands, stage
 
 
 def test_an_edit_from_click_to_recipe(session):
@@ -158,20 +157,10 @@ def test_reopened_where_it_was_left(session):
         assert len(other.edits.steps) == count
     other.live.wait()
     stage(other)
-    known = [weakref.ref(one) for one in (other.live.scene, other.live._preview.result())]
     other.close()
-    free_memory().result()
-    assert [one() for one in known] == [None, None]
     with pytest.raises(InputError, match="Open a photo"):
         other.set("edit", hue="1")
     session.take_over()
-
-
-def test_a_closed_preview_is_waited_for_by_nobody(session):
-    live = LivePreview(session.scene)
-    live.close()
-    with pytest.raises(InputError, match="was closed"):
-        live.wait()
 
 
 def test_of_two_final_pictures_the_last_is_kept(session):
@@ -217,29 +206,6 @@ def test_a_change_that_cannot_be_written_is_none(session, monkeypatch):
     monkeypatch.undo()
     session.undo()
     assert session.edits.steps == ()
-
-
-def test_a_preview_closed_while_it_prepares_is_freed(session, monkeypatch):
-    """Its next part would wait in the queue, and hold the scene, until after `free_memory`."""
-    begun = threading.Event()
-    ends = threading.Event()
-    seen = []
-
-    def prepare(preview):
-        begun.set()
-        return ends.wait(60)
-
-    monkeypatch.setattr(Preview, "prepare", prepare)
-    live = LivePreview(session.scene)
-    assert begun.wait(60)
-    known = weakref.ref(live)
-    live.close()
-    freed = free_memory()
-    freed.add_done_callback(lambda _: seen.append(known()))
-    del live
-    ends.set()
-    free_memory().result(60)  # after the callback of the first
-    assert seen == [None]
 
 
 def test_edits_that_cannot_be_read_are_left_as_they_are(studio, session):
@@ -334,16 +300,17 @@ def test_ticking_and_moving_leave_the_current_one():
     )
 
 
-def test_an_object_falls_and_lies_there(session, monkeypatch):
+def test_an_object_falls_and_lies_there(session, monkeypatch, tmp_path):
     pytest.importorskip("mujoco", reason="needs the physics extra")
-    floor = LivePreview(floor_scene(64, 48))
+    save_scene(floor_scene(64, 48), tmp_path / "floor.scene")
+    floor = LiveHere(floor_scene(64, 48), tmp_path / "floor.scene", tmp_path / "floor.npz")
     monkeypatch.setattr(session, "live", floor)
     with pytest.raises(InputError, match="Place an object first"):
         objects.let_fall(session, 1.0)
     objects.set_object_option(session, "mesh", objects.library_file(session, "Cube"))
     objects.set_object_option(session, "scale", "0.5")
     objects.place(session, 32, 34)
-    stands = session.live.edited(session.edits.active).bodies[0]
+    stands = session.live.here.edited(session.edits.active).bodies[0]
     assert objects.let_fall(session, 0.5) == []
     step = session.edits.steps[0]
     assert [s.kind for s in session.edits.steps] == ["drop"] and session.current_kind == "drop"
@@ -352,7 +319,7 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
         and step.options["scale"] == "0.5"
         and step.options["seed"] == "0"
     )
-    lies = session.live.edited(session.edits.active).bodies[0]
+    lies = session.live.here.edited(session.edits.active).bodies[0]
     assert (
         lies.vertices.shape == stands.vertices.shape
         and np.abs(lies.vertices - stands.vertices).max() > 0.01
@@ -361,17 +328,16 @@ def test_an_object_falls_and_lies_there(session, monkeypatch):
     np.testing.assert_allclose(replayed.vertices, lies.vertices, atol=1e-6)
     objects.let_fall(session, 0.5)
     assert session.edits.steps[0].options["seed"] == "1" and len(session.edits.steps) == 1
-    again = session.live.edited(session.edits.active).bodies[0]
+    again = session.live.here.edited(session.edits.active).bodies[0]
     assert np.abs(again.vertices - lies.vertices).max() > 1e-3
     session.undo()
     session.undo()
     assert [s.kind for s in session.edits.steps] == ["insert"]
-    floor.close()
 
 
 def test_the_report_is_plain_and_harmless():
     scene = replace(room(), report=replace(room().report, warnings=("<img src=x> [a](b)",)))
-    text = report(scene)
+    text = quality(scene)
     assert (
         "31.5 dB from the photo" in text and "40.0°" in text and "&lt;img src=x> &#91;a](b)" in text
     )

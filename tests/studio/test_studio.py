@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 from collections import deque
-from concurrent.futures import Future
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -19,9 +18,10 @@ from studio_server import free_port
 from materialist.errors import InputError
 from materialist.io.photo import example_path
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
-from materialist.studio import SETTINGS, StudioSettings, archives, live_preview, stage
+from materialist.studio import SETTINGS, StudioSettings, archives, stage
 from materialist.studio.access import quota
 from materialist.studio.access.quota import Allowance
+from materialist.studio.reporting import quality
 from materialist.studio.server import check_host
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import WorkFolder
@@ -196,21 +196,15 @@ def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_close
     begun = threading.Event()
     go_on = threading.Event()
 
-    class Busy(Future):
-        """Memory that is being given back until the test lets it."""
-
-        def result(self, timeout=None):
-            begun.set()
-            assert go_on.wait(10)
-
-    def free():
+    def give_back():
         freed.append(threading.current_thread())
-        return Busy()
+        begun.set()
+        assert go_on.wait(10)
 
-    monkeypatch.setattr("materialist.studio.studio.free_memory", free)
+    monkeypatch.setattr("materialist.studio.studio.give_back", give_back)
     for number in range(201):
         page = shared.page(f"page{number}", f"person{number}")
-        page.session.live = SimpleNamespace(close=lambda: None)
+        page.session.live = SimpleNamespace(close=lambda: None, rest=lambda idle: None)
     shared.leave("page0")
     assert begun.wait(10)
     for number in range(1, 201):
@@ -219,18 +213,6 @@ def test_the_memory_of_many_closed_pages_is_given_back_once_and_not_by_who_close
     shared._closer.shutdown(wait=True)
     assert len(freed) == 2
     assert threading.current_thread() not in freed
-
-
-def test_one_freeing_serves_all_who_wait_for_it(monkeypatch):
-    pytest.importorskip("torch")
-    live_preview._THREAD.submit(lambda: None).result()
-    held = threading.Event()
-    live_preview._THREAD.submit(held.wait, 10)
-    futures = {live_preview.free_memory() for _ in range(100)}
-    held.set()
-    assert len(futures) == 1
-    futures.pop().result(30)
-    assert live_preview.free_memory() not in futures
 
 
 def test_a_page_that_is_not_heard_of_is_forgotten_after_a_while(shared, monkeypatch):
@@ -321,7 +303,7 @@ def test_the_report_carries_no_html_of_a_scene(opened):
     scene = opened.scene
     prior = replace(scene.prior, predictor="`<script>alert(1)</script>")
     photo = replace(scene.photo, fov_source="<img src=x onerror=alert(2)>")
-    shown = stage.report(replace(scene, prior=prior, photo=photo))
+    shown = quality(replace(scene, prior=prior, photo=photo))
     assert "<script" not in shown and "<img" not in shown
     assert "script>alert(1)" in shown
 

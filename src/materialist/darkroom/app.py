@@ -23,10 +23,8 @@ from materialist.darkroom.state import (
     about,
     example_file,
     light_jpeg,
-    map_jpeg,
     native_jpeg,
     photo_jpeg,
-    report_of,
     state,
     working_jpeg,
 )
@@ -118,13 +116,15 @@ def _routes(desks: Desks) -> list[Any]:
         "/api/arrive": lambda desk, request: _json(opening.arrive(desk)),
         "/api/state": _state,
         "/api/projects": lambda desk, request: _json(opening.listed(desk)),
-        "/api/report": lambda desk, request: _json(report_of(desk)),
+        "/api/report": lambda desk, request: _json(seeing.report_of(desk)),
         "/api/photo": _photo,
         "/api/mesh": _mesh,
         "/api/drawn/{kind}": _drawn,
         "/api/light/{name}": lambda desk, request: _jpeg(light_jpeg(request.path_params["name"])),
         "/api/example/{name}": _example,
-        "/api/map/{name}": lambda desk, request: _jpeg(map_jpeg(desk, request.path_params["name"])),
+        "/api/map/{name}": lambda desk, request: _jpeg(
+            seeing.map_jpeg(desk, request.path_params["name"])
+        ),
         "/api/picture/{project}/{name}": _picture,
         "/api/file/{file}": taking.download,
     }

@@ -12,7 +12,6 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from materialist.edits.core.notes import noise_notes
-from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 from materialist.jobs.queue import QUEUED, RUNNING, STOPPED, Job
 from materialist.jobs.worker import DONE, FAILED
@@ -169,7 +168,7 @@ class Desk:
                 self._scene = scene
             if place not in self._pointed and compute:
                 # While one is being found, the next pointer waits: a page asks for one at a time.
-                self._pointed[place] = select(scene, click=place)
+                self._pointed[place] = self.session.preview.select(click=place)
                 while len(self._pointed) > POINTED:
                     self._pointed.popitem(last=False)
             return self._pointed.get(place)

@@ -5,17 +5,16 @@ from typing import Any
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
 from materialist.darkroom.removing import take_away
-from materialist.darkroom.reopening import edit_at
 from materialist.darkroom.state import outline, settable, state
 from materialist.edits.core.operation import Target
 from materialist.edits.light import presets
-from materialist.edits.recipe import region_of
 from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.option_kinds import declarations
-from materialist.studio import objects, uploads
+from materialist.studio import objects, reopening, uploads, views
 from materialist.studio.lights import change_lamp, light_file, number_text, place_lamp
 from materialist.studio.selection import read_pick
+from materialist.studio.session import Session
 
 State = dict[str, Any]
 CLEARED = {"texture", "envmap", "gain", "mesh", "lamps"}
@@ -46,8 +45,20 @@ def point(desk: Desk, body: bodies.Pointed) -> State:
     if index is not None:
         step = session.edits.steps[index]
         placed = step.operation.target is Target.PLACE
-        return {"region": "" if placed else outline(region_of(session.scene, step))}
+        if placed:
+            return {"region": ""}
+        return {"region": outline(session.preview.call(views.region, step=step))}
     return {"region": outline(desk.pointed(*body.at))}
+
+
+def edit_at(session: Session, x: float, y: float) -> int | None:
+    """The place in the list of the edit that a click at a place of the photo means, if any."""
+    column, row = session.pixel(x, y)
+    edits = session.edits
+    if not edits.active:
+        return None
+    given = {"listed": edits.steps, "current": edits.current, "column": column, "row": row}
+    return session.preview.call(reopening.edit_at, **given)
 
 
 def deselect(desk: Desk, body: bodies.Nothing) -> State:

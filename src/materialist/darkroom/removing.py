@@ -7,7 +7,7 @@ from materialist.darkroom.desk import Desk, Followed
 from materialist.edits.recipe import Step, options_of
 from materialist.edits.remove.operation import REMOVE
 from materialist.jobs.worker import DONE
-from materialist.studio import tasks
+from materialist.studio import tasks, views
 from materialist.studio.edit_list import EditList, with_options
 from materialist.studio.session import Session
 
@@ -43,7 +43,7 @@ def take_away(desk: Desk, options: dict[str, Any]) -> None:
         if entry.job.state != DONE or session.live is None or not session.shows(project):
             return
         # Applied once before the lock: other requests go on meanwhile.
-        session.live.edited(_with(session, before, step).active)
+        session.live.call(views.check, steps=_with(session, before, step).active)
         with session.lock:
             session.change(REMOVE.name, _with(session, before, step))
 

@@ -1,6 +1,5 @@
 """What a page of the darkroom shows, as one JSON object, and the outline of a region."""
 
-import re
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,6 @@ import numpy as np
 from materialist import __version__
 from materialist.color import srgb_levels
 from materialist.darkroom.desk import Desk
-from materialist.darkroom.seeing import edited_scene
 from materialist.edits.light import presets
 from materialist.edits.registry import OPERATIONS
 from materialist.edits.select import sam
@@ -24,7 +22,7 @@ from materialist.options import InvertOptions
 from materialist.studio import SETTINGS, drawn, objects, uploads
 from materialist.studio.edit_list import step_summary
 from materialist.studio.selection import Selection
-from materialist.studio.stage import commands, named_maps, report, stage
+from materialist.studio.stage import commands, stage
 from materialist.studio.studio import PREDICTORS, Studio
 from materialist.studio.tasks import kinds_here
 from materialist.studio.workspace import Project
@@ -232,21 +230,3 @@ def example_file(studio: Studio, name: str) -> Path:
     if name not in EXAMPLES:
         raise InputError(f"There is no example {name!r}; choose one of the list.")
     return example_path(name)
-
-
-def map_jpeg(desk: Desk, name: str) -> bytes:
-    """A map of what the page shows, by its place in `stage.named_maps`. Raises InputError for another name."""
-    maps = named_maps(edited_scene(desk))
-    if not re.fullmatch("[0-9]{1,3}", name) or int(name) >= len(maps):
-        raise InputError(f"There is no map {name!r}.")
-    return display.encoded(maps[int(name)][0], "JPEG", quality=92)
-
-
-def report_of(desk: Desk) -> dict[str, Any]:
-    """The names of the maps, the quality in words, and the warnings of the edits."""
-    session = desk.session
-    scene = edited_scene(desk)
-    return {
-        "maps": [title for _, title in named_maps(scene)],
-        "report": session.without_folders(report(scene)),
-    }

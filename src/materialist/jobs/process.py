@@ -36,12 +36,14 @@ class Worker:
         niceness: int = 0,
         idle: float = 0.0,
         memory: int = 0,
+        threads: int = 0,
         keep_errors: bool = False,
     ) -> None:
         """Start it. Raises OSError where no process can be started.
 
         environment: variables that differ from this process's. niceness: added to this process's. idle: seconds
         without a task after which it ends by itself; 0: never. memory: bytes of data that it may hold; 0: no limit.
+        threads: tasks that it does at a time, all that it gets; 0: one, the newest of those that wait.
         keep_errors: keep its stderr for the report of its end.
         """
         # A file, not a pipe: a pipe that nobody reads stops the process once it is full.
@@ -49,7 +51,7 @@ class Worker:
         self.connection, theirs = Pipe()
         # The worker gets its end of the pipe as a file descriptor.
         words = [sys.executable, "-m", "materialist.jobs.worker", str(theirs.fileno())]
-        words += [str(niceness), str(idle), str(memory)]
+        words += [str(niceness), str(idle), str(memory), str(threads)]
         try:
             # A new program, not a fork: a renderer that has started does not survive one.
             self._process = subprocess.Popen(
@@ -76,7 +78,7 @@ class Worker:
         return self._process.poll() is None
 
     def begin(self, task: Callable[..., Any], arguments: dict[str, Any]) -> int:
-        """Send a task, which replaces those that wait in the process; returns its number."""
+        """Send a task, which without threads replaces those that wait in the process; returns its number."""
         self._number += 1
         with contextlib.suppress(OSError):  # the process has ended: LOST says so
             self.connection.send((self._number, pickle.dumps((task, arguments))))

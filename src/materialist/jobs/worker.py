@@ -1,7 +1,8 @@
 """The worker process: it does the tasks that come over a socket.
 
-It is started as `python -m materialist.jobs.worker FD NICENESS IDLE MEMORY`.
-It receives `(number, task)` and sends `(kind, facts, number)`. Of several waiting tasks it does the newest.
+It is started as `python -m materialist.jobs.worker FD NICENESS IDLE MEMORY THREADS`.
+It receives `(number, task)` and sends `(kind, facts, number)`. Of several waiting tasks it does the newest; with
+THREADS it does all of them, so many at a time.
 The process ends when the other end of the socket is closed, also in the middle of a task: a coordinator that was killed
 leaves none behind. `multiprocessing` and pools on top of it (pebble) would run the caller's main module again in each
 worker and import torch before the environment of a worker is set, so only its connections are used.
@@ -16,6 +17,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -67,10 +69,11 @@ class Reporter:
         return self._waiting()
 
 
-def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
+def main(descriptor: int, niceness: int, idle: float, memory: int, threads: int = 0) -> None:
     """Do tasks until the socket is closed, or none came for `idle` seconds (0: wait for ever).
 
-    memory: bytes of data that the process may hold, where the system can limit them; 0: no limit.
+    memory: bytes of data that the process may hold, where the system can limit them; 0: no limit. threads: tasks
+    that are done at a time, none of them left out; 0: one, the newest.
     """
     if memory:
         resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
@@ -78,6 +81,7 @@ def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
     os.nice(niceness)
     connection: Connection = Connection(descriptor)
     tasks: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    sending = threading.Lock()
 
     def receive() -> None:
         try:
@@ -88,25 +92,31 @@ def main(descriptor: int, niceness: int, idle: float, memory: int) -> None:
 
     def send(message: Any) -> None:
         try:
-            connection.send(message)
+            with sending:
+                connection.send(message)
         except OSError:
             os._exit(3)
 
+    def do(content: bytes) -> None:
+        # The task itself stays pickled until `run_task`, whose errors are reported.
+        number, task = pickle.loads(content)
+        report = Reporter(lambda *message: send((*message, number)), lambda: not tasks.empty())
+        send((*run_task(task, report), number))
+
     threading.Thread(target=receive, daemon=True).start()
+    pool = ThreadPoolExecutor(threads) if threads else None
     while True:
         try:
             content = tasks.get(timeout=idle or None)
         except queue.Empty:
             os._exit(0)
+        if pool is not None:
+            pool.submit(do, content)
+            continue
         # Only the newest: a slider has moved on.
         while not tasks.empty():
             content = tasks.get()
-        # The task itself stays pickled until `run_task`, whose errors are reported.
-        number, task = pickle.loads(content)
-        report = Reporter(
-            lambda *message, number=number: send((*message, number)), lambda: not tasks.empty()
-        )
-        send((*run_task(task, report), number))
+        do(content)
 
 
 def run_task(task: bytes, report: Reporter) -> tuple[str, Any]:
@@ -143,4 +153,4 @@ def failure_facts(error: BaseException, stage: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), int(sys.argv[4]))
+    main(int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]), *map(int, sys.argv[4:]))

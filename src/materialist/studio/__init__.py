@@ -56,6 +56,8 @@ class StudioSettings:
     free_for_glass: float = 2.0e9  # before glass is traced
     # The process that waits for the next photo.
     ready_seconds: float = 300.0  # after which it ends
+    # The process of a photo's live preview.
+    preview_idle: float = 900.0  # seconds without a question after which it ends
     # The process that traces glass.
     glass_idle: float = 900.0  # seconds without a request after which it ends
     glass_niceness: int = 3  # between previews and inversions: somebody waits at a slider

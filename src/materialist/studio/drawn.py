@@ -27,6 +27,7 @@ from materialist.geometry.silhouette import window
 from materialist.io import display
 from materialist.studio import SETTINGS, glass
 from materialist.studio.edit_list import key_of, with_options
+from materialist.studio.live import Live
 from materialist.studio.live_preview import LivePreview
 from materialist.studio.session import Session
 from materialist.studio.sketch import draw_bodies
@@ -46,8 +47,7 @@ DEPTH_SIDE = 96
 class Drawing:
     """One kind of change: the step that is changed, and the list of edits around it."""
 
-    live: LivePreview
-    client: Any
+    panes: glass.Panes
     before: tuple[Step, ...]
     own: Step
     after: tuple[Step, ...]
@@ -59,18 +59,19 @@ class Drawing:
     def others(self) -> tuple[Step, ...]:
         return (*self.before, *self.after)
 
-    def key(self) -> str:
+    def key(self, live: Live) -> str:
         """What the bytes depend on, as a short text."""
         steps = (*self.before, self.fixed, *self.after)
-        panes = [id(self.client.pane(step)) for step in steps if glass.is_traced(step)]
+        panes = [id(self.panes.get(glass.place(step))) for step in steps if glass.is_traced(step)]
         region = b"" if self.region is None else np.packbits(self.region).tobytes()
-        parts = [id(self.live), self.live.fine, len(self.before), key_of(steps), panes]
+        parts = [id(live), live.fine, len(self.before), key_of(steps), panes]
         return hashlib.sha1(json.dumps(parts).encode() + region).hexdigest()[:16]
 
 
 def keys(session: Session) -> dict[str, str]:
     """Kind of change -> the key of what `content` would give for it; kinds that a page cannot draw now are left out."""
-    return {kind: drawing.key() for kind in KINDS if (drawing := _drawing(session, kind))}
+    drawings = {kind: _drawing(session, kind) for kind in KINDS}
+    return {kind: found[1].key(found[0]) for kind, found in drawings.items() if found}
 
 
 def content(session: Session, kind: str) -> bytes | None:
@@ -79,11 +80,21 @@ def content(session: Session, kind: str) -> bytes | None:
     They begin with the length of a JSON header, uint32, and the header, filled up to a multiple of 4 bytes. Its
     `arrays` are [name, type, shape] each; their bytes, each filled up likewise, follow in this order, little-endian.
     """
-    drawing = _drawing(session, kind)
-    if drawing is None:
+    found = _drawing(session, kind)
+    if found is None:
         return None
-    key = drawing.key()
-    made = KINDS[kind](drawing)
+    live, drawing = found
+    key = drawing.key(live)
+    steps = (*drawing.before, drawing.own, *drawing.after)
+    content: bytes | None = live.call(block, kind=kind, drawing=drawing, key=key, steps=steps)
+    return content
+
+
+def block(
+    live: LivePreview, kind: str, drawing: Drawing, key: str, steps: tuple[Step, ...]
+) -> bytes | None:
+    """The bytes of a kind of change in a list of edits, `steps`; a call of `studio.live`."""
+    made = KINDS[kind](live, drawing)
     if made is None:
         return None
     header, arrays = made
@@ -94,7 +105,7 @@ def content(session: Session, kind: str) -> bytes | None:
     return len(padded[0]).to_bytes(4, "little") + b"".join(padded)
 
 
-def _drawing(session: Session, kind: str) -> Drawing | None:
+def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
     """What a change of that kind would be about now; None for nothing."""
     with session.lock:
         live = session.live
@@ -115,22 +126,22 @@ def _drawing(session: Session, kind: str) -> Drawing | None:
         return None
     place = active.index(own)
     around = (active[:place], own, active[place + 1 :])
+    panes = client.panes(active)
     if kind == "material" and own.kind == EDIT.name and mask is not None:
         fixed = with_options(own, **dict.fromkeys((*MOVED, *REGION)))
-        return Drawing(live, client, *around, fixed, mask)
+        return live, Drawing(panes, *around, fixed, mask)
     if kind == "thing" and own.kind == INSERT.name:
-        return Drawing(live, client, *around, own)
+        return live, Drawing(panes, *around, own)
     if kind == "lamps" and "lamps" in own.options:
-        return Drawing(live, client, *around, with_options(own, lamps=None))
+        return live, Drawing(panes, *around, with_options(own, lamps=None))
     return None
 
 
 Made = tuple[dict[str, Any], dict[str, Array]] | None
 
 
-def _material(drawing: Drawing) -> Made:
+def _material(live: LivePreview, drawing: Drawing) -> Made:
     """Tables of the pixels of a region, row by row of the picture."""
-    live = drawing.live
     from materialist.transport.cache import ROUGHNESS_LEVELS
 
     steps = drawing.others
@@ -144,7 +155,8 @@ def _material(drawing: Drawing) -> Made:
     if not inside.any() or inside.sum() > SETTINGS.drawn_pixels:
         return None
     # What lies over the surfaces has to be known, and no later edit may change what this one makes.
-    waits = any(drawing.client.pane(step) is None for step in steps if glass.is_traced(step))
+    traced = [glass.place(step) for step in steps if glass.is_traced(step)]
+    waits = any(place not in drawing.panes for place in traced)
     later = any(
         (old != new)[inside].any()
         for old, new in zip(vars(before.materials).values(), vars(rest.materials).values())
@@ -170,7 +182,7 @@ def _material(drawing: Drawing) -> Made:
         "fitted_metallic": live.scene.materials.metallic,
         "weight": weight,
     }
-    over = _over(drawing, rest)
+    over = _over(live, drawing, rest)
     rows |= {
         name: values.reshape(inside.size, -1)[pixels] for name, values in (maps | over).items()
     }
@@ -186,7 +198,7 @@ def _material(drawing: Drawing) -> Made:
     return header, {"at": at.astype("<u4")} | {name: _halves(v) for name, v in rows.items()}
 
 
-def _over(drawing: Drawing, rest: Scene) -> dict[str, Array]:
+def _over(live: LivePreview, drawing: Drawing, rest: Scene) -> dict[str, Array]:
     """What lies over the surfaces: picture -> gain picture + lit albedo (1 - metallic) + added, [H, W, 3] each."""
     if not rest.lamps and not rest.bodies and not any(map(glass.is_traced, drawing.others)):
         return {}
@@ -197,15 +209,14 @@ def _over(drawing: Drawing, rest: Scene) -> dict[str, Array]:
         nothing = np.zeros(shape, np.float32)
         scene = replace(rest, materials=Materials(albedo, nothing, nothing))
         picture = np.full((*shape, 3), value, np.float32)
-        return drawing.live.laid_over(picture, scene, drawing.others, drawing.client)
+        return live.laid_over(picture, scene, drawing.others, drawing.panes)
 
     added = laid(0, 0)
     return {"gain": laid(1, 0) - added, "lit": laid(0, 1) - added, "added": added}
 
 
-def _thing(drawing: Drawing) -> Made:
+def _thing(live: LivePreview, drawing: Drawing) -> Made:
     """An object as it is sketched: what it leaves of the picture, what it adds; and the picture without it."""
-    live = drawing.live
     before = live.edited(drawing.before)
     alone = live.edited((*drawing.before, drawing.own)).bodies[len(before.bodies) :]
     scene = replace(live.edited(drawing.others), bodies=alone)
@@ -229,19 +240,18 @@ def _thing(drawing: Drawing) -> Made:
         "size": [scene.camera.width, scene.camera.height],
     }
     arrays = {"gain": gain[box], "added": added[box], "depth": np.asarray(depth)}
-    without = live.picture(drawing.others, drawing.client)
+    without = live.picture(drawing.others, drawing.panes)
     return header, {name: _halves(values) for name, values in arrays.items()} | _jpeg(without)
 
 
-def _lamps(drawing: Drawing) -> Made:
+def _lamps(live: LivePreview, drawing: Drawing) -> Made:
     """Surfaces as lamps light them, and the picture without the light of lamps."""
-    live = drawing.live
     steps = (*drawing.before, drawing.own, *drawing.after)
     edited = live.edited(steps)
     shape = edited.depth.shape
 
     def laid(picture: Array) -> Array:
-        return live.laid_over(picture, edited, steps, drawing.client, lamps=False)
+        return live.laid_over(picture, edited, steps, drawing.panes, lamps=False)
 
     ones = np.ones((*shape, 3), np.float32)
     gain = np.clip(laid(ones) - laid(0 * ones), 0, 1)
@@ -261,7 +271,7 @@ def _lamps(drawing: Drawing) -> Made:
     } | _jpeg(laid(live.shaded(steps)))
 
 
-KINDS: dict[str, Callable[[Drawing], Made]] = {
+KINDS: dict[str, Callable[[LivePreview, Drawing], Made]] = {
     "material": _material,
     "thing": _thing,
     "lamps": _lamps,

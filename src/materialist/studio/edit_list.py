@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from materialist.edits.core.operation import Target
+from materialist.edits.core.operation import PreviewMode, Target
 from materialist.edits.recipe import Step
 
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness", "at", "seed", "gain")
@@ -88,6 +88,11 @@ class EditList:
     @property
     def active(self) -> tuple[Step, ...]:
         return tuple(step for step in self.steps if not step.skipped)
+
+
+def is_shaded(step: Step) -> bool:
+    """Whether the preview shades a step; what the others add is sketched."""
+    return step.operation.preview is PreviewMode.SHADED
 
 
 def with_options(step: Step, **options: Any) -> Step:

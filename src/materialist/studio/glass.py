@@ -54,6 +54,10 @@ class GlassState:
     bad: bool = False
 
 
+Panes = dict[str, Pane]
+"""`place` of a glass step -> its last picture."""
+
+
 def is_traced(step: Step) -> bool:
     """Whether a step is glass that the worker traces: the paper's two-interface model is shown by other means."""
     is_closed = str(step.options.get("model", "closed")) == "closed"
@@ -94,17 +98,22 @@ class GlassClient:
 
     def pane(self, step: Step) -> Pane | None:
         """The last picture of a glass step, perhaps with earlier values."""
-        return self._panes.get(_place(step), (None, None))[1]
+        return self._panes.get(place(step), (None, None))[1]
+
+    def panes(self, steps: tuple[Step, ...]) -> Panes:
+        """The last pictures of the glass in a list, where there are any."""
+        shown = {place(step): self.pane(step) for step in steps if is_traced(step)}
+        return {name: pane for name, pane in shown.items() if pane is not None}
 
     def fresh(self, steps: tuple[Step, ...], step: Step) -> bool:
         """Whether `pane` shows exactly this step of this list."""
-        return self._panes.get(_place(step), (None, None))[0] == _request(steps, step)
+        return self._panes.get(place(step), (None, None))[0] == _request(steps, step)
 
     def keep(self, steps: tuple[Step, ...]) -> None:
         """Forget panes of other steps than these, and end the process when there is no glass any more."""
-        places = {_place(step) for step in steps if is_traced(step)}
+        places = {place(step) for step in steps if is_traced(step)}
         with self.changed:
-            self._panes = {place: pane for place, pane in self._panes.items() if place in places}
+            self._panes = {name: pane for name, pane in self._panes.items() if name in places}
         if not places:
             self.stop()
 
@@ -167,7 +176,7 @@ class GlassClient:
         elif message.kind == PROGRESS:
             self.state = GlassState(True, _WORDS.get(message.facts["stage"], self.state.words))
         elif message.kind == DONE and message.facts is not None and self._asked is not None:
-            self._panes[_place(self._asked[1])] = (self._asked, message.facts)
+            self._panes[place(self._asked[1])] = (self._asked, message.facts)
             self.state = GlassState()
         elif message.kind == FAILED:
             self.state = GlassState(False, sentence(message.facts), True)
@@ -177,7 +186,7 @@ def _request(steps: tuple[Step, ...], step: Step) -> Request:
     return tuple(other for other in steps if other is not step), with_options(step, skip=None)
 
 
-def _place(step: Step) -> str:
+def place(step: Step) -> str:
     """Which object a glass step is about."""
     return json.dumps({name: step.options.get(name) for name in REGION}, default=str)
 

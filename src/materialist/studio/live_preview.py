@@ -1,13 +1,12 @@
-"""Pictures of a scene while a slider moves: `edits.preview.Preview` on its thread, and sketches of what it lacks."""
+"""Pictures of a scene while a slider moves: `edits.preview.Preview` on its thread, and sketches of what it lacks.
 
-import ctypes
-import gc
-import sys
+It lives in a process of its own, which `studio.live` starts and asks.
+"""
+
 import threading
 import time
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,8 +24,7 @@ from materialist.errors import InputError
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
-from materialist.studio.access.quota import Allowance
-from materialist.studio.edit_list import kept, key_of, step_summary
+from materialist.studio.edit_list import is_shaded, kept, key_of, step_summary
 from materialist.studio.sketch import draw_bodies, light_lamps
 from materialist.types import Array, Scene
 
@@ -45,20 +43,14 @@ _THREAD = ThreadPoolExecutor(1, thread_name_prefix="live", initializer=_use_one_
 class LivePreview:
     """A fitted scene, its preview (seconds to build, unless `file` has its tables), and the last edited scenes."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        file: Path | None = None,
-        package: Path | None = None,
-        allowance: Allowance | None = None,
-    ):
-        """package: where the scene lies; things then fall in a process of their own, as the allowance allows."""
-        self._allowance = allowance or Allowance()
+    def __init__(self, scene: Scene, file: Path | None = None, package: Path | None = None):
+        """package: where the scene lies; things then fall in a process of their own."""
         self.scene = scene
         self._package = package
         self._asked = float("-inf")
         """When a picture was last asked for, by the monotonic clock."""
-        self._later: threading.Timer | None = None
+        self.prepared = threading.Event()
+        """Whether everything is there for fine pictures, also under another light."""
         self._kept: dict[str, Any] = {}
         """What steps make: scenes, and what a sketch needs of glass."""
         self._shaded: tuple[Scene, tuple[bool, bool], Array] | None = None
@@ -69,15 +61,14 @@ class LivePreview:
     def _prepare(self, built: Future[Any]) -> None:
         """Get ready for another light part by part, while nobody moves a slider: a part takes longer than a picture."""
         quiet = SETTINGS.quiet_seconds - (time.monotonic() - self._asked)
-        if built is self._preview and quiet > 0:
-            self._later = threading.Timer(quiet, _THREAD.submit, (self._prepare, built))
-            self._later.daemon = True
-            self._later.start()
-            return
-        more = built is self._preview and built.exception() is None and built.result().prepare()
-        # Only while it is open: the task would hold a closed preview until after `free_memory`.
-        if more and built is self._preview:
+        if quiet > 0:
+            later = threading.Timer(quiet, _THREAD.submit, (self._prepare, built))
+            later.daemon = True
+            later.start()
+        elif built.exception() is None and built.result().prepare():
             _THREAD.submit(self._prepare, built)
+        else:
+            self.prepared.set()
 
     @property
     def ready(self) -> bool:
@@ -87,7 +78,7 @@ class LivePreview:
     def fine(self) -> bool:
         """Whether pictures have all their rays by now."""
         preview = self._preview
-        built = preview.done() and not preview.cancelled() and preview.exception() is None
+        built = preview.done() and preview.exception() is None
         return built and not preview.result().coarse
 
     def wait(self) -> None:
@@ -135,8 +126,7 @@ class LivePreview:
         """The scene `before` after the fall that the last step is; what falls, and for how long, is a stranger's."""
         limits = Limits(SETTINGS.opening_memory, SETTINGS.fall_seconds)
         place = str(self._package)
-        with self._allowance.opening():
-            added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
+        added = run_limited(tasks.fallen, limits, scene=place, steps=steps)
         # Only what the fall added crosses between the processes.
         edits = [*before.provenance.get("edits", []), *added["edits"]]
         after = replace(
@@ -157,18 +147,18 @@ class LivePreview:
     def picture(
         self,
         steps: tuple[Step, ...],
-        client: glass.GlassClient | None = None,
+        panes: glass.Panes,
         *,
         coarse: bool = False,
     ) -> Array:
         """[H, W, 3] float32 linear: the edits in the photo at working size. Waits for the preview.
 
-        Glass comes from the client, or is sketched where the client has no pane yet.
+        Glass is sketched where there is no pane of it yet.
         """
         if not steps:
             return self.scene.photo.linear
         shaded = self.shaded(steps, coarse=coarse)
-        return self.laid_over(shaded, self.edited(steps), steps, client)
+        return self.laid_over(shaded, self.edited(steps), steps, panes)
 
     def shaded(self, steps: tuple[Step, ...], *, coarse: bool = False) -> Array:
         """[H, W, 3]: the surfaces of the photo after the steps, without what is laid over them."""
@@ -210,7 +200,7 @@ class LivePreview:
         picture: Array,
         edited: Scene,
         steps: tuple[Step, ...],
-        client: glass.GlassClient | None = None,
+        panes: glass.Panes,
         *,
         lamps: bool = True,
     ) -> Array:
@@ -218,9 +208,7 @@ class LivePreview:
 
         Where all glass has a pane it is a linear function of each pixel.
         """
-        known = [
-            (step, client.pane(step) if client else None) for step in steps if glass.is_traced(step)
-        ]
+        known = [(step, panes.get(glass.place(step))) for step in steps if glass.is_traced(step)]
         # --- Lamps: their light without its shadows ---
         if edited.lamps and lamps:
             picture = light_lamps(picture, edited)
@@ -237,18 +225,6 @@ class LivePreview:
                 picture = lay_over(picture, pane.picture, pane.share)
         return picture
 
-    def close(self) -> None:
-        if self._later is not None:
-            # It would hold the closed preview until it is due.
-            self._later.cancel()
-            self._later = None
-        self._preview.cancel()
-        self._preview = Future()
-        # For whoever still waits for it.
-        self._preview.set_exception(InputError("This photo was closed; open it again."))
-        self._kept.clear()
-        self._shaded = None
-
 
 def _look_alike(scene: Scene, other: Scene) -> bool:
     """Whether shading, which knows no bodies, makes the same picture of two edits of a scene."""
@@ -260,63 +236,24 @@ def _look_alike(scene: Scene, other: Scene) -> bool:
     )
 
 
-def is_shaded(step: Step) -> bool:
-    """Whether the preview shades a step; what the others add is sketched."""
-    return step.operation.preview is PreviewMode.SHADED
-
-
 def _build(scene: Scene, file: Path | None) -> Any:
     from materialist.edits.preview import Preview
 
     return Preview(scene, file)
 
 
-def load_renderer() -> None:
-    """Load what previews need, on their thread, before there is a scene."""
-    _THREAD.submit(_load)
+def load_renderer(device: str) -> None:
+    """Load what previews need for a device, on their thread."""
+    _THREAD.submit(_load, device).result()
 
 
-def _load() -> None:
+def _load(device: str) -> None:
     from materialist.edits.preview import load
+    from materialist.render.variant import setup
 
+    if device != "auto":
+        setup(device)
     load()
-
-
-class _Freeing:
-    """Gives memory back on the thread of the previews: once for all who ask before it has begun."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._waiting: Future[None] | None = None
-
-    def submit(self) -> Future[None]:
-        with self._lock:
-            if self._waiting is None:
-                self._waiting = _THREAD.submit(self._free)
-            return self._waiting
-
-    def _free(self) -> None:
-        with self._lock:
-            self._waiting = None
-        # Scenes are in cycles: only the collector frees them.
-        gc.collect()
-        if "drjit" in sys.modules:
-            sys.modules["drjit"].sync_thread()  # what is being freed is not in its cache yet
-            sys.modules["drjit"].flush_malloc_cache()
-        with suppress(OSError, AttributeError):  # glibc has it
-            ctypes.CDLL(None).malloc_trim(0)
-
-
-_FREEING = _Freeing()
-
-
-def free_memory() -> Future[None]:
-    """Give the memory of closed scenes back to the system; the renderer and the C library would keep it."""
-    if "torch" not in sys.modules:  # no scene was open
-        done = Future[None]()
-        done.set_result(None)
-        return done
-    return _FREEING.submit()
 
 
 def _bytes_of_bodies(kept_values: Iterable[Any]) -> int:

@@ -12,6 +12,7 @@ from materialist.edits.recipe import Step
 from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.io.atomic import whole_file
+from materialist.studio import views
 from materialist.studio.session import Session
 
 KINDS = tuple(name for name, entry in OPERATIONS.items() if entry.target is Target.PLACE)
@@ -76,20 +77,18 @@ def let_fall(session: Session, height: float) -> list[str]:
     """
     with session.lock:
         index = last(session)
-        _ = session.scene
-        if index is None or session.live is None:
+        live = session.preview
+        if index is None:
             raise InputError("Place an object first; it falls where it stands.")
         # Only what this fall adds is told.
-        known = session.live.edited(session.edits.active).report.warnings
+        known = live.call(views.check, steps=session.edits.active)
         step = session.edits.steps[index]
         kept = {name: value for name, value in step.options.items() if name in {*DROP.keys, "skip"}}
         options = {**kept, "height": f"{height:.3g}", "seed": str(session.falls)}
         after = session.edits.put(index, replace(step, kind=DROP.name, options=options))
         session.falls += 1
         session.change("fall", after)
-        return [
-            note for note in session.live.edited(after.active).report.warnings if note not in known
-        ]
+        return [n for n in live.call(views.check, steps=after.active) if n not in known]
 
 
 def file_of(name: str) -> str:

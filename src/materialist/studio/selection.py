@@ -11,13 +11,14 @@ import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
 REPLACE = "new"
 ADD = "add"
 REMOVE = "remove"
+Choose = Callable[..., Array]
+"""[H, W] bool of a `click`, a `box` or a `mask`, as `select` gives it."""
 _PIECE_COLOUR = 14.0
 """How far colours of one piece may lie from that of its pixel, in each of L, a and b; tuned by eye."""
 
@@ -57,7 +58,7 @@ class Selection:
         x: float,
         y: float,
         mode: str,
-        method: str = "network",
+        choose: Choose,
         region: Array | None = None,
     ) -> Selection:
         """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added.
@@ -75,18 +76,25 @@ class Selection:
         if inside and mode != ADD:
             return Selection(tuple(part for part in self.parts if not part[row, column]))
         if region is None:
-            region = select(scene, click=(x, y), method=method)
+            region = choose(click=(x, y))
         return self._with(region, mode)
 
-    def box(self, scene: Scene, box: list[float], mode: str, method: str = "network") -> Selection:
+    def box(self, scene: Scene, box: list[float], mode: str, choose: Choose) -> Selection:
         if mode == REMOVE:
             x0, y0, x1, y1 = (round(v) for v in box)
             gone = np.zeros(scene.depth.shape, bool)
             gone[min(y0, y1) : max(y0, y1), min(x0, x1) : max(x0, x1)] = True
             return self._without(gone)
-        return self._with(select(scene, box=box, method=method), mode)
+        return self._with(choose(box=box), mode)
 
-    def brush(self, scene: Scene, points: list[list[float]], radius: float, mode: str) -> Selection:
+    def brush(
+        self,
+        scene: Scene,
+        points: list[list[float]],
+        radius: float,
+        mode: str,
+        choose: Choose,
+    ) -> Selection:
         """With a stroke through pixels (x, y): added, or rubbed out."""
         if not points or len(points) > 20_000 or not 0.5 <= radius <= 500:
             raise InputError("The brush stroke could not be read; paint again.")
@@ -97,11 +105,7 @@ class Selection:
         for x, y in line[[0, -1]]:
             cv2.circle(stroke, (int(x), int(y)), max(1, round(radius)), 1, -1)
         painted = stroke > 0
-        return (
-            self._without(painted)
-            if mode == REMOVE
-            else self._with(select(scene, mask=painted), ADD)
-        )
+        return self._without(painted) if mode == REMOVE else self._with(choose(mask=painted), ADD)
 
     def _with(self, region: Array, mode: str) -> Selection:
         return Selection((*self.parts, region) if mode == ADD else (region,))

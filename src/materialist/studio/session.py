@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -10,19 +11,20 @@ from typing import Any
 import materialist as mt
 from materialist.edits.core.operation import REGION, PreviewMode, Target
 from materialist.edits.light.operation import RELIGHT
-from materialist.edits.recipe import Step, region_of, write_recipe
+from materialist.edits.recipe import Step, write_recipe
 from materialist.errors import InputError, OutputError
+from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
-from materialist.studio import SETTINGS, uploads
+from materialist.studio import SETTINGS, uploads, views
 from materialist.studio.access.quota import Allowance
 from materialist.studio.archives import read_list, unpack
 from materialist.studio.edit_list import EditList, slides, with_options
 from materialist.studio.finals import FinalPicture, kept_final, sweep_finals
 from materialist.studio.glass import GlassClient
 from materialist.studio.history import History, read_history, write_history
-from materialist.studio.live_preview import LivePreview
+from materialist.studio.live import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
-from materialist.studio.workspace import Project, located, read_steps, write_mask
+from materialist.studio.workspace import Project, content_of, located, read_steps, write_mask
 from materialist.types import Array, Scene
 
 EDITS = "edits.yaml"
@@ -45,17 +47,19 @@ class Session:
         without_folders: Callable[[str], str] = str,
         local: bool = True,
         allowance: Allowance | None = None,
+        device: str = "auto",
     ):
         self.person = person
         self.without_folders = without_folders
         self.local = local
         """`without_folders` is the studio's; `local`: the person has the command line of this machine, too."""
         self.allowance = allowance or Allowance()
+        self._device = device
         self.lock = threading.RLock()
         self.project: Project | None = None
         self.expected: Project | None = None
         """The photo that is being opened here, or was."""
-        self.live: LivePreview | None = None
+        self.live: Live | None = None
         self.glass: GlassClient | None = None
         self.selection = Selection()
         self.next_object: dict[str, str] = {}
@@ -75,9 +79,15 @@ class Session:
     @property
     def scene(self) -> Scene:
         """The open scene. Raises InputError where there is none."""
-        if self.live is None:
+        return self.preview.scene
+
+    @property
+    def preview(self) -> Live:
+        """Its live preview. Raises InputError where no photo is open."""
+        live = self.live
+        if live is None:
             raise InputError("Open a photo first.")
-        return self.live.scene
+        return live
 
     def shows(self, project: Project) -> bool:
         """Whether it is the session of a photo."""
@@ -121,12 +131,15 @@ class Session:
         """Let every page that shows this session ask for its state."""
         self.revision = next_revision()
 
-    def open(self, project: Project) -> None:
-        """Open a photo with its edits, history and last final picture as they were left. Raises InputError."""
+    def open(self, project: Project, worker: Worker | None = None) -> None:
+        """Open a photo with its edits, history and last final picture as they were left. Raises InputError.
+
+        worker: a process for its preview that is running already.
+        """
         loaded = mt.load_scene(project.scene)
         workspace = project.workspace(self.person)
         # --- Everything that can fail, before the page changes ---
-        kept = _content(workspace / EDITS)
+        kept = content_of(workspace / EDITS)
         try:
             steps = read_steps(workspace, workspace / EDITS) if kept is not None else ()
         except InputError as error:
@@ -138,9 +151,8 @@ class Session:
             self.close()
             self.project = self.expected = project
             self.glass = GlassClient(project.scene)
-            self.live = LivePreview(
-                loaded, project.folder / "preview.npz", project.scene, self.allowance
-            )
+            tables = project.folder / "preview.npz"
+            self.live = Live(loaded, project.scene, tables, self.allowance, worker, self._device)
             # --- As it was left ---
             history = read_history(workspace, loaded.depth.shape)
             current = history.current
@@ -185,15 +197,16 @@ class Session:
         """
         with self.lock:
             scene = self.scene
+            choose = partial(self.preview.select, method=method)
             mode = pick["mode"]
             before = self.selection
             if pick["tool"] == "click":
                 x, y = self.pixel(*pick["at"])
-                after = before.click(scene, x, y, mode, method, region)
+                after = before.click(scene, x, y, mode, choose, region)
             elif pick["tool"] == "box":
-                after = before.box(scene, pick["at"], mode, method)
+                after = before.box(scene, pick["at"], mode, choose)
             else:
-                after = before.brush(scene, pick["points"], pick["radius"], mode)
+                after = before.brush(scene, pick["points"], pick["radius"], mode, choose)
             if after.mask is None or mode not in (ADD, REMOVE) or not self._follows_selection():
                 self.remember("select")
                 self.edits = self.edits.chosen(None)
@@ -328,17 +341,14 @@ class Session:
                 )
             self.change("load", EditList(steps))
 
-    # Within
-
     def change(self, action: str, after: EditList, *, moving: bool = False) -> None:
         """Set another list of edits, with a way back. Raises InputError, and changes nothing, where it is not valid."""
-        assert self.live is not None
         if len(after.steps) > SETTINGS.edits:
             raise InputError(
                 f"That would be {len(after.steps)} edits; a photo takes up to {SETTINGS.edits}. Take some away first."
             )
         # Applied once before it counts: an edit that cannot be applied is refused.
-        self.live.edited(after.active)
+        self.preview.call(views.check, steps=after.active)
         with self._or_as_before():
             self.remember(action, moving=moving)
             self.edits = after
@@ -383,7 +393,7 @@ class Session:
         step = edits.current_step
         if step is None or not {*REGION} & {*step.options}:
             return Selection()
-        return Selection((region_of(self.scene, step),))
+        return Selection((self.preview.call(views.region, step=step),))
 
     def _check_unchanged(self) -> None:
         """Take over what another studio, or a person, has written meanwhile. Raises InputError where they did."""
@@ -401,7 +411,7 @@ class Session:
             if self.project is None:
                 return False
             file = self.workspace / EDITS
-            content = _content(file)
+            content = content_of(file)
             if content == self._kept:
                 return False
             steps = () if content is None else read_steps(self.workspace, file)
@@ -436,12 +446,5 @@ class Session:
             write_recipe(file, list(self.edits.steps))
         else:
             file.unlink(missing_ok=True)
-        self._kept = _content(file)
+        self._kept = content_of(file)
         self._note_history()
-
-
-def _content(file: Path) -> bytes | None:
-    try:
-        return file.read_bytes()
-    except FileNotFoundError:
-        return None

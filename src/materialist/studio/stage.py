@@ -5,20 +5,15 @@ from shlex import quote
 from time import time
 from typing import Any
 
-import numpy as np
-
-from materialist.color import srgb_levels
 from materialist.edits.recipe import Step
 from materialist.errors import MaterialistError
-from materialist.io import display
 from materialist.jobs.queue import Job
-from materialist.studio import SETTINGS, glass
-from materialist.studio.edit_list import EditList
-from materialist.studio.live_preview import is_shaded
+from materialist.studio import glass, views
+from materialist.studio.edit_list import EditList, is_shaded
 from materialist.studio.selection import data_url
 from materialist.studio.session import EDITS, Session
 from materialist.studio.tasks import before_of
-from materialist.types import Array, Scene
+from materialist.types import Array
 
 _EMPTY: dict[str, Any] = {
     "picture": "",
@@ -99,8 +94,11 @@ def stage(
     if quiet:
         del shown["picture"]
         return {**shown, "coarse": True}
+    if not steps:
+        return {**shown, "picture": jpeg_url(live.scene.photo.linear), "coarse": coarse}
+    panes = {} if client is None else client.panes(steps)
     try:
-        linear = live.picture(steps, client, coarse=coarse)
+        made = live.call(views.picture, steps=steps, panes=panes, coarse=coarse)
     except MaterialistError as error:
         photo = jpeg_url(live.scene.photo.linear)
         why = session.without_folders(str(error))
@@ -113,7 +111,7 @@ def stage(
             "waiting": False,
             "bad": True,
         }
-    return {**shown, "picture": jpeg_url(linear), "coarse": coarse}
+    return {**shown, "picture": data_url(made, "jpeg"), "coarse": coarse}
 
 
 def _lamps(edits: EditList) -> list[list[float]]:
@@ -152,61 +150,12 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
 
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
-    return data_url(
-        display.encoded(srgb_levels(linear), "JPEG", quality=SETTINGS.jpeg_quality), "jpeg"
-    )
+    return data_url(views.encoded(linear), "jpeg")
 
 
 def jpeg_file(file: Path) -> str:
     """A JPEG file as a data URL."""
     return data_url(file.read_bytes(), "jpeg")
-
-
-def named_maps(scene: Scene) -> list[tuple[Array, str]]:
-    """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
-    shown = display.maps(scene)
-    return [
-        (shown["albedo"], "Albedo: colour without light"),
-        (shown["roughness"], "Roughness: black is a mirror, white is chalk"),
-        (shown["metallic"], "Metallic: white is metal"),
-        (shown["normal"], "Normals: which way surfaces face"),
-        (shown["depth"], "Depth: near is bright"),
-        (display.light(scene.envmap), "Light, all around; ahead is the middle"),
-        (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
-        (
-            display.error(scene.photo.linear, scene.rerender),
-            "Error: where it misses the photo (x 4)",
-        ),
-    ]
-
-
-def report(scene: Scene) -> str:
-    """How good the scene is, in Markdown and plain words."""
-    metrics = scene.report.metrics
-    value = metrics.get("rerender_psnr_path", float("nan"))
-    quality = (
-        f"Rendered from its maps and light, the scene is {value:.1f} dB from the photo. "
-        "Edits start from the photo."
-    )
-    lines = [quality] if np.isfinite(value) else []
-    camera = scene.camera
-    source = {
-        "exif": "from the photo's EXIF data",
-        "default": "assumed",
-        "option": "as chosen",
-    }.get(scene.photo.fov_source, f"from the {_safe(scene.photo.fov_source)}")
-    lines.append(
-        f"Worked at {camera.width} × {camera.height} pixels; field of view {camera.fov:.1f}° ({source}); first guess "
-        f"by `{_safe(scene.prior.predictor).replace('`', '')}`."
-    )
-    notes = scene.warnings
-    lines += ["", "**What to beware of**", *(f"- {_safe(note)}" for note in notes)] if notes else []
-    return "\n".join(lines)
-
-
-def _safe(text: str) -> str:
-    """A text that may hold a file name, without meaning in Markdown or HTML."""
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace("[", "&#91;")
 
 
 def failure_message(job: Job) -> str:

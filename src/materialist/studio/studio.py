@@ -18,11 +18,13 @@ import psutil
 
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import writing
+from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
+from materialist.memory import give_back
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
-from materialist.studio.live_preview import free_memory, load_renderer
+from materialist.studio.live import warmed
 from materialist.studio.page import Page
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
@@ -61,6 +63,8 @@ class Studio:
     _pages: dict[str, Page] = field(default_factory=dict)
     _left: list[Session] = field(default_factory=list)
     """Sessions that no page shows any more, whose memory is not given back yet."""
+    _spare: Worker | None = None
+    """A process that has loaded what a preview needs, for the photo that is being taken apart."""
     _closer: ThreadPoolExecutor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer")
     )
@@ -101,6 +105,24 @@ class Studio:
             ]
         for known in gone:
             self.leave(known)
+        self._rest()
+
+    def _rest(self) -> None:
+        """End the processes of previews that nobody asks for anything, or that no photo is coming for."""
+        with self._lock:
+            live = [page.session.live for page in self._pages.values()]
+        for one in live:
+            if one is not None:
+                one.rest(SETTINGS.preview_idle)
+        if not self.jobs.unfinished(kind=tasks.invert.__name__):
+            spare = self._take_spare()
+            if spare is not None:
+                spare.close()
+
+    def _take_spare(self) -> Worker | None:
+        with self._lock:
+            spare, self._spare = self._spare, None
+        return spare if spare is not None and spare.running else None
 
     def _check_pages(self, person: str) -> None:
         """Raise InputError where a person's sender has too many pages open."""
@@ -122,7 +144,7 @@ class Studio:
 
     def _new_session(self, person: str) -> Session:
         allowance = Allowance(self.quota, lambda: self.sender(person))
-        return Session(person, self.without_folders, self.single_user, allowance)
+        return Session(person, self.without_folders, self.single_user, allowance, self.device)
 
     def without_folders(self, text: str) -> str:
         """A text for a page: names in place of the paths of this machine."""
@@ -181,7 +203,7 @@ class Studio:
             with session.lock:
                 if session.live is None:
                     _check_memory(project)
-                    session.open(project)
+                    session.open(project, self._take_spare())
                 else:
                     session.take_over()
         except Exception:
@@ -200,7 +222,7 @@ class Studio:
             before.stop(self.jobs, *ENDING)
             before.close()
             if had_scene:
-                free_memory().result()
+                give_back()
 
     def discard(self, project: Project) -> None:
         """Delete a project: its jobs are stopped, and the pages that show it have none."""
@@ -291,8 +313,14 @@ class Studio:
             shutil.rmtree(project.folder, ignore_errors=True)
             raise
         if self.keeps_ready:
-            load_renderer()  # the preview comes next
+            self._warm_preview()
         return project, job
+
+    def _warm_preview(self) -> None:
+        """Let a process load what the preview needs, which comes next."""
+        with self._lock:
+            if self._spare is None or not self._spare.running:
+                self._spare = warmed(self.device)
 
     def unpack(self, session: Session, file: Path) -> Project:
         """A project with an uploaded, zipped scene package. Raises InputError."""
@@ -338,7 +366,7 @@ class Studio:
                 traceback.print_exception(error)
         sessions.clear()
         if had_scene:
-            free_memory().result()
+            give_back()
 
     def public_copy(self, person: str, file: Path, name: str = "") -> str:
         """A copy of a result for a person, in the cache, the only place of served files; its path.

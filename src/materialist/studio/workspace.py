@@ -307,3 +307,11 @@ def with_plain_files(step: Step, use: Callable[[str, str], Any]) -> Step:
         return use(option, value)
 
     return with_files(step, plain)
+
+
+def content_of(file: Path) -> bytes | None:
+    """The bytes of a file; None where there is none."""
+    try:
+        return file.read_bytes()
+    except FileNotFoundError:
+        return None

@@ -270,6 +270,8 @@ def _dropped(page: Any, photo: Path, size: int) -> dict[str, float]:
     # The page asks for a working size in a list that is folded away; what it keeps of it is plain.
     page.evaluate("(size) => sessionStorage.setItem('view', JSON.stringify({size}))", size)
     page.reload()
+    # Somebody drops on what they see; before that, the page may open its sheet over the photo.
+    page.wait_for_selector(".veil.open")
     data = base64.b64encode(photo.read_bytes()).decode()
     start = time.perf_counter()
     page.evaluate(_DROP, [photo.name, data])

@@ -8,28 +8,25 @@ from materialist.camera import project
 from materialist.edits.core.operation import Target
 from materialist.edits.recipe import Step, region_of
 from materialist.errors import MaterialistError
-from materialist.studio.session import Session
+from materialist.studio.live_preview import LivePreview
 from materialist.types import Array, Body
 
 
-def edit_at(session: Session, x: float, y: float) -> int | None:
+def edit_at(
+    live: LivePreview, listed: tuple[Step, ...], current: int | None, column: int, row: int
+) -> int | None:
     """The place in the list of the edit that a click at a pixel means; None for none, and for the current one.
 
     What stands in front comes first: objects, then regions, each the latest first. A second click on the thing of the
-    current edit selects as ever.
+    current edit selects as ever. It is a call of `studio.live`.
     """
-    live = session.live
-    if live is None:
-        return None
-    column, row = session.pixel(x, y)
-    edits = session.edits
     candidates: list[tuple[bool, int]] = []
-    for index, step in enumerate(edits.steps):
+    for index, step in enumerate(listed):
         if step.skipped:
             continue
         try:
             if step.operation.target is Target.PLACE:
-                if _stands_at(session, index, column, row):
+                if _stands_at(live, listed[: index + 1], column, row):
                     candidates.append((True, index))
             elif (
                 step.operation.target is Target.REGION and region_of(live.scene, step)[row, column]
@@ -37,16 +34,13 @@ def edit_at(session: Session, x: float, y: float) -> int | None:
                 candidates.append((False, index))
         except MaterialistError:
             continue  # what cannot be applied is told by the picture
-    if not candidates or max(candidates)[1] == edits.current:
+    if not candidates or max(candidates)[1] == current:
         return None
     return max(candidates)[1]
 
 
-def _stands_at(session: Session, index: int, column: int, row: int) -> bool:
-    """Whether an object of the list is seen at a pixel."""
-    live = session.live
-    assert live is not None
-    steps = session.edits.steps[: index + 1]
+def _stands_at(live: LivePreview, steps: tuple[Step, ...], column: int, row: int) -> bool:
+    """Whether an object, the last of some steps, is seen at a pixel."""
     before: tuple[Step, ...] = tuple(step for step in steps[:-1] if not step.skipped)
     known = {id(body) for body in live.edited(before).bodies}
     added = [body for body in live.edited((*before, steps[-1])).bodies if id(body) not in known]

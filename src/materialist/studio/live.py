@@ -1,0 +1,269 @@
+"""The live preview of an open photo, in a process of its own: torch, the renderer and all tables end with it.
+
+The studio's own process imports neither. It asks by `Live.call`, with functions that get the process's `LivePreview`.
+"""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from materialist import errors
+from materialist.edits.core.operation import PreviewMode
+from materialist.edits.recipe import Step
+from materialist.errors import InputError, MaterialistError
+from materialist.jobs.process import LOST, Message, Worker, sentence
+from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, Reporter
+from materialist.studio import SETTINGS, views
+from materialist.studio.access.quota import Allowance
+from materialist.studio.edit_list import key_of
+from materialist.types import Array, Scene
+
+Steps = tuple[Step, ...]
+CLOSED = "This photo was closed; open it again."
+
+
+class Live:
+    """An open scene, and the process of its preview. Methods may be called from any thread."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        package: Path,
+        file: Path,
+        allowance: Allowance | None = None,
+        worker: Worker | None = None,
+        device: str = "auto",
+    ):
+        """package: where the scene lies. file: where the preview keeps its tables. worker: one that `warmed` gave.
+
+        device: on which the preview is computed, as of `invert`.
+        """
+        self.scene = scene
+        self._package = str(package)
+        self._device = device
+        self._file = str(file)
+        self._allowance = allowance or Allowance()
+        self._lock = threading.Lock()
+        self._worker: Worker | None = None
+        self._calls: dict[int, Future[Any]] = {}
+        """What is asked at present, by its number."""
+        self._opening = 0
+        """The number of the task that opens the scene there."""
+        self._built: Future[None] = Future()
+        self._fine = False
+        self._closed = False
+        self._asked = time.monotonic()
+        self._fallen: set[str] = set()
+        """Lists of edits that end with a fall, which was simulated."""
+        with self._lock:
+            self._start(worker)
+
+    @property
+    def ready(self) -> bool:
+        """Whether there are live pictures, or an error in their place; an idle process is started when it is asked."""
+        return self._built.done()
+
+    @property
+    def fine(self) -> bool:
+        """Whether pictures have all their rays by now."""
+        return self._fine
+
+    @property
+    def process(self) -> int | None:
+        """The process's id; None where it is idle, closed, or was lost."""
+        worker = self._worker
+        return None if worker is None else worker.pid
+
+    def wait(self) -> None:
+        """Wait for the preview. Raises the error of its building, if there was one."""
+        self._built.result()
+
+    def call(self, function: Callable[..., Any], **arguments: Any) -> Any:
+        """What function(preview, **arguments), importable, returns in the process; `steps` are edits that it applies.
+
+        Raises its errors, if they are ours; InputError where the photo is closed or the process is lost meanwhile.
+        """
+        with self._allowed(arguments.get("steps", ())):
+            return self._begin(function, arguments).result()
+
+    def select(self, **where: Any) -> Array:
+        """[H, W] bool: what `edits.select.select.select` chooses by these keywords. Raises InputError."""
+        return np.asarray(self.call(views.selected, where=where))
+
+    def _begin(self, function: Callable[..., Any], arguments: dict[str, Any]) -> Future[Any]:
+        with self._lock:
+            if self._closed:
+                raise InputError(CLOSED)
+            if self._worker is None:
+                self._start(None)
+            assert self._worker is not None
+            self._asked = time.monotonic()
+            given = {"function": function, "arguments": arguments}
+            future: Future[Any] = Future()
+            self._calls[self._worker.begin(answer, given)] = future
+            return future
+
+    @contextmanager
+    def _allowed(self, steps: Steps) -> Iterator[None]:
+        """Count a fall that is simulated anew: what falls, and for how long, is a stranger's."""
+        slow = [k for k, step in enumerate(steps, 1) if _is_slow(step)]
+        key = key_of(steps[: slow[-1]]) if slow else None
+        if key is None or key in self._fallen:
+            yield
+            return
+        with self._allowance.opening():
+            yield
+        self._fallen.add(key)
+
+    def rest(self, seconds: float) -> None:
+        """End the process where it has been asked nothing for so long; the next question starts another one."""
+        with self._lock:
+            idle = not self._calls and self.ready and time.monotonic() - self._asked > seconds
+            worker = self._worker if idle else None
+            if worker is not None:
+                self._worker = None
+        if worker is not None:
+            worker.kill()
+
+    def close(self) -> None:
+        """End the process; whoever waits for it gets an InputError."""
+        with self._lock:
+            self._closed = True
+            worker = self._worker
+            self._worker = None
+            waiting = [*self._calls.values()]
+            self._calls.clear()
+        if worker is not None:
+            worker.kill()
+        for future in (*waiting, self._built):
+            _fail(future, InputError(CLOSED))
+
+    # The process
+
+    def _start(self, worker: Worker | None) -> None:
+        """Let a process, a new one where none is given, open the scene; the lock is held. Raises InputError."""
+        try:
+            self._worker = worker = worker or _new_worker()
+        except OSError as error:
+            raise InputError(f"The live preview cannot be started: {error}; try again.") from error
+        given = {"package": self._package, "file": self._file, "device": self._device}
+        self._opening = worker.begin(open_preview, given)
+        threading.Thread(target=self._listen, args=(worker,), name="live", daemon=True).start()
+
+    def _listen(self, worker: Worker) -> None:
+        """Take the messages of a process until it ends."""
+        for message in worker.messages():
+            with self._lock:
+                if worker is not self._worker:
+                    continue  # closed, or idle
+                lost = message.kind == LOST
+                future = (
+                    self._calls.pop(message.number, None)
+                    if message.kind in (DONE, FAILED)
+                    else None
+                )
+                failed = [*self._calls.values()] if lost else []
+                if lost:
+                    self._worker = None
+                    self._calls.clear()
+            if lost:
+                words = f"The live preview has ended: {message.facts['reason']} Do it again."
+                for waiting in (*failed, self._built):
+                    _fail(waiting, InputError(words))
+            elif future is not None:
+                _settle(future, message)
+            elif message.number == self._opening:
+                self._take(message)
+
+    def _take(self, message: Message) -> None:
+        """A message about the opening: there are pictures, then fine ones, or an error."""
+        if message.kind == INTERMEDIATE:
+            self._fine = message.facts["fine"]
+            if not self._built.done():
+                self._built.set_result(None)
+        elif message.kind == FAILED:
+            _fail(self._built, _error_of(message))
+
+
+def warmed(device: str) -> Worker | None:
+    """A process that loads what previews need, before there is a scene; None where none can be started."""
+    try:
+        worker = _new_worker()
+    except OSError:
+        return None
+    worker.begin(load, {"device": device})
+    return worker
+
+
+def _new_worker() -> Worker:
+    # What it opens may be a stranger's: it does not see the password.
+    return Worker(
+        environment={"MATERIALIST_PASSWORD": ""},
+        memory=SETTINGS.job_memory,
+        threads=SETTINGS.requests,
+    )
+
+
+def _is_slow(step: Step) -> bool:
+    return step.operation.preview is PreviewMode.SIMULATED and not step.skipped
+
+
+def _settle(future: Future[Any], message: Message) -> None:
+    if message.kind == DONE:
+        future.set_result(message.facts)
+    else:
+        _fail(future, _error_of(message))
+
+
+def _fail(future: Future[Any], error: Exception) -> None:
+    if not future.done():
+        future.set_exception(error)
+
+
+def _error_of(message: Message) -> Exception:
+    """The exception that a failed task raised, where it is one of ours; else one that says what it was."""
+    known = getattr(errors, message.facts["error"], MaterialistError)
+    return known(sentence(message.facts))
+
+
+# --- In the process ---
+
+_OPENED: Future[Any] = Future()
+"""The `LivePreview` of this process."""
+
+
+def load(report: Reporter, device: str) -> None:
+    """Load what previews need."""
+    from materialist.studio.live_preview import load_renderer
+
+    load_renderer(device)
+
+
+def open_preview(report: Reporter, package: str, file: str, device: str) -> None:
+    """Open a scene, once in a process; reports `fine` when there are pictures, and again when those are fine."""
+    from materialist.io.package import load_scene
+    from materialist.studio.live_preview import LivePreview, load_renderer
+
+    try:
+        if device != "auto":
+            load_renderer(device)
+        preview = LivePreview(load_scene(package), Path(file), Path(package))
+    except BaseException as error:
+        _OPENED.set_exception(error)
+        raise
+    _OPENED.set_result(preview)
+    preview.wait()
+    report.intermediate(fine=preview.fine)
+    preview.prepared.wait()
+    report.intermediate(fine=preview.fine)
+
+
+def answer(report: Reporter, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
+    """What a function of the preview returns."""
+    return function(_OPENED.result(), **arguments)

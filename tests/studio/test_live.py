@@ -1,0 +1,58 @@
+"""The process of a live preview: what it answers, and that the photo outlives it."""
+
+import os
+import signal
+
+import psutil
+import pytest
+from made_tasks import until
+from studio_scenes import block, package, room
+
+from materialist.edits.recipe import Step
+from materialist.errors import InputError
+from materialist.studio import views
+from materialist.studio.access.quota import Allowance, Quota
+from materialist.studio.live import Live
+from materialist.studio.workspace import write_mask
+
+
+def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
+    """One story, as starting the process is what takes time."""
+    quota = Quota(tmp_path)
+    live = Live(room(), package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
+    step = Step("edit", {"mask": write_mask(tmp_path, block()), "hue": "120"}, tmp_path)
+    # Selecting does not wait for the tables.
+    assert live.call(views.selected, where={"click": (25, 24)})[24, 25]
+    live.wait()
+    assert live.ready
+    until(lambda: live.fine)
+    picture = live.call(views.picture, steps=(step,), panes={})
+    assert picture.startswith(b"\xff\xd8")
+    # Errors come with their class and sentence.
+    with pytest.raises(InputError, match="must lie in"):
+        live.call(views.check, steps=(Step("edit", {**step.options, "roughness": "7"}, tmp_path),))
+    # Unused it ends, and the page does not see that: the next question starts another one.
+    first = live.process
+    live.rest(60)
+    assert live.process == first
+    live.rest(0)
+    until(lambda: not psutil.pid_exists(first))
+    assert live.ready and live.process is None
+    assert live.call(views.picture, steps=(step,), panes={}) == picture
+    # Ended by the system, it is told in words, once.
+    os.kill(live.process, signal.SIGSTOP)
+    second = live.process
+    future = live._begin(views.check, {"steps": (step,)})
+    os.kill(second, signal.SIGKILL)
+    with pytest.raises(InputError, match="ended: The worker process was ended by SIGKILL"):
+        future.result(30)
+    # A second fall of one person waits for the first.
+    fall = Step("drop", {"mesh": "x.ply", "at": ["5", "5"]}, tmp_path)
+    with quota.opening("somebody"), pytest.raises(InputError, match="being opened"):
+        live.call(views.check, steps=(fall,))
+    assert live.call(views.region, step=step).sum() == block().sum()
+    third = live.process
+    live.close()
+    until(lambda: not psutil.pid_exists(third))
+    with pytest.raises(InputError, match="was closed"):
+        live.call(views.check, steps=())
