@@ -301,6 +301,38 @@ def test_a_removal_is_a_job_that_can_be_stopped(client, heard):
     assert answer.status_code == 400 and "must lie in" in answer.json()["error"]
 
 
+def test_removals_are_switched_by_a_job_and_at_once_when_that_was_done(client, heard):
+    """The second hides something else without the first."""
+
+    def take_away(*box):
+        client.post("/api/deselect", json={})
+        client.post("/api/pick", json={"tool": "brush", "points": box, "radius": 4})
+        change(client, "remove")
+        heard(lambda news: not working(news))
+
+    def toggle():
+        return client.post("/api/act", json={"action": "toggle", "index": 0}).json()
+
+    take_away([20, 20], [30, 20])
+    take_away([22, 28], [30, 28])
+    state = client.get("/api/state").json()
+    assert [step["kind"] for step in state["steps"]] == ["remove", "remove"]
+    # --- Stopped, nothing changes; done, the list does ---
+    assert toggle()["steps"][0]["on"]
+    (job,) = heard(working)["jobs"][-1:]
+    assert job["kind"] == "removal" and job["text"]
+    client.post("/api/stop", json={"number": job["number"]})
+    heard(lambda news: not working(news))
+    assert client.get("/api/state").json()["steps"][0]["on"]
+    toggle()
+    heard(working)
+    heard(lambda news: not working(news))
+    assert not client.get("/api/state").json()["steps"][0]["on"]
+    # --- Both pictures are known by now ---
+    assert toggle()["steps"][0]["on"] and not toggle()["steps"][0]["on"]
+    assert client.post("/api/undo", json={}).json()["steps"][0]["on"]
+
+
 def test_two_tabs_on_one_photo_agree(client):
     """What one changes, the other shows and may change further; nothing is lost."""
     other = {"x-materialist-page": "c" * 32}

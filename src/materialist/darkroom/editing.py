@@ -4,7 +4,7 @@ from typing import Any
 
 from materialist.darkroom import bodies
 from materialist.darkroom.desk import Desk
-from materialist.darkroom.removing import take_away
+from materialist.darkroom.removing import take_away, when_filled
 from materialist.darkroom.state import outline, settable, state
 from materialist.edits.core.operation import Target
 from materialist.edits.light import presets
@@ -169,10 +169,17 @@ def let_fall(desk: Desk, body: bodies.Fall) -> State:
 
 
 def act(desk: Desk, body: bodies.Act) -> State:
-    desk.session.act(body.action, body.index)
+    session = desk.session
+    if body.action == "choose":
+        session.act(body.action, body.index)
+    else:
+        after = session.edits.acted(body.action, body.index)
+        when_filled(desk, after, lambda: session.act(body.action, body.index))
     return state(desk)
 
 
 def undo(desk: Desk, body: bodies.Undo) -> State:
-    desk.session.undo(again=body.again)
+    session = desk.session
+    after = session.undone(again=body.again)
+    when_filled(desk, after, lambda: session.undo(again=body.again))
     return state(desk)

@@ -1,5 +1,6 @@
-"""An object is taken away: what it hid is filled by a job, which takes seconds and can be stopped."""
+"""What a removal hid is filled by a job, which takes seconds and can be stopped; the list changes when it is done."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -46,6 +47,41 @@ def take_away(desk: Desk, options: dict[str, Any]) -> None:
         session.live.call(views.check, steps=_with(session, before, step).active)
         with session.lock:
             session.change(REMOVE.name, _with(session, before, step))
+
+    desk.follow(job, then)
+
+
+def when_filled(desk: Desk, after: EditList, change: Callable[[], None]) -> None:
+    """Make a change that leads to a list of edits: at once, or when a job has filled what its removals hide.
+
+    A removal hides something else when one before it is switched off, or the photo was opened by an older list.
+    """
+    session = desk.session
+    steps = after.active
+    removals = [k for k, step in enumerate(steps, 1) if step.kind == REMOVE.name]
+    if not removals or not session.preview.call(views.unfilled, steps=steps):
+        return change()
+    project = session.opened
+    before = session.edits
+    # Only the newest counts.
+    session.stop(desk.studio.jobs, tasks.removal.__name__)
+    job = desk.studio.submit(
+        session,
+        tasks.removal,
+        session.workspace,
+        scene=str(project.scene),
+        steps=steps[: removals[-1]],
+        fillings=str(session.workspace),
+    )
+
+    def then(entry: Followed) -> None:
+        if entry.job.state != DONE or session.live is None or not session.shows(project):
+            return
+        with session.lock:
+            if session.edits == before:
+                change()
+            else:
+                entry.notes.append("The list of edits has changed meanwhile; do it again.")
 
     desk.follow(job, then)
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from materialist.edits.core.operation import PreviewMode, Target
 from materialist.edits.recipe import Step
+from materialist.errors import InputError
 
 _SILENT = ("mask", "click", "box", "with", "skip", "thickness", "at", "seed", "gain")
 """Options that a summary leaves out: the picture shows them."""
@@ -68,6 +69,22 @@ class EditList:
 
     def without(self, index: int) -> EditList:
         return EditList((*self.steps[:index], *self.steps[index + 1 :]), None)
+
+    def acted(self, action: str, index: int) -> EditList:
+        """After one of the buttons of the list: toggle, up, down, remove, choose. Raises InputError."""
+        if not 0 <= index < len(self.steps):
+            raise InputError("That edit is no longer there.")
+        # Lazily: only the pressed button's list is made.
+        changed = {
+            "toggle": lambda: self.toggled(index),
+            "up": lambda: self.moved(index, -1),
+            "down": lambda: self.moved(index, 1),
+            "remove": lambda: self.without(index),
+            "choose": lambda: self.chosen(None if self.current == index else index),
+        }
+        if action not in changed:
+            raise InputError("That button is not known; reload the page.")
+        return changed[action]()
 
     def chosen(self, index: int | None) -> EditList:
         return replace(self, current=index)

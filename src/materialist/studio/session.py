@@ -283,20 +283,7 @@ class Session:
     def act(self, action: str, index: int) -> None:
         """One of the buttons of the list: toggle, up, down, remove, choose."""
         with self.lock:
-            if not 0 <= index < len(self.edits.steps):
-                raise InputError("That edit is no longer there.")
-            edits = self.edits
-            # Lazily: only the pressed button's list is made.
-            changed = {
-                "toggle": lambda: edits.toggled(index),
-                "up": lambda: edits.moved(index, -1),
-                "down": lambda: edits.moved(index, 1),
-                "remove": lambda: edits.without(index),
-                "choose": lambda: edits.chosen(None if edits.current == index else index),
-            }
-            if action not in changed:
-                raise InputError("That button is not known; reload the page.")
-            after = changed[action]()
+            after = self.edits.acted(action, index)
             # First everything that can fail, then the changes.
             region = self._region_of(after) if action == "choose" else None
             with self._or_as_before():
@@ -306,6 +293,11 @@ class Session:
                     self.selection = region
                     self._take_up_object()
                 self.save()
+
+    def undone(self, *, again: bool = False) -> EditList:
+        """The list of edits after `undo`; the present one where there is nothing to take back."""
+        entries = self._future if again else self._past
+        return entries[-1][1] if entries else self.edits
 
     def undo(self, *, again: bool = False) -> None:
         """Take back the last change, or do it again. Raises InputError where there is none."""

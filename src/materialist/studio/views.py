@@ -7,8 +7,9 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step, region_of
+from materialist.edits.remove.patches import NotFilled, remembered_alone
 from materialist.edits.select.select import select
-from materialist.errors import InputError
+from materialist.errors import InputError, MaterialistError
 from materialist.io import display
 from materialist.studio import SETTINGS
 from materialist.studio.glass import Panes
@@ -26,6 +27,18 @@ _SAMPLE = 2
 def check(live: LivePreview, steps: Steps) -> tuple[str, ...]:
     """The warnings of a list of edits. Raises InputError where it cannot be applied."""
     return live.edited(steps).report.warnings
+
+
+def unfilled(live: LivePreview, steps: Steps) -> bool:
+    """Whether something that the edits take away hid what was not filled yet, which takes seconds."""
+    try:
+        with remembered_alone():
+            live.edited(steps)
+    except NotFilled:
+        return True
+    except MaterialistError:
+        return False  # the picture tells what cannot be applied
+    return False
 
 
 def picture(live: LivePreview, steps: Steps, panes: Panes, coarse: bool = False) -> bytes:

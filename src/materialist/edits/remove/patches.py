@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb, srgb_to_linear
-from materialist.errors import SetupError
+from materialist.errors import MaterialistError, SetupError
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
 from materialist.install import install_command
@@ -42,6 +42,11 @@ SETTINGS = PatchSettings()
 _LOCK = threading.Lock()
 """The library has one seed for all threads."""
 _FOLDER: ContextVar[Path | None] = ContextVar("fillings", default=None)
+_MAY_FILL: ContextVar[bool] = ContextVar("may_fill", default=True)
+
+
+class NotFilled(MaterialistError):
+    """A hole that would have to be filled, within `remembered_alone`."""
 
 
 def patched(photo: Array, hole: Array, usable: Array, label: Array, seed: int = 0) -> Array:
@@ -96,6 +101,16 @@ def remembered(folder: Path) -> Iterator[None]:
         _FOLDER.reset(token)
 
 
+@contextmanager
+def remembered_alone() -> Iterator[None]:
+    """Within it a hole that was not filled before raises NotFilled: filling takes seconds."""
+    token = _MAY_FILL.set(False)
+    try:
+        yield
+    finally:
+        _MAY_FILL.reset(token)
+
+
 def _kept(levels: Array, gap: Array, excluded: Array, guide: Array, seed: int) -> Array:
     """`_inpainted`, once for equal arguments where fillings are remembered."""
     folder = _FOLDER.get()
@@ -110,6 +125,8 @@ def _kept(levels: Array, gap: Array, excluded: Array, guide: Array, seed: int) -
         filled = cv2.imread(str(file), cv2.IMREAD_COLOR)
         if filled is not None and filled.shape == levels.shape:
             return np.asarray(filled)
+    if not _MAY_FILL.get():
+        raise NotFilled("What was hidden has to be filled first.")
     filled = _inpainted(levels, gap, excluded, guide, seed)
     write_whole(file, cv2.imencode(".png", filled)[1].tobytes())
     return filled
