@@ -1,6 +1,7 @@
 """The darkroom on a small scene: by requests alone, and in a real browser."""
 
 import time
+from pathlib import Path
 
 import pytest
 
@@ -85,8 +86,12 @@ def client(local):
 def running(tmp_path_factory):
     """(address, work folder) of the darkroom in a process of its own, on the small scene."""
     folder = tmp_path_factory.mktemp("browser")
-    with studio_server.studio(folder, str(package(folder))) as (_, address):
+    with studio_server.studio(folder, str(package(folder))) as (process, address):
         yield address, folder / "work"
+        # Whatever the tests did: what is large is in the processes of the photos alone.
+        maps = Path(f"/proc/{process.pid}/maps")
+        loaded = maps.read_text() if maps.is_file() else ""
+        assert "libtorch" not in loaded and "mitsuba" not in loaded
 
 
 @pytest.fixture

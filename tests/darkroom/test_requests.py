@@ -1,12 +1,14 @@
 """Selecting and changing by requests: what they answer, and what they refuse."""
 
 import base64
+import gc
 import io
 import json
 import os
 import re
 import signal
 import time
+import weakref
 
 import made_tasks
 import numpy as np
@@ -351,6 +353,17 @@ def test_two_tabs_on_one_photo_agree(client):
     assert "roughness" not in options
     client.post("/api/close", json={}, headers=other)
     assert client.get("/api/state").json()["project"]["title"] == "Room"
+
+
+def test_a_closed_page_is_forgotten_with_the_scene_that_it_showed(client):
+    page = "d" * 32
+    client.post("/api/pick", json={"tool": "click", "at": [25, 24]})
+    client.get("/api/arrive", headers={"x-materialist-page": page})
+    known = weakref.ref(client.studio.page(page, "me").desk)
+    assert known().selected is not None
+    client.studio.leave(page)
+    gc.collect()
+    assert known() is None
 
 
 def test_other_photos_are_safe_while_one_is_taken_apart(client, heard, monkeypatch):

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from materialist.edits.core.notes import noise_notes
 from materialist.errors import InputError, MaterialistError
@@ -179,7 +178,6 @@ class Desks:
 
     def __init__(self, studio: Studio) -> None:
         self.studio = studio
-        self._desks: WeakKeyDictionary[Page, Desk] = WeakKeyDictionary()
         self._lock = threading.Lock()
 
     def of(self, name: str | None, person: str) -> Desk:
@@ -188,9 +186,11 @@ class Desks:
             raise InputError(LOST)
         page = self.studio.page(name, person)
         with self._lock:
-            if page not in self._desks:
-                self._desks[page] = Desk(self.studio, page)
-            return self._desks[page]
+            # With the page: a table of desks, each of which holds its page, would never forget one.
+            if page.desk is None:
+                page.desk = Desk(self.studio, page)
+            desk: Desk = page.desk
+            return desk
 
 
 def found_file(project: Project, name: str) -> Path:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 from materialist.studio.session import Session
 
@@ -19,6 +20,8 @@ class Page:
     """When it last asked for something, by the monotonic clock."""
     left: bool = False
     """Whether it was closed."""
+    desk: Any = None
+    """What a server of pages keeps beside it; it goes with the page."""
     _busy: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
 
