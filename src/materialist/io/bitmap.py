@@ -1,6 +1,7 @@
 """Pictures of whole levels, by Pillow and OpenCV, to linear Rec.709."""
 
 import io
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,6 +37,8 @@ _LIMIT = threading.RLock()
 _JPEG_END = b"\xff\xd9"
 _ENTROPY = (b"\x01", b"\x55", b"\x24", b"\xaa", b"\xd3")
 """Bytes that a JPEG decoder reads as coefficients; after some endings it takes a few of them for damage."""
+_PNM = re.compile(rb"P[2356](?:\s+(?:#[^\n]*\n\s*)*(\d+)){3}")
+"""Header of a PGM or PPM; its last number is the level that is white."""
 
 
 @dataclass
@@ -156,6 +159,8 @@ def read_bitmap(path: Path) -> Decoded:
             levels = _shallow(image, profile, space, warnings)
     # --- Linear, upright, over white ---
     colour, alpha, space = levels
+    if colour.dtype.kind == "f":  # of a PFM: light
+        return light_and_alpha(turned_upright(colour, tags).astype(np.float32), None, warnings)
     decoded = flattened(
         turned_upright(colour, tags),
         None if alpha is None else turned_upright(alpha, tags),
@@ -314,9 +319,22 @@ def levels_of(content: Array, path: Path) -> tuple[Array, Array | None]:
             f"{path} is no readable picture: damaged or truncated, too large, or of an unusual layout; export it again "
             "as EXR, or as PNG or TIFF of 8 or 16 bits."
         )
-    pixels = np.atleast_3d(decoded)
+    pixels = _whitened(np.atleast_3d(decoded), content)
     colour = pixels[..., :1] if pixels.shape[2] <= 2 else pixels[..., 2::-1]
     return colour, pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
+
+
+def _whitened(pixels: Array, content: Array) -> Array:
+    """Levels of a PGM or PPM, which OpenCV leaves as stored, so that its white is the largest; others as they are."""
+    header = _PNM.match(content[:4096].tobytes())
+    if header is None or pixels.dtype.kind != "u":
+        return pixels
+    white = int(header[1])
+    top = np.iinfo(pixels.dtype).max
+    if not 0 < white < top:
+        return pixels
+    scaled = np.round(np.minimum(pixels, white) * np.float32(top / white))
+    return np.asarray(scaled, pixels.dtype)
 
 
 def rgb_levels(path: Path) -> tuple[Array, Array | None]:
