@@ -1,8 +1,10 @@
 """Messages of the library in the words of the command line."""
 
+import json
+
 import pytest
 
-from materialist.cli.outcome import with_flags
+from materialist.cli.outcome import report_success, with_flags
 
 
 @pytest.mark.parametrize(
@@ -19,6 +21,12 @@ from materialist.cli.outcome import with_flags
 )
 def test_keywords_become_flags(python, flags):
     assert with_flags(python) == flags
+
+
+def test_notes_for_programs_name_flags_too(capsys):
+    report_success("export", True, [], notes=["give `residual=False`"], output="a `b=1`")
+    told = json.loads(capsys.readouterr().out)
+    assert told["notes"] == ["give --no-residual"] and told["output"] == "a `b=1`"
 
 
 def test_an_error_of_the_library_names_flags(refused, tmp_path):

@@ -30,6 +30,8 @@ GRACE = 5.0
 """Seconds in which a command that is told to end may take its unfinished files away."""
 _KEYWORD = re.compile(r"`(\w+)=([^`]+)`")
 """A keyword of Python in a message, as in `force=True` or `device="cpu"`."""
+_SENTENCES = {"notes", "warnings"}
+"""Facts that are sentences for people."""
 FLAGS = {"method": "with"}
 """Keywords whose flags have other names."""
 
@@ -130,6 +132,8 @@ def _flag(keyword: re.Match[str]) -> str:
 def report_success(command: str, as_json: bool, lines: Sequence[str], **facts: Any) -> None:
     """Tell a person in `lines`, or with `as_json` a program in one last line on stdout."""
     if as_json:
+        for name in _SENTENCES & facts.keys():
+            facts[name] = [with_flags(sentence) for sentence in facts[name]]
         typer.echo(json.dumps(plain({"ok": True, "command": command, **facts})))
     else:
         for line in lines:
