@@ -125,15 +125,8 @@ def read_bitmap(path: Path) -> Decoded:
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
     with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
         notes = list[str]()
-        try:
-            image.load()  # finds truncation, also for files whose pixels OpenCV reads below
-        except OSError:
-            content = _with_end(path) if image.format in ("JPEG", "MPO") else None
-            if content is None:
-                raise
-            image = Image.open(io.BytesIO(content))
-            image.load()
-            notes.append("The end marker of the JPEG is missing; all its pixels are there.")
+        # Finds truncation, also for files whose pixels OpenCV reads below.
+        image = loaded(image, path, notes)
         one_picture = image.format in ("MPO", "HEIF", "JPEG")
         warnings = notes + frames_note(1 if one_picture else getattr(image, "n_frames", 1))
         tags = image_tags(image)
@@ -169,6 +162,23 @@ def read_bitmap(path: Path) -> Decoded:
     )
     decoded.tags = tags
     return decoded
+
+
+def loaded(image: Image.Image, path: Path, notes: list[str]) -> Image.Image:
+    """An open image with its pixels; of a JPEG whose end marker alone is missing, too, with a note.
+
+    Pillow turns a TIFF upright here, and takes the orientation from its tags. Raises OSError for a truncated file.
+    """
+    try:
+        image.load()
+    except OSError:
+        content = _with_end(path) if image.format in ("JPEG", "MPO") else None
+        if content is None:
+            raise
+        image = Image.open(io.BytesIO(content))
+        image.load()
+        notes.append("The end marker of the JPEG is missing; all its pixels are there.")
+    return image
 
 
 def _with_end(path: Path) -> bytes | None:

@@ -118,7 +118,7 @@ def read_tiff(path: Path) -> Decoded:
             return _shallow(path, layout)
         _require_known(layout, path)
         tags = file_tags(path)
-        colour, alpha = _levels(page, layout, tags) if layout.for_tifffile else rgb_levels(path)
+        colour, alpha = _deep_pixels(page, layout, path)
     warnings = frames_note(layout.frames)
     if layout.extra[0] == _UNSPECIFIED:
         warnings.append(FOURTH)
@@ -134,6 +134,20 @@ def read_tiff(path: Path) -> Decoded:
         decoded = flattened(colour, alpha, space, warnings)
     decoded.tags = tags
     return decoded
+
+
+def deep_levels(path: Path) -> Array:
+    """[H, W, 3] uint16 levels of a grey or RGB TIFF of 16 or 32 bits, upright. Raises InputError for other layouts."""
+    with unprinted(), TiffFile(path) as file:
+        page: Any = file.pages[0]
+        layout = _Layout.of(page, len(file.pages))
+        _require_known(layout, path)
+        return _deep_pixels(page, layout, path)[0]
+
+
+def _deep_pixels(page: Any, layout: _Layout, path: Path) -> tuple[Array, Array | None]:
+    """RGB [H, W, 3] and alpha [H, W, 1] or None, upright, by the reader that knows the layout."""
+    return _levels(page, layout, file_tags(path)) if layout.for_tifffile else rgb_levels(path)
 
 
 def _shallow(path: Path, layout: _Layout) -> Decoded:
