@@ -260,7 +260,9 @@ def test_a_disk_without_room_is_refused_before_the_work(scene, tmp_path, monkeyp
     usage = namedtuple("usage", "total used free")
     # The light and the overview of an inversion take more, however small the photo is.
     for free in (1000, 1_500_000):
-        monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage(10**9, 10**9 - free, free))
+        monkeypatch.setattr(
+            shutil, "disk_usage", lambda folder, free=free: usage(10**9, 10**9 - free, free)
+        )
         with pytest.raises(
             OutputError, match=rf"no space left .* takes about [\d,]+ bytes, and {free:,}"
         ):
