@@ -123,10 +123,10 @@ def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
 def read_bitmap(path: Path) -> Decoded:
     """Everything Pillow opens but deep TIFF: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
-    with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
+    with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as opened:
         notes = list[str]()
         # Finds truncation, also for files whose pixels OpenCV reads below.
-        image = loaded(image, path, notes)
+        image = loaded(opened, path, notes)
         one_picture = image.format in ("MPO", "HEIF", "JPEG")
         warnings = notes + frames_note(1 if one_picture else getattr(image, "n_frames", 1))
         tags = image_tags(image)
