@@ -50,3 +50,9 @@ def test_the_command_is_named(package, ask, words, models, tmp_path, monkeypatch
     with pytest.raises(mt.SetupError, match=words):
         ask(tmp_path)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_studio_asks_before_it_makes_a_folder(refused, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    assert "install 'pydantic" in refused("studio", "--work", tmp_path / "work")
+    assert not (tmp_path / "work").exists()

@@ -161,11 +161,19 @@ class Prior(Record):
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        """Arrays of whatever was given. Raises InputError for another shape than the map has, or no numbers."""
+        """Arrays of whatever was given. Raises InputError for another shape than the map has, no numbers, or a mask."""
         for name, given in self.known.items():
-            values = np.asarray(given)
+            if np.ma.is_masked(given):
+                raise InputError(
+                    f"The prior's {name} is a masked array; fill what is masked, as in depth.filled(0)."
+                )
+            try:
+                values = np.asarray(given)
+            except Exception as error:  # whatever an object's __array__ raises
+                raise InputError(f"The prior's {name} is no array: {error}") from error
             channels = (3,) if name in ("albedo", "normal") else ()
-            if values.dtype.kind not in "fiub" or values.ndim < 2 or values.shape[2:] != channels:
+            is_map = values.ndim >= 2 and values.shape[2:] == channels and values.size > 0
+            if values.dtype.kind not in "fiub" or not is_map:
                 form = "[H, W, 3]" if channels else "[H, W]"
                 raise InputError(
                     f"The prior's {name} is {values.dtype}{list(values.shape)}; give numbers of the shape {form}."

@@ -10,7 +10,7 @@ from materialist.batches.photos import LONGEST_NAME as LONGEST
 from materialist.batches.photos import list_photos, unique_names
 from materialist.batches.remote import fingerprint, local_copy, without_secrets
 from materialist.batches.run import batch
-from materialist.errors import InputError
+from materialist.errors import InputError, SetupError
 
 
 def ids(source, runs="elsewhere"):
@@ -45,6 +45,20 @@ def test_a_list_has_its_own_folder_comments_and_each_photo_once(tmp_path):
 def test_a_list_may_be_utf16(tmp_path):
     (tmp_path / "list.txt").write_text("# grün\nexample:cat\n", "utf-16")
     assert [photo.id for photo in list_photos(tmp_path / "list.txt", runs="r")] == ["example:cat"]
+
+
+def test_a_list_of_urls_asks_for_their_library_before_the_work(tmp_path, monkeypatch):
+    def missing(protocol):
+        raise ImportError(f"library of {protocol}")
+
+    (tmp_path / "list.txt").write_text("https://host/a.jpg\n")
+    monkeypatch.setattr(fsspec, "get_filesystem_class", missing)
+    with pytest.raises(SetupError, match=r"^https://host/a.jpg needs .* install .*aiohttp"):
+        batch(tmp_path / "list.txt", tmp_path / "runs")
+    assert not (tmp_path / "runs").exists()
+    (tmp_path / "list.txt").write_text("s3://host/a.jpg\n")
+    with pytest.raises(SetupError, match="cannot be opened: library of s3"):
+        batch(tmp_path / "list.txt", tmp_path / "runs")
 
 
 def test_what_is_passed_over_is_named(tmp_path):

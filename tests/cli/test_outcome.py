@@ -1,8 +1,13 @@
 """Messages of the library in the words of the command line."""
 
-import pytest
+import json
+import signal
+import time
 
-from materialist.cli.outcome import with_flags
+import pytest
+import typer
+
+from materialist.cli.outcome import report_success, run_to_exit_code, with_flags
 
 
 @pytest.mark.parametrize(
@@ -21,6 +26,30 @@ def test_keywords_become_flags(python, flags):
     assert with_flags(python) == flags
 
 
+def test_notes_for_programs_name_flags_too(capsys):
+    report_success("export", True, [], notes=["give `residual=False`"], output="a `b=1`")
+    told = json.loads(capsys.readouterr().out)
+    assert told["notes"] == ["give --no-residual"] and told["output"] == "a `b=1`"
+
+
 def test_an_error_of_the_library_names_flags(refused, tmp_path):
     (tmp_path / "a.scene").mkdir()
     assert "give --force" in refused("invert", "example:coffee", "-o", tmp_path / "a.scene")
+
+
+def test_a_library_cannot_swallow_ctrl_c_while_it_is_imported(tmp_path, monkeypatch, capsys):
+    swallow = "import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException:\n    pass\n"
+    (tmp_path / "greedy_library.py").write_text(swallow)
+    monkeypatch.syspath_prepend(tmp_path)
+    before = signal.getsignal(signal.SIGINT)
+    app = typer.Typer()
+
+    @app.command()
+    def go() -> None:
+        import greedy_library  # noqa: F401
+
+        time.sleep(3)
+
+    assert run_to_exit_code(app, []) == 130
+    assert "nothing was written" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is before

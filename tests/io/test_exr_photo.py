@@ -341,6 +341,13 @@ def test_lines_that_make_no_sense_are_told_of(tmp_path, line):
     assert any("cannot be used" in note for note in photo.warnings)
 
 
+@pytest.mark.parametrize(("gamma", "notes"), [("2.2", 1), ("1.0", 0)])
+def test_a_gamma_that_is_not_used_is_told_of(tmp_path, gamma, notes):
+    photo = read_photo(radiance(tmp_path / "a.hdr", quadrants(), f"GAMMA={gamma}\n"))
+    assert_right(photo, 0.01)
+    assert sum("GAMMA" in note for note in photo.warnings) == notes
+
+
 @pytest.mark.parametrize(
     ("resolution", "stored"),
     [

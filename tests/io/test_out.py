@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+import tifffile
 from made_scene import make_scene
 from PIL import Image, ImageCms
 from tifffile import TiffFile
@@ -15,8 +16,10 @@ import materialist as mt
 from materialist.color import srgb_levels
 from materialist.errors import InputError, OutputError
 from materialist.io import colour_space as spaces
+from materialist.io.bitmap import turned_upright
 from materialist.io.exr import read_exr
 from materialist.io.icc import matrix_profile
+from materialist.io.out.encode import _deep_png
 from materialist.io.out.exif import SOFTWARE
 from materialist.io.out.icc import profile_of, srgb_profile
 from materialist.io.out.tiff import tiff_bytes
@@ -148,6 +151,63 @@ def test_a_photo_that_states_its_colours_without_a_profile_gets_one(tmp_path):
     named = ImageCms.ImageCmsProfile(io.BytesIO(image.info["icc_profile"])).profile
     assert named.profile_description == "Adobe RGB"
     assert image.getexif().get_ifd(0x8769)[0xA001] == 65535
+
+
+@pytest.mark.parametrize("orientation", [2, 6, 8])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("kind", ["png", "tif", "webp"])
+def test_turned_photos_of_wide_colours_keep_their_levels(tmp_path, kind, dtype, orientation):
+    if kind == "webp" and dtype != np.uint8:
+        pytest.skip("WebP has 8 bits")
+    levels = LEVELS.astype(dtype) * dtype(np.iinfo(dtype).max // 255)
+    path = tmp_path / f"photo.{kind}"
+    if kind == "tif":
+        tag = (0x112, "H", 1, orientation, True)
+        tifffile.imwrite(path, levels, photometric="rgb", iccprofile=P3, extratags=[tag])
+    else:
+        exif = Image.Exif()
+        exif[0x112] = orientation
+        settings = {"exif": exif, "icc_profile": P3, "lossless": True}
+        Image.fromarray(LEVELS).save(path, **settings)
+        if dtype == np.uint16:
+            path.write_bytes(_deep_png(levels, exif.tobytes(), P3))
+    photo = read_photo(path)
+    mt.save_image(tmp_path / "out.tif", photo.original, photo)
+    written = tifffile.imread(tmp_path / "out.tif")
+    upright = turned_upright(levels, {"Orientation": orientation})
+    assert written.dtype == dtype and np.array_equal(written, upright)
+    assert np.array_equal(read_photo(tmp_path / "out.tif").original, photo.original)
+
+
+def test_a_jpeg_without_its_end_keeps_its_colours(tmp_path):
+    buffer = io.BytesIO()
+    Image.fromarray(LEVELS).save(buffer, "JPEG", icc_profile=P3)
+    (tmp_path / "a.jpg").write_bytes(buffer.getvalue()[:-2])
+    photo = read_photo(tmp_path / "a.jpg")
+    assert mt.save_image(tmp_path / "out.png", photo.original, photo) == ()
+    assert Image.open(tmp_path / "out.png").info["icc_profile"] == P3
+
+
+@pytest.mark.parametrize("orientation", [1, 6])
+def test_a_wide_tiff_in_planes_keeps_its_levels(tmp_path, orientation):
+    levels = LEVELS.astype(np.uint16) * 257
+    tag = (0x112, "H", 1, orientation, True)
+    settings = {"planarconfig": "separate", "iccprofile": P3, "extratags": [tag]}
+    planes = np.moveaxis(levels, -1, 0)
+    tifffile.imwrite(tmp_path / "a.tif", planes, photometric="rgb", **settings)
+    photo = read_photo(tmp_path / "a.tif")
+    mt.save_image(tmp_path / "out.png", photo.original, photo)
+    written = cv2.imread(str(tmp_path / "out.png"), cv2.IMREAD_UNCHANGED)[..., ::-1]
+    assert np.array_equal(written, turned_upright(levels, {"Orientation": orientation}))
+
+
+@pytest.mark.parametrize(("profile", "notes"), [(P3, 1), (srgb_profile(), 0), (None, 0)])
+def test_colours_of_a_tiff_of_a_rare_layout_are_told_of(tmp_path, profile, notes):
+    levels = LEVELS.astype(np.uint32) << 24
+    tifffile.imwrite(tmp_path / "a.tif", levels, photometric="rgb", iccprofile=profile)
+    photo = read_photo(tmp_path / "a.tif")
+    told = mt.save_image(tmp_path / "out.png", photo.original, photo)
+    assert sum("rare layout" in note for note in told) == notes
 
 
 def test_colours_that_are_not_written_are_told_of(tmp_path):

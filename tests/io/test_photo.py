@@ -17,6 +17,7 @@ from materialist.errors import InputError
 from materialist.io.decode import SUFFIXES
 from materialist.io.exr import write_exr
 from materialist.io.icc import matrix_profile
+from materialist.io.image import read_map
 from materialist.io.photo import decode_photo, exposed, read_photo
 from materialist.types import Camera, Photo
 
@@ -73,6 +74,42 @@ def test_16_bits_stay_16_bits(tmp_path, suffix, channels):
     expected = srgb_to_linear(colour.astype(np.float64) / 65535)
     np.testing.assert_allclose(photo.linear, expected, atol=2e-6)
     assert photo.warnings == ()
+
+
+@pytest.mark.parametrize("white", [100, 255, 1023, 4095, 65535])
+@pytest.mark.parametrize("kind", ["P5", "P6"])
+def test_the_white_of_a_pnm_is_what_its_header_says(tmp_path, kind, white):
+    encoded = picture() / 255 if kind == "P6" else picture()[..., 0] / 255
+    levels = np.round(encoded * white).astype(">u2" if white > 255 else np.uint8)
+    header = f"{kind}\n# 30 20 9\n30 20\n{white}\n".encode()
+    (tmp_path / "a.pnm").write_bytes(header + levels.tobytes())
+    expected = np.atleast_3d(srgb_to_linear(levels / white)) * np.ones(3)
+    # Pillow keeps 8 bits of coloured ones.
+    np.testing.assert_allclose(read_photo(tmp_path / "a.pnm").linear, expected, atol=5e-3)
+    # As a map, too.
+    values = np.broadcast_to(np.atleast_3d(read_map(tmp_path / "a.pnm")), (20, 30, 3))
+    np.testing.assert_allclose(values, np.atleast_3d(levels / white) * np.ones(3), atol=3e-3)
+
+
+def test_a_grey_pfm_holds_light(tmp_path):
+    light = picture()[..., 0].astype(np.float32) / 64
+    (tmp_path / "a.pfm").write_bytes(b"Pf\n30 20\n-1.0\n" + light[::-1].tobytes())
+    photo = read_photo(tmp_path / "a.pfm")
+    assert photo.hdr
+    np.testing.assert_allclose(photo.original[..., 1] * 2.0**-photo.stops, light, rtol=1e-6)
+
+
+@pytest.mark.parametrize("bits", [4, 24])
+def test_tiffs_of_packed_levels_are_refused_as_what_they_are(tmp_path, bits):
+    tifffile.imwrite(tmp_path / "whole.tif", np.full((16, 16, 3), 9, np.uint8), photometric="rgb")
+    content = bytearray((tmp_path / "whole.tif").read_bytes())
+    # BitsPerSample of three channels lies outside of the directory.
+    at = content.index(struct.pack("<3H", 8, 8, 8))
+    content[at : at + 6] = struct.pack("<3H", bits, bits, bits)
+    (tmp_path / "packed.tif").write_bytes(content + bytes(4096))
+    with pytest.raises(InputError, match=f"{bits} bits") as refused:
+        read_photo(tmp_path / "packed.tif")
+    assert "damaged" not in str(refused.value) and "save it as plain" in str(refused.value)
 
 
 def test_float_tiff_is_scene_linear(tmp_path):

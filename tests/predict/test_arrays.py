@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 from made_maps import good_maps
 from made_matnet import made_photo
 
@@ -84,6 +85,18 @@ def test_maps_that_cannot_be_meant(name, values, words, photo):
 def test_shapes_are_checked_at_once():
     with pytest.raises(InputError, match=r"The prior's normal is float64\[2, 3\]"):
         mt.Prior(normal=np.ones((2, 3)))
+    with pytest.raises(InputError, match=r"The prior's depth is float64\[0, 3\]"):
+        mt.Prior(depth=np.ones((0, 3)))
+    for depth in ([[1, 2], [3]], torch.ones(2, 3, requires_grad=True)):
+        with pytest.raises(InputError, match="The prior's depth is no array: "):
+            mt.Prior(depth=depth)
+
+
+def test_what_is_masked_is_not_taken_for_a_value():
+    depth = np.ma.masked_greater(np.ones((H, W)) * 3, 2)
+    with pytest.raises(InputError, match=r"The prior's depth is a masked array; .*filled"):
+        mt.Prior(depth=depth)
+    mt.Prior(depth=depth.filled(0))
 
 
 def test_a_map_has_one_source():

@@ -94,7 +94,7 @@ def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
                     others.append(id)
     except OSError as error:
         raise InputError(
-            f"The folder {folder} cannot be read: {error.strerror or error}."
+            f"The folder {error.filename or folder} cannot be read: {error.strerror or error}."
         ) from error
     if others:
         notes.append(f"Passed over, as their names are no photo's: {_some(sorted(others))}.")

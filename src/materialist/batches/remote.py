@@ -2,13 +2,14 @@
 
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Any
 
 from materialist.batches.results import file_hash
 from materialist.errors import InputError, MaterialistError, SetupError
+from materialist.install import extra_command
 from materialist.io.photo import PREFIX, example_path
 
 LARGEST = 2 << 30
@@ -79,13 +80,36 @@ def _opened(url: str) -> Iterator[tuple[Any, str]]:
         yield fsspec.core.url_to_fs(url)
     except (InputError, SetupError):
         raise
-    except ImportError as error:  # fsspec names the package that the protocol needs
-        raise SetupError(f"{without_secrets(url)} cannot be opened: {error}.") from error
+    except ImportError as error:
+        raise _lacking(url, error) from error
     except FileNotFoundError as error:
         raise InputError(f"There is nothing at {without_secrets(url)}.") from error
     except Exception as error:
         reason = str(error).replace(url, without_secrets(url)) or type(error).__name__
         raise InputError(f"{without_secrets(url)} cannot be read: {reason}.") from error
+
+
+def require_stores(locations: Iterable[str]) -> None:
+    """Raise SetupError where a library that one of the URLs needs is not installed; nothing is opened."""
+    import fsspec
+
+    # One URL of each kind tells: `simplecache::https` is that of simplecache::https://...
+    kinds = {url.split("://")[0]: url for url in locations if is_url(url)}
+    for kind, url in kinds.items():
+        for protocol in kind.split("::"):
+            try:
+                fsspec.get_filesystem_class(protocol)
+            except ImportError as error:
+                raise _lacking(url, error) from error
+            except ValueError:  # a protocol that nobody knows shows when it is opened
+                continue
+
+
+def _lacking(url: str, error: ImportError) -> SetupError:
+    """The error of a library that is not there; of the stores but the web fsspec itself names it."""
+    if re.search(r"(^|::)https?:", url):
+        return SetupError(f"{without_secrets(url)} needs one more package: {extra_command('http')}")
+    return SetupError(f"{without_secrets(url)} cannot be opened: {str(error).rstrip('.')}.")
 
 
 def _path(url: str) -> PurePosixPath:

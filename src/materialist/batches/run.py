@@ -18,6 +18,7 @@ from materialist.batches.options import BatchOptions
 from materialist.batches.outcome import COLUMNS, Outcome, Row, Status, write_page, write_summary
 from materialist.batches.photos import Listed, list_photos
 from materialist.batches.plan import check_options, plan
+from materialist.batches.remote import require_stores
 from materialist.batches.task import SINGLE_THREAD, PhotoTask, process
 from materialist.errors import InputError, OutputError
 from materialist.jobs.pool import LocalPool, RayPool
@@ -86,6 +87,7 @@ def batch(
         edits_for(batch_options.recipe, "")  # a damaged list is an error before anything is written
     notes: list[str] = []
     photos = list_photos(source, runs=runs, notes=notes)
+    require_stores([photo.location for photo in photos])
     folder = Path(runs)
     facts = {**asked, "tool_version": __version__}
     with open_ledger(

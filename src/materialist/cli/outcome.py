@@ -28,8 +28,12 @@ KEEPING = frozenset({"train", "batch", "bench", "models", "studio"})
 """Commands that write as they go; the others write whole results, or nothing."""
 GRACE = 5.0
 """Seconds in which a command that is told to end may take its unfinished files away."""
+RETRY = 0.05
+"""Seconds after which Ctrl-C is looked at again."""
 _KEYWORD = re.compile(r"`(\w+)=([^`]+)`")
 """A keyword of Python in a message, as in `force=True` or `device="cpu"`."""
+_SENTENCES = {"notes", "warnings"}
+"""Facts that are sentences for people."""
 FLAGS = {"method": "with"}
 """Keywords whose flags have other names."""
 
@@ -38,7 +42,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code; no exception leaves except SystemExit of a signal."""
     wants_json = "--json" in arguments
     try:
-        with _tidy_when_terminated():
+        with _tidy_when_terminated(), _interrupted_between_imports():
             result = app(args=list(arguments), standalone_mode=False, prog_name="materialist")
         if result == INTERRUPTED:  # how some versions of typer report Ctrl-C
             raise KeyboardInterrupt
@@ -113,6 +117,46 @@ def _tidy_when_terminated() -> Iterator[None]:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
+@contextmanager
+def _interrupted_between_imports() -> Iterator[None]:
+    """Within it Ctrl-C waits for the end of an import, GRACE seconds at most.
+
+    Libraries swallow it while they are imported, so that the command goes on, or report that they are damaged.
+    """
+    here = threading.current_thread() is threading.main_thread()
+    if not here or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    waiting: list[threading.Timer] = []
+
+    def stop(number: int, frame: Any) -> None:
+        if not _is_importing(frame) or len(waiting) * RETRY >= GRACE:
+            waiting.clear()
+            raise KeyboardInterrupt
+        again = threading.Timer(RETRY, os.kill, (os.getpid(), number))
+        again.daemon = True
+        waiting.append(again)
+        again.start()
+
+    signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        for timer in waiting:
+            timer.cancel()
+        if signal.getsignal(signal.SIGINT) is stop:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _is_importing(frame: Any) -> bool:
+    """Whether a frame is one of a module that is being imported."""
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
+
+
 def with_flags(message: str) -> str:
     """A message in the words of the command line: flags for the keywords of Python."""
     return _KEYWORD.sub(_flag, message)
@@ -130,6 +174,8 @@ def _flag(keyword: re.Match[str]) -> str:
 def report_success(command: str, as_json: bool, lines: Sequence[str], **facts: Any) -> None:
     """Tell a person in `lines`, or with `as_json` a program in one last line on stdout."""
     if as_json:
+        for name in _SENTENCES & facts.keys():
+            facts[name] = [with_flags(sentence) for sentence in facts[name]]
         typer.echo(json.dumps(plain({"ok": True, "command": command, **facts})))
     else:
         for line in lines:

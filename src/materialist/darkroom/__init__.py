@@ -12,8 +12,8 @@ from materialist.errors import SetupError
 from materialist.install import extra_command
 
 
-def application(*arguments: Any, **options: Any) -> Any:
-    """`app.application`. Raises SetupError where the studio extra is not installed."""
+def require_packages() -> None:
+    """Raise SetupError where the studio extra is not installed."""
     try:
         import starlette  # noqa: F401
         import uvicorn  # noqa: F401
@@ -21,6 +21,11 @@ def application(*arguments: Any, **options: Any) -> Any:
         from pydantic import BaseModel  # noqa: F401
     except ImportError as error:
         raise SetupError(f"The studio needs one more package: {extra_command('studio')}") from error
+
+
+def application(*arguments: Any, **options: Any) -> Any:
+    """`app.application`. Raises SetupError where the studio extra is not installed."""
+    require_packages()
     from materialist.darkroom import app
 
     return app.application(*arguments, **options)

@@ -1,6 +1,7 @@
 """Pictures of whole levels, by Pillow and OpenCV, to linear Rec.709."""
 
 import io
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,6 +37,8 @@ _LIMIT = threading.RLock()
 _JPEG_END = b"\xff\xd9"
 _ENTROPY = (b"\x01", b"\x55", b"\x24", b"\xaa", b"\xd3")
 """Bytes that a JPEG decoder reads as coefficients; after some endings it takes a few of them for damage."""
+_PNM = re.compile(rb"P[2356](?:\s+(?:#[^\n]*\n\s*)*(\d+)){3}")
+"""Header of a PGM or PPM; its last number is the level that is white."""
 
 
 @dataclass
@@ -120,17 +123,10 @@ def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
 def read_bitmap(path: Path) -> Decoded:
     """Everything Pillow opens but deep TIFF: PNG, JPEG, HEIC, TIFF, WEBP, BMP, GIF, AVIF, ..."""
     # From an open file: Pillow maps files that it is given by name, and gets the rows of turned ones wrong.
-    with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as image:
+    with pixel_limit_lifted(), path.open("rb") as file, Image.open(file) as opened:
         notes = list[str]()
-        try:
-            image.load()  # finds truncation, also for files whose pixels OpenCV reads below
-        except OSError:
-            content = _with_end(path) if image.format in ("JPEG", "MPO") else None
-            if content is None:
-                raise
-            image = Image.open(io.BytesIO(content))
-            image.load()
-            notes.append("The end marker of the JPEG is missing; all its pixels are there.")
+        # Finds truncation, also for files whose pixels OpenCV reads below.
+        image = loaded(opened, path, notes)
         one_picture = image.format in ("MPO", "HEIF", "JPEG")
         warnings = notes + frames_note(1 if one_picture else getattr(image, "n_frames", 1))
         tags = image_tags(image)
@@ -156,6 +152,8 @@ def read_bitmap(path: Path) -> Decoded:
             levels = _shallow(image, profile, space, warnings)
     # --- Linear, upright, over white ---
     colour, alpha, space = levels
+    if colour.dtype.kind == "f":  # of a PFM: light
+        return light_and_alpha(turned_upright(colour, tags).astype(np.float32), None, warnings)
     decoded = flattened(
         turned_upright(colour, tags),
         None if alpha is None else turned_upright(alpha, tags),
@@ -164,6 +162,23 @@ def read_bitmap(path: Path) -> Decoded:
     )
     decoded.tags = tags
     return decoded
+
+
+def loaded(image: Image.Image, path: Path, notes: list[str]) -> Image.Image:
+    """An open image with its pixels; of a JPEG whose end marker alone is missing, too, with a note.
+
+    Pillow turns a TIFF upright here, and takes the orientation from its tags. Raises OSError for a truncated file.
+    """
+    try:
+        image.load()
+    except OSError:
+        content = _with_end(path) if image.format in ("JPEG", "MPO") else None
+        if content is None:
+            raise
+        image = Image.open(io.BytesIO(content))
+        image.load()
+        notes.append("The end marker of the JPEG is missing; all its pixels are there.")
+    return image
 
 
 def _with_end(path: Path) -> bytes | None:
@@ -314,9 +329,22 @@ def levels_of(content: Array, path: Path) -> tuple[Array, Array | None]:
             f"{path} is no readable picture: damaged or truncated, too large, or of an unusual layout; export it again "
             "as EXR, or as PNG or TIFF of 8 or 16 bits."
         )
-    pixels = np.atleast_3d(decoded)
+    pixels = _whitened(np.atleast_3d(decoded), content)
     colour = pixels[..., :1] if pixels.shape[2] <= 2 else pixels[..., 2::-1]
     return colour, pixels[..., -1:] if pixels.shape[2] in (2, 4) else None
+
+
+def _whitened(pixels: Array, content: Array) -> Array:
+    """Levels of a PGM or PPM, which OpenCV leaves as stored, so that its white is the largest; others as they are."""
+    header = _PNM.match(content[:4096].tobytes())
+    if header is None or pixels.dtype.kind != "u":
+        return pixels
+    white = int(header[1])
+    top = np.iinfo(pixels.dtype).max
+    if not 0 < white < top:
+        return pixels
+    scaled = np.round(np.minimum(pixels, white) * np.float32(top / white))
+    return np.asarray(scaled, pixels.dtype)
 
 
 def rgb_levels(path: Path) -> tuple[Array, Array | None]:

@@ -47,13 +47,15 @@ from materialist.types import (
 FORMAT = "materialist-scene"
 VERSION = 1
 _JSON_BYTES = 64_000_000
-BYTES_A_PIXEL = 200
+BYTES_A_PIXEL = 250
 """Of the working size that a package takes, beside the photo's file; 230 to 265 of ten photos."""
+FIXED_BYTES = 1_700_000
+"""Of the light and the overview, which a small photo has as well; 1.76 to 2.5 MB of five photos."""
 
 
 def check_room(path: str | Path, photo: Photo) -> None:
     """Ask before an inversion whether the disk has room for the scene of a photo at PATH. Raises OutputError."""
-    needed = BYTES_A_PIXEL * photo.linear[..., 0].size + len(photo.source or b"")
+    needed = FIXED_BYTES + BYTES_A_PIXEL * photo.linear[..., 0].size + len(photo.source or b"")
     free = shutil.disk_usage(Path(path).absolute().parent).free
     if free < needed:
         raise OutputError(

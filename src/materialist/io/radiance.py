@@ -85,6 +85,10 @@ def read_radiance(path: Path) -> Decoded:
     if (factor != 1).any():
         light /= factor.astype(np.float32)
     transformed(light, to_rec709(_primaries(header, notes)))
+    if (_product(header, "GAMMA", 1, notes) != 1).any():
+        notes.append(
+            "The line GAMMA of the Radiance header is not used: the values are taken as light."
+        )
     # --- Square pixels ---
     tall = _product(header, "PIXASPECT", 1, notes)[0]
     return square_pixels(Decoded(light, True, warnings=notes), 1 / tall, path)

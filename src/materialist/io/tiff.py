@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import UnidentifiedImageError
 from tifffile import TiffFile
 
 from materialist.color import ROWS
@@ -37,6 +38,8 @@ _ICCLAB = 9
 """What values mean, of PhotometricInterpretation."""
 _OWN = ("NONE", "ADOBE_DEFLATE", "DEFLATE", "LZMA")
 """Compressions that tifffile decodes without other packages."""
+_OF_FLOATS = 3
+"""A predictor."""
 _OPENCV = ("uint16", "float32", "float64")
 """Kinds of numbers deeper than 8 bits that OpenCV reads."""
 FOURTH = "The file says of its last channel that it is no transparency; it is left out."
@@ -60,6 +63,8 @@ class _Layout:
     """Channels of a pixel."""
     numbers: str
     """What NumPy calls their kind."""
+    predictor: int
+    """How values are told by their neighbours."""
 
     @property
     def for_tifffile(self) -> bool:
@@ -77,6 +82,8 @@ class _Layout:
         """Whether one of the two readers knows it; of grey and RGB."""
         numbers = np.dtype(self.numbers) if self.numbers in np.sctypeDict else np.dtype(complex)
         known = numbers.kind in ("u" if self.meaning == _INVERTED else "uf")
+        # Without its compiled codecs tifffile knows neither packed levels nor the predictor of floats.
+        known &= self.bits == 8 * numbers.itemsize and self.predictor != _OF_FLOATS
         return not self.for_tifffile or (known and self.compression in _OWN)
 
     @classmethod
@@ -93,6 +100,7 @@ class _Layout:
             frames,
             int(tags.valueof("SamplesPerPixel", 1)),
             str(page.dtype),
+            int(tags.valueof("Predictor", 1)),
         )
 
 
@@ -110,7 +118,7 @@ def read_tiff(path: Path) -> Decoded:
             return _shallow(path, layout)
         _require_known(layout, path)
         tags = file_tags(path)
-        colour, alpha = _levels(page, layout, tags) if layout.for_tifffile else rgb_levels(path)
+        colour, alpha = _deep_pixels(page, layout, path)
     warnings = frames_note(layout.frames)
     if layout.extra[0] == _UNSPECIFIED:
         warnings.append(FOURTH)
@@ -128,8 +136,28 @@ def read_tiff(path: Path) -> Decoded:
     return decoded
 
 
+def deep_levels(path: Path) -> Array:
+    """[H, W, 3] uint16 levels of a grey or RGB TIFF of 16 or 32 bits, upright. Raises InputError for other layouts."""
+    with unprinted(), TiffFile(path) as file:
+        page: Any = file.pages[0]
+        layout = _Layout.of(page, len(file.pages))
+        _require_known(layout, path)
+        return _deep_pixels(page, layout, path)[0]
+
+
+def _deep_pixels(page: Any, layout: _Layout, path: Path) -> tuple[Array, Array | None]:
+    """RGB [H, W, 3] and alpha [H, W, 1] or None, upright, by the reader that knows the layout."""
+    return _levels(page, layout, file_tags(path)) if layout.for_tifffile else rgb_levels(path)
+
+
 def _shallow(path: Path, layout: _Layout) -> Decoded:
-    decoded = read_bitmap(path)
+    try:
+        decoded = read_bitmap(path)
+    except UnidentifiedImageError as error:
+        raise InputError(
+            f"{path} is a TIFF of {layout.samples} channels of {layout.bits} bits in a layout that is not read; save "
+            "it as plain RGB of 8 or 16 bits."
+        ) from error
     # --- Transparency: only where the file says that the last channel is one ---
     if layout.extra[0] == _UNSPECIFIED:
         decoded.warnings.append(FOURTH)
@@ -145,6 +173,8 @@ def _require_known(layout: _Layout, path: Path) -> None:
         )
     if not layout.is_readable:
         order = " in planes" * (layout.planar == 2) + ", inverted" * (layout.meaning == _INVERTED)
+        order += f" of {layout.bits} bits" * (layout.bits % 8 != 0 or layout.bits == 24)
+        order += ", each told by its neighbour," * (layout.predictor == _OF_FLOATS)
         raise InputError(
             f"{path} is a TIFF of {layout.samples} channels of {layout.numbers}{order} with compression "
             f"{layout.compression}, which is not read; save it as plain 16-bit RGB."

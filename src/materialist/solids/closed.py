@@ -1,15 +1,16 @@
-"""A closed object from one view: the visible front, a back at the depth of its thickness, and the wall between.
+"""A closed object from one view: its front, a back at the depth of its thickness, and the wall between.
 
 The paper bends a camera ray twice at front normals and needs no back side. A closed surface can be path-traced:
 reflections inside, total internal reflection, shadows and caustics then come by themselves. What light does at glass is
-decided by normals, hardly by places: the front has those of the map, the back those that are known of it, else those
-of planes fitted to its depth.
+decided by normals, hardly by places: the front has those that are given, the back those that are known of it, else
+those of planes fitted to its depth.
 """
 
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from materialist.camera import rays_through, unit
 from materialist.errors import InputError
@@ -38,6 +39,9 @@ class ClosedSettings:
     min_thickness: float = 0.004  # of the object's size: front and back never touch; by eye
     min_border_thickness: float = 1e-4  # the same at the border, part of the depth
     normal_blur: float = 0.01  # standard deviation, part of the object's size; tuned by eye
+    outline_blur: float = (
+        0.015  # the same for the outline, which glass shows as a ragged rim; by eye
+    )
     min_cosine: float = 0.35  # n.v from which a slanting wall gets no longer; tuned by eye
 
 
@@ -168,7 +172,9 @@ def _closed(view: _View, camera: Camera) -> Shell:
     front = view.depth
     thick = view.thickness
     # --- The outline, triangulated on a grid finer than the pixels of a small object ---
-    silhouette_distance = silhouette_field(known)  # [h, w] pixels
+    silhouette_distance = gaussian_filter(
+        silhouette_field(known), SETTINGS.outline_blur * view.size
+    )  # [h, w] pixels
     points_per_pixel = int(
         np.clip(round(SETTINGS.grid_points / max(known.shape)), 1, SETTINGS.max_points_per_pixel)
     )

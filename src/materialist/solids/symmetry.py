@@ -79,11 +79,11 @@ def _silhouette_plane(
     gap = border[ring] * front[ring] * spacing(rays) / length
     before = gap * cosine / (1 - np.sqrt(1 - cosine**2))
     weight = (1 - cosine) ** SETTINGS.grazing_power + 1e-4
-    a, b, c = _robust_plane(rays[ring][:, 0], rays[ring][:, 1], 1 / (front[ring] + before), weight)
+    a, b, c = robust_plane(rays[ring][:, 0], rays[ring][:, 1], 1 / (front[ring] + before), weight)
     return a + b * rays[..., 0] + c * rays[..., 1]
 
 
-def _robust_plane(x: Array, y: Array, values: Array, weight: Array) -> tuple[float, float, float]:
+def robust_plane(x: Array, y: Array, values: Array, weight: Array) -> tuple[float, float, float]:
     """Coefficients (a, b, c) of values [n] ~ a + b x + c y by weighted least absolute deviations."""
     centre = np.array([np.average(x, weights=weight), np.average(y, weights=weight)])
     basis = np.stack([np.ones_like(x), x - centre[0], y - centre[1]], -1)

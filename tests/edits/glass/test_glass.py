@@ -72,7 +72,10 @@ def test_thickness_is_given_mirrored_or_predicted():
         and (given.solid[~MASK] == 0).all()
     )
     assert object_thickness(scene, MASK, "symmetry").method == "symmetry"
-    assert object_thickness(scene, MASK).method in {"revolution", "network", "symmetry"}
+    assert object_thickness(scene, MASK, "network").method == "network"
+    assert object_thickness(scene, MASK).method == "outline"
+    forced = object_thickness(scene, MASK, "outline")
+    assert forced.method == "outline" and forced.front is not None
     for wrong, message in (
         (np.ones((3, 3)), "thickness map is"),
         (-np.ones(MASK.shape), "negative"),

@@ -55,6 +55,19 @@ def test_polygons_of_any_shape_keep_their_area_and_side(tmp_path, suffix, outlin
     np.testing.assert_allclose(body.normals @ facing, 1, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("kd", "albedo", "is_told"),
+    [("0.7", 0.7, False), ("xyz 0.2 0.2 0.2", 0.5, True), ("spectral a.rfl", 0.5, True)],
+)
+def test_colours_of_a_material_that_are_no_rgb(tmp_path, kd, albedo, is_told):
+    write(tmp_path / "a.mtl", f"newmtl a\nKd {kd}\n")
+    model = read_model(
+        write(tmp_path / "a.obj", "\n".join(["mtllib a.mtl", "usemtl a", *BOX_LINES]))
+    )
+    assert colours(model) == [[pytest.approx(albedo)] * 3]
+    assert any(f"Kd '{kd}'" in note for note in model.warnings) == is_told
+
+
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("mark", ["", "\ufeff"])
 def test_lines_of_any_kind(tmp_path, end, mark):

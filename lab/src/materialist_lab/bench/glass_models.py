@@ -114,11 +114,12 @@ def two_interface(
     mask = case.stage.mask
     # "found" takes the normals that are given, "same" those of the front.
     beyond = interfaces.Backdrop(behind.picture, behind.maps.depth, scene.envmap)
+    depth, normal = thickness.front or (scene.depth, scene.normal)
     material = Glass(ior=case.ior, model="two-interface", back="same" if papers_back else "found")
     return interfaces.two_interface(
         scene.camera,
-        scene.normal,
-        scene.depth,
+        normal,
+        depth,
         mask,
         thickness.solid,
         beyond,
@@ -135,8 +136,7 @@ def closed(case: Case, thickness: Thickness, behind: Background) -> Array:
     whole = thickness.revolution
     if whole is not None:
         return before(case, whole.body(scene.camera), behind)
-    depth = scene.depth
-    normal = scene.normal
+    depth, normal = thickness.front or (scene.depth, scene.normal)
     beyond = behind.maps.depth
     body = closed_proxy(
         depth, normal, mask, thickness.solid, scene.camera, behind=beyond, back=thickness.back

@@ -96,9 +96,10 @@ def _shell(
     revolution = thick.revolution
     wall = wall_of(scene, part, thick) if hollow else None
     if revolution is None:
+        depth, normal = thick.front or (scene.depth, scene.normal)
         shell = closed_proxy(
-            scene.depth,
-            scene.normal,
+            depth,
+            normal,
             part,
             thick.solid,
             camera,
@@ -169,10 +170,7 @@ def _front(scene: Scene, region: Array, thick: Thickness) -> tuple[Array, Array,
     Normals of the maps are blurred as for the closed proxy.
     """
     if thick.revolution is None:
-        return (
-            region,
-            scene.depth,
-            blurred_normals(scene.normal, region, 0.01 * float(np.sqrt(region.sum()))),
-        )
+        depth, normal = thick.front or (scene.depth, scene.normal)
+        return region, depth, blurred_normals(normal, region, 0.01 * float(np.sqrt(region.sum())))
     depth, normal = thick.revolution.front(region, pixel_rays(scene.camera).astype(np.float64))
     return depth > 0, depth, normal

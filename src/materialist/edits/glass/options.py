@@ -58,8 +58,8 @@ class Glass(Removal):
         "auto",
         "How thick it is; a file has scene units.",
         kind="file",
-        choices=("auto", "network", "symmetry"),
-        metavar="auto|network|symmetry|FILE",
+        choices=("auto", "outline", "network", "symmetry"),
+        metavar="auto|outline|network|symmetry|FILE",
     )
     """One of the methods, or [H, W] along the camera rays, or a file of that."""
 

@@ -1,4 +1,4 @@
-"""How thick the object under a mask is: given, of a surface of revolution, by RefractionNet, or mirrored."""
+"""How thick the object under a mask is: given, of a surface of revolution, inflated, by RefractionNet, or mirrored."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +12,16 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.planes import upright
 from materialist.geometry.silhouette import object_size, silhouette_field, surface_in
 from materialist.io.image import read_map
-from materialist.predict.refraction.thickness import Thickness, best_thickness, thickness
+from materialist.predict.refraction.thickness import (
+    Thickness,
+    best_thickness,
+    of_outline,
+    thickness,
+)
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
 
-METHODS = ("auto", "network", "symmetry")
+METHODS = ("auto", "outline", "network", "symmetry")
 """Names of `--thickness`."""
 
 
@@ -55,9 +60,9 @@ def object_thickness(
     """The thickness of the object under a mask [H, W] bool (paper, Thickness Prior Prediction).
 
     Args:
-        method: `auto` (a surface of revolution where its outline says so, else RefractionNet),
-            `network` (RefractionNet), `symmetry` (the paper's assumption), or a map [H, W] of scene
-            units along the rays, or its file.
+        method: `auto` (a surface of revolution where its outline says so, else `outline`),
+            `outline` (inflated from it), `network` (RefractionNet), `symmetry` (the paper's
+            assumption), or a map [H, W] of scene units along the rays, or its file.
         behind: [H, W] planar depth of what stands behind the object, 0 = nothing.
 
     Raises InputError for an unknown method, a map of another size or with negative values, a mask without a surface;
@@ -73,6 +78,8 @@ def object_thickness(
         return Thickness(mirrored, np.zeros_like(mirrored), method=method)
     if method == "network":
         return thickness(*maps)
+    if method == "outline":
+        return of_outline(thickness(*maps).hollow, inside, scene.normal, scene.depth, scene.camera)
     up = upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
     return best_thickness(*maps, up=up, behind=behind)
 

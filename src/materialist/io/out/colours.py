@@ -1,5 +1,6 @@
 """The colours that a photo's file has: pictures made of it are written in them, so that none are clipped to sRGB."""
 
+import io
 import tempfile
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from tifffile import TiffFile
 
 from materialist.color import ROWS, srgb_levels
-from materialist.io.bitmap import pixel_limit_lifted, rgb_levels, turned_upright
+from materialist.io.bitmap import loaded, pixel_limit_lifted, rgb_levels, turned_upright
 from materialist.io.boxes import jp2_profile
 from materialist.io.colour_space import ColourSpace, transformed
 from materialist.io.colour_tags import png_chunks, stated_space
@@ -18,6 +20,7 @@ from materialist.io.exif import image_tags
 from materialist.io.icc import matrix_profile
 from materialist.io.out.depth import is_deep, is_tiff
 from materialist.io.out.icc import profile_of, srgb_profile
+from materialist.io.tiff import deep_levels
 from materialist.types import Array, Photo
 
 UNKEPT = "The photo's colours are of a kind that is not written ({}); the picture is sRGB."
@@ -26,6 +29,8 @@ CLIPPED = (
 )
 _TOLERANCE = 1e-6
 """Linear difference up to which a pixel is the photo's: far less than a level of 16 bits but in the darkest."""
+_GREY_AND_RGB = (0, 1, 2)
+"""PhotometricInterpretation of TIFF."""
 _MOVED = 0.25
 """Share of what clipping took by which a channel is well above 0 (by eye)."""
 
@@ -122,11 +127,8 @@ def photo_colours(photo: Photo) -> PhotoColours:
         file.write_bytes(photo.source)
         try:
             return _of_file(file, deep=is_deep(photo))
-        except (
-            OSError,
-            ValueError,
-        ):  # formats that Pillow does not know: EXR, float and CIELab TIFF
-            return SRGB
+        except (OSError, ValueError):  # what Pillow does not know: EXR, and TIFFs of some layouts
+            return _of_odd_tiff(photo.source) if is_tiff(photo.source) else SRGB
 
 
 def _of_file(file: Path, *, deep: bool) -> PhotoColours:
@@ -153,16 +155,23 @@ def _of_file(file: Path, *, deep: bool) -> PhotoColours:
         if "A" in mode or "a" in mode or "transparency" in image.info or (kind == "HEIF" and deep):
             return PhotoColours(written_profile, colours, notes=(CLIPPED,))
         if not deep:
-            return PhotoColours(
-                written_profile, colours, turned_upright(np.asarray(image.convert("RGB")), tags)
-            )
-    # OpenCV turns TIFF upright itself.
-    levels = rgb_levels(file)[0]
-    return PhotoColours(
-        written_profile,
-        colours,
-        levels if is_tiff(file.read_bytes()) else turned_upright(levels, tags),
-    )
+            whole = loaded(image, file, [])
+            stored = turned_upright(np.asarray(whole.convert("RGB")), image_tags(whole))
+            return PhotoColours(written_profile, colours, stored)
+    is_a_tiff = is_tiff(file.read_bytes())
+    levels = deep_levels(file) if is_a_tiff else turned_upright(rgb_levels(file)[0], tags)
+    return PhotoColours(written_profile, colours, levels)
+
+
+def _of_odd_tiff(content: bytes) -> PhotoColours:
+    """sRGB, with a note where a TIFF that Pillow does not open has other colours."""
+    page = TiffFile(io.BytesIO(content)).pages.first
+    profile = page.tags.valueof("InterColorProfile")
+    colours = matrix_profile(profile) if profile else None
+    is_srgb = profile is None if colours is None else colours.is_srgb
+    if is_srgb and page.photometric in _GREY_AND_RGB:
+        return SRGB
+    return PhotoColours(SRGB.profile, notes=(UNKEPT.format("a TIFF of a rare layout"),))
 
 
 def _reason(mode: str, profile: bytes | None) -> str:

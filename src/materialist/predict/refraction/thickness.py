@@ -10,6 +10,7 @@ from materialist.camera import pixel_rays, unit
 from materialist.errors import InputError, WeightsError
 from materialist.geometry.silhouette import surface_in
 from materialist.predict.refraction.crop import BACK_X, Window, refraction_features, to_window
+from materialist.solids.inflated import inflated
 from materialist.solids.outline import surface_of_revolution
 from materialist.solids.revolution import Revolution
 from materialist.types import Array, Camera
@@ -32,6 +33,8 @@ class Thickness:
     """[H, W, 3] float32 unit, camera frame: outward normals of its last surface, 0 outside the mask; None: unknown."""
     revolution: Revolution | None = None
     """The whole object, where it is a surface of revolution."""
+    front: tuple[Array, Array] | None = None
+    """[H, W] planar depth and [H, W, 3] normals of its first surface, where it has others than the maps."""
     method: str = "network"
     """Where it comes from."""
 
@@ -89,21 +92,37 @@ def best_thickness(
     up: Array | None = None,
     behind: Array | None = None,
 ) -> Thickness:
-    """The thickness of the object under a mask: of a surface of revolution by itself, else as `thickness` has it.
+    """The thickness of the object under a mask: of a surface of revolution by itself, else of its inflated outline.
 
-    `back` is None for surfaces of revolution, whose `revolution` tells more. `up`: [3] unit, the upright direction in
-    the camera's frame, where a support tells it. `behind`: [H, W] planar depth of the surface behind the object, 0 =
-    nothing.
+    `back` and `front` are None for surfaces of revolution, whose `revolution` tells more. `up`: [3] unit, the upright
+    direction in the camera's frame, where a support tells it. `behind`: [H, W] planar depth of the surface behind the
+    object, 0 = nothing.
     """
     # The network still gives the wall of the hollow object, which an outline does not show.
     guess = thickness(photo_linear, mask, normal, depth, camera)
-    fitted = surface_of_revolution(
-        depth, normal, surface_in(mask, depth, camera), camera, up=up, behind=behind
-    )
+    inside = surface_in(mask, depth, camera)
+    fitted = surface_of_revolution(depth, normal, inside, camera, up=up, behind=behind)
     if fitted is None:
-        return guess
+        return of_outline(guess.hollow, inside, normal, depth, camera)
     body, solid = fitted
     return Thickness(solid, np.minimum(guess.hollow, solid), revolution=body, method="revolution")
+
+
+def of_outline(
+    hollow: Array, mask: Array, normal: Array, depth: Array, camera: Camera
+) -> Thickness:
+    """The thickness, front and back of the body inflated from the outline of a mask; maps as of `thickness`.
+
+    hollow: [H, W] through the walls alone, scene units, as far as it is known.
+    """
+    body = inflated(depth, normal, mask, camera)
+    return Thickness(
+        body.thickness,
+        np.minimum(hollow, body.thickness),
+        body.back,
+        front=(body.depth, body.normal),
+        method="outline",
+    )
 
 
 def _answer(

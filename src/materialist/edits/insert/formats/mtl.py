@@ -93,14 +93,14 @@ class MtlLibrary:
         picture, layout = _map(entries.get("map_kd", []))
         colour = self.textures.pixels(picture)
         # Writers leave Kd black, or half, beside a texture: it counts where there is none.
-        kd = _numbers(entries.get("kd"), (GREY,) * 3).reshape(1, 1, 3)
+        kd = _colour(entries.get("kd"), GREY).reshape(1, 1, 3)
         albedo = kd if colour is None else srgb_to_linear(colour)
         (exponent,) = _numbers(entries.get("ns"), (0.0,))
         shiny = (2 / (max(exponent, 0.0) + 2)) ** 0.25 if exponent else GREY
         roughness = _numbers(entries.get("pr"), (shiny,)).reshape(1, 1)
         metallic = _numbers(entries.get("pm"), (0.0,)).reshape(1, 1)
         surface = clipped_surface(albedo, roughness, metallic)
-        emission = np.clip(np.nan_to_num(_numbers(entries.get("ke"), (0.0,) * 3), posinf=0), 0, 1e6)
+        emission = np.clip(np.nan_to_num(_colour(entries.get("ke"), 0.0), posinf=0), 0, 1e6)
         content.left_out += _left_out(entries)
         return Paint(replace(surface, emission=triple(emission)), layout)
 
@@ -146,10 +146,29 @@ def _left_out(entries: dict[str, list[str]]) -> list[str]:
     left_out = []
     if _numbers(entries.get("d"), (1.0,))[0] < 1 or _numbers(entries.get("tr"), (0.0,))[0] > 0:
         left_out.append("its transparency (taken as opaque)")
+    for key in ("kd", "ke"):
+        if not _is_colour(entries.get(key, ["0"])):
+            left_out.append(
+                f"its {key.title()} '{' '.join(entries[key])[:40]}', which is no RGB colour"
+            )
     for key in entries:
         if key.startswith(("map_", "bump", "norm", "disp")) and key != "map_kd":
             left_out.append(f"its {key[:40]}")
     return left_out
+
+
+def _is_colour(words: list[str]) -> bool:
+    """Whether an entry has one or three numbers: not `xyz` or `spectral`."""
+    try:
+        return len(list(map(float, words))) in (1, 3)
+    except ValueError:
+        return False
+
+
+def _colour(words: list[str] | None, otherwise: float) -> Array:
+    """[3] float32 of an entry: one number is red, green and blue alike."""
+    words = words * 3 if words is not None and len(words) == 1 else words
+    return _numbers(words, (otherwise,) * 3)
 
 
 def _numbers(value: Any, otherwise: tuple[float, ...]) -> Array:
