@@ -141,6 +141,8 @@ class Live:
             self._calls.clear()
         if worker is not None:
             worker.kill()
+            # It holds the scene, whose memory is given back next.
+            self._listener.join(2)
         for future in (*waiting, self._built):
             _fail(future, InputError(CLOSED))
 
@@ -154,7 +156,10 @@ class Live:
             raise InputError(f"The live preview cannot be started: {error}; try again.") from error
         given = {"package": self._package, "file": self._file, "device": self._device}
         self._opening = worker.begin(open_preview, given)
-        threading.Thread(target=self._listen, args=(worker,), name="live", daemon=True).start()
+        self._listener = threading.Thread(
+            target=self._listen, args=(worker,), name="live", daemon=True
+        )
+        self._listener.start()
 
     def _listen(self, worker: Worker) -> None:
         """Take the messages of a process until it ends."""
