@@ -84,18 +84,19 @@ def _membrane(inside: Array) -> Array:
     distance = silhouette_field(np.pad(inside, _MARGIN, mode="edge"))[margin]
     # --- The five-point Laplacian; beyond the frame the membrane goes on as at its edge ---
     own = np.zeros(inside.shape)
-    rows, columns = [], []
+    starts: list[Array] = []
+    ends: list[Array] = []
     for near, far in (np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:]):
         both = inside[near] & inside[far]
-        rows += [index[near][both], index[far][both]]
-        columns += [index[far][both], index[near][both]]
+        starts += [index[near][both], index[far][both]]
+        ends += [index[far][both], index[near][both]]
         for one, other in ((near, far), (far, near)):
             # Next to the outline the slope is that to the outline, which is nearer than the neighbour.
             part = distance[one] / np.maximum(distance[one] - distance[other], 1e-6)
             to_outline = 1 / np.clip(part, _NEAREST, 1)
             own[one] += np.where(inside[other], 1, to_outline) * inside[one]
-    rows, columns = np.concatenate(rows), np.concatenate(columns)
-    links = coo_matrix((-np.ones(len(rows)), (rows, columns)), (count, count))
+    places = np.concatenate(starts), np.concatenate(ends)
+    links = coo_matrix((-np.ones(len(places[0])), places), (count, count))
     # --- Solved ---
     # A mask without any outline has no largest thickness: the pull back bounds it.
     system = csr_matrix(links + diags(own[inside] + 1e-3 / count))
