@@ -39,7 +39,7 @@ _ICCLAB = 9
 _OWN = ("NONE", "ADOBE_DEFLATE", "DEFLATE", "LZMA")
 """Compressions that tifffile decodes without other packages."""
 _OF_FLOATS = 3
-"""A predictor."""
+"""The predictor of floating-point numbers."""
 _OPENCV = ("uint16", "float32", "float64")
 """Kinds of numbers deeper than 8 bits that OpenCV reads."""
 FOURTH = "The file says of its last channel that it is no transparency; it is left out."
@@ -64,7 +64,7 @@ class _Layout:
     numbers: str
     """What NumPy calls their kind."""
     predictor: int
-    """How values are told by their neighbours."""
+    """How values are stored as differences to their neighbours; 1 is not at all."""
 
     @property
     def for_tifffile(self) -> bool:
@@ -174,7 +174,7 @@ def _require_known(layout: _Layout, path: Path) -> None:
     if not layout.is_readable:
         order = " in planes" * (layout.planar == 2) + ", inverted" * (layout.meaning == _INVERTED)
         order += f" of {layout.bits} bits" * (layout.bits % 8 != 0 or layout.bits == 24)
-        order += ", each told by its neighbour," * (layout.predictor == _OF_FLOATS)
+        order += " with the predictor of floats" * (layout.predictor == _OF_FLOATS)
         raise InputError(
             f"{path} is a TIFF of {layout.samples} channels of {layout.numbers}{order} with compression "
             f"{layout.compression}, which is not read; save it as plain 16-bit RGB."

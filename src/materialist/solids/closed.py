@@ -39,9 +39,7 @@ class ClosedSettings:
     min_thickness: float = 0.004  # of the object's size: front and back never touch; by eye
     min_border_thickness: float = 1e-4  # the same at the border, part of the depth
     normal_blur: float = 0.01  # standard deviation, part of the object's size; tuned by eye
-    outline_blur: float = (
-        0.015  # the same for the outline, which glass shows as a ragged rim; by eye
-    )
+    outline_blur: float = 0.015  # the same for the outline: no ragged rim; by eye
     min_cosine: float = 0.35  # n.v from which a slanting wall gets no longer; tuned by eye
 
 

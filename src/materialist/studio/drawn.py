@@ -71,7 +71,7 @@ class Drawing:
 def keys(session: Session) -> dict[str, str]:
     """Kind of change -> the key of what `content` would give for it; kinds that a page cannot draw now are left out."""
     drawings = {kind: _drawing(session, kind) for kind in KINDS}
-    return {kind: found[1].key(found[0]) for kind, found in drawings.items() if found}
+    return {kind: pair[1].key(pair[0]) for kind, pair in drawings.items() if pair}
 
 
 def content(session: Session, kind: str) -> bytes | None:
@@ -80,10 +80,10 @@ def content(session: Session, kind: str) -> bytes | None:
     They begin with the length of a JSON header, uint32, and the header, filled up to a multiple of 4 bytes. Its
     `arrays` are [name, type, shape] each; their bytes, each filled up likewise, follow in this order, little-endian.
     """
-    found = _drawing(session, kind)
-    if found is None:
+    pair = _drawing(session, kind)
+    if pair is None:
         return None
-    live, drawing = found
+    live, drawing = pair
     key = drawing.key(live)
     steps = (*drawing.before, drawing.own, *drawing.after)
     content: bytes | None = live.call(block, kind=kind, drawing=drawing, key=key, steps=steps)
