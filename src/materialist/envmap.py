@@ -1,10 +1,30 @@
 """The texels of an equirectangular environment map, in the project's convention (docs/conventions.md)."""
 
+from dataclasses import dataclass
+
+import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter
 from scipy.special import sph_harm_y
 
 from materialist.camera import pixel_rays, project, unit
 from materialist.types import Array, Camera
+
+
+@dataclass(frozen=True)
+class DetailSettings:
+    """How the photo's detail lies around the camera; by eye on 4 photos."""
+
+    coarse: float = 0.08  # of the photo's longer side: what is broader is left to the fitted light
+    floor: float = 0.05  # radiance added before ratios are taken
+    max_log: float = 1.0  # of a ratio
+    fade_in: float = 15.0  # degrees from the frame's edge to full detail
+    full_elevation: float = 50.0  # degrees up to which detail is full
+    last_elevation: float = 75.0  # degrees; there it ends, and so does the photo
+    white: float = 1.0  # radiance from which a texel is a lamp, which has no detail
+
+
+DETAIL = DetailSettings()
 
 
 def row_solid_angle(height: int) -> Array:
@@ -125,3 +145,49 @@ def paste_visible_sky(
     # --- Texels with pixels in them take their mean, smaller ones the pixel at their centre ---
     value = np.where(count > 0, total / np.maximum(count, 1), raised(photo[r, c], envmap))
     return np.where(seen, value, envmap).astype(np.float32)
+
+
+def with_mirrored_photo(envmap: Array, photo: Array, camera: Camera) -> Array:
+    """The map with the photo's detail where the photo does not look, so that mirrors have something to show.
+
+    A fitted light is smooth: diffuse surfaces tell no more. As in Khan et al. 2006 (image-based material editing) the
+    photo stands for what is behind the camera: mirrored and stretched from the right edge of the frame round to the
+    left one. Only its ratio to its own broad colours is taken, so that the light on diffuse surfaces stays.
+
+    envmap: [h, 2h, 3] linear. photo: [H, W, 3] linear.
+    """
+    h, w = envmap.shape[:2]
+    x, y, z = np.moveaxis(texel_directions(h, w), -1, 0)
+    azimuth = np.degrees(np.arctan2(x, -z))
+    elevation = np.degrees(np.arcsin(np.clip(y, -1, 1)))
+    half_fov = camera.fov / 2
+    # --- Where a texel looks into the mirrored photo: 0 at the frame's edge, 1 straight behind ---
+    turned = (np.abs(azimuth) - half_fov) / (180 - half_fov)
+    column = np.where(azimuth > 0, 1 - turned / 2, turned / 2)
+    row = 0.5 - elevation / (2 * DETAIL.last_elevation)
+    # --- The photo at the size at which the map shows it, over its own broad colours ---
+    size = (
+        max(2, round(w * (1 - camera.fov / 360))),
+        max(2, round(h * DETAIL.last_elevation / 90)),
+    )
+    small = cv2.resize(np.ascontiguousarray(photo, np.float32), size, interpolation=cv2.INTER_AREA)
+    log = np.log(np.maximum(small, 0) + DETAIL.floor)
+    widths = [DETAIL.coarse * max(photo.shape) * n / m for n, m in zip(size[::-1], photo.shape)]
+    fine = log - gaussian_filter(log, (*widths, 0))
+    ratio = np.exp(np.clip(fine, -DETAIL.max_log, DETAIL.max_log))
+    ratio /= gaussian_filter(ratio, (*widths, 0))
+    # --- Laid on the map, fading out at the frame, at the poles and on lamps ---
+    place = [
+        np.clip(share * length - 0.5, 0, length - 1).astype(np.float32)
+        for share, length in zip((column, row), size, strict=True)
+    ]
+    detail = cv2.remap(ratio, *place, cv2.INTER_LINEAR)
+    fade = np.clip((np.abs(azimuth) - half_fov) / DETAIL.fade_in, 0, 1)
+    fade = fade * np.clip(
+        (DETAIL.last_elevation - np.abs(elevation))
+        / (DETAIL.last_elevation - DETAIL.full_elevation),
+        0,
+        1,
+    )
+    fade = fade * (envmap.max(-1) < DETAIL.white)
+    return (envmap * (1 + fade[..., None] * (detail - 1))).astype(np.float32)

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from materialist.buffers import placed
-from materialist.envmap import paste_visible_sky
+from materialist.envmap import paste_visible_sky, with_mirrored_photo
 from materialist.fit.albedo import solve_albedo
 from materialist.fit.engine import (
     Engine,
@@ -132,9 +132,11 @@ class Fit:
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 
     def prepared_light(self, radiance: torch.Tensor) -> Array:
-        """[h, 2h, 3] a found light of any size, with the photo's own sky where the settings want it."""
+        """[h, 2h, 3] a found light of any size, with the photo's own sky and detail where the settings want them."""
         setup = self.setup
         envmap = prepared_envmap(radiance, setup.envmap_height)
+        if setup.settings.light.mirrored:
+            envmap = with_mirrored_photo(envmap, setup.photo.linear, setup.photo.camera)
         if not setup.settings.light.sky:
             return envmap
         surface = np.zeros(setup.photo.linear.shape[:2], bool)

@@ -53,6 +53,7 @@ class LightSettings:
     # linear value from which a photo's channel is clipped: a brighter rendering is no error
     white: float = math.inf
     sky: bool = False  # the photo's own sky takes the place of what was fitted there
+    mirrored: bool = False  # the photo's detail, mirrored, where the photo does not look
     schedule: Schedule = dataclasses.field(default_factory=Schedule)
     again: Schedule | None = None  # of another fit of the light after each stage of the materials
     # weight of the total variation of log radiance, as it differs from the predicted one
@@ -160,6 +161,7 @@ DEFAULT = FitSettings(
         encoding="srgb",
         white=CLIPPED,
         sky=True,
+        mirrored=True,
         schedule=Schedule(learning_rate=0.1, max_steps=240, decay_every=80, decay=0.6, patience=0),
         smooth=0.03,
         chroma=0.05,
