@@ -10,6 +10,7 @@ from skimage.morphology import remove_small_objects
 
 from materialist.color import linear_to_srgb, luminance
 from materialist.edits.composite.native_layer import NativeLayer, native_layer
+from materialist.edits.composite.rims import settled
 from materialist.edits.core.region import body_coverage
 from materialist.edits.core.renderer import (
     EditRenderer,
@@ -105,6 +106,9 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
     layers = difference(
         base, other, changed, guides if options.denoise else None, options, hidden=hidden
     )
+    if relit:
+        rendered = settled([layers.base, layers.edited], scene.depth, scene.photo.linear)
+        layers = replace(layers, base=rendered[0], edited=rendered[1])
     return replace(
         layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited)
     )
