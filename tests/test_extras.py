@@ -7,6 +7,7 @@ import pytest
 from edit_scenes import flat_scene
 
 import materialist as mt
+from materialist.edits.remove.background import inpainter
 from materialist.edits.remove.patches import patched
 from materialist.io.photo import read_photo
 from materialist.io.video import write_frames
@@ -38,12 +39,14 @@ FLAT = np.ones((4, 6), bool)
             lambda _: get_predictor("constant", normal="marigold"),
             "needs diffusers.* install 'diffusers",
         ),
+        ("diffusers", lambda _: get_predictor("marigold:a/b"), "needs diffusers"),
+        ("transformers", lambda _: get_predictor("constant", depth="depth-anything"), "needs tran"),
+        ("diffusers", lambda _: inpainter("sd"), "needs diffusers.* leave inpaint out"),
     ],
 )
-def test_the_command_is_named(package, ask, words, models, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("models")  # no weights: the library is asked for before them
+def test_the_command_is_named(package, ask, words, tmp_path, monkeypatch):
     (tmp_path / "a.CR2").write_bytes(b"II*\0" * 20)
-    (models / "prs-eth--marigold-normals-v1-1").mkdir(parents=True)
-    (models / "prs-eth--marigold-normals-v1-1" / "SHA256SUMS").touch()
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)

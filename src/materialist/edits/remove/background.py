@@ -88,6 +88,7 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
         )
     gpu = on_gpu(device)
     with hub.advice("leave inpaint out"):
+        hub.import_library("diffusers")  # before gigabytes of weights are asked for
         folder = locate(where, DEFAULT)
         pipeline = hub.pipeline(
             "StableDiffusionInpaintPipeline",
