@@ -78,9 +78,9 @@ def test_16_bits_stay_16_bits(tmp_path, suffix, channels):
 
 def deep_picture(path, bits, channels):
     """Writes a lossless AVIF or JPEG 2000 of 9 to 16 bits a channel; its levels [H, W, C], RGB before alpha."""
-    levels = (
-        np.random.default_rng(bits).integers(0, 1 << bits, (16, 17, channels)).astype(np.uint16)
-    )
+    ramp = np.linspace(0, (1 << bits) - 1, 64 * 96).reshape(64, 96)
+    turned = (ramp, ramp[::-1], ramp[:, ::-1], ramp)[:channels]
+    levels = np.round(np.stack(turned, -1)).astype(np.uint16)
     stored = levels[..., [0] if channels == 1 else [2, 1, 0, 3][:channels]]
     if path.suffix == ".avif":
         cv2.imwrite(
@@ -94,7 +94,7 @@ def deep_picture(path, bits, channels):
     )
     content = bytearray(path.read_bytes())
     content[content.index(b"ihdr") + 14] = bits - 1
-    sizes = content.index(b"\xff\x4f\xff\x51") + 40
+    sizes = content.index(b"\xff\x4f\xff\x51") + 42
     content[sizes : sizes + 3 * channels : 3] = bytes([bits - 1]) * channels
     path.write_bytes(content)
     return levels
@@ -111,7 +111,7 @@ def test_10_to_16_bits_of_avif_and_jpeg_2000_stay(tmp_path, suffix, bits, channe
     levels = deep_picture(tmp_path / f"a.{suffix}", bits, channels)
     photo = read_photo(tmp_path / f"a.{suffix}")
     expected = srgb_to_linear(levels / ((1 << bits) - 1.0)) * np.ones(3)
-    np.testing.assert_allclose(photo.linear, expected, atol=2e-5)
+    np.testing.assert_allclose(photo.linear, expected, atol=5e-5)
     assert photo.warnings == ()
 
 
@@ -140,7 +140,9 @@ def test_the_white_of_a_pnm_is_what_its_header_says(tmp_path, kind, white):
     header = f"{kind}\n# 30 20 9\n30 20\n{white}\n".encode()
     (tmp_path / "a.pnm").write_bytes(header + levels.tobytes())
     expected = np.atleast_3d(srgb_to_linear(levels / white)) * np.ones(3)
-    np.testing.assert_allclose(read_photo(tmp_path / "a.pnm").linear, expected, atol=2e-5 if white > 255 else 5e-3)
+    np.testing.assert_allclose(
+        read_photo(tmp_path / "a.pnm").linear, expected, atol=2e-5 if white > 255 else 5e-3
+    )
     # As a map, too.
     values = np.broadcast_to(np.atleast_3d(read_map(tmp_path / "a.pnm")), (20, 30, 3))
     np.testing.assert_allclose(values, np.atleast_3d(levels / white) * np.ones(3), atol=3e-3)

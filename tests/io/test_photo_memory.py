@@ -47,7 +47,7 @@ def write(folder, name):
     if name.endswith("16.png"):
         cv2.imwrite(str(path), with_alpha(deep) if "rgba" in name else deep)
     elif name == "deep.avif":
-        cv2.imwrite(str(path), with_alpha(deep >> 6), [cv2.IMWRITE_AVIF_DEPTH, 10])
+        cv2.imwrite(str(path), with_alpha(deep) >> 6, [cv2.IMWRITE_AVIF_DEPTH, 10])
     elif name in ("deep.jp2", "deep.ppm"):
         cv2.imwrite(str(path), deep)
     elif name == "float.tif":
