@@ -9,6 +9,7 @@ from edit_scenes import flat_scene
 import materialist as mt
 from materialist.edits.remove.background import inpainter
 from materialist.edits.remove.patches import patched
+from materialist.exporters import run
 from materialist.io.photo import read_photo
 from materialist.io.video import write_frames
 from materialist.predict import get_predictor
@@ -53,6 +54,14 @@ def test_the_command_is_named(package, ask, words, tmp_path, monkeypatch):
     with pytest.raises(mt.SetupError, match=words):
         ask(tmp_path)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_usd_asks_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
+    monkeypatch.setattr(run, "with_residual", lambda scene: pytest.fail("the work comes first"))
+    with pytest.raises(mt.SetupError, match="pip install 'usd-core"):
+        mt.export(flat_scene(), tmp_path / "a.usdz")
 
 
 def test_the_studio_asks_before_it_makes_a_folder(refused, tmp_path, monkeypatch):

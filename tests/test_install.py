@@ -1,5 +1,6 @@
 """Commands that install work in environments with and without a pip, and name no other project."""
 
+import re
 import shlex
 import sys
 
@@ -40,3 +41,12 @@ def test_an_extra_that_this_installation_does_not_know_names_our_distribution(mo
 
     monkeypatch.setattr(install.metadata, "requires", unknown)
     assert install.extra_requirements("usd") == ["materialist-photo[usd]"]
+
+
+def test_the_laboratory_is_installed_by_name_or_from_a_checkout(monkeypatch):
+    assert install.laboratory_advice().endswith("/lab") and " -e " in install.laboratory_advice()
+    monkeypatch.setattr(install, "__file__", "/usr/lib/site-packages/materialist/install.py")
+    assert re.search(
+        "install materialist-photo-lab, or in a checkout.* install ./lab$",
+        install.laboratory_advice(),
+    )

@@ -24,12 +24,15 @@ def install_command(*requirements: str) -> str:
     return shlex.join(["uv", "pip", "install", "--python", sys.executable, *requirements])
 
 
-def laboratory_command() -> str:
-    """A line for a shell that installs the laboratory: from the checkout that this package runs from, if it does."""
+def laboratory_advice() -> str:
+    """Lines for a shell that install the laboratory: from the checkout that this package runs from, if it does."""
     folder = Path(__file__).resolve().parents[2] / "lab"
     if (folder / "pyproject.toml").is_file():
         return install_command("-e", str(folder))
-    return install_command(LABORATORY)
+    return (
+        f"{install_command(LABORATORY)}, or in a checkout of the repository: "
+        f"{install_command('./lab')}"
+    )
 
 
 def extra_command(extra: str) -> str:
