@@ -5,8 +5,10 @@ import sys
 import numpy as np
 import pytest
 from edit_scenes import flat_scene
+from PIL import Image
 
 import materialist as mt
+from materialist.edits import recipe
 from materialist.edits.remove.background import inpainter
 from materialist.edits.remove.patches import patched
 from materialist.exporters import run
@@ -54,6 +56,22 @@ def test_the_command_is_named(package, ask, words, tmp_path, monkeypatch):
     with pytest.raises(mt.SetupError, match=words):
         ask(tmp_path)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("library", ["mujoco", "coacd"])
+def test_a_list_of_edits_asks_for_physics_before_its_first_step(library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    monkeypatch.setattr(recipe, "_applied", lambda *_: pytest.fail("the work comes first"))
+    (tmp_path / "edits.yaml").write_text(
+        "- relight: {rotate: 45}\n- drop: {mesh: a.ply, at: [8, 30]}\n"
+    )
+    words = "need two more packages; install them with: .* install 'coacd"
+    with pytest.raises(mt.SetupError, match=words):
+        recipe.apply(flat_scene(), recipe.read_recipe(tmp_path / "edits.yaml"))
+    Image.fromarray(np.zeros((16, 16), np.uint8)).save(tmp_path / "photo.png")
+    with pytest.raises(mt.SetupError, match=words):
+        mt.batch(tmp_path / "photo.png", tmp_path / "runs", apply=tmp_path / "edits.yaml")
+    assert not (tmp_path / "runs").exists()
 
 
 def test_usd_asks_before_the_work(tmp_path, monkeypatch):
