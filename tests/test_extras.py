@@ -44,7 +44,7 @@ FLAT = np.ones((4, 6), bool)
         ),
         ("diffusers", lambda _: get_predictor("marigold:a/b"), "needs diffusers"),
         ("transformers", lambda _: get_predictor("constant", depth="depth-anything"), "needs tran"),
-        ("diffusers", lambda _: inpainter("sd"), "needs diffusers.* leave inpaint out"),
+        ("diffusers", lambda _: inpainter("sd"), "needs diffusers.* leave `inpaint"),
     ],
 )
 @pytest.mark.usefixtures("models")  # no weights: the library is asked for before them

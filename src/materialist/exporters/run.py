@@ -69,8 +69,13 @@ def export(
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and most is None:
         most = PAGE_TRIANGLES
+    # --- What is missing is told before the work ---
     if to == "usd":
-        _usd_writers()  # before the work
+        _usd_writers()
+    if settings.blender is not None:
+        from materialist.exporters.blender import find_blender
+
+        find_blender(settings.blender)
     ensure_writable(path, force, EXPORT if path.suffix.lower() not in SUFFIX.values() else None)
     carries = settings.residual and to != "html"
     if carries:
