@@ -129,6 +129,16 @@ def test_urls_are_listed_versioned_and_fetched(tmp_path):
         list_photos("nosuchstore://bucket", runs="r")
 
 
+def test_a_store_out_of_reach_is_not_called_empty(monkeypatch):
+    def unreachable(self, path, detail=True, **options):
+        raise OSError("Cannot connect to host")
+
+    # fsspec's search of folders passes over such errors.
+    monkeypatch.setattr(fsspec.get_filesystem_class("memory"), "ls", unreachable)
+    with pytest.raises(InputError, match="cannot be read: Cannot connect to host"):
+        list_photos("memory://bucket/photos", runs="r")
+
+
 def test_names_are_stems_as_long_as_those_are_unique():
     names = unique_names(
         ["a/k.png", "b/k.jpg", "c.png", "d.png", "d.jpg", "x y/é.png", "http://h/p/z.jpg"]

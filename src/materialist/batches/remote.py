@@ -36,6 +36,8 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
         if not pattern and _path(url).suffix.lower() in suffixes:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
+        if not paths and not pattern:
+            system.ls(path)  # says why: a search passes over what cannot be reached
         urls = [str(listed) for listed in map(system.unstrip_protocol, paths)]
     return [
         listed
