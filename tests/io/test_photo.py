@@ -83,6 +83,8 @@ def deep_picture(path, bits, channels):
     levels = np.round(np.stack(turned, -1)).astype(np.uint16)
     stored = levels[..., [0] if channels == 1 else [2, 1, 0, 3][:channels]]
     if path.suffix == ".avif":
+        if not cv2.haveImageWriter(str(path)):
+            pytest.skip("OpenCV before 4.12 writes no AVIF")
         cv2.imwrite(
             str(path), stored, [cv2.IMWRITE_AVIF_DEPTH, bits, cv2.IMWRITE_AVIF_QUALITY, 100]
         )
