@@ -173,7 +173,7 @@ def test_tiffs_of_packed_levels_are_refused_as_what_they_are(tmp_path, bits):
 
 def test_float_tiff_is_scene_linear(tmp_path):
     values = np.random.default_rng(0).random((12, 13, 3), np.float32) * 4
-    cv2.imwrite(str(tmp_path / "a.tiff"), values[..., ::-1])
+    tifffile.imwrite(tmp_path / "a.tiff", values, photometric="rgb")
     photo = read_photo(tmp_path / "a.tiff")
     np.testing.assert_array_equal(photo.linear * np.float32(2.0**-photo.stops), values)
     assert photo.hdr
