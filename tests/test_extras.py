@@ -5,9 +5,13 @@ import sys
 import numpy as np
 import pytest
 from edit_scenes import flat_scene
+from PIL import Image
 
 import materialist as mt
+from materialist.edits import recipe
+from materialist.edits.remove.background import inpainter
 from materialist.edits.remove.patches import patched
+from materialist.exporters import run
 from materialist.io.photo import read_photo
 from materialist.io.video import write_frames
 from materialist.predict import get_predictor
@@ -38,18 +42,44 @@ FLAT = np.ones((4, 6), bool)
             lambda _: get_predictor("constant", normal="marigold"),
             "needs diffusers.* install 'diffusers",
         ),
+        ("diffusers", lambda _: get_predictor("marigold:a/b"), "needs diffusers"),
+        ("transformers", lambda _: get_predictor("constant", depth="depth-anything"), "needs tran"),
+        ("diffusers", lambda _: inpainter("sd"), "needs diffusers.* leave `inpaint"),
     ],
 )
-def test_the_command_is_named(package, ask, words, models, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("models")  # no weights: the library is asked for before them
+def test_the_command_is_named(package, ask, words, tmp_path, monkeypatch):
     (tmp_path / "a.CR2").write_bytes(b"II*\0" * 20)
-    (models / "prs-eth--marigold-normals-v1-1").mkdir(parents=True)
-    (models / "prs-eth--marigold-normals-v1-1" / "SHA256SUMS").touch()
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
     with pytest.raises(mt.SetupError, match=words):
         ask(tmp_path)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("library", ["mujoco", "coacd"])
+def test_a_list_of_edits_asks_for_physics_before_its_first_step(library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    monkeypatch.setattr(recipe, "_applied", lambda *_: pytest.fail("the work comes first"))
+    (tmp_path / "edits.yaml").write_text(
+        "- relight: {rotate: 45}\n- drop: {mesh: a.ply, at: [8, 30]}\n"
+    )
+    words = "need two more packages; install them with: .* install 'coacd"
+    with pytest.raises(mt.SetupError, match=words):
+        recipe.apply(flat_scene(), recipe.read_recipe(tmp_path / "edits.yaml"))
+    Image.fromarray(np.zeros((16, 16), np.uint8)).save(tmp_path / "photo.png")
+    with pytest.raises(mt.SetupError, match=words):
+        mt.batch(tmp_path / "photo.png", tmp_path / "runs", apply=tmp_path / "edits.yaml")
+    assert not (tmp_path / "runs").exists()
+
+
+def test_usd_asks_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pxr", None)
+    monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
+    monkeypatch.setattr(run, "with_residual", lambda scene: pytest.fail("the work comes first"))
+    with pytest.raises(mt.SetupError, match="pip install 'usd-core"):
+        mt.export(flat_scene(), tmp_path / "a.usdz")
 
 
 def test_the_studio_asks_before_it_makes_a_folder(refused, tmp_path, monkeypatch):

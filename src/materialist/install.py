@@ -1,4 +1,4 @@
-"""The command that installs a package into this very Python: by its own pip, or by uv where it has none."""
+"""The command that installs a package into this very Python: by pipx where it made it, else by pip, else by uv."""
 
 import re
 import shlex
@@ -16,20 +16,26 @@ LABORATORY = "materialist-photo-lab"
 def install_command(*requirements: str) -> str:
     """A line for a shell that installs requirements, as in `install_command("rawpy>=0.21")`.
 
-    Environments that uv made have no pip of their own.
+    Environments that uv made have no pip of their own; those of pipx have one or not, as pipx chose.
     """
+    environment = Path(sys.prefix)
+    if (environment / "pipx_metadata.json").is_file():
+        return shlex.join(["pipx", "inject", environment.name, *requirements])
     # This very Python's pip, whatever the shell would find first.
     if find_spec("pip") is not None:
         return shlex.join([sys.executable, "-m", "pip", "install", *requirements])
     return shlex.join(["uv", "pip", "install", "--python", sys.executable, *requirements])
 
 
-def laboratory_command() -> str:
-    """A line for a shell that installs the laboratory: from the checkout that this package runs from, if it does."""
+def laboratory_advice() -> str:
+    """Lines for a shell that install the laboratory: from the checkout that this package runs from, if it does."""
     folder = Path(__file__).resolve().parents[2] / "lab"
     if (folder / "pyproject.toml").is_file():
         return install_command("-e", str(folder))
-    return install_command(LABORATORY)
+    return (
+        f"{install_command(LABORATORY)}, or in a checkout of the repository: "
+        f"{install_command('./lab')}"
+    )
 
 
 def extra_command(extra: str) -> str:

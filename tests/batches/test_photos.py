@@ -56,9 +56,13 @@ def test_a_list_of_urls_asks_for_their_library_before_the_work(tmp_path, monkeyp
     with pytest.raises(SetupError, match=r"^https://host/a.jpg needs .* install .*aiohttp"):
         batch(tmp_path / "list.txt", tmp_path / "runs")
     assert not (tmp_path / "runs").exists()
-    (tmp_path / "list.txt").write_text("s3://host/a.jpg\n")
-    with pytest.raises(SetupError, match="cannot be opened: library of s3"):
-        batch(tmp_path / "list.txt", tmp_path / "runs")
+    for url, words in (
+        ("simplecache::s3://host/a.jpg", "needs one more package: .* install s3fs"),
+        ("smb://host/a.jpg", "cannot be opened: library of smb"),
+    ):
+        (tmp_path / "list.txt").write_text(f"{url}\n")
+        with pytest.raises(SetupError, match=words):
+            batch(tmp_path / "list.txt", tmp_path / "runs")
 
 
 def test_what_is_passed_over_is_named(tmp_path):
@@ -123,6 +127,16 @@ def test_urls_are_listed_versioned_and_fetched(tmp_path):
         pass
     with pytest.raises(InputError, match=r"cannot be read|nothing at"):
         list_photos("nosuchstore://bucket", runs="r")
+
+
+def test_a_store_out_of_reach_is_not_called_empty(monkeypatch):
+    def unreachable(self, path, detail=True, **options):
+        raise OSError("Cannot connect to host")
+
+    # fsspec's search of folders passes over such errors.
+    monkeypatch.setattr(fsspec.get_filesystem_class("memory"), "ls", unreachable)
+    with pytest.raises(InputError, match="cannot be read: Cannot connect to host"):
+        list_photos("memory://bucket/photos", runs="r")
 
 
 def test_names_are_stems_as_long_as_those_are_unique():

@@ -7,7 +7,7 @@ import typer
 
 from materialist.cli import plugins
 from materialist.cli.generate import group
-from materialist.install import laboratory_command
+from materialist.install import laboratory_advice
 
 greeting = group("greet", "Greetings.")
 
@@ -42,7 +42,7 @@ def entry_point(value):
 def test_without_the_laboratory_one_sentence_says_how_to_install_it(installed, run, arguments):
     installed()
     sentence = f"materialist {arguments[0]} is in the laboratory, which is not installed"
-    message = f"Error: {sentence}; install it with: {laboratory_command()}\n"
+    message = f"Error: {sentence}; install it with: {laboratory_advice()}\n"
     assert run(*arguments) == (2, "", message)
     assert "In the laboratory: materialist-photo-lab." in run("--help")[1]
 

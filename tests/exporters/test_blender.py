@@ -16,6 +16,7 @@ from export_scenes import CHECKS, renderer, room
 import materialist as mt
 from materialist.edits.core.renderer import rendered
 from materialist.edits.core.surfaces import uniform_surface
+from materialist.exporters import run
 from materialist.exporters.blender import run_script
 from materialist.io.exr import read_exr
 from materialist.metrics import psnr
@@ -76,10 +77,11 @@ def test_a_blender_that_works(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["python-with-bpy", "room.blend"]
 
 
-def test_a_blender_that_fails(tmp_path):
+def test_a_blender_that_fails(tmp_path, monkeypatch):
     program = fake(tmp_path, "sys.exit('No module named bpy')")
     with pytest.raises(mt.SetupError, match="No module named bpy"):
         mt.export(room(), tmp_path / "room.blend", blender=program)
+    monkeypatch.setattr(run, "with_residual", lambda scene: pytest.fail("the work comes first"))
     with pytest.raises(mt.SetupError, match="There is no program /nowhere/blender"):
         mt.export(room(), tmp_path / "room.blend", blender="/nowhere/blender")
     assert [path.name for path in tmp_path.iterdir()] == ["python-with-bpy"]

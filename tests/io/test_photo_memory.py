@@ -46,6 +46,10 @@ def write(folder, name):
     light = colour / np.float32(255)
     if name.endswith("16.png"):
         cv2.imwrite(str(path), with_alpha(deep) if "rgba" in name else deep)
+    elif name == "deep.avif":
+        cv2.imwrite(str(path), with_alpha(deep) >> 6, [cv2.IMWRITE_AVIF_DEPTH, 10])
+    elif name in ("deep.jp2", "deep.ppm"):
+        cv2.imwrite(str(path), deep)
     elif name == "float.tif":
         tifffile.imwrite(path, light, photometric="rgb")
     elif name == "lab16.tif":
@@ -89,6 +93,9 @@ def write(folder, name):
         "rgb.heic",
         "rgb.avif",
         "rgb.jp2",
+        "deep.avif",
+        "deep.jp2",
+        "deep.ppm",
         "rgb.tif",
         "float.tif",
         "lab16.tif",

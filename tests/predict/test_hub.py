@@ -153,6 +153,7 @@ def test_depth_anything_relative_and_metric(hub, models, tmp_path):
         ("matnet:none.pth", "albedo", "no file none.pth.*models download matnet.*maps:DIR"),
     ],
 )
-def test_absent_models_say_how_to_get_them(spec, part, words):
+def test_absent_models_say_how_to_get_them(spec, part, words, monkeypatch):
+    monkeypatch.setattr("materialist.predict.hub.import_library", lambda name: None)
     with pytest.raises(WeightsError, match=words):
         get_predictor("constant", **{part: spec})

@@ -29,6 +29,13 @@ def edits_for(path: str | Path, name: str) -> "list[Step]":
     ]
 
 
+def check_edits(path: str | Path) -> None:
+    """Raise InputError where the list cannot be read, SetupError where a library that a step needs is missing."""
+    from materialist.edits.recipe import check_libraries
+
+    check_libraries(edits_for(path, ""))
+
+
 @lru_cache(maxsize=1)
 def _steps(path: str | Path, content: bytes) -> "list[Step]":
     """The steps of a file with this content, parsed once for all photos."""

@@ -9,11 +9,13 @@ from typing import Any
 
 from materialist.batches.results import file_hash
 from materialist.errors import InputError, MaterialistError, SetupError
-from materialist.install import extra_command
+from materialist.install import extra_command, install_command
 from materialist.io.photo import PREFIX, example_path
 
 LARGEST = 2 << 30
 """Bytes of a photo that is fetched: no photo within the pixel limit is larger."""
+STORES = {"s3": "s3fs", "gs": "gcsfs", "gcs": "gcsfs", "az": "adlfs", "abfs": "adlfs"}
+"""Protocol -> the package that fsspec needs for it."""
 
 
 def is_url(text: str) -> bool:
@@ -34,6 +36,8 @@ def list_url(url: str, suffixes: frozenset[str]) -> list[str]:
         if not pattern and _path(url).suffix.lower() in suffixes:
             return [url]
         paths = system.glob(path) if pattern else system.find(path)
+        if not paths and not pattern:
+            system.ls(path)  # says why: a search passes over what cannot be reached
         urls = [str(listed) for listed in map(system.unstrip_protocol, paths)]
     return [
         listed
@@ -106,10 +110,15 @@ def require_stores(locations: Iterable[str]) -> None:
 
 
 def _lacking(url: str, error: ImportError) -> SetupError:
-    """The error of a library that is not there; of the stores but the web fsspec itself names it."""
-    if re.search(r"(^|::)https?:", url):
-        return SetupError(f"{without_secrets(url)} needs one more package: {extra_command('http')}")
-    return SetupError(f"{without_secrets(url)} cannot be opened: {str(error).rstrip('.')}.")
+    """The error of a library that is not there; where we do not know its name, fsspec's own words."""
+    kind = re.findall(r"(\w+)://", url)[-1]  # the store at the end of zip://*.jpg::https://...
+    if kind in ("http", "https"):
+        command = extra_command("http")
+    elif kind in STORES:
+        command = install_command(STORES[kind])
+    else:
+        return SetupError(f"{without_secrets(url)} cannot be opened: {str(error).rstrip('.')}.")
+    return SetupError(f"{without_secrets(url)} needs one more package: {command}")
 
 
 def _path(url: str) -> PurePosixPath:

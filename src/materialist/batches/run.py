@@ -12,7 +12,7 @@ from typing import Any, Unpack
 import psutil
 
 from materialist import __version__, errors
-from materialist.batches.edits import edits_for, missing_files
+from materialist.batches.edits import check_edits, missing_files
 from materialist.batches.ledger import Ledger, open_ledger
 from materialist.batches.options import BatchOptions
 from materialist.batches.outcome import COLUMNS, Outcome, Row, Status, write_page, write_summary
@@ -84,7 +84,7 @@ def batch(
     asked |= {name: value for name, value in values.items() if name not in batch_fields}
     check_options(asked)
     if batch_options.recipe is not None:
-        edits_for(batch_options.recipe, "")  # a damaged list is an error before anything is written
+        check_edits(batch_options.recipe)  # before anything is written
     notes: list[str] = []
     photos = list_photos(source, runs=runs, notes=notes)
     require_stores([photo.location for photo in photos])

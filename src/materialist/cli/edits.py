@@ -172,10 +172,11 @@ def apply_command(
 ) -> None:
     """Replay a list of edits on a scene: materials and light, in one picture."""
     from materialist.edits.recipe import apply as replay
-    from materialist.edits.recipe import read_recipe
+    from materialist.edits.recipe import check_libraries, read_recipe
 
     check_before(output, rendering)
     steps = read_recipe(edits)
+    check_libraries(steps)
     loaded = mt.load_scene(scene)
     edited = replay(loaded, steps, seed=rendering.seed, device=rendering.device)
     skipped = sum(step.skipped for step in steps)

@@ -11,7 +11,7 @@ from typer.core import TyperGroup
 
 from materialist.cli.generate import group
 from materialist.errors import SetupError
-from materialist.install import LABORATORY, laboratory_command
+from materialist.install import LABORATORY, laboratory_advice
 
 GROUP = "materialist.commands"
 LABORATORY_COMMANDS = ("bench", "train")
@@ -42,7 +42,7 @@ def _plugin(name: str) -> Any:
             return _refusal(name, "Cannot be loaded.", f"materialist {name} {reason}")
     if name in LABORATORY_COMMANDS:
         reason = "is in the laboratory, which is not installed; install it with:"
-        message = f"materialist {name} {reason} {laboratory_command()}"
+        message = f"materialist {name} {reason} {laboratory_advice()}"
         return _refusal(name, f"In the laboratory: {LABORATORY}.", message)
     return None
 

@@ -169,6 +169,13 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     write_whole(path, text)
 
 
+def check_libraries(steps: list[Step]) -> None:
+    """Raise SetupError where a step needs a library that is not installed: before any step is applied."""
+    for step in steps:
+        if step.operation.check_libraries is not None and not step.skipped:
+            step.operation.check_libraries()
+
+
 @fixed_threads()
 def apply(
     scene: Scene,
@@ -182,6 +189,7 @@ def apply(
 
     seed: of random numbers, for steps that name none. onto: the scene after earlier steps.
     """
+    check_libraries(steps)
     edited = scene if onto is None else onto
     for number, step in enumerate(steps, 1):
         if step.skipped:

@@ -69,6 +69,13 @@ def export(
         raise InputError(f"The options for Blender do not go with the format {to}; leave them out.")
     if to == "html" and most is None:
         most = PAGE_TRIANGLES
+    # --- What is missing is told before the work ---
+    if to == "usd":
+        _usd_writers()
+    if settings.blender is not None:
+        from materialist.exporters.blender import find_blender
+
+        find_blender(settings.blender)
     ensure_writable(path, force, EXPORT if path.suffix.lower() not in SUFFIX.values() else None)
     carries = settings.residual and to != "html"
     if carries:
@@ -159,12 +166,17 @@ def _mitsuba(path: Path, scene: Scene, parts: list[Part], force: bool) -> Export
     )
 
 
-def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+def _usd_writers() -> tuple[Callable[..., None], Callable[..., None]]:
+    """What writes a folder, and what packs it. Raises SetupError where usd-core is not installed."""
     try:
         from materialist.exporters.usd import pack_usdz, write_usd
     except ImportError as error:
         raise SetupError(f"USD needs usd-core; install it with: {extra_command('usd')}") from error
+    return write_usd, pack_usdz
 
+
+def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
+    write_usd, pack_usdz = _usd_writers()
     if path.suffix.lower() == ".usdz":
         with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as file:
             write_usd(Path(scratch), scene, parts)

@@ -15,7 +15,7 @@ from PIL import Image, ImageCms
 
 from materialist.color import ROWS, srgb_to_linear
 from materialist.errors import InputError
-from materialist.io.boxes import jp2_profile
+from materialist.io.boxes import avif_bits, jp2_bits, jp2_profile
 from materialist.io.colour_space import ColourSpace
 from materialist.io.colour_tags import png_chunks, stated_space
 from materialist.io.exif import image_tags
@@ -39,6 +39,8 @@ _ENTROPY = (b"\x01", b"\x55", b"\x24", b"\xaa", b"\xd3")
 """Bytes that a JPEG decoder reads as coefficients; after some endings it takes a few of them for damage."""
 _PNM = re.compile(rb"P[2356](?:\s+(?:#[^\n]*\n\s*)*(\d+)){3}")
 """Header of a PGM or PPM; its last number is the level that is white."""
+_PNM_HEAD = 4096
+"""Bytes in which it is looked for."""
 
 
 @dataclass
@@ -134,18 +136,16 @@ def read_bitmap(path: Path) -> Decoded:
         profile = None if b"cICP" in chunks else _profile(image, path)
         # --- What the levels mean: cICP before ICC before other tags ---
         space = None if profile else stated_space(path, image.format, tags, warnings)
-        # Pillow cuts PNG and HEIC of more bits a channel to 8.
-        bits = int(image.info.get("bit_depth", 8)) if image.format == "HEIF" else 8
-        if bits > 8:
-            image.close()
-            levels = (
-                *_heif_levels(path, bits),
-                deep_space(profile, warnings) if profile else space,
+        bits = _bits(path, image, chunks)
+        if bits > 8 and image.format == "AVIF" and not cv2.haveImageReader(str(path)):
+            warnings.append(
+                f"Of the AVIF's {bits} bits a channel 8 are read; OpenCV from 4.12 on reads all."
             )
-        elif image.mode[0] in "IF" or chunks.get(b"IHDR", b"")[8:9] == b"\x10":
+            bits = 8
+        if bits > 8 or image.mode[0] in "IF":
             image.close()
             levels = (
-                *_deep_levels(path, chunks.get(b"tRNS")),
+                *_deep_levels(path, image.format, bits, chunks.get(b"tRNS")),
                 deep_space(profile, warnings) if profile else space,
             )
         else:
@@ -284,14 +284,46 @@ def _through_lcms(image: Image.Image, profile: bytes | None, warnings: list[str]
     return image
 
 
-def _deep_levels(path: Path, transparent: bytes | None) -> tuple[Array, Array | None]:
-    """RGB and alpha of a file of 16 bits a channel; `transparent` is the colour that a PNG's tRNS chunk names."""
+def _bits(path: Path, image: Image.Image, chunks: dict[bytes, bytes]) -> int:
+    """Bits a channel of an open image, by its header: Pillow cuts most of what has more than 8 to 8."""
+    if image.format == "PNG":
+        return chunks.get(b"IHDR", b"\x08" * 9)[8]
+    if image.format == "HEIF":
+        return int(image.info.get("bit_depth", 8))
+    if image.format == "AVIF":
+        return avif_bits(path)
+    if image.format == "JPEG2000":
+        return jp2_bits(path)
+    if image.format == "PPM":
+        with path.open("rb") as file:
+            header = _PNM.match(file.read(_PNM_HEAD))
+        return 16 if header is not None and int(header[1]) > 255 else 8
+    return 8
+
+
+def _deep_levels(
+    path: Path, kind: str | None, bits: int, transparent: bytes | None
+) -> tuple[Array, Array | None]:
+    """RGB and alpha of a file of more than 8 bits a channel, of 16 bits.
+
+    `transparent` is the colour that a PNG's tRNS chunk names.
+    """
+    if kind == "HEIF":
+        return _heif_levels(path, bits)
     colour, alpha = rgb_levels(path)
+    if kind in ("AVIF", "JPEG2000"):  # which OpenCV gives at their own bits
+        return _stretched(colour, bits), None if alpha is None else _stretched(alpha, bits)
     if transparent is None or colour.dtype != np.uint16 or len(transparent) not in (2, 6):
         return colour, alpha
     # Exactly this colour is transparent, and nothing else.
     clear = (colour == np.frombuffer(transparent, ">u2")).all(-1, keepdims=True)
     return colour, np.where(clear, np.uint16(0), np.uint16(65535))
+
+
+def _stretched(levels: Array, bits: int) -> Array:
+    """Levels of 9 to 16 bits as levels of 16: white becomes 65535."""
+    high = levels << (16 - bits)
+    return high | high >> bits if bits < 16 else levels
 
 
 def _heif_levels(path: Path, bits: int) -> tuple[Array, Array | None]:
@@ -336,7 +368,7 @@ def levels_of(content: Array, path: Path) -> tuple[Array, Array | None]:
 
 def _whitened(pixels: Array, content: Array) -> Array:
     """Levels of a PGM or PPM, which OpenCV leaves as stored, so that its white is the largest; others as they are."""
-    header = _PNM.match(content[:4096].tobytes())
+    header = _PNM.match(content[:_PNM_HEAD].tobytes())
     if header is None or pixels.dtype.kind != "u":
         return pixels
     white = int(header[1])

@@ -1,4 +1,4 @@
-"""Boxes of ISO files (HEIC, AVIF, JPEG 2000): the colour information that Pillow does not hand out."""
+"""Boxes of ISO files (HEIC, AVIF, JPEG 2000): colour and bits a channel, which Pillow does not hand out."""
 
 import struct
 from collections.abc import Iterator
@@ -6,18 +6,39 @@ from pathlib import Path
 
 _HEAD_BYTES = 4 << 20
 """How much of a file is searched: boxes of colour stand before the pixels."""
+_CODESTREAM = b"\xff\x4f\xff\x51"
+"""How the pixels of a JPEG 2000 begin: the markers SOC and SIZ."""
 
 
 def nclx(path: Path) -> tuple[int, int] | None:
     """Codes of primaries and transfer (ITU-T H.273) of a HEIC's or AVIF's main picture; None where it has none."""
-    meta = dict(iso_boxes(_head(path))).get(b"meta", b"")[4:]
-    top = dict(iso_boxes(meta))
-    properties = list(iso_boxes(dict(iso_boxes(top.get(b"iprp", b""))).get(b"ipco", b"")))
-    for index in _properties_of_primary(top):
-        kind, data = properties[index - 1] if 0 < index <= len(properties) else (b"", b"")
+    for kind, data in _primary_properties(path):
         if kind == b"colr" and data[:4] == b"nclx" and len(data) >= 8:
             return struct.unpack_from(">HH", data, 4)  # type: ignore[return-value]
     return None
+
+
+def avif_bits(path: Path) -> int:
+    """Bits a channel of an AVIF's main picture; 8 where the file does not say."""
+    for kind, data in _primary_properties(path):
+        if kind == b"av1C" and len(data) > 2 and data[2] & 0x40:
+            return 12 if data[2] & 0x20 else 10
+        if (
+            kind == b"pixi" and len(data) > 5
+        ):  # the codec's box stands at the tiles of a picture in tiles
+            return max(data[5 : 5 + data[4]])
+    return 8
+
+
+def jp2_bits(path: Path) -> int:
+    """Bits a channel of a JPEG 2000, of the channel that has most; 8 where the file does not say."""
+    _, _, sizes = _head(path).partition(_CODESTREAM)
+    try:
+        (channels,) = struct.unpack_from(">H", sizes, 36)
+        # Of each channel: bits less one, with a sign in front, and its two steps.
+        return 1 + max(sizes[38 + 3 * k] & 0x7F for k in range(channels))
+    except (IndexError, ValueError, struct.error):
+        return 8
 
 
 def jp2_profile(path: Path) -> bytes | None:
@@ -48,6 +69,16 @@ def iso_boxes(data: bytes) -> Iterator[tuple[bytes, bytes]]:
             return
         yield kind, data[start:end]
         at = end
+
+
+def _primary_properties(path: Path) -> Iterator[tuple[bytes, bytes]]:
+    """Kind and content of the properties of a HEIC's or AVIF's main picture."""
+    meta = dict(iso_boxes(_head(path))).get(b"meta", b"")[4:]
+    top = dict(iso_boxes(meta))
+    properties = list(iso_boxes(dict(iso_boxes(top.get(b"iprp", b""))).get(b"ipco", b"")))
+    for index in _properties_of_primary(top):
+        if 0 < index <= len(properties):
+            yield properties[index - 1]
 
 
 def _head(path: Path) -> bytes:

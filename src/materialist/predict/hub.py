@@ -75,14 +75,19 @@ class HubPredictor(Predictor):
 
     def prepare(self, names: Collection[str]) -> None:
         """Raise SetupError or WeightsError where a library or the model is missing."""
-        _ = self.folder
-        for name in self.libraries:
+        for name in self.libraries:  # before gigabytes of weights are asked for
             import_library(name)
+        _ = self.folder
 
 
 def open_marigold(where: str = "", *, device: str = "auto") -> Predictor:
-    """The Marigold model in a folder or of a hub id, else WeightsError; "": all maps from the three published ones."""
+    """The Marigold model in a folder or of a hub id; "": all maps from the three published ones.
+
+    Raises SetupError or WeightsError where a library or the model of `where` is missing.
+    """
     if where:
+        for name in Marigold.libraries:
+            import_library(name)
         return Marigold(where, GIVES[_pipeline_class(locate(where, ""))], device=device)
     parts = {
         model: Marigold(model, gives, device=device) for model, gives in zip(MODELS, GIVES.values())

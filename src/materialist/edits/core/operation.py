@@ -73,6 +73,8 @@ class Operation:
     bare: str = "as it is"
     """What the studio says of a step without options."""
     preview: PreviewMode = PreviewMode.SKETCHED
+    check_libraries: Callable[[], None] | None = None
+    """Raises SetupError where an optional library that it needs is not installed."""
     needed: tuple[str, ...] = ()
     """Options without which nothing would change: one of them at least is to be given."""
     summary: Callable[[Scene], str] | None = None

@@ -11,6 +11,13 @@ if TYPE_CHECKING:
     from materialist.types import Scene
 
 
+def _check_libraries() -> None:
+    from materialist.edits.drop.physics import LIBRARIES, load_library
+
+    for name in LIBRARIES:
+        load_library(name)
+
+
 def _apply(scene: Scene, target: Placement, options: Any, fitted: Scene) -> Scene:
     from materialist.edits.drop.drop import settle
 
@@ -26,4 +33,5 @@ DROP = Operation(
     about="Let meshes fall onto what the photo shows.",
     label="Fallen",
     preview=PreviewMode.SIMULATED,
+    check_libraries=_check_libraries,
 )

@@ -36,6 +36,8 @@ class PhysicsSettings:
 
 
 SETTINGS = PhysicsSettings()
+LIBRARIES = ("mujoco", "coacd")
+"""What the extra `physics` installs."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ def fall(
 
 
 def load_library(name: str) -> Any:
-    """The module mujoco or coacd. Raises SetupError with the command that installs it."""
+    """The module of one of `LIBRARIES`. Raises SetupError with the command that installs it."""
     try:
         return importlib.import_module(name)
     except ImportError as error:

@@ -87,7 +87,8 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
             f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option)."
         )
     gpu = on_gpu(device)
-    with hub.advice("leave inpaint out"):
+    with hub.advice('leave `inpaint="sd"` out'):
+        hub.import_library("diffusers")  # before gigabytes of weights are asked for
         folder = locate(where, DEFAULT)
         pipeline = hub.pipeline(
             "StableDiffusionInpaintPipeline",
