@@ -1,9 +1,18 @@
 """Texels of environment maps: their directions and how much of the sphere they cover."""
 
+import cv2
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
-from materialist.camera import project
-from materialist.envmap import row_solid_angle, sh_basis, texel_directions, with_mirrored_photo
+from materialist.camera import pixel_rays, project, unit
+from materialist.envmap import (
+    environment,
+    row_solid_angle,
+    sh_basis,
+    texel_directions,
+    with_mirrored_photo,
+)
+from materialist.io.exr import read_exr
 from materialist.types import Array, Camera
 
 
@@ -71,3 +80,45 @@ def test_the_mirrored_photo_starts_at_both_edges_of_the_frame_and_meets_itself_b
     # 75 % of the way from the left edge is half of the way from the right edge to straight behind.
     assert abs(azimuth[row.argmax()] - (30 + 150 * 0.5)) < 4
     assert abs(row[0] - row[-1]) < 0.05
+
+
+def _fine(envmap: Array, where: Array) -> float:
+    """RMS of the logarithm over its own surroundings, of 4 degrees."""
+    log = np.log(envmap.mean(-1) + 0.05)
+    difference = log - gaussian_filter(log, 6, mode=("nearest", "wrap"))
+    return float(np.sqrt(np.square(difference[where]).mean()))
+
+
+def test_captured_surroundings_have_detail_and_so_has_the_mirrored_photo(real_data):
+    """Panoramas: a piece of each is the photo, and a blur of it stands for the fitted light.
+
+    The true detail is 0.26 in the mean, a blur's 0.02, the mirrored photo's 0.11; it is not nearer to the truth.
+    """
+    camera = Camera(256, 192, 45.0)
+    rays = unit(pixel_rays(camera)).reshape(-1, 3)
+    direction = texel_directions(256, 512)
+    azimuth = np.degrees(np.arctan2(direction[..., 0], -direction[..., 2]))
+    unseen = (np.abs(azimuth) > 40) & (np.abs(direction[..., 1]) < 0.75)
+    figures = []
+    for path in sorted(real_data("data/envmaps").glob("*.exr"))[::4]:
+        full = np.maximum(read_exr(path), 0).astype(np.float32)
+        truth = cv2.resize(full, (512, 256), interpolation=cv2.INTER_AREA)
+        photo = environment(rays, truth).reshape(192, 256, 3)
+        truth = truth * (0.8 / np.percentile(photo, 90))
+        photo = np.clip(photo * (0.8 / np.percentile(photo, 90)), 0, 1)
+        fitted = np.stack(
+            [gaussian_filter(truth[..., k], 16, mode=("nearest", "wrap")) for k in range(3)], -1
+        )
+        mirrored = with_mirrored_photo(fitted, photo, camera)
+        where = unseen & (fitted.max(-1) < 1)
+
+        def error(light: Array, truth: Array = truth, where: Array = where) -> float:
+            ratio = np.log((light.mean(-1) + 0.05) / (truth.mean(-1) + 0.05))
+            return float(np.sqrt(np.square(ratio[where]).mean()))
+
+        detail = [_fine(light, where) for light in (truth, fitted, mirrored)]
+        figures.append([*detail, error(fitted), error(mirrored)])
+    true, blurred, detail_of_ours, error_before, error_after = np.mean(figures, 0)
+    assert blurred < 0.15 * true
+    assert 0.3 * true < detail_of_ours < true
+    assert error_after < 1.1 * error_before

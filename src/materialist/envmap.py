@@ -21,7 +21,7 @@ class DetailSettings:
     fade_in: float = 15.0  # degrees from the frame's edge to full detail
     full_elevation: float = 50.0  # degrees up to which detail is full
     last_elevation: float = 75.0  # degrees; there it ends, and so does the photo
-    white: float = 1.0  # radiance from which a texel is a lamp, which has no detail
+    lamp: tuple[float, float] = (1.0, 4.0)  # radiance from which detail fades, and has none
 
 
 DETAIL = DetailSettings()
@@ -189,5 +189,6 @@ def with_mirrored_photo(envmap: Array, photo: Array, camera: Camera) -> Array:
         0,
         1,
     )
-    fade = fade * (envmap.max(-1) < DETAIL.white)
+    dim, bright = DETAIL.lamp
+    fade = fade * np.clip((bright - envmap.max(-1)) / (bright - dim), 0, 1)
     return (envmap * (1 + fade[..., None] * (detail - 1))).astype(np.float32)

@@ -8,7 +8,6 @@ import pytest
 from materialist.types import Materials, Prediction
 from materialist_lab.metrics.maps import (
     aligned_psnr,
-    contrast,
     depth_abs_rel,
     depth_figures,
     mean_angle,
@@ -166,15 +165,3 @@ def test_half_of_the_errors_are_within_a_calibrated_spread(truth):
     assert coverage["depth_calibration"] == pytest.approx(0.5, abs=0.06)
     assert coverage["metallic_calibration"] == 0
     assert spread_calibration(truth, truth, truth.depth > 0) == {}
-
-
-def test_contrast_is_of_fine_differences_within_the_mask():
-    rows, columns = np.indices((100, 100))
-    mask = columns < 50
-    stripes = np.where(rows % 4 < 2, 0.2, 0.4)[..., None] * np.ones(3)
-    shading = (0.3 + 0.3 * rows / 100)[..., None] * np.ones(3)
-    assert contrast(stripes, mask) > 10 * contrast(shading, mask)
-    # What is outside the mask does not count.
-    outside = np.where(mask[..., None], stripes, 1.0)
-    assert contrast(outside, mask) == pytest.approx(contrast(stripes, mask), abs=1e-9)
-    assert contrast(np.full((100, 100, 3), 0.3), mask) == pytest.approx(0, abs=1e-9)

@@ -12,8 +12,7 @@ was predicted (the true light replaces the fitted one); `ceiling` is the edit wi
 darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` and `metal` (copper) after one factor on
 the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also with `screen space`
 shadows of the fitted light; `glass` is the largest object turned to glass, `remove` the picture without it. `shadow` is
-the PSNR where the true picture changes outside: in shadows and reflections. `contrast`: fine differences inside over
-those of the true picture, right or wrong; 1 is as many. sheet.png: photo, truth, and the pictures
+the PSNR where the true picture changes outside: in shadows and reflections. sheet.png: photo, truth, and the pictures
 of the rows after `untouched`. An edit that the program refuses leaves the photo as it was.
 """
 
@@ -34,7 +33,7 @@ from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, 
 from materialist_lab.bench.edits import KINDS, Edit, edits, sample_and_light, true_scene
 from materialist_lab.bench.report import CEILING, Column, Report, side_by_side
 from materialist_lab.bench.screen_space import screen_space
-from materialist_lab.metrics.maps import aligned_psnr, best_scale, contrast, score
+from materialist_lab.metrics.maps import aligned_psnr, best_scale, score
 from materialist_lab.procedural.synthetic import SyntheticSample
 
 SCENE_SEED = 38_000
@@ -54,7 +53,6 @@ class PhotoAloneBench(Benchmark):
     columns = (
         Column("inside", "PSNR inside", "higher", 2),
         Column("shadow", "PSNR in shadow", "higher", 2),
-        Column("contrast", "contrast over the truth's", "", 2),
         Column("albedo", "albedo PSNR", "higher", 2),
         Column("roughness", "roughness PSNR", "higher", 2),
         Column("normal", "normals, degrees", "lower", 1),
@@ -216,9 +214,6 @@ class PhotoAloneBench(Benchmark):
             figures = {"inside": aligned_psnr(picture, truth, inside)}
         else:
             figures = {"inside": metrics.psnr(picture, truth, mask=inside)}
-        truth_contrast = contrast(truth, inside)
-        if truth_contrast > 0:
-            figures["contrast"] = contrast(picture, inside) / truth_contrast
         if edit.kind in TRACED and traces.any():
             figures["shadow"] = metrics.psnr(picture, truth, mask=traces)
         return figures

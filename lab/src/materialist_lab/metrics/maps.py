@@ -4,7 +4,6 @@ The protocol is that of `bench materials`: the light's brightness cannot be told
 """
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from materialist.color import linear_to_srgb
 from materialist.metrics import mse, ssim, ssim_of_values
@@ -12,8 +11,6 @@ from materialist.types import Array, Prediction
 
 MIN_SURFACE = 0.01
 """A picture with less surface than this share of its pixels is not scored."""
-CONTRAST_WIDTH = 0.02
-"""Of what counts as contrast, in longer sides of the picture: broader differences are shading."""
 PAIRS = 50_000
 """Pixel pairs whose order in depth is compared."""
 MIN_DIFFERENCE = 0.02
@@ -193,16 +190,3 @@ def _albedo(predicted: Array, true: Array, surface: Array) -> dict[str, float]:
         filled = np.where(surface[..., None], estimate, true)
         figures[f"albedo_ssim{suffix}"] = ssim(filled, true, mask=surface)
     return figures
-
-
-def contrast(picture: Array, mask: Array) -> float:
-    """RMS of the difference of sRGB values from their surroundings within a mask [H, W] bool; picture [H, W, 3] linear.
-
-    The surroundings are a Gaussian mean of the mask's own pixels. It tells how much a surface has to show, right or
-    wrong: a smooth light leaves polished metal without.
-    """
-    width = CONTRAST_WIDTH * max(mask.shape)
-    values = np.where(mask[..., None], linear_to_srgb(np.clip(picture, 0, 1)), 0)
-    share = np.maximum(gaussian_filter(mask.astype(np.float64), width), 1e-6)
-    around = gaussian_filter(values.astype(np.float64), (width, width, 0)) / share[..., None]
-    return float(np.sqrt(np.square(values - around)[mask].mean()))
