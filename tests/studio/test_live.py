@@ -6,7 +6,7 @@ import signal
 import psutil
 import pytest
 from made_tasks import until
-from studio_scenes import block, package, room
+from studio_scenes import block, package
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
@@ -19,7 +19,7 @@ from materialist.studio.workspace import write_mask
 def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     """One story, as starting the process is what takes time."""
     quota = Quota(tmp_path)
-    live = Live(room(), package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
+    live = Live(package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
     step = Step("edit", {"mask": write_mask(tmp_path, block()), "hue": "120"}, tmp_path)
     # Selecting does not wait for the tables.
     assert live.call(views.selected, where={"click": (25, 24)})[24, 25]

@@ -17,6 +17,7 @@ from materialist import errors
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step
 from materialist.errors import InputError, MaterialistError
+from materialist.io.package import load_scene
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, Reporter
 from materialist.studio import SETTINGS, views
@@ -33,7 +34,6 @@ class Live:
 
     def __init__(
         self,
-        scene: Scene,
         package: Path,
         file: Path,
         allowance: Allowance | None = None,
@@ -42,9 +42,8 @@ class Live:
     ):
         """package: where the scene lies. file: where the preview keeps its tables. worker: one that `warmed` gave.
 
-        device: on which the preview is computed, as of `invert`.
+        device: on which the preview is computed, as of `invert`. Raises SceneError as `load_scene`.
         """
-        self.scene = scene
         self._package = str(package)
         self._device = device
         self._file = str(file)
@@ -63,6 +62,12 @@ class Live:
         """Lists of edits that end with a fall, which was simulated."""
         with self._lock:
             self._start(worker)
+        try:
+            # Read here, too, while the process does.
+            self.scene: Scene = load_scene(package)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def ready(self) -> bool:
@@ -252,7 +257,6 @@ def load(report: Reporter, device: str) -> None:
 
 def open_preview(report: Reporter, package: str, file: str, device: str) -> None:
     """Open a scene, once in a process; reports `fine` when there are pictures, and again when those are fine."""
-    from materialist.io.package import load_scene
     from materialist.studio.live_preview import LivePreview, load_renderer
 
     try:

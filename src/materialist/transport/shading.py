@@ -21,13 +21,14 @@ def shade(
 
 
 def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
-    """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P].
+    """[P, 6] specular tables interpolated linearly between their roughness levels; differentiable in roughness [P].
 
     Tables made at the pixels' own roughness (L = 1) are returned unchanged.
     """
     if len(tables.specular) == 1:
         return tables.specular[0]
-    levels = torch.tensor(ROUGHNESS_LEVELS).to(roughness)
+    last = tables.first + len(tables.specular)
+    levels = torch.tensor(ROUGHNESS_LEVELS[tables.first : last]).to(roughness)
     # --- The two levels around each pixel's roughness, and its place between them ---
     r = roughness.clamp(levels[0], levels[-1])
     low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
