@@ -192,15 +192,13 @@ class Preview:
 
         Coarse ones are of the scene's own roughness alone.
         """
-        from materialist.transport.cache import levels_around
-
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
             return self._other[1]
         # First what surfaces pass on under this light, by few rays, at the roughness that they have; then the picture,
         # by all of them.
         before = self._passed_on if coarse else None
-        levels = levels_around(edited.materials.roughness.ravel()[self._pixels])
-        tables = self._filtered(self._quick, edited.envmap, before, levels)
+        roughness = edited.materials.roughness.ravel()[self._pixels]
+        tables = self._filtered(self._quick, edited.envmap, before, roughness)
         self._passed_on = self._image(
             self._shaded(edited.materials, tables), self._sky(edited.envmap)
         )
@@ -214,12 +212,19 @@ class Preview:
         cache: TransportCache,
         envmap: Array,
         passed_on: Array | None,
-        levels: range | None = None,
+        roughness: Array | None = None,
     ) -> Tables:
-        """Tables of a light by the rays of one cache, without noise, of some levels of roughness or all."""
+        """Tables of a light by the rays of one cache, without noise, of all levels or of one roughness [P] alone."""
+        from materialist.transport.cache import levels_around
         from materialist.transport.filter import filter_tables
+        from materialist.transport.shading import at_roughness
 
-        tables = cache.gather(envmap, passed_on, levels)
+        if roughness is None:
+            tables = cache.gather(envmap, passed_on)
+        else:
+            tables = cache.gather(envmap, passed_on, levels_around(roughness))
+            # One level to filter in place of all.
+            tables = at_roughness(tables, roughness)
         return filter_tables(cache, tables, self._guide, sharpest=SHARPEST)
 
     def _shaded(self, materials: Materials, tables: Tables):

@@ -120,7 +120,7 @@ class TransportEngine:
 
         def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
             return _shaded(
-                Tables(tables.diffuse[rows], tables.specular[:, rows], tables.first), maps
+                Tables(tables.diffuse[rows], tables.specular[:, rows], tables.levels), maps
             )
 
         return render

@@ -317,7 +317,7 @@ class Studio:
         return project, job
 
     def _warm_preview(self, job: Job) -> None:
-        """Let a process load what the preview needs, once an inversion has found its first maps: they are waited for."""
+        """Let a process load what the preview needs, once an inversion has found the first maps, which come first."""
         while all(found["name"] == tasks.PHOTO for found in job.intermediate):
             if job.over:
                 return

@@ -66,8 +66,8 @@ class Tables:
     specular: torch.Tensor
     """[L, P, 6]: S0, S1 (RGB each) per roughness level, or at the pixel's own roughness if L is 1; specular radiance
     is C0 S0(R) + S1(R)."""
-    first: int = 0
-    """Place in ROUGHNESS_LEVELS of the first level."""
+    levels: tuple[Array, ...] = tuple(np.array([r], np.float32) for r in ROUGHNESS_LEVELS)
+    """Perceptual roughness of each level, [1], or [P] of the pixels."""
 
 
 def build_scene(mesh: Mesh) -> mi.Scene:
@@ -262,7 +262,8 @@ class TransportCache:
             dr.eval(*sums)
             # The mean over `count` samples is the Monte Carlo estimate.
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
-        return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous(), wanted.start)
+        made = tuple(self.roughness[k] for k in wanted)
+        return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous(), made)
 
     def slot_radiance(self, radiance: Array | None) -> Array:
         """[S, 3] radiance per slot: one a pixel, then one a face of the continued planes."""
