@@ -166,8 +166,8 @@ async function drain(): Promise<void> {
   running = true;
   for (let entry = queue.shift(); entry; entry = queue.shift()) {
     const { words } = entry;
-    // Words for what takes long only: a slider answers before anybody could read.
-    const timer = window.setTimeout(() => set({ working: words || t.working }), words ? 150 : 700);
+    // Words for what takes long only: a slider answers before anybody could read, and what the page has drawn is seen.
+    const timer = window.setTimeout(() => set({ working: words || t.working }), words ? 150 : entry.quiet ? 5000 : 700);
     changes += 1;
     try {
       accept(await entry.run());
@@ -274,7 +274,8 @@ export async function arrive(): Promise<void> {
     const about = view.about ?? (await get<About>("about"));
     set({ about });
     accept(await get<State>("arrive"));
-    if (!view.state?.project && !view.state?.expected) set({ sheet: "open" });
+    // Somebody may have dropped a photo meanwhile.
+    if (!view.state?.project && !view.state?.expected && !view.dropped && view.sent === null) set({ sheet: "open" });
     await listProjects();
   } catch (error) {
     tell(error);
