@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 
 import psutil
 import pytest
@@ -46,6 +47,15 @@ def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     os.kill(second, signal.SIGKILL)
     with pytest.raises(InputError, match="ended: The worker process was ended by SIGKILL"):
         future.result(30)
+
+    # A call asks another process once, and tells of the second that is lost.
+    def kill():
+        os.kill(live.process, signal.SIGKILL)
+
+    assert live.call(views.region, step=step).any()
+    os.kill(live.process, signal.SIGSTOP)
+    threading.Timer(0.3, kill).start()
+    assert live.call(views.picture, steps=(step,), panes={}) == picture
     # A second fall of one person waits for the first.
     fall = Step("drop", {"mesh": "x.ply", "at": ["5", "5"]}, tmp_path)
     with quota.opening("somebody"), pytest.raises(InputError, match="being opened"):

@@ -29,6 +29,10 @@ Steps = tuple[Step, ...]
 CLOSED = "This photo was closed; open it again."
 
 
+class PreviewLost(InputError):
+    """The process of a preview has ended while it was asked."""
+
+
 class Live:
     """An open scene, and the process of its preview. Methods may be called from any thread."""
 
@@ -92,10 +96,15 @@ class Live:
     def call(self, function: Callable[..., Any], **arguments: Any) -> Any:
         """What function(preview, **arguments), importable, returns in the process; `steps` are edits that it applies.
 
-        Raises its errors, if they are ours; InputError where the photo is closed or the process is lost meanwhile.
+        Where the process is lost meanwhile, another one is asked, once. Raises its errors, if they are ours; InputError
+        where the photo is closed, PreviewLost where the second process is lost, too.
         """
         with self._allowed(arguments.get("steps", ())):
-            return self._begin(function, arguments).result()
+            try:
+                return self._begin(function, arguments).result()
+            except PreviewLost:
+                # Whatever ended it need not be what was asked: a process of its own answers.
+                return self._begin(function, arguments).result()
 
     def select(self, **where: Any) -> Array:
         """[H, W] bool: what `edits.select.select.select` chooses by these keywords. Raises InputError."""
@@ -185,7 +194,7 @@ class Live:
             if lost:
                 words = f"The live preview has ended: {message.facts['reason']} Do it again."
                 for waiting in (*failed, self._built):
-                    _fail(waiting, InputError(words))
+                    _fail(waiting, PreviewLost(words))
             elif future is not None:
                 _settle(future, message)
             elif message.number == self._opening:
