@@ -71,7 +71,7 @@ class Studio:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
-        self.quota = Quota(self.work.cache, self.work.root)
+        self.quota = Quota(self.work.cache, self.work.root, patient=self.single_user)
         self.last = self.work.read_last()
 
     def person(self, token: Any) -> str:
