@@ -23,6 +23,12 @@ RESET = """async () => {
   localStorage.removeItem('theme');
   addEventListener('pagehide', () => sessionStorage.removeItem('view')); }"""
 
+DISCARD = """async () => {
+  const headers = {'x-materialist-page': sessionStorage.getItem('page'), 'content-type': 'application/json'};
+  const {project} = await (await fetch('/api/state', {headers})).json();
+  await fetch('/api/discard', {method: 'POST', headers, body: JSON.stringify({project: project.name})}); }"""
+"""Deletes the photo that a page shows."""
+
 
 @pytest.fixture(scope="module")
 def opened(browser, running):
@@ -148,13 +154,18 @@ def test_select_change_undo_and_reload(page):
     page.wait_for_selector("#steps >> text=hue 120")
     page.wait_for_selector(SELECTED)  # the selection, and what can be undone
     becomes(page, green)
-    # Both switches are taken back, then the edit itself.
-    for _ in range(3):
+    # Both switches are taken back, then the edit itself, and the selection. Keys that come faster than answers, and
+    # more of them than there are changes, are no mistake.
+    for _ in range(20):
         page.keyboard.press("Control+z")
     page.wait_for_selector("#steps >> text=No edits yet")
+    page.wait_for_selector("#undo:disabled")
     becomes(page, red)
-    page.keyboard.press("Control+Shift+z")
+    for _ in range(20):
+        page.keyboard.press("Control+Shift+z")
     page.wait_for_selector("#steps >> text=hue 120")
+    page.wait_for_selector("#redo:disabled")
+    assert page.locator("#message").count() == 0
     assert not page.errors
 
 
@@ -446,7 +457,19 @@ def test_a_dropped_scene_opens_and_photos_are_kept(page, tmp_path):
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Choose a file").click()
     chooser.value.set_files(str(file))
-    page.wait_for_selector(".bar h1 >> text=a")
+    page.wait_for_selector(".bar h1[title=a]")
+    page.wait_for_selector("#progress", state="hidden")
+    # Deleted on another page, this one has photos to choose from in place of an empty window.
+    other = page.context.new_page()
+    other.goto(page.url)
+    other.wait_for_selector(".marks")
+    other.evaluate(DISCARD)
+    page.wait_for_selector(".veil.open")
+    other.close()
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Choose a file").click()
+    chooser.value.set_files(str(file))
+    page.wait_for_selector(".bar h1[title=a]")
     page.wait_for_selector("#progress", state="hidden")
     page.get_by_role("button", name="Photos").click()
     assert page.locator("#projects li").count() >= 2

@@ -96,7 +96,7 @@ def test_kept_tables_are_taken_and_damaged_ones_made_again(preview, tmp_path):
     picture = made.picture(edited)
 
     def traced(one):
-        return "_engine" in vars(one)
+        return "_quick" in vars(one)
 
     again = Preview(scene, file)
     np.testing.assert_array_equal(again.picture(edited), picture)

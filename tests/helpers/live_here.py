@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from materialist.io.package import load_scene
 from materialist.studio.live import Live
 from materialist.studio.live_preview import LivePreview
 
@@ -12,7 +13,7 @@ from materialist.studio.live_preview import LivePreview
 class LiveHere(Live):
     def _start(self, worker):
         file = Path(self._file)
-        self.here = LivePreview(self.scene, file, Path(self._package))
+        self.here = LivePreview(load_scene(self._package), file, Path(self._package))
 
     @property
     def ready(self):

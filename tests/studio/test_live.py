@@ -2,11 +2,12 @@
 
 import os
 import signal
+import threading
 
 import psutil
 import pytest
 from made_tasks import until
-from studio_scenes import block, package, room
+from studio_scenes import block, package
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
@@ -19,7 +20,7 @@ from materialist.studio.workspace import write_mask
 def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     """One story, as starting the process is what takes time."""
     quota = Quota(tmp_path)
-    live = Live(room(), package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
+    live = Live(package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
     step = Step("edit", {"mask": write_mask(tmp_path, block()), "hue": "120"}, tmp_path)
     # Selecting does not wait for the tables.
     assert live.call(views.selected, where={"click": (25, 24)})[24, 25]
@@ -46,6 +47,15 @@ def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     os.kill(second, signal.SIGKILL)
     with pytest.raises(InputError, match="ended: The worker process was ended by SIGKILL"):
         future.result(30)
+
+    # A call asks another process once, and tells of the second that is lost.
+    def kill():
+        os.kill(live.process, signal.SIGKILL)
+
+    assert live.call(views.region, step=step).any()
+    os.kill(live.process, signal.SIGSTOP)
+    threading.Timer(0.3, kill).start()
+    assert live.call(views.picture, steps=(step,), panes={}) == picture
     # A second fall of one person waits for the first.
     fall = Step("drop", {"mesh": "x.ply", "at": ["5", "5"]}, tmp_path)
     with quota.opening("somebody"), pytest.raises(InputError, match="being opened"):

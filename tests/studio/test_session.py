@@ -303,7 +303,7 @@ def test_ticking_and_moving_leave_the_current_one():
 def test_an_object_falls_and_lies_there(session, monkeypatch, tmp_path):
     pytest.importorskip("mujoco", reason="needs the physics extra")
     save_scene(floor_scene(64, 48), tmp_path / "floor.scene")
-    floor = LiveHere(floor_scene(64, 48), tmp_path / "floor.scene", tmp_path / "floor.npz")
+    floor = LiveHere(tmp_path / "floor.scene", tmp_path / "floor.npz")
     monkeypatch.setattr(session, "live", floor)
     with pytest.raises(InputError, match="Place an object first"):
         objects.let_fall(session, 1.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from studio_scenes import room
 
+from materialist.studio.live_preview import lit_as_around
 from materialist.studio.sketch import draw_bodies, light_lamps
 from materialist.types import Body, Lamp, Surface
 
@@ -63,3 +64,16 @@ def test_a_lamp_lights_what_faces_it_by_the_square_of_its_distance():
     squared = x * x + y * y + 1
     np.testing.assert_allclose(lit[row, column], expected / squared**1.5, rtol=0.02)
     assert (lit[:4] > 0).any() and light_lamps(black, replace(scene, lamps=())).max() == 0
+
+
+def test_a_filling_is_as_bright_as_what_lies_around_it():
+    photo = np.full((40, 40, 3), 0.4, np.float32)
+    filled = np.zeros((40, 40), bool)
+    filled[10:30, 12:28] = True
+    # Twice as bright to the left, half as bright to the right; what is lit where it is filled says nothing.
+    gain = np.where(np.arange(40) < 20, 2, 0.5).astype(np.float32)[None, :, None]
+    lit = np.where(filled[..., None], 9, photo * gain).astype(np.float32)
+    shown = lit_as_around(photo, lit, photo, filled)
+    np.testing.assert_allclose(shown[20, 14], 0.8, rtol=0.03)
+    np.testing.assert_allclose(shown[20, 26], 0.2, rtol=0.03)
+    np.testing.assert_allclose(lit_as_around(photo, photo, photo, filled), photo, rtol=1e-5)

@@ -18,7 +18,7 @@ from studio_server import free_port
 from materialist.errors import InputError
 from materialist.io.photo import example_path
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
-from materialist.studio import SETTINGS, StudioSettings, archives, stage
+from materialist.studio import SETTINGS, StudioSettings, archives, stage, tasks
 from materialist.studio.access import quota
 from materialist.studio.access.quota import Allowance
 from materialist.studio.reporting import quality
@@ -314,3 +314,22 @@ def test_a_scene_that_is_unpacked_counts_as_stored(studio, tmp_path, monkeypatch
     with pytest.raises(InputError, match="within an hour"):
         studio.unpack(studio._new_session("me"), zipped_package(tmp_path))
     assert studio.work.projects() == before
+
+
+def test_a_process_that_gets_ready_leaves_it_to_a_job_that_waits(monkeypatch):
+    told = []
+
+    def invert(photo, *, progress, **options):
+        for name in ("read", "predict", "geometry"):
+            progress(name, 0, 1)
+
+    class Report:
+        outdated = False
+
+        def __call__(self, stage, done, total):
+            told.append(stage)
+            self.outdated = stage == "predict"
+
+    monkeypatch.setattr(tasks.mt, "invert", invert)
+    tasks.warm(Report())
+    assert told == ["read", "predict"]

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
-from materialist.transport.shading import shade, specular_at
+from materialist.transport.cache import ROUGHNESS_LEVELS, Tables, levels_around
+from materialist.transport.shading import at_roughness, shade, specular_at
 
 P = 6
 
@@ -62,3 +62,30 @@ def test_roughness_beyond_the_levels_is_held(tables, roughness):
 def test_gradients_are_those_of_finite_differences(tables):
     leaves = [x.clone().requires_grad_() for x in draw_materials()]
     assert torch.autograd.gradcheck(lambda *m: shade(tables, *m), leaves, eps=1e-6, atol=1e-6)
+
+
+def test_the_levels_around_a_roughness_are_all_that_shading_takes(tables):
+    albedo, _, metallic = draw_materials()
+    roughness = np.array([0.2, 0.25, 0.3, 0.35, 0.41, 0.42])
+    some = levels_around(roughness)
+    assert [ROUGHNESS_LEVELS[k] for k in some] == [0.12, 0.2, 0.3, 0.42]
+    few = Tables(
+        tables.diffuse,
+        tables.specular[some.start : some.stop],
+        tables.levels[some.start : some.stop],
+    )
+    materials = albedo, torch.from_numpy(roughness), metallic
+    expected = shade(tables, *materials)
+    torch.testing.assert_close(shade(few, *materials), expected)
+    # At their own roughness alone, they need one level.
+    own = at_roughness(few, roughness)
+    assert len(own.specular) == 1
+    torch.testing.assert_close(shade(own, *materials), expected)
+
+
+@pytest.mark.parametrize(
+    ("roughness", "first", "count"), [([0.0], 0, 2), ([1.0], 6, 2), ([0.0, 1.0], 0, 8), ([], 0, 2)]
+)
+def test_there_are_two_levels_around_any_roughness(roughness, first, count):
+    levels = levels_around(np.array(roughness))
+    assert levels.start == first and len(levels) == count

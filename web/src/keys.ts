@@ -7,7 +7,8 @@ const TOOLS: Tool[] = ["click", "box", "brush", "lamp", "place"];
 const PANELS: Record<string, Panel> = { Digit1: "material", Digit2: "light", Digit3: "object", Digit4: "look" };
 
 export function undo(again: boolean): void {
-  if (again ? view.state?.redo : view.state?.undo) void change("undo", { again });
+  // Asked when it is its turn: keys come faster than answers.
+  void change("undo", { again }, "", "", () => !!(again ? view.state?.redo : view.state?.undo));
 }
 
 function typing(target: EventTarget | null): boolean {

@@ -124,6 +124,8 @@ interface Waiting {
   key: string;
   words: string;
   quiet: boolean;
+  /** Whether it still makes sense when it is its turn. */
+  when: () => boolean;
   run: () => Promise<State>;
   done: () => void;
 }
@@ -137,9 +139,15 @@ const SPARSE = 250; // milliseconds between two changes that the page has drawn 
 let later = 0;
 
 /** Send a change; one that is `quiet`, which the page has drawn, waits for those that follow it at once. */
-export function change(place: string, body: { quiet?: boolean; [name: string]: unknown } = {}, key = "", words = ""): Promise<void> {
+export function change(
+  place: string,
+  body: { quiet?: boolean; [name: string]: unknown } = {},
+  key = "",
+  words = "",
+  when = () => true,
+): Promise<void> {
   return new Promise((done) => {
-    const entry = { key, words, quiet: !!body.quiet, run: () => post<State>(place, body), done };
+    const entry = { key, words, quiet: !!body.quiet, when, run: () => post<State>(place, body), done };
     const same = key ? queue.find((one) => one.key === key) : undefined;
     if (same) {
       same.done();
@@ -166,8 +174,12 @@ async function drain(): Promise<void> {
   running = true;
   for (let entry = queue.shift(); entry; entry = queue.shift()) {
     const { words } = entry;
-    // Words for what takes long only: a slider answers before anybody could read.
-    const timer = window.setTimeout(() => set({ working: words || t.working }), words ? 150 : 700);
+    if (!entry.when()) {
+      entry.done();
+      continue;
+    }
+    // Words for what takes long only: a slider answers before anybody could read, and what the page has drawn is seen.
+    const timer = window.setTimeout(() => set({ working: words || t.working }), words ? 150 : entry.quiet ? 5000 : 700);
     changes += 1;
     try {
       accept(await entry.run());
@@ -194,6 +206,9 @@ export function accept(state: State): void {
   if (!newer) Object.assign(stage, { ...last!.stage, region: state.stage.region });
   if (state.notes?.length) remark(state.notes.join(" "));
   set({ state: { ...state, stage }, ...(state.project && view.dropped ? { dropped: "" } : {}) });
+  // Deleted or closed, perhaps on another page: there is something to choose, not an empty window.
+  const gone = last?.project && !state.project && !state.expected && !view.dropped && view.sent === null;
+  if (gone) set({ sheet: "open" });
   clearTimeout(rest);
   if (stage.coarse) rest = window.setTimeout(() => void refresh(), 300);
 }
@@ -274,7 +289,8 @@ export async function arrive(): Promise<void> {
     const about = view.about ?? (await get<About>("about"));
     set({ about });
     accept(await get<State>("arrive"));
-    if (!view.state?.project && !view.state?.expected) set({ sheet: "open" });
+    // Somebody may have dropped a photo meanwhile.
+    if (!view.state?.project && !view.state?.expected && !view.dropped && view.sent === null) set({ sheet: "open" });
     await listProjects();
   } catch (error) {
     tell(error);

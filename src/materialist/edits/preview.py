@@ -25,6 +25,7 @@ from materialist.types import Array, Materials, Scene
 
 if TYPE_CHECKING:
     from materialist.transport.cache import Tables, TransportCache
+    from materialist.transport.filter import Guide
 
 RAYS = (48, 12)
 """Diffuse and specular rays a pixel, three quarters of the fit's: a new light is gathered sooner."""
@@ -42,7 +43,7 @@ def load() -> None:
     from materialist.render.variant import setup
 
     setup()
-    import materialist.fit.engine  # noqa: F401
+    import materialist.transport.filter  # noqa: F401
 
 
 class Preview:
@@ -65,35 +66,39 @@ class Preview:
         self._passed_on = scene.rerender
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
-        self._use(
-            kept or _stored(self._quick, self._filtered(self._quick, scene.envmap, scene.rerender))
-        )
+        if kept is None:
+            tables = self._filtered(self._quick, scene.envmap, scene.rerender)
+            self._use(self._quick.pixels, tables)
+        else:
+            self._use(kept["pixels"], _restored(kept))
 
-    def _use(self, kept: dict[str, Any]) -> None:
-        """Shade with stored tables of the fitted light from now on."""
-        from materialist.transport.cache import Tables
-
-        self._pixels = kept["pixels"].astype(np.int64)
-        self._skies = np.setdiff1d(np.arange(self.scene.depth.size), self._pixels)
-        self._tables = Tables(
-            *(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular"))
-        )
+    def _use(self, pixels: Array, tables: Tables) -> None:
+        """Shade those pixels [P] with tables of the fitted light from now on."""
+        self._pixels = pixels.astype(np.int64)
+        sky = np.ones(self.scene.depth.size, bool)
+        sky[self._pixels] = False
+        self._skies = np.flatnonzero(sky)
+        self._tables = tables
         # The fitted scene, shaded once: every edit is compared with it.
         self._base = self._image(
             self._shaded(self.scene.materials, self._tables), self._sky(self.scene.envmap)
         )
 
     @cached_property
-    def _engine(self):
-        from materialist.fit.engine import TransportEngine
+    def _cache(self) -> TransportCache:
+        """All rays of a fine picture."""
         from materialist.transport.cache import CacheSettings
 
-        scene = self.scene
-        rays = CacheSettings(*RAYS)
-        return TransportEngine(scene.geometry, scene.camera, scene.rerender, seed=0, cache=rays)
+        return self._quick.with_rays(CacheSettings(*RAYS))
 
     @cached_property
-    def _quick(self):
+    def _guide(self) -> Guide:
+        from materialist.transport.filter import surface_guide
+
+        return surface_guide(self._quick)
+
+    @cached_property
+    def _quick(self) -> TransportCache:
         """A few rays a pixel: enough for what surfaces pass on, which is averaged again where it arrives."""
         from materialist.transport.cache import CacheSettings, TransportCache
 
@@ -106,14 +111,13 @@ class Preview:
 
     def prepare(self) -> bool:
         """Trace the next part for finer pictures and another light, a second or so; False where all is there."""
-        if self._quick.trace_next() or self._engine.cache.trace_next():
+        if self._quick.trace_next() or self._cache.trace_next():
             return True
         if self._coarse:
-            cache = self._engine.cache
-            tables = self._filtered(cache, self.scene.envmap, self.scene.rerender)
-            kept = _stored(cache, tables)
+            tables = self._filtered(self._cache, self.scene.envmap, self.scene.rerender)
+            kept = _stored(self._cache, tables)
             self._coarse = False
-            self._use(kept)
+            self._use(kept["pixels"], _restored(kept))
             if self._file is not None:
                 with suppress(OutputError), whole_file(self._file, force=True) as whole:
                     np.savez(whole, key=self._key, **kept)
@@ -184,26 +188,44 @@ class Preview:
         return replace(edited, envmap=(light * factor).astype(np.float32))
 
     def _tables_under(self, edited: Scene, coarse: bool) -> Tables:
-        """The tables of another light, which surfaces pass on once; kept until there is a third light."""
+        """The tables of another light, which surfaces pass on once; kept until there is a third light.
+
+        Coarse ones are of the scene's own roughness alone.
+        """
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
             return self._other[1]
-        # First what surfaces pass on under this light, by few rays; then the picture, by all of
-        # them.
-        tables = self._filtered(self._quick, edited.envmap, self._passed_on if coarse else None)
+        # First what surfaces pass on under this light, by few rays, at the roughness that they have; then the picture,
+        # by all of them.
+        before = self._passed_on if coarse else None
+        roughness = edited.materials.roughness.ravel()[self._pixels]
+        tables = self._filtered(self._quick, edited.envmap, before, roughness)
         self._passed_on = self._image(
             self._shaded(edited.materials, tables), self._sky(edited.envmap)
         )
         if not coarse:
-            tables = self._filtered(self._engine.cache, edited.envmap, self._passed_on)
+            tables = self._filtered(self._cache, edited.envmap, self._passed_on)
             self._other = (edited.envmap, tables)
         return tables
 
-    def _filtered(self, cache: TransportCache, envmap: Array, passed_on: Array | None) -> Tables:
-        """Tables of a light by the rays of one cache, without noise."""
+    def _filtered(
+        self,
+        cache: TransportCache,
+        envmap: Array,
+        passed_on: Array | None,
+        roughness: Array | None = None,
+    ) -> Tables:
+        """Tables of a light by the rays of one cache, without noise, of all levels or of one roughness [P] alone."""
+        from materialist.transport.cache import levels_around
         from materialist.transport.filter import filter_tables
+        from materialist.transport.shading import at_roughness
 
-        tables = cache.gather(envmap, passed_on)
-        return filter_tables(cache, tables, self._engine.guide, sharpest=SHARPEST)
+        if roughness is None:
+            tables = cache.gather(envmap, passed_on)
+        else:
+            tables = cache.gather(envmap, passed_on, levels_around(roughness))
+            # One level to filter in place of all.
+            tables = at_roughness(tables, roughness)
+        return filter_tables(cache, tables, self._guide, sharpest=SHARPEST)
 
     def _shaded(self, materials: Materials, tables: Tables):
         """[P, 3] torch radiance of the surface pixels."""
@@ -246,9 +268,16 @@ def _stored(cache: TransportCache, tables: Tables) -> dict[str, Any]:
     # float16 halves the file; its largest number is 65504.
     halves = {
         name: np.clip(v.cpu().numpy(), -6e4, 6e4).astype(np.float16)
-        for name, v in vars(tables).items()
+        for name, v in (("diffuse", tables.diffuse), ("specular", tables.specular))
     }
     return halves | {"pixels": cache.pixels}
+
+
+def _restored(kept: dict[str, Any]) -> Tables:
+    """Tables as `_stored` gave them."""
+    from materialist.transport.cache import Tables
+
+    return Tables(*(placed(kept[name].astype(np.float32)) for name in ("diffuse", "specular")))
 
 
 def _read(file: Path, key: str) -> dict[str, Any] | None:

@@ -119,7 +119,9 @@ class TransportEngine:
         tables = filter_tables(self.cache, gathered, self.guide)
 
         def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
-            return _shaded(Tables(tables.diffuse[rows], tables.specular[:, rows]), maps)
+            return _shaded(
+                Tables(tables.diffuse[rows], tables.specular[:, rows], tables.levels), maps
+            )
 
         return render
 

@@ -142,20 +142,23 @@ class _Grid:
         strength = weight * self.facing**2
         system = (self.step.T @ diags(strength) @ self.step + diags(pull)).tocsr()
         right_side = self.step.T @ (strength * self.demanded) + pull * data
-        multigrid = pyamg.ruge_stuben_solver(
-            system, max_coarse=SETTINGS.coarsest, coarse_solver="splu"
-        )
         limit = SETTINGS.tolerance * float(np.linalg.norm(right_side - system @ data))
-        log_depth, _ = cg(
-            system,
-            right_side,
-            start,
+        # What is missing to the start is solved for in single precision, which takes half the time: its error is far
+        # below the tolerance.
+        missing = (right_side - system @ start).astype(np.float32)
+        single = system.astype(np.float32)
+        multigrid = pyamg.ruge_stuben_solver(
+            single, max_coarse=SETTINGS.coarsest, coarse_solver="splu", interpolation="direct"
+        )
+        change, _ = cg(
+            single,
+            missing,
             rtol=0.0,
             atol=limit,
             maxiter=SETTINGS.iterations,
             M=multigrid.aspreconditioner(),
         )
-        return log_depth
+        return start + change
 
 
 def _change(normal: Array, near: Array, far: Array) -> Array:

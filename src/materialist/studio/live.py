@@ -17,6 +17,7 @@ from materialist import errors
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step
 from materialist.errors import InputError, MaterialistError
+from materialist.io.package import load_scene
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, Reporter
 from materialist.studio import SETTINGS, views
@@ -28,12 +29,15 @@ Steps = tuple[Step, ...]
 CLOSED = "This photo was closed; open it again."
 
 
+class PreviewLost(InputError):
+    """The process of a preview has ended while it was asked."""
+
+
 class Live:
     """An open scene, and the process of its preview. Methods may be called from any thread."""
 
     def __init__(
         self,
-        scene: Scene,
         package: Path,
         file: Path,
         allowance: Allowance | None = None,
@@ -42,9 +46,8 @@ class Live:
     ):
         """package: where the scene lies. file: where the preview keeps its tables. worker: one that `warmed` gave.
 
-        device: on which the preview is computed, as of `invert`.
+        device: on which the preview is computed, as of `invert`. Raises SceneError as `load_scene`.
         """
-        self.scene = scene
         self._package = str(package)
         self._device = device
         self._file = str(file)
@@ -63,6 +66,12 @@ class Live:
         """Lists of edits that end with a fall, which was simulated."""
         with self._lock:
             self._start(worker)
+        try:
+            # Read here, too, while the process does.
+            self.scene: Scene = load_scene(package)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def ready(self) -> bool:
@@ -87,10 +96,15 @@ class Live:
     def call(self, function: Callable[..., Any], **arguments: Any) -> Any:
         """What function(preview, **arguments), importable, returns in the process; `steps` are edits that it applies.
 
-        Raises its errors, if they are ours; InputError where the photo is closed or the process is lost meanwhile.
+        Where the process is lost meanwhile, another one is asked, once. Raises its errors, if they are ours; InputError
+        where the photo is closed, PreviewLost where the second process is lost, too.
         """
         with self._allowed(arguments.get("steps", ())):
-            return self._begin(function, arguments).result()
+            try:
+                return self._begin(function, arguments).result()
+            except PreviewLost:
+                # Whatever ended it need not be what was asked: a process of its own answers.
+                return self._begin(function, arguments).result()
 
     def select(self, **where: Any) -> Array:
         """[H, W] bool: what `edits.select.select.select` chooses by these keywords. Raises InputError."""
@@ -180,7 +194,7 @@ class Live:
             if lost:
                 words = f"The live preview has ended: {message.facts['reason']} Do it again."
                 for waiting in (*failed, self._built):
-                    _fail(waiting, InputError(words))
+                    _fail(waiting, PreviewLost(words))
             elif future is not None:
                 _settle(future, message)
             elif message.number == self._opening:
@@ -252,7 +266,6 @@ def load(report: Reporter, device: str) -> None:
 
 def open_preview(report: Reporter, package: str, file: str, device: str) -> None:
     """Open a scene, once in a process; reports `fine` when there are pictures, and again when those are fine."""
-    from materialist.io.package import load_scene
     from materialist.studio.live_preview import LivePreview, load_renderer
 
     try:

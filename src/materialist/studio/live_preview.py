@@ -17,10 +17,12 @@ import numpy as np
 
 from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
+from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import KEY
 from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.edits.remove.patches import remembered
 from materialist.errors import InputError
+from materialist.geometry.membrane import nearest
 from materialist.jobs.limited import Limits, run_limited
 from materialist.memory import give_back
 from materialist.option_kinds import Colour
@@ -28,6 +30,13 @@ from materialist.studio import SETTINGS, glass, tasks
 from materialist.studio.edit_list import is_shaded, kept, key_of, step_summary
 from materialist.studio.sketch import draw_bodies, light_lamps
 from materialist.types import Array, Scene
+
+REACH = 0.01
+"""Share of the longer side over which light is compared around a filling (by eye)."""
+FLOOR = 0.004
+"""Radiance, about one level of 8 bits, by which a ratio of dark pixels stays finite."""
+MOST = 8.0
+"""Most by which a filling is brightened."""
 
 
 def _use_one_thread() -> None:
@@ -178,7 +187,11 @@ class LivePreview:
         picture = known[2]
         # --- What was taken away is filled as in the photo ---
         if edited.photo is not self.scene.photo:
-            picture = np.where(self.filled(edited)[..., None], edited.photo.linear, picture)
+            filled = self.filled(edited)
+            fill = edited.photo.linear
+            if is_relit(self.scene, scene):
+                fill = lit_as_around(fill, picture, self.scene.photo.linear, filled)
+            picture = np.where(filled[..., None], fill, picture)
         return picture
 
     def filled(self, edited: Scene) -> Array:
@@ -212,6 +225,7 @@ class LivePreview:
         Where all glass has a pane it is a linear function of each pixel.
         """
         known = [(step, panes.get(glass.place(step))) for step in steps if glass.is_traced(step)]
+        relit = bool(edited.lamps) or is_relit(self.scene, edited)
         # --- Lamps: their light without its shadows ---
         if edited.lamps and lamps:
             picture = light_lamps(picture, edited)
@@ -220,7 +234,13 @@ class LivePreview:
             if pane is None:
                 picture = sketch_glass(picture, *self._glass(step))
             else:
-                picture = lay_over(picture, pane.picture, pane.filled)
+                ground = pane.picture
+                if relit and pane.filled.any():
+                    # By what is there, not by `picture`, of which this stays a linear function.
+                    lit = self.shaded(steps)
+                    lit = light_lamps(lit, edited) if edited.lamps else lit
+                    ground = lit_as_around(ground, lit, self.scene.photo.linear, pane.filled)
+                picture = lay_over(picture, ground, pane.filled)
         if edited.bodies:
             picture = draw_bodies(picture, edited)
         for _, pane in known:
@@ -285,6 +305,23 @@ def sketch_glass(picture: Array, region: Array, tint: Colour) -> Array:
     spread = 1 + int(1.5 * np.sqrt(region.sum()))  # pixels
     blurred = cv2.blur(picture, (spread, spread))
     return np.where(region[..., None], blurred * np.asarray(tint, np.float32), picture)
+
+
+def lit_as_around(fill: Array, lit: Array, photo: Array, filled: Array) -> Array:
+    """[H, W, 3] a filling, taken from the photo, as much brighter or darker as what lies around it has become.
+
+    lit, photo: [H, W, 3] the picture under another light and the photo; filled: [H, W] bool, where they say nothing.
+    """
+    if filled.all():
+        return fill
+    around = ~filled
+    sigma = REACH * max(filled.shape)
+    now, before = (
+        cv2.GaussianBlur(np.where(around[..., None], values, 0), (0, 0), sigma)
+        for values in (lit, photo)
+    )
+    gain = np.clip((now + FLOOR) / (before + FLOOR), 0, MOST)[nearest(around)]
+    return fill * cv2.GaussianBlur(gain, (0, 0), sigma)
 
 
 def lay_over(picture: Array, piece: Array, share: Array) -> Array:

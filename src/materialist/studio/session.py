@@ -8,7 +8,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import materialist as mt
 from materialist.edits.core.operation import REGION, PreviewMode, Target
 from materialist.edits.light.operation import RELIGHT
 from materialist.edits.recipe import Step, write_recipe
@@ -136,7 +135,6 @@ class Session:
 
         worker: a process for its preview that is running already.
         """
-        loaded = mt.load_scene(project.scene)
         workspace = project.workspace(self.person)
         # --- Everything that can fail, before the page changes ---
         kept = content_of(workspace / EDITS)
@@ -147,14 +145,15 @@ class Session:
             raise InputError(
                 f"The edits of this photo cannot be read, and were left as they are: {error} Repair or rename {place}."
             ) from error
+        tables = project.folder / "preview.npz"
+        live = Live(project.scene, tables, self.allowance, worker, self._device)
         with self.lock:
             self.close()
             self.project = self.expected = project
             self.glass = GlassClient(project.scene)
-            tables = project.folder / "preview.npz"
-            self.live = Live(loaded, project.scene, tables, self.allowance, worker, self._device)
+            self.live = live
             # --- As it was left ---
-            history = read_history(workspace, loaded.depth.shape)
+            history = read_history(workspace, live.scene.depth.shape)
             current = history.current
             self._past = history.past
             self._future = history.future

@@ -10,6 +10,7 @@ from materialist.errors import MaterialistError
 from materialist.jobs.queue import Job
 from materialist.studio import glass, views
 from materialist.studio.edit_list import EditList, is_shaded
+from materialist.studio.live import PreviewLost
 from materialist.studio.selection import data_url
 from materialist.studio.session import EDITS, Session
 from materialist.studio.tasks import before_of
@@ -102,7 +103,13 @@ def stage(
     except MaterialistError as error:
         photo = jpeg_url(live.scene.photo.linear)
         why = session.without_folders(str(error))
-        badge = f"The photo without its edits: {why} Switch off, or remove, what cannot be applied."
+        # Edits are not to blame where the process has ended.
+        mend = (
+            ""
+            if isinstance(error, PreviewLost)
+            else " Switch off, or remove, what cannot be applied."
+        )
+        badge = f"The photo without its edits: {why}{mend}"
         return {
             **shown,
             "picture": photo,

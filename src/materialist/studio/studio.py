@@ -71,7 +71,7 @@ class Studio:
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
-        self.quota = Quota(self.work.cache, self.work.root)
+        self.quota = Quota(self.work.cache, self.work.root, patient=self.single_user)
         self.last = self.work.read_last()
 
     def person(self, token: Any) -> str:
@@ -313,11 +313,15 @@ class Studio:
             shutil.rmtree(project.folder, ignore_errors=True)
             raise
         if self.keeps_ready:
-            self._warm_preview()
+            threading.Thread(target=self._warm_preview, args=(job,), daemon=True).start()
         return project, job
 
-    def _warm_preview(self) -> None:
-        """Let a process load what the preview needs, which comes next."""
+    def _warm_preview(self, job: Job) -> None:
+        """Let a process load what the preview needs, once an inversion has found the first maps, which come first."""
+        while all(found["name"] == tasks.PHOTO for found in job.intermediate):
+            if job.over:
+                return
+            time.sleep(0.1)
         with self._lock:
             if self._spare is None or not self._spare.running:
                 self._spare = warmed(self.device)

@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -69,11 +69,22 @@ def on_device(device: str, task: Task, report: Reporter, **arguments: Any) -> No
     task(report, **arguments)
 
 
+class _Awaited(Exception):
+    """A job waits for the process that gets ready."""
+
+
 def warm(report: Reporter) -> None:
-    """Load all that `invert` needs, by an inversion of a few pixels."""
+    """Load all that `invert` needs, by an inversion of a few pixels, which a waiting job ends at its next stage."""
+
+    def tick(stage: str, done: int, total: int) -> None:
+        if report.outdated:
+            raise _Awaited
+        report(stage, done, total)
+
     grey = np.full((WARM_SIDE, WARM_SIDE, 3), 0.5, np.float32)
     grey[: WARM_SIDE // 2] = 0.3
-    mt.invert(grey, encoded=False, size=WARM_SIDE, progress=report)
+    with suppress(_Awaited):
+        mt.invert(grey, encoded=False, size=WARM_SIDE, progress=tick)
 
 
 def invert(

@@ -8,6 +8,7 @@ memory traffic.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -65,6 +66,8 @@ class Tables:
     specular: torch.Tensor
     """[L, P, 6]: S0, S1 (RGB each) per roughness level, or at the pixel's own roughness if L is 1; specular radiance
     is C0 S0(R) + S1(R)."""
+    levels: tuple[Array, ...] = tuple(np.array([r], np.float32) for r in ROUGHNESS_LEVELS)
+    """Perceptual roughness of each level, [1], or [P] of the pixels."""
 
 
 def build_scene(mesh: Mesh) -> mi.Scene:
@@ -109,6 +112,17 @@ class TransportCache:
         self.slots = integers(mi, slots)
         """[F] radiance slot of every face: its pixel, or one of its own on a continued plane."""
         self._primary()
+        self._progress = progress
+        self._set_lobes(s, roughness)
+
+    def with_rays(self, settings: CacheSettings) -> TransportCache:
+        """A cache of the same surfaces with other rays, none of them traced yet."""
+        other = copy(self)
+        other.settings = settings
+        other._set_lobes(settings, None)
+        return other
+
+    def _set_lobes(self, s: CacheSettings, roughness: Array | None) -> None:
         counts = s.level_share
         self.roughness = [np.array([r], np.float32) for r in ROUGHNESS_LEVELS]
         """Of each level of the specular lobe, [1], or [P] of the pixels."""
@@ -125,7 +139,6 @@ class TransportCache:
         ]
         """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each level."""
         self._hits: list[mi.UInt32] = []
-        self._progress = progress
 
     def _primary(self) -> None:
         """Trace one ray through each pixel; keep what the pixels with a surface need for shading."""
@@ -213,8 +226,8 @@ class TransportCache:
         self._hits.clear()
         dr.flush_malloc_cache()
 
-    def gather(self, envmap: Array, radiance: Array | None) -> Tables:
-        """Tables for one light, an envmap [h, 2h, 3] of linear radiance.
+    def gather(self, envmap: Array, radiance: Array | None, levels: range | None = None) -> Tables:
+        """Tables for one light, an envmap [h, 2h, 3] of linear radiance, of all levels of roughness or of some.
 
         radiance: [H, W, 3] linear radiance that leaves the surface seen by each pixel (for indirect light), or None
             for direct light alone.
@@ -223,7 +236,10 @@ class TransportCache:
         slots = floats(mi, self.slot_radiance(radiance))
         width = len(self.pixels)
         out = []
+        wanted = range(len(self.roughness)) if levels is None else levels
         for k, (hits, (count, alpha)) in enumerate(zip(self.trace(), self.lobes, strict=True)):
+            if k > 0 and k - 1 not in wanted:
+                continue
             # Diffuse lobes are sampled alike in every tile: what falls between their few directions would be missing
             # from the whole picture, or be in all of it twice.
             level = pyramid.level(4 * np.pi * alpha * alpha / count)
@@ -246,7 +262,8 @@ class TransportCache:
             dr.eval(*sums)
             # The mean over `count` samples is the Monte Carlo estimate.
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
-        return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous())
+        made = tuple(self.roughness[k] for k in wanted)
+        return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous(), made)
 
     def slot_radiance(self, radiance: Array | None) -> Array:
         """[S, 3] radiance per slot: one a pixel, then one a face of the continued planes."""
@@ -354,6 +371,14 @@ def _gather_loop(
         sums = _added(sums, diffuse, wi, wo, h, alpha, light)
         i += 1
     return sums
+
+
+def levels_around(roughness: Array) -> range:
+    """Those of ROUGHNESS_LEVELS, one after another and at least two, between which all of a roughness [P] lies."""
+    last = len(ROUGHNESS_LEVELS) - 1
+    low, high = (float(roughness.min()), float(roughness.max())) if roughness.size else (0.0, 0.0)
+    first = int(np.clip(np.searchsorted(ROUGHNESS_LEVELS, low) - 1, 0, last - 1))
+    return range(first, int(np.clip(np.searchsorted(ROUGHNESS_LEVELS, high), first + 1, last)) + 1)
 
 
 def pixel_shift(height: int, width: int, seed: int) -> Array:

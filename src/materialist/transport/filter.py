@@ -112,7 +112,7 @@ def filter_tables(
 ) -> Tables:
     """The tables with the diffuse lobe and the specular levels from the roughness `sharpest` on filtered."""
     # Sharper levels are nearly noise-free and carry reflected detail.
-    wide = [roughness[:, None] >= sharpest for roughness in cache.roughness]
+    wide = [roughness[:, None] >= sharpest for roughness in tables.levels]
     filtered = [k for k, pixels in enumerate(wide) if pixels.any()]
     # --- All tables that are filtered, side by side on the image grid: one product filters them ---
     stack = torch.cat([tables.diffuse, *(tables.specular[k] for k in filtered)], -1)
@@ -125,4 +125,4 @@ def filter_tables(
     for n, k in enumerate(filtered):  # none where every pixel is nearly a mirror
         first = 9 + 6 * n
         levels[k] = torch.where(placed(wide[k]), smooth[:, first : first + 6], levels[k])
-    return Tables(smooth[:, :9].contiguous(), torch.stack(levels))
+    return Tables(smooth[:, :9].contiguous(), torch.stack(levels), tables.levels)

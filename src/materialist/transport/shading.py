@@ -3,7 +3,9 @@
 import torch
 
 from materialist.bsdf.disney import combine, quadratic
-from materialist.transport.cache import ROUGHNESS_LEVELS, Tables
+from materialist.buffers import placed
+from materialist.transport.cache import Tables
+from materialist.types import Array
 
 
 def shade(
@@ -21,13 +23,13 @@ def shade(
 
 
 def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
-    """[P, 6] specular tables interpolated linearly between ROUGHNESS_LEVELS; differentiable in roughness [P].
+    """[P, 6] specular tables interpolated linearly between their roughness levels; differentiable in roughness [P].
 
     Tables made at the pixels' own roughness (L = 1) are returned unchanged.
     """
     if len(tables.specular) == 1:
         return tables.specular[0]
-    levels = torch.tensor(ROUGHNESS_LEVELS).to(roughness)
+    levels = torch.tensor([float(level[0]) for level in tables.levels]).to(roughness)
     # --- The two levels around each pixel's roughness, and its place between them ---
     r = roughness.clamp(levels[0], levels[-1])
     low = (torch.bucketize(r.detach(), levels) - 1).clamp(0, len(levels) - 2)
@@ -38,3 +40,9 @@ def specular_at(tables: Tables, roughness: torch.Tensor) -> torch.Tensor:
     s_low = flat[index]
     s_high = flat[index + len(r)]
     return s_low + t * (s_high - s_low)
+
+
+def at_roughness(tables: Tables, roughness: Array) -> Tables:
+    """Tables at the pixels' own roughness [P] alone (L = 1)."""
+    specular = specular_at(tables, placed(roughness))
+    return Tables(tables.diffuse, specular[None], (roughness,))

@@ -121,6 +121,16 @@ def test_few_uploads_are_opened_at_once_and_one_of_each_sender(monkeypatch, tmp_
     assert max(opened_at_once) <= SETTINGS.openings
     assert any("Another file of yours" in text for text in refusals)
     assert any("files of others" in text for text in refusals)
+    # On one's own machine two photos that are dropped at once come one after the other.
+    shared_quota = quota.Quota(patient=True)
+    refusals.clear()
+    opened_at_once.clear()
+    threads = [threading.Thread(target=open_one, args=("127.0.0.1",)) for _ in range(3)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert opened_at_once == [1, 1, 1] and not refusals
 
 
 def test_jobs_are_counted_by_address(shared, tmp_path):

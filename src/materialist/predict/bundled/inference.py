@@ -57,24 +57,25 @@ def infer_bundled(
     The network, in evaluation mode on `device`, sees the photo, clipped to [0, 1], and its mirror image at two sizes;
     its answers are averaged and enlarged, depth with the photo's edges. rays: [H, W, 2] float32 x and y of the
     camera rays at z = -1. Albedo is linear, depth has a fixed median and is 0 where there is no surface; light where
-    the network knows it. on_materials: called with the materials, which are there long before the depth.
+    the network knows it. on_materials: called with the materials, which are there long before the depth; before them
+    with those of its first, smallest answer.
     """
     linear = np.clip(linear, 0, 1).astype(np.float32)
     size = linear.shape[:2]
+
+    def tell(maps: dict[str, Array]) -> None:
+        if on_materials is not None:
+            on_materials(_materials(maps, size))
+
     # --- What the network answers, at its own size ---
-    maps, light, spread = _mean_answer(network, linear, rays, device)
+    maps, light, spread = _mean_answer(network, linear, rays, device, on_first=tell)
     surface = _without_specks(_surface(maps["mask"], resample.values(linear, maps["mask"].shape)))
     if not surface.any():
         surface[:] = True
     unsure = _unsure_sky(maps["mask"], surface)
     depth = _scaled(maps["depth"], surface)
     # --- At the photo's size: materials by enlarging, depth with the photo's edges ---
-    albedo, roughness, metallic = (
-        resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic")
-    )
-    materials = Materials(
-        srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1)
-    )
+    materials = _materials(maps, size)
     if on_materials is not None:
         on_materials(materials)
     depth, normal = with_edges(depth, maps["normal"], linear, rays)
@@ -93,6 +94,16 @@ def infer_bundled(
         )
     spread = {name: resample.values(values, size) for name, values in spread.items()}
     return Prediction(materials, normal, depth, warnings=notes, light=light, spread=spread)
+
+
+def _materials(maps: dict[str, Array], size: tuple[int, int]) -> Materials:
+    """Those of the network's maps, at the photo's size (H, W)."""
+    albedo, roughness, metallic = (
+        resample.values(maps[n], size) for n in ("albedo", "roughness", "metallic")
+    )
+    return Materials(
+        srgb_to_linear(np.clip(albedo, 0, 1)), np.clip(roughness, 0, 1), np.clip(metallic, 0, 1)
+    )
 
 
 def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple[Array, Array]:
@@ -134,11 +145,16 @@ def with_sky(depth: Array, guide: GuidedFilter) -> Array:
 
 
 def _mean_answer(
-    network: BundledNetwork, linear: Array, rays: Array, device: Any
+    network: BundledNetwork,
+    linear: Array,
+    rays: Array,
+    device: Any,
+    on_first: Callable[[dict[str, Array]], None],
 ) -> tuple[dict[str, Array], Array | None, dict[str, Array]]:
     """Means of the network's maps over sizes and over the photo and its mirror image, at the largest of the sizes.
 
-    Beside them the light as `Prediction.light` and the spread as `Prediction.spread`, of means of logarithms.
+    Beside them the light as `Prediction.light` and the spread as `Prediction.spread`, of means of logarithms. on_first:
+    called with the maps of the smallest size, which are there first.
     """
     sizes = sorted({resample.with_longer_side(linear.shape[:2], side) for side in SETTINGS.sides})
     answers = []
@@ -146,6 +162,8 @@ def _mean_answer(
         photo = resample.values(linear, size)
         seen = rays_at(rays, *photo.shape[:2])
         answers.append(_run(network, photo, seen, device))
+        if size == sizes[0] and len(sizes) > 1:
+            on_first(answers[0])
         # The mirror image: x turns round in rays and normals.
         mirrored = (
             np.ascontiguousarray(photo[:, ::-1]),

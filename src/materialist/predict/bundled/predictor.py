@@ -1,7 +1,9 @@
 """The predictor `bundled`: the network that ships with the package; docs/training.md tells how it was made."""
 
 from collections.abc import Collection
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -18,6 +20,13 @@ WEIGHTS = Path(__file__).with_name("weights.safetensors")
 """The weights that ship with the package."""
 
 
+@lru_cache(maxsize=1)
+def _read(path: Path, changed: int, device: torch.device) -> tuple[BundledNetwork, dict[str, Any]]:
+    """The network of a file that was last written at a time, and its facts; read once for photos in a row."""
+    network, facts = BundledNetwork.load(path)
+    return network.to(device, memory_format=torch.channels_last), facts  # type: ignore[call-overload]
+
+
 class BundledPredictor(Predictor):
     """The network in the package, or one of its kind from `train matnet` in the .safetensors file `where`.
 
@@ -27,8 +36,8 @@ class BundledPredictor(Predictor):
     def __init__(self, where: str | Path = "", *, device: str = "auto"):
         path = Path(where).expanduser() if str(where) else WEIGHTS
         self.device = torch.device("cuda" if on_gpu(device) else "cpu")
-        network, self.facts = BundledNetwork.load(path)
-        self.network = network.to(self.device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        changed = path.stat().st_mtime_ns if path.is_file() else 0
+        self.network, self.facts = _read(path, changed, self.device)
         file_name = "" if path == WEIGHTS else f" {path.name}"
         self.name = (
             f"bundled{file_name} step {self.facts.get('step', '?')} sha256:{sha256(path)[:16]}"

@@ -34,9 +34,14 @@ class Quota:
     Its methods may be called from any thread.
     """
 
-    def __init__(self, *places: Path) -> None:
-        """places: folders whose disks must not be filled."""
+    def __init__(self, *places: Path, patient: bool = False) -> None:
+        """places: folders whose disks must not be filled.
+
+        patient: whether a file waits for the one that is being opened, as on one's own machine; strangers are refused.
+        """
         self.places = places
+        self._patient = patient
+        self._turn = threading.Lock()
         self._claims: dict[str, deque[Claim]] = {}
         self._running: Counter[tuple[str, str]] = Counter()
         """(What is done, for which sender) -> how often at present."""
@@ -85,17 +90,24 @@ class Quota:
     def opening(self, sender: str) -> Iterator[None]:
         """A place among the few files that are opened at a time. Raises InputError where there is none."""
         refusal = "Another file of yours is being opened; wait until it is there."
-        with self._place("opening", sender, 1, refusal):
-            with self._lock:
-                opening = sum(
-                    count for (activity, _), count in self._running.items() if activity == "opening"
-                )
-            # Checked after counting oneself: two at once cannot both pass.
-            if opening > SETTINGS.openings:
-                raise InputError(
-                    "The studio is opening the files of others; try again in a moment."
-                )
-            yield
+        turn = self._patient and self._turn.acquire(timeout=SETTINGS.opening_seconds)
+        try:
+            with self._place("opening", sender, 1, refusal):
+                with self._lock:
+                    opening = sum(
+                        count
+                        for (activity, _), count in self._running.items()
+                        if activity == "opening"
+                    )
+                # Checked after counting oneself: two at once cannot both pass.
+                if opening > SETTINGS.openings:
+                    raise InputError(
+                        "The studio is opening the files of others; try again in a moment."
+                    )
+                yield
+        finally:
+            if turn:
+                self._turn.release()
 
     @contextmanager
     def uploading(self, sender: str) -> Iterator[None]:
