@@ -86,3 +86,13 @@ def test_the_studio_asks_before_it_makes_a_folder(refused, tmp_path, monkeypatch
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     assert "install 'pydantic" in refused("studio", "--work", tmp_path / "work")
     assert not (tmp_path / "work").exists()
+
+
+def test_a_film_of_falling_things_asks_for_all_its_packages_at_once(refused, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    drop = ("drop", tmp_path / "no.scene", "a.ply", "--at", "1,2", "-o")
+    words = refused(*drop, tmp_path / "a.mp4")
+    assert "mujoco" in words and "coacd" in words and "imageio-ffmpeg" in words
+    words = refused(*drop, tmp_path / "frames")  # a folder of PNG needs no encoder
+    assert "mujoco" in words and "imageio" not in words

@@ -181,7 +181,7 @@ def with_mirrored_photo(envmap: Array, photo: Array, camera: Camera) -> Array:
         np.clip(share * length - 0.5, 0, length - 1).astype(np.float32)
         for share, length in zip((column, row), size, strict=True)
     ]
-    detail = cv2.remap(ratio, *place, cv2.INTER_LINEAR)
+    detail = cv2.remap(ratio, place[0], place[1], cv2.INTER_LINEAR)
     fade = np.clip((np.abs(azimuth) - half_fov) / DETAIL.fade_in, 0, 1)
     fade = fade * np.clip(
         (DETAIL.last_elevation - np.abs(elevation))

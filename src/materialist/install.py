@@ -38,9 +38,9 @@ def laboratory_advice() -> str:
     )
 
 
-def extra_command(extra: str) -> str:
-    """A line for a shell that installs the packages of an extra of ours, such as `usd`."""
-    return install_command(*extra_requirements(extra))
+def extra_command(*extras: str) -> str:
+    """A line for a shell that installs the packages of extras of ours, such as `usd`."""
+    return install_command(*(need for extra in extras for need in extra_requirements(extra)))
 
 
 def extra_requirements(extra: str) -> list[str]:

@@ -255,11 +255,15 @@ def drop_command(
     rendering: Rendering = Rendering(),  # noqa: B008
 ) -> None:
     """Let meshes fall onto what the photo shows, and film it; --save writes the scene of the last frame."""
+    from materialist.edits.drop.physics import check_libraries
     from materialist.edits.insert.meshes import read_model
     from materialist.edits.light.relight import moving_light
+    from materialist.io.video import lacks_encoder
 
     # Read as a list of edits would be, so that the same texts are accepted.
     light = Relight.read({} if rotate is None else {"rotate": rotate})
+    # One command installs all that is missing: the film's package, too.
+    check_libraries(*(["video"] if lacks_encoder(output) else []))
     check_before(output, rendering, video=True)
     places: Any = [parse_numbers(text, 2, "--at") for text in at]
     models = [read_model(path, up=options.up) for path in meshes]

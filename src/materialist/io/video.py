@@ -28,6 +28,11 @@ BT709 = (
 MAX_FRAMES = 3600
 
 
+def lacks_encoder(path: Path) -> bool:
+    """Whether PATH is a video, and the package that encodes it is not installed."""
+    return bool(path.suffix) and find_spec("imageio_ffmpeg") is None
+
+
 def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
     """Check before the work that `write_frames` will accept PATH. Raises OutputError, InputError or SetupError."""
     path = Path(path)
@@ -36,7 +41,7 @@ def ensure_video_writable(path: str | Path, *, force: bool = False) -> None:
             f"The output {path} must end in .mp4, or have no ending: a folder of PNG frames."
         )
     # Found before the work: writing fails only at the end.
-    if path.suffix and find_spec("imageio_ffmpeg") is None:
+    if lacks_encoder(path):
         raise SetupError(
             f"Video needs one more package: {extra_command('video')}; or give -o a name without "
             "an ending to get PNG frames in a folder."

@@ -34,6 +34,8 @@ class HubModel:
     licence: str
     megabytes: int
     """What a download takes, about."""
+    instead: str = INSTEAD
+    """Advice for a person who cannot fetch it."""
 
 
 KNOWN = (
@@ -84,6 +86,7 @@ KNOWN = (
         "selections: --with sam2",
         "Apache-2.0",
         160,
+        'select without `method="sam2"`',
     ),
 )
 """By name; any other repository of the same kind can be named by its id, owner/name."""
@@ -113,7 +116,8 @@ def hub_model(name: str) -> HubModel:
         if name in (model.name, model.repo):
             return model
     if is_hub_id(name):
-        return HubModel(name, name, "", "given by its id", "see its page on the hub", 0)
+        licence = "see its page on the hub"
+        return HubModel(name, name, "", "given by its id", licence, 0, "do without it")
     known = ", ".join(model.name for model in KNOWN)
     raise InputError(
         f"There is no model '{name}'; choose one of {known}, or give a hub id as owner/name."
@@ -214,7 +218,7 @@ def download(model: HubModel, *, force: bool = False) -> Path:
         raise WeightsError(
             f"{model.repo} cannot be fetched from {api.endpoint} ({reason(error)}); run the same command again, or "
             f"fetch {model.main_file or 'its files'} elsewhere into a folder and take them from there: materialist "
-            f"models download {model.name} --from FOLDER; or {INSTEAD}."
+            f"models download {model.name} --from FOLDER; or {model.instead}."
         ) from error
     if not any(name.endswith(WEIGHTS) for name in names):
         raise WeightsError(f"{api.endpoint}/{model.repo} holds no file of weights; check the id.")

@@ -9,10 +9,10 @@ re-rendering, which `another seed` is, too; sheet.png has photo, re-rendering, a
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import trimesh
@@ -81,10 +81,9 @@ class ExportBench(Benchmark):
     ) -> Iterator[tuple[str, Array]]:
         """(what renders, [H, W, 3] linear)."""
         folder.mkdir()
-        load = partial(mi.load_file, parallel=False, spp=self.spp)
 
         def rendered(file):
-            return np.array(mi.render(load(str(file)), seed=mi.UInt32(self.seed)))
+            return np.array(mi.render(loaded(file, self.spp), seed=mi.UInt32(self.seed)))
 
         yield "another seed", pipeline.render_scene(scene, spp=self.spp, seed=self.seed + 2)
         export(scene, folder / "mitsuba", to="mitsuba", residual=residual)
@@ -106,6 +105,17 @@ class ExportBench(Benchmark):
                 asked = ["--render", str(folder / "cycles.exr"), "--samples", str(self.spp), *flags]
                 run_script(program, script, folder / "scene.blend", asked)
                 yield f"Blender, {name}", read_exr(folder / "cycles.exr")[..., :3]
+
+
+def loaded(file: Path, spp: int) -> Any:
+    """The scene that a Mitsuba file describes."""
+    threads = dr.thread_count()
+    # Where Dr.Jit has a single thread, as by OMP_NUM_THREADS=1, Mitsuba waits for itself for ever.
+    dr.set_thread_count(max(threads, 2))
+    try:
+        return mi.load_file(str(file), parallel=False, spp=spp)
+    finally:
+        dr.set_thread_count(threads)
 
 
 def _glb(file: Path) -> Iterator[tuple]:

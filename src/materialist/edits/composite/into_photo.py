@@ -27,7 +27,8 @@ class CompositeSettings:
     clipped_photo: float = 0.995  # channel of a linear photo that is clipped; derived: 8 bits
     clipped_emitter: float = 0.97  # least channel of an emitter's clipped pixel; derived: 8 bits
     bright_emitter: float = 0.9  # least channel from which it may be brighter than it looks
-    max_threads: int = 4  # strips of a large photo made together, 0.2 GB each; derived: memory
+    block: int = 1024  # native columns of a strip handled at a time; derived: memory and time
+    max_threads: int = 4  # blocks of a large photo made together, 0.05 GB each; derived: memory
 
 
 SETTINGS = CompositeSettings()
@@ -86,7 +87,8 @@ def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
         return out
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
 
-    def laid(rows: slice) -> None:
+    def laid(block: tuple[slice, slice]) -> None:
+        rows, columns = block
         share = alpha[rows, columns]
         colours = _side_colours(alpha, photo, rows, columns)
         moved = out[rows, columns].copy()
@@ -104,8 +106,9 @@ def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
             )
         out[rows, columns] = np.maximum(moved, 0)
 
-    # --- Strip by strip, which bounds the memory ---
-    parts = list(strips(box.stop, start=box.start))
+    # --- Block by block, which bounds the memory ---
+    across = list(strips(columns.stop, SETTINGS.block, columns.start))
+    parts = [(rows, part) for rows in strips(box.stop, start=box.start) for part in across]
     with ThreadPoolExecutor(min(SETTINGS.max_threads, os.cpu_count() or 1)) as threads:
         for done, _ in enumerate(threads.map(laid, parts)):
             tick("photo", done, len(parts))
@@ -137,7 +140,7 @@ def _side_colours(alpha: Array, photo: Photo, rows: slice, columns: slice) -> tu
         return here, here
     # --- Only the columns with mixed pixels, and what their means look up ---
     scale = max(1.0, photo.original.shape[1] / photo.linear.shape[1])
-    margin = int(np.ceil(3 * scale))
+    margin = int(np.ceil(4 * scale))
     left = columns.start + int(mixed[0])
     right = columns.start + int(mixed[-1]) + 1
     around = np.s_[

@@ -12,10 +12,9 @@ if TYPE_CHECKING:
 
 
 def _check_libraries() -> None:
-    from materialist.edits.drop.physics import LIBRARIES, load_library
+    from materialist.edits.drop.physics import check_libraries
 
-    for name in LIBRARIES:
-        load_library(name)
+    check_libraries()
 
 
 def _apply(scene: Scene, target: Placement, options: Any, fitted: Scene) -> Scene:

@@ -104,13 +104,20 @@ def fall(
         yield [Pose(b.xpos.copy(), b.xmat.reshape(3, 3).copy(), energy) for b in bodies]
 
 
-def load_library(name: str) -> Any:
-    """The module of one of `LIBRARIES`. Raises SetupError with the command that installs it."""
+def check_libraries(*extras: str) -> None:
+    """Import all `LIBRARIES`. Raises SetupError with the command that installs them and the packages of `extras`."""
+    for name in LIBRARIES:
+        load_library(name, *extras)
+
+
+def load_library(name: str, *extras: str) -> Any:
+    """The module of one of `LIBRARIES`. Raises SetupError as `check_libraries` does."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
+        number = "more packages" if extras else "two more packages"
         raise SetupError(
-            f"Falling objects need two more packages; install them with: {extra_command('physics')}"
+            f"Falling objects need {number}; install them with: {extra_command('physics', *extras)}"
         ) from error
 
 
