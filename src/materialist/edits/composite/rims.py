@@ -19,6 +19,7 @@ class RimSettings:
     reach: float = 0.024  # of the pixels that speak for it
     colour: float = 0.08  # standard deviation of alike colours, sRGB-encoded
     samples: int = 6  # pixels looked up along the reach
+    floor: float = 1e-3  # radiance added before logarithms
 
 
 SETTINGS = RimSettings()
@@ -43,8 +44,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     rows, columns = np.nonzero(trust < 1)
     if not trust.any():
         return pictures
-    floor = 1e-3
-    logs = np.concatenate([np.log(np.maximum(p, 0) + floor) for p in pictures], -1)
+    logs = np.concatenate([np.log(np.maximum(p, 0) + SETTINGS.floor) for p in pictures], -1)
     logs = logs.astype(np.float32)
     seen = linear_to_srgb(np.clip(photo, 0, 1)).astype(np.float32)
     own = seen[rows, columns]
@@ -74,7 +74,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     share = trust[rows, columns, None]
     mean = total[known] / norm[known, None]
     logs[rows, columns] = share * logs[rows, columns] + (1 - share) * mean
-    rims = np.exp(logs[rows, columns]) - floor
+    rims = np.exp(logs[rows, columns]) - SETTINGS.floor
     results = []
     for k, picture in enumerate(pictures):
         result = picture.astype(np.float32)
