@@ -29,17 +29,17 @@ def ball(centre, radius):
 def test_a_circle_gives_a_ball_whatever_its_maps_say():
     depth, normal, mask, thickness = ball((0.1, -0.05, -6), 0.5)
     flat = np.tile([0.0, 0, 1], (*mask.shape, 1))
-    found = inflated(depth, flat, mask, CAMERA)
+    body = inflated(depth, flat, mask, CAMERA)
     # Pixels round the outline: within some percent of the radius.
-    assert np.abs(found.thickness - thickness)[mask].mean() < 0.03
-    assert np.abs(found.depth - depth)[mask].mean() < 0.03
-    cosine = (found.normal * normal).sum(-1)[mask]
+    assert np.abs(body.thickness - thickness)[mask].mean() < 0.03
+    assert np.abs(body.depth - depth)[mask].mean() < 0.03
+    cosine = (body.normal * normal).sum(-1)[mask]
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 4
     # The back is the front's mirror image, and outside the mask nothing changed.
     ahead = np.array([0.1, -0.05, -6]) / np.linalg.norm([0.1, -0.05, -6])
     mirrored = normal - 2 * (normal @ ahead)[..., None] * ahead
-    assert (found.back * mirrored).sum(-1)[mask].mean() > 0.98
-    assert (found.thickness[~mask] == 0).all() and (found.normal[~mask] == flat[~mask]).all()
+    assert (body.back * mirrored).sum(-1)[mask].mean() > 0.98
+    assert (body.thickness[~mask] == 0).all() and (body.normal[~mask] == flat[~mask]).all()
 
 
 def test_scale_is_that_of_the_depth_and_a_leaning_object_leans():
@@ -60,10 +60,10 @@ def test_what_the_frame_cuts_goes_on_beyond_it():
     normal = np.tile([0.0, 0, 1], (120, 120, 1))
     mask = np.zeros((120, 120), bool)
     mask[:, 40:80] = True
-    found = inflated(depth, normal, mask, CAMERA)
+    body = inflated(depth, normal, mask, CAMERA)
     # A strip from edge to edge: its section is the same in every row, and widest in its middle.
-    np.testing.assert_allclose(found.thickness[:1], found.thickness[50:51], rtol=1e-3)
-    assert found.thickness[50].argmax() in (59, 60)
+    np.testing.assert_allclose(body.thickness[:1], body.thickness[50:51], rtol=1e-3)
+    assert body.thickness[50].argmax() in (59, 60)
     everything = inflated(depth, normal, np.ones((120, 120), bool), CAMERA)
     assert np.isfinite(everything.thickness).all() and np.isfinite(everything.normal).all()
     with pytest.raises(InputError, match="covers no surface"):

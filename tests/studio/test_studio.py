@@ -317,7 +317,7 @@ def test_a_scene_that_is_unpacked_counts_as_stored(studio, tmp_path, monkeypatch
 
 
 def test_a_process_that_gets_ready_leaves_it_to_a_job_that_waits(monkeypatch):
-    told = []
+    stages = []
 
     def invert(photo, *, progress, **options):
         for name in ("read", "predict", "geometry"):
@@ -327,9 +327,9 @@ def test_a_process_that_gets_ready_leaves_it_to_a_job_that_waits(monkeypatch):
         outdated = False
 
         def __call__(self, stage, done, total):
-            told.append(stage)
+            stages.append(stage)
             self.outdated = stage == "predict"
 
     monkeypatch.setattr(tasks.mt, "invert", invert)
     tasks.warm(Report())
-    assert told == ["read", "predict"]
+    assert stages == ["read", "predict"]

@@ -318,7 +318,7 @@ class Studio:
 
     def _warm_preview(self, job: Job) -> None:
         """Let a process load what the preview needs, once an inversion has found the first maps, which come first."""
-        while all(found["name"] == tasks.PHOTO for found in job.intermediate):
+        while all(result["name"] == tasks.PHOTO for result in job.intermediate):
             if job.over:
                 return
             time.sleep(0.1)

@@ -236,9 +236,9 @@ class TransportCache:
         slots = floats(mi, self.slot_radiance(radiance))
         width = len(self.pixels)
         out = []
-        wanted = range(len(self.roughness)) if levels is None else levels
+        kept_levels = range(len(self.roughness)) if levels is None else levels
         for k, (hits, (count, alpha)) in enumerate(zip(self.trace(), self.lobes, strict=True)):
-            if k > 0 and k - 1 not in wanted:
+            if k > 0 and k - 1 not in kept_levels:
                 continue
             # Diffuse lobes are sampled alike in every tile: what falls between their few directions would be missing
             # from the whole picture, or be in all of it twice.
@@ -262,7 +262,7 @@ class TransportCache:
             dr.eval(*sums)
             # The mean over `count` samples is the Monte Carlo estimate.
             out.append(placed(np.concatenate([np.array(s).T for s in sums], -1)) / count)
-        made = tuple(self.roughness[k] for k in wanted)
+        made = tuple(self.roughness[k] for k in kept_levels)
         return Tables(out[0].contiguous(), torch.stack(out[1:]).contiguous(), made)
 
     def slot_radiance(self, radiance: Array | None) -> Array:

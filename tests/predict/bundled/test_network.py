@@ -91,13 +91,13 @@ def test_the_transformer_does_not_learn_with_the_network():
 
 @pytest.mark.parametrize("size", [(32, 32), (45, 61), (97, 33), (7, 150)])
 def test_any_size(file, size):
-    told = []
+    answers = []
     predictor = BundledPredictor(file)
-    predictor.on_materials = told.append
+    predictor.on_materials = answers.append
     prediction = predictor.predict(made_photo(*size))
     # The first answer's materials at once, then those of all of them.
-    assert [one.albedo.shape[:2] for one in told] == [prediction.depth.shape] * len(told)
-    assert told[-1].albedo is prediction.materials.albedo and len(told) <= 2
+    assert [one.albedo.shape[:2] for one in answers] == [prediction.depth.shape] * len(answers)
+    assert answers[-1].albedo is prediction.materials.albedo and len(answers) <= 2
     check_conventions(prediction, size)
     known = prediction.depth > 0
     assert known.any()

@@ -51,15 +51,15 @@ def test_a_ball_is_a_surface_of_revolution_and_half_a_ball_is_inflated():
     camera = Camera(64, 64, 40)
     photo, mask, normal, depth, true = seen(camera, (0, 0, -3.0), 0.6)
     guess = thickness(photo, mask, normal, depth, camera)
-    found = best_thickness(photo, mask, normal, depth, camera, up=np.array([0.0, 1, 0]))
-    assert found.method == "revolution" and found.revolution is not None and found.back is None
-    assert np.abs(found.solid - true)[mask].sum() < 0.12 * true[mask].sum()
+    best = best_thickness(photo, mask, normal, depth, camera, up=np.array([0.0, 1, 0]))
+    assert best.method == "revolution" and best.revolution is not None and best.back is None
+    assert np.abs(best.solid - true)[mask].sum() < 0.12 * true[mask].sum()
     assert (
-        (found.hollow <= found.solid).all()
-        and (found.hollow <= guess.hollow).all()
-        and found.hollow.max() > 0
+        (best.hollow <= best.solid).all()
+        and (best.hollow <= guess.hollow).all()
+        and best.hollow.max() > 0
     )
     half = mask & (np.arange(64) > 32)
-    found = best_thickness(photo, half, normal, depth, camera, up=np.array([0.0, 1, 0]))
-    assert found.method == "outline" and found.front is not None and found.back is not None
-    assert (found.hollow <= found.solid).all() and found.hollow.max() > 0
+    best = best_thickness(photo, half, normal, depth, camera, up=np.array([0.0, 1, 0]))
+    assert best.method == "outline" and best.front is not None and best.back is not None
+    assert (best.hollow <= best.solid).all() and best.hollow.max() > 0
