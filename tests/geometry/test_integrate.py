@@ -5,7 +5,7 @@ import pytest
 from geometry_scenes import plane_depth, sphere_depth
 
 from materialist.camera import pixel_rays, unit
-from materialist.geometry.integrate import integrated
+from materialist.geometry.integrate import _Grid, integrated
 from materialist.predict.normals import normals_from_depth
 from materialist.types import Camera
 
@@ -111,3 +111,16 @@ def test_sky_and_tiny_surfaces_stay():
     speck = np.zeros_like(true)
     speck[4, 5:8] = 2
     np.testing.assert_array_equal(integrated(speck, normals, RAYS), speck.astype(np.float32))
+
+
+def test_a_pull_below_single_precision_leaves_the_system_solvable():
+    true, normals = _plane((0, 0, 1))
+    grid = _Grid.of(true > 0, normals, RAYS)
+    data = np.log(true.ravel())
+    # Two pixels that hold to each other alone, pulled less than single precision resolves.
+    pair = np.isin(np.arange(true.size), [500, 501])
+    linked = pair[grid.first] == pair[grid.second]
+    pull = np.where(pair, 1e-9, 1e-3)
+    solved = grid.solved(linked.astype(float), pull, data, data + 0.01)
+    np.testing.assert_allclose(solved[~pair], data[~pair], atol=1e-3)
+    assert np.isfinite(solved).all()

@@ -40,6 +40,7 @@ class IntegrationSettings:
     tolerance: float = 1e-3  # residual at which a solve ends, share of its first one
     iterations: int = 100  # most steps of a solve
     coarsest: int = 500  # unknowns that multigrid solves directly
+    hold: float = 1e-6  # pull to the start, as a share of the links; for single precision
 
 
 SETTINGS = IntegrationSettings()
@@ -147,6 +148,8 @@ class _Grid:
         # below the tolerance.
         missing = (right_side - system @ start).astype(np.float32)
         single = system.astype(np.float32)
+        # Single precision loses a weak pull beside strong links; without one, nothing holds a stray in its place.
+        single = (single + diags(np.float32(SETTINGS.hold) * single.diagonal())).tocsr()
         multigrid = pyamg.ruge_stuben_solver(
             single, max_coarse=SETTINGS.coarsest, coarse_solver="splu", interpolation="direct"
         )
