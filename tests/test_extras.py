@@ -10,11 +10,12 @@ from PIL import Image
 import materialist as mt
 from materialist.edits import recipe
 from materialist.edits.remove.background import inpainter
-from materialist.edits.remove.patches import patched
+from materialist.edits.remove.filling import filled
 from materialist.exporters import run
 from materialist.io.photo import read_photo
 from materialist.io.video import write_frames
 from materialist.predict import get_predictor
+from materialist.predict.onnx import session
 from materialist.render.denoise import denoise
 
 IMAGE = np.ones((4, 6, 3), np.float32)
@@ -32,9 +33,9 @@ FLAT = np.ones((4, 6), bool)
         ),
         ("pyoidn", lambda _: denoise(IMAGE, albedo=IMAGE, normal=IMAGE), "-m pip install pyoidn"),
         (
-            "patchmatch",
-            lambda _: patched(IMAGE, FLAT, FLAT, FLAT, seed=1),
-            "pip install --force-reinstall --no-deps PyPatchMatch",
+            "onnxruntime",
+            lambda _: filled(IMAGE, FLAT, ~FLAT),
+            "pip install onnxruntime",
         ),
         ("pxr", lambda folder: mt.export(flat_scene(), folder / "a.usdz"), "pip install 'usd-core"),
         (
@@ -53,6 +54,7 @@ def test_the_command_is_named(package, ask, words, tmp_path, monkeypatch):
     before = sorted(tmp_path.rglob("*"))
     monkeypatch.setitem(sys.modules, package, None)
     monkeypatch.delitem(sys.modules, "materialist.exporters.usd", raising=False)
+    session.cache_clear()
     with pytest.raises(mt.SetupError, match=words):
         ask(tmp_path)
     assert sorted(tmp_path.rglob("*")) == before

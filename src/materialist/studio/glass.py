@@ -15,7 +15,7 @@ import psutil
 import materialist as mt
 from materialist.edits.core.operation import REGION, PreviewMode
 from materialist.edits.recipe import Step, apply, options_of, region_of
-from materialist.edits.remove.patches import remembered
+from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, PROGRESS, Reporter

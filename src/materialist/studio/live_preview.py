@@ -20,7 +20,7 @@ from materialist.edits.core.operation import PreviewMode
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import KEY
 from materialist.edits.recipe import Step, apply, options_of, region_of
-from materialist.edits.remove.patches import remembered
+from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
 from materialist.jobs.limited import Limits, run_limited

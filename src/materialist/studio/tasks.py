@@ -167,7 +167,7 @@ def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
     Steps before it that neither move a surface nor change the photo are left out: they change nothing of the hole.
     """
     from materialist.edits.recipe import apply, options_of, region_of
-    from materialist.edits.remove.patches import remembered
+    from materialist.edits.remove.filling import remembered
     from materialist.edits.remove.remove import disclosed
 
     report("load", 0, 1)
@@ -242,7 +242,7 @@ def take(report: Reporter, scene: str, steps: Steps, output: str, kind: str) -> 
 
 def _edited(report: Reporter, scene: str, steps: Steps) -> tuple[Scene, Scene]:
     from materialist.edits.recipe import apply
-    from materialist.edits.remove.patches import remembered
+    from materialist.edits.remove.filling import remembered
 
     report("load", 0, 1)
     loaded = mt.load_scene(scene)

@@ -7,7 +7,7 @@ import numpy as np
 
 from materialist.color import srgb_levels
 from materialist.edits.recipe import Step, region_of
-from materialist.edits.remove.patches import NotFilled, remembered_alone
+from materialist.edits.remove.filling import NotFilled, remembered_alone
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 from materialist.io import display

@@ -13,7 +13,7 @@ from materialist.edits.core.renderer import denoised
 from materialist.edits.glass import two_interface as interfaces
 from materialist.edits.glass.options import Glass
 from materialist.edits.glass.thickness import object_thickness
-from materialist.edits.remove.patches import patched
+from materialist.edits.remove.filling import filled
 from materialist.edits.remove.remove import remove
 from materialist.geometry.build import build_geometry, part
 from materialist.geometry.silhouette import grown, window
@@ -88,7 +88,7 @@ class Background:
 def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
     """What `materialist glass` takes to be behind the object.
 
-    Before nothing but the light, where it refuses, the same patches.
+    Before nothing but the light, where it refuses, the same filling.
     """
     # --- A room: the object is removed from it ---
     if stage.room.items:
@@ -97,10 +97,10 @@ def inpainted_background(scene: Scene, stage: GlassScene) -> Background:
         return Background(
             removed.photo.linear, Prediction(removed.materials, removed.normal, removed.depth)
         )
-    # --- The light alone: patches of what is around the object ---
+    # --- The light alone: guessed from what is around the object ---
     hole = grown(stage.mask, 1)
     maps = stage.room.truth
-    return Background(patched(scene.photo.linear, hole, ~hole, np.zeros(hole.shape, int)), maps)
+    return Background(filled(scene.photo.linear, hole, ~hole), maps)
 
 
 def two_interface(

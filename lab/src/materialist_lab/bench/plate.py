@@ -3,8 +3,10 @@
 `materialist_indoor1.png` and `_indoor2.png` of the published code show one view without and with an orange jug. The one
 without is brought over the other (ALIGNED); the jug's mask is its colour, grown a little. `inside`
 is the mask, `around` a ring about it, in which the jug's shadow and reflection lie; PSNR and SSIM on sRGB. `untouched`
-is the photo as it was, `diffused` fills the mask from its border (Telea), `remove` is the program's. sheet.png: photo,
-plate, and the pictures of the rows after `untouched`.
+is the photo as it was, `diffused` fills the mask from its border (Telea), `remove` is the program's. `holes` rows: in
+the photos of DATA nothing stands in the way; the outline of an object of another photo is cut out at a random place,
+grown a little, and filled. sheet.png: photo, plate, and the pictures of the rows after `untouched`; then photo, hole
+and fillings of some photos.
 """
 
 from collections.abc import Iterator
@@ -19,6 +21,7 @@ from scipy.ndimage import binary_dilation
 from materialist import metrics, pipeline
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.composite.composite import composite
+from materialist.edits.remove.filling import filled
 from materialist.edits.remove.remove import remove
 from materialist.errors import InputError
 from materialist.io.photo import read_photo
@@ -26,6 +29,7 @@ from materialist.option_kinds import option
 from materialist.types import Array
 from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, timed
 from materialist_lab.bench.report import Column, Report, side_by_side
+from materialist_lab.bench.select import drawn, outlines
 
 PLATE, PHOTO = (f"photos/tabletop/materialist_indoor{k}.png" for k in (1, 2))
 ALIGNED = np.array([[1.17386, 0.00042, 6.523], [0.00028, 1.17358, 3.178]])
@@ -47,6 +51,9 @@ class PlateBench(Benchmark):
 
     size: int = option(512, "Longer side.", **SIZE)
     spp: int = option(128, "Paths a pixel of the composite.", **COUNT)
+    smallest: float = option(0.005, "Smallest hole, share of the picture.", low=0, high=1)
+    largest: float = option(0.12, "Largest hole, share of the picture.", low=0, high=1)
+    shown: int = option(6, "Holes on the sheet.", **COUNT)
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         if data is None or not ((data / PLATE).is_file() and (data / PHOTO).is_file()):
@@ -85,9 +92,7 @@ class PlateBench(Benchmark):
 
         yield row("untouched", photo.linear)
         # --- Baseline: inpainting by colour alone ---
-        shades = np.round(linear_to_srgb(photo.linear) * 255).astype(np.uint8)
-        filled = cv2.inpaint(shades, mask.astype(np.uint8), 5, cv2.INPAINT_TELEA)
-        yield row("diffused", srgb_to_linear(filled))
+        yield row("diffused", _diffused(photo.linear, mask))
         # --- Removal with each predictor's maps ---
         sources = {"bundled": "bundled"} | (
             {"published maps": f"maps:{data / MAPS}"} if (data / MAPS).is_dir() else {}
@@ -97,11 +102,52 @@ class PlateBench(Benchmark):
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
             yield row(f"remove, {name}", picture, seconds=cost["seconds"])
         report.sheet.append(side_by_side(*pictures[:2], *pictures[3:]))
+        yield from self._holes(data / "photos", report)
+
+    def _holes(self, folder: Path, report: Report) -> Iterator[Row]:
+        """Rows of holes with the outlines of other photos' objects."""
+        known = {name: things for name, things in outlines().items() if (folder / name).is_file()}
+        things = [thing for objects in known.values() for thing in objects]
+        rng = np.random.default_rng(self.seed)
+        for name in known:
+            truth = read_photo(folder / name, size=self.size).linear
+            hole = self._drawn_hole(things, truth.shape[:2], rng)
+            spoiled = np.where(hole[..., None], 0.5, truth).astype(np.float32)
+            pictures = {
+                "diffused": _diffused(spoiled, hole),
+                "filled": filled(spoiled, hole, ~hole),
+            }
+            for method, picture in pictures.items():
+                figures = {
+                    "inside": metrics.psnr(picture, truth, mask=hole),
+                    "inside_ssim": metrics.ssim(picture, truth, mask=hole),
+                }
+                yield {"method": f"holes: {method}", "sample": name, **figures}
+            if len(report.sheet) <= self.shown:
+                report.sheet.append(side_by_side(truth, spoiled, *pictures.values()))
+
+    def _drawn_hole(
+        self, things: list[dict[str, Any]], shape: tuple[int, ...], rng: np.random.Generator
+    ) -> Array:
+        """[H, W] bool: an outline at a random place, of a size between `smallest` and `largest` of the picture."""
+        while True:
+            outline = drawn(things[rng.integers(len(things))], shape)
+            moved = np.roll(outline, rng.integers(0, shape), (0, 1))
+            hole = _widened(moved, max(1, self.size // 100))
+            if self.smallest < hole.mean() < self.largest:
+                return hole
 
     def _removed(self, photo: Any, predictor: str, mask: Array) -> Array:
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
         scene = pipeline.invert(photo, predictor=predictor, **shared)
         return composite(scene, remove(scene, mask), spp=self.spp, **shared)
+
+
+def _diffused(photo: Array, hole: Array) -> Array:
+    """[H, W, 3] linear photo with the hole [H, W] bool filled from its border (Telea 2004)."""
+    shades = np.round(linear_to_srgb(photo) * 255).astype(np.uint8)
+    levels = cv2.inpaint(shades, hole.astype(np.uint8), 5, cv2.INPAINT_TELEA)
+    return srgb_to_linear(levels.astype(np.float32) / 255)
 
 
 def _widened(mask: Array, pixels: int) -> Array:

@@ -1,4 +1,4 @@
-"""A picture of what is behind the object: patches of the photo, a given one, or a diffusion model's (paper, Background
+"""A picture of what is behind the object: guessed by MI-GAN or a diffusion model, or a given one (paper, Background
 Inpainting)."""
 
 from collections.abc import Callable
@@ -9,9 +9,8 @@ import numpy as np
 from PIL import Image
 
 from materialist.color import srgb_levels, srgb_to_linear
-from materialist.edits.remove.behind import HiddenGeometry
+from materialist.edits.remove.filling import filled
 from materialist.edits.remove.options import Removal
-from materialist.edits.remove.patches import patched
 from materialist.errors import InputError
 from materialist.io.image import same_aspect
 from materialist.io.photo import decode_photo
@@ -29,23 +28,19 @@ LONGEST = 768
 
 
 def picture_behind(
-    scene: Scene, options: Removal, hole: Array, usable: Array, hidden: HiddenGeometry
+    scene: Scene, options: Removal, hole: Array, usable: Array
 ) -> tuple[Array, str, list[str]]:
     """([h, w, 3] linear picture of what is behind a hole [H, W] bool, what made it, warnings of its file).
 
-    usable [H, W] bool: what patches may come from. hidden: the surfaces behind. Raises InputError for a picture that
-    is none of this view; see `inpainter` and `patches.patched`.
+    usable [H, W] bool: what a filling may be guessed from. Raises InputError for a picture that is none of this view;
+    see `inpainter` and `filling.filled`.
     """
     background = options.background
     inpaint = options.inpaint
     if background is not None and inpaint is not None:
         raise InputError("Give a background or an inpainter, not both.")
     if background is None and inpaint is None:
-        return (
-            patched(scene.photo.original, hole, usable, hidden.label, options.seed),
-            "patches",
-            [],
-        )
+        return filled(scene.photo.original, hole, usable), "migan", []
     name = "background" if inpaint is None else "inpainter"
     notes = list[str]()
     if isinstance(inpaint, str):
@@ -84,7 +79,7 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     kind, _, where = text.partition(":")
     if kind != "sd":
         raise InputError(
-            f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (patches need no option)."
+            f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (MI-GAN needs no option)."
         )
     gpu = on_gpu(device)
     with hub.advice('leave `inpaint="sd"` out'):

@@ -30,7 +30,7 @@ class Removal(OperationOptions):
     inpaint: str | Callable[[Array, Array], Array] | None = option(
         None, "A diffusion model: a folder, or owner/name.", kind="name", metavar="sd:MODEL"
     )
-    """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None copies patches."""
+    """Or a function (photo [H, W, 3] linear, hole [H, W] bool) -> [H, W, 3] linear; None is MI-GAN."""
     # How far around the object.
     shadow: float | None = option(
         None,
@@ -49,7 +49,7 @@ class Removal(OperationOptions):
         called="rim",
         flag=None,
     )
-    seed: int = option(0, "Of the patch search.", **SEED)
+    seed: int = option(0, "Of a diffusion model.", **SEED)
     device: str = option("auto", "Where a diffusion model runs.", **DEVICE)
 
     def __post_init__(self) -> None:

@@ -71,7 +71,7 @@ def remove(
         "grow": options.grow,
         "shadow": "auto" if options.shadow is None else options.shadow,
     }
-    if method == "patches":
+    if method == "migan":
         warnings += evidence_notes(hole)
     return noted(warned(removed, *warnings), "remove", facts)
 
@@ -92,7 +92,7 @@ def disclosed(
     hidden = behind(
         scene.depth, scene.normal, scene.geometry.plane_label, hole.gone, front, scene.camera
     )
-    return hole, hidden, picture_behind(scene, options, hole.painted, ~bodies, hidden)
+    return hole, hidden, picture_behind(scene, options, hole.painted, ~bodies)
 
 
 def carried(values: Array, photo: Array, hole: Array) -> Array:

@@ -1,0 +1,86 @@
+"""Filling by MI-GAN: surfaces go on through the hole, and nothing is guessed from what may not be seen."""
+
+import numpy as np
+import pytest
+
+from materialist.edits.remove.filling import NotFilled, filled, remembered, remembered_alone
+
+
+def hole_in(shape, top=24, left=30, height=20, width=24):
+    hole = np.zeros(shape, bool)
+    hole[top : top + height, left : left + width] = True
+    return hole
+
+
+def two_walls(height=96, width=128):
+    """A picture [H, W, 3] of two rough surfaces that meet along a slanting edge, and where the lower one is."""
+    rows, columns = np.indices((height, width))
+    below = rows > 0.48 * height - columns / 8
+    rough = np.random.default_rng(0).uniform(0.85, 1.15, (height, width, 1))
+    return np.where(below[..., None], [0.5, 0.2, 0.1], [0.3, 0.4, 0.6]) * rough, below
+
+
+def without(picture, hole):
+    """The picture, spoiled in the hole."""
+    return np.where(hole[..., None], 0.9, picture)
+
+
+def test_a_slanting_edge_crosses_the_hole():
+    picture, below = two_walls()
+    rows, columns = np.indices(below.shape)
+    hole = np.hypot(rows - 40, columns - 64) < 16
+    guess = filled(without(picture, hole), hole, ~hole)
+    np.testing.assert_array_equal(guess[~hole], picture[~hole].astype(np.float32))
+    assert ((guess[..., 0] > guess[..., 2]) != below)[hole].mean() < 0.1
+    assert np.abs(guess - picture)[hole].mean() < 0.1
+
+
+def test_what_may_not_be_seen_changes_nothing():
+    picture, _ = two_walls()
+    hole = hole_in(picture.shape[:2])
+    usable = ~hole & (np.arange(128) < 58)
+    other = np.where(np.arange(128)[:, None] < 58, picture, [0.9, 0.1, 0.1])
+    one, two = (filled(without(p, hole), hole, usable) for p in (picture, other))
+    np.testing.assert_array_equal(one[hole], two[hole])
+    assert np.abs(one - filled(without(other, hole), hole, ~hole))[hole].max() > 0.01
+
+
+def test_hdr_values_stay():
+    picture, _ = two_walls()
+    hole = hole_in(picture.shape[:2])
+    guess = filled(without(40 * picture, hole), hole, ~hole)
+    assert np.abs(np.log(guess / (40 * picture)))[hole].mean() < 0.5
+
+
+@pytest.mark.parametrize("place", [np.s_[:70], np.s_[:, 1:], np.s_[30:, 50:], np.s_[:1, :1]])
+def test_holes_of_any_shape(place):
+    picture, _ = two_walls(72, 96)
+    hole = np.zeros((72, 96), bool)
+    hole[place] = True
+    guess = filled(without(picture, hole), hole, ~hole)
+    assert np.isfinite(guess).all() and guess.min() >= 0
+
+
+@pytest.mark.parametrize("size", [(9, 9), (30, 400), (700, 20)])
+def test_photos_of_any_shape(size):
+    hole = np.zeros(size, bool)
+    hole[3:6, 4:7] = True
+    guess = filled(np.full((*size, 3), 0.4), hole, ~hole)
+    assert guess.shape == (*size, 3) and np.abs(guess - 0.4)[hole].max() < 0.3
+
+
+def test_a_large_photo_is_filled_at_a_smaller_size():
+    photo = np.full((30, 2048, 3), 0.3, np.float32)
+    hole = hole_in((15, 1024), top=4, left=500, height=6)
+    assert filled(photo, hole, ~hole).shape == (15, 1024, 3)
+
+
+def test_a_filling_is_remembered(tmp_path):
+    picture, _ = two_walls()
+    hole = hole_in(picture.shape[:2])
+    with remembered(tmp_path):
+        with remembered_alone(), pytest.raises(NotFilled):
+            filled(picture, hole, ~hole)
+        once = filled(picture, hole, ~hole)
+        with remembered_alone():
+            np.testing.assert_array_equal(filled(picture, hole, ~hole), once)
