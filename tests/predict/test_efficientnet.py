@@ -23,7 +23,7 @@ def picture():
 
 
 def test_the_package_has_the_classifier_it_names():
-    """Against the reference implementation with the same checkpoint; the package stores float16."""
+    """Against the reference implementation with the same checkpoint; the package stores int8."""
     encoder = shipped("lite2")
     with torch.no_grad():
         found = encoder(picture())

@@ -23,14 +23,14 @@ def picture():
 
 
 def test_the_package_has_the_transformer_it_names():
-    """Against another implementation with the same weights; the package stores float16."""
+    """Against another implementation with the same weights; the package stores int8, 1.7 % off in the mean square."""
     encoder = shipped_patches(NAME)
     with torch.no_grad():
         layers = encoder.vit((picture() - encoder.mean) / encoder.deviation, LAYERS)
     for features, (mean, deviation, first, last) in zip(layers, FIGURES, strict=True):
         assert features.mean().item() == pytest.approx(mean, abs=0.002)
         assert features.std().item() == pytest.approx(deviation, rel=2e-3)
-        assert features[0, 0, 0, 0].item() == pytest.approx(first, abs=0.05)
+        assert features[0, 0, 0, 0].item() == pytest.approx(first, abs=0.03 * deviation)
         assert features[0, 5, -1, -1].item() == pytest.approx(last, rel=0.08)
 
 

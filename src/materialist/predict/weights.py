@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 INSTEAD = 'use another predictor (`predictor="auto"`), or read another tool\'s maps with `predictor="maps:DIR"`'
 """Advice for a person who lacks the network in question."""
+SCALE = ".scale"
+"""Suffix of the scales of a tensor that is stored as int8."""
 CHECKSUMS = "SHA256SUMS"
 """List beside every download: one line a file, as `sha256sum` writes and checks them."""
 
@@ -77,7 +79,8 @@ def _listed(folder: Path) -> dict[str, str]:
 def read_state(path: Path) -> dict[str, Tensor]:
     """The tensors of a .safetensors file or a PyTorch checkpoint, on the CPU; no code in the file is ever run.
 
-    A dict in a dict (`state_dict`, `model`) is opened, a leading `module.` of multi-GPU training dropped. Raises
+    A dict in a dict (`state_dict`, `model`) is opened, a leading `module.` of multi-GPU training dropped; int8 tensors
+    with a scale for each output (NAME and NAME.scale) come as float32. Raises
     WeightsError for a missing, empty, truncated or damaged file, and for one that holds anything but tensors.
     """
     import torch
@@ -113,7 +116,12 @@ def read_state(path: Path) -> dict[str, Tensor]:
         isinstance(value, torch.Tensor) for value in content.values()
     ):
         raise WeightsError(f"{path} holds more than named tensors; it is no plain file of weights.")
-    return {str(name).removeprefix("module."): tensor for name, tensor in content.items()}
+    state = {str(name).removeprefix("module."): tensor for name, tensor in content.items()}
+    # --- Levels times scales ---
+    for name in [name for name in state if f"{name}{SCALE}" in state]:
+        scale = state.pop(f"{name}{SCALE}")
+        state[name] = state[name] * scale.reshape(-1, *[1] * (state[name].ndim - 1))
+    return state
 
 
 def out_of_memory(error: Exception) -> bool:
