@@ -214,11 +214,10 @@ export function Stage() {
       set({ panel: "object", tool: "click" });
       void change("place", { at: last });
     } else {
-      const method = view.sam ? "sam2" : "network";
       // Where something was edited the very place counts: an edited thing may lie within what is outlined.
       const place = (on.length ? null : pointing.place(first)) ?? first;
       pointing.out();
-      void change("pick", { tool: "click", mode, at: place, method }, "", t.selecting).then(follow);
+      void change("pick", { tool: "click", mode, at: place }, "", t.selecting).then(follow);
     }
   };
 

@@ -33,7 +33,6 @@ export interface View {
   sent: number | null;
   results: Result[];
   lamp: { kelvin: number; power: number; before: number };
-  sam: boolean;
   /** Whether the mesh is shown in place of the picture. */
   mesh: boolean;
   /** Exposure of what is seen, stops; it changes no picture. */
@@ -71,7 +70,6 @@ export const view: View = {
   sent: null,
   results: [],
   lamp: { kelvin: 2700, power: 1, before: 0.75 },
-  sam: false,
   mesh: false,
   exposure: 0,
   clipped: false,

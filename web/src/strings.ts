@@ -60,7 +60,6 @@ export const t = {
   remove: "Take away (Alt)",
   brushSize: "Brush size",
   deselect: "Select nothing (Esc)",
-  sam: "Find objects with SAM 2",
   // Panels
   panels: "Panels",
   material: "Material",

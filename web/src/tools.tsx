@@ -14,7 +14,7 @@ const MODES: Mode[] = ["new", "add", "remove"];
 const SIGNS: Record<Mode, string> = { new: "◻", add: "+", remove: "−" };
 
 export function Tools() {
-  const { tool, mode, brush, state, about, sam } = useView();
+  const { tool, mode, brush, state } = useView();
   const selecting = tool === "click" || tool === "box" || tool === "brush";
   return (
     <div class="tools" role="toolbar" aria-label={t.tools} aria-orientation="vertical">
@@ -55,11 +55,6 @@ export function Tools() {
           title={t.brushSize}
           onInput={(event) => set({ brush: Number(event.currentTarget.value) })}
         />
-      )}
-      {about && about.sam === null && tool === "click" && (
-        <button class="icon-only sign" aria-label={t.sam} title={t.sam} aria-pressed={sam} onClick={() => set({ sam: !sam })}>
-          S2
-        </button>
       )}
       {state?.stage.region && (
         <button class="icon-only" id="deselect" aria-label={t.deselect} title={t.deselect} onClick={() => void change("deselect")}>

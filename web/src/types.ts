@@ -100,7 +100,6 @@ export interface About {
   lights: string[];
   objects: string[];
   takes: [string, string][];
-  sam: string | null;
   megabytes: number;
   photos: string[];
   meshes: string[];

@@ -92,7 +92,7 @@ class Place(OperationOptions):
 class Region(Place):
     method: str = option(
         "network",
-        "network: ClickNet; grabcut: colours alone; sam2 needs its weights.",
+        "network: MobileSAM and ClickNet; grabcut: colours alone.",
         kind="word",
         choices=("network", "grabcut", "sam2"),
         flag="--with",

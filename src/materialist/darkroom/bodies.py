@@ -49,7 +49,6 @@ class Pick(RequestBody):
     at: Annotated[list[Number], Field(max_length=4)] = []
     points: Annotated[list[Place], Field(max_length=20_000)] = []
     radius: Number = 1.0
-    method: Literal["network", "sam2"] = "network"
 
 
 class Pointed(RequestBody):

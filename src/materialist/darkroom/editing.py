@@ -23,7 +23,7 @@ CLEARED = {"texture", "envmap", "gain", "mesh", "lamps"}
 
 def pick(desk: Desk, body: bodies.Pick) -> State:
     """A click, a box or a brush stroke."""
-    given = body.model_dump(exclude={"method"})
+    given = body.model_dump()
     if body.tool == "click" and body.mode == "new" and len(body.at) == 2:
         # What was edited already opens its edit, with the selection that it was made with.
         index = edit_at(desk.session, *body.at)
@@ -32,9 +32,9 @@ def pick(desk: Desk, body: bodies.Pick) -> State:
             return state(desk)
     known = None
     # What the page outlined under the pointer is what the click takes.
-    if body.tool == "click" and body.method == "network" and len(body.at) == 2:
+    if body.tool == "click" and len(body.at) == 2:
         known = desk.pointed(*body.at, compute=body.mode != "remove")
-    desk.session.pick(read_pick(given), body.method, known)
+    desk.session.pick(read_pick(given), known)
     return state(desk)
 
 

@@ -12,7 +12,6 @@ from materialist.color import srgb_levels
 from materialist.darkroom.desk import Desk
 from materialist.edits.light import presets
 from materialist.edits.registry import OPERATIONS
-from materialist.edits.select import sam
 from materialist.errors import InputError
 from materialist.io import display
 from materialist.io.decode import SUFFIXES
@@ -146,7 +145,6 @@ def about(studio: Studio, person: str) -> dict[str, Any]:
         "lights": [*presets.LIGHTS],
         "objects": objects.LIBRARY,
         "takes": [[kind, title] for kind, (title, _) in kinds_here().items()],
-        "sam": sam.sam_problem(),
         "megabytes": SETTINGS.upload_megabytes,
         "photos": sorted(SUFFIXES),
         "meshes": uploads.MESHES,

@@ -79,15 +79,6 @@ KNOWN = (
         "Apache-2.0",
         100,
     ),
-    HubModel(
-        "sam2",
-        "facebook/sam2.1-hiera-tiny",
-        "config.json",
-        "selections: --with sam2",
-        "Apache-2.0",
-        160,
-        'select without `method="sam2"`',
-    ),
 )
 """By name; any other repository of the same kind can be named by its id, owner/name."""
 

@@ -3,7 +3,6 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -187,16 +186,14 @@ class Session:
         """Whether there is a change to take back, and one to do again."""
         return bool(self._past), bool(self._future)
 
-    def pick(
-        self, pick: dict[str, Any], method: str = "network", region: Array | None = None
-    ) -> None:
+    def pick(self, pick: dict[str, Any], region: Array | None = None) -> None:
         """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError.
 
         region: [H, W] bool of the object at a click, where it is known already.
         """
         with self.lock:
             scene = self.scene
-            choose = partial(self.preview.select, method=method)
+            choose = self.preview.select
             mode = pick["mode"]
             before = self.selection
             if pick["tool"] == "click":

@@ -1,1 +1,1 @@
-"""Selecting a region of the photo: click, box, SAM 2."""
+"""Selecting a region of the photo: click or box."""

@@ -22,7 +22,9 @@ from materialist.predict.clicks.features import Box
 from materialist.spelling import spelled
 from materialist.types import Array, Scene
 
-METHODS = ("network", "grabcut", "sam2")
+METHODS = ("network", "grabcut")
+FORMER = {"sam2": "network"}
+"""Names of recipes of before: SAM 2, whose weights nobody had, and which selects no better on photos."""
 
 
 @spelled
@@ -40,8 +42,8 @@ def select(
     Args:
         click: (x, y) at working size, or several, all of them on the object. box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
-        method: `network` (ClickNet), `grabcut` (by colours alone) or `sam2` (needs its weights).
-        device: `auto`, `cpu` or `cuda`, for `sam2`.
+        method: `network` (MobileSAM and ClickNet) or `grabcut` (by colours alone); `sam2` is `network`.
+        device: of no effect; both run on the processor.
 
     Raises InputError for none or several of click, box and mask; a click or box outside the photo or on the sky; an
     empty mask or one of another shape. SetupError, WeightsError: a method without its library or weights.
@@ -49,6 +51,7 @@ def select(
     check_process()
     if sum(v is not None for v in (click, box, mask)) != 1:
         raise InputError("Give exactly one of a click, a box or a mask.")
+    method = FORMER.get(method, method)
     if method not in METHODS:
         raise InputError(f"The method is '{method}'; choose one of {', '.join(METHODS)}.")
     if isinstance(mask, str | Path):
@@ -58,11 +61,7 @@ def select(
     # --- The object, by the chosen method ---
     points = [] if click is None else _points(scene, click)
     frame = None if box is None else _box(scene, box)
-    if method == "sam2":
-        from materialist.edits.select.sam import segment
-
-        region = segment(scene.photo.linear, points, frame, device=device)
-    elif frame is not None:
+    if frame is not None:
         region = object_in(scene, frame, network=method == "network")
     else:
         region = object_at_points(scene, points, network=method == "network")

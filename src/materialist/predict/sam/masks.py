@@ -78,7 +78,7 @@ def embedding(rgb: Array) -> Array:
         return _embeddings[key]
     rows, columns = resample.with_longer_side(rgb.shape[:2], SIDE)
     square = np.zeros((SIDE, SIDE, 3), np.float32)
-    square[:rows, :columns] = resample.values(np.float32(levels) / 255, (rows, columns))
+    square[:rows, :columns] = resample.values(levels.astype(np.float32) / 255, (rows, columns))
     square[:rows, :columns] -= MEAN
     square[:rows, :columns] /= DEVIATION
     picture = np.ascontiguousarray(np.moveaxis(square, -1, 0))[None]
