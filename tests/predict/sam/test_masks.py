@@ -48,5 +48,5 @@ def test_photos_of_any_shape(size):
 def test_a_photo_is_encoded_once(monkeypatch):
     rgb, _, _ = picture()
     first = sam.embedding(rgb)
-    monkeypatch.setattr(sam, "session", lambda path: pytest.fail(f"{path.name} ran again"))
+    monkeypatch.setattr(sam, "run", lambda path, _: pytest.fail(f"{path.name} ran again"))
     assert sam.embedding(rgb) is first

@@ -19,7 +19,7 @@ from materialist.errors import MaterialistError
 from materialist.geometry.membrane import membrane
 from materialist.io.atomic import write_whole
 from materialist.predict import resample
-from materialist.predict.onnx import session
+from materialist.predict.onnx import run
 from materialist.types import Array
 
 NETWORK = Path(__file__).with_name("migan.onnx")
@@ -47,7 +47,7 @@ class NotFilled(MaterialistError):
 def filled(photo: Array, hole: Array, usable: Array) -> Array:
     """[h, w, 3] float32 linear: a photo [H0, W0, 3] with the hole [H, W] bool filled, at its size or `max_side`.
 
-    usable [H, W] bool: what the filling may be guessed from. Raises SetupError, WeightsError: see `onnx.session`.
+    usable [H, W] bool: what the filling may be guessed from. Raises SetupError, WeightsError: see `onnx.run`.
     """
     native = photo.shape[:2]
     scale = min(1.0, SETTINGS.max_side / max(native))
@@ -127,6 +127,6 @@ def _inpainted(levels: Array, unknown: Array) -> Array:
     small = np.where(unknown, 0, 255).astype(np.uint8)
     known = np.asarray(cv2.resize(small, large, interpolation=cv2.INTER_NEAREST))
     channels_first = np.ascontiguousarray(np.moveaxis(picture, -1, 0))
-    painted = session(NETWORK).run(None, {"image": channels_first[None], "mask": known[None, None]})
-    result = np.ascontiguousarray(np.moveaxis(painted[0][0], 0, -1))
+    painted = run(NETWORK, {"image": channels_first[None], "mask": known[None, None]})[0]
+    result = np.ascontiguousarray(np.moveaxis(painted[0], 0, -1))
     return np.asarray(cv2.resize(result, size, interpolation=cv2.INTER_AREA))

@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.predict import resample
 from materialist.predict.clicks.features import Box
-from materialist.predict.onnx import session
+from materialist.predict.onnx import run
 from materialist.types import Array
 
 ENCODER = Path(__file__).with_name("encoder.onnx")
@@ -41,7 +41,7 @@ def masks(
     """([3, H, W] float32 logits of three masks, [3] the IoU that the network expects of each).
 
     rgb: [H, W, 3] sRGB in [0, 1]. clicks: (column, row) on one object, or box: (x0, y0, x1, y1) around it. Raises
-    SetupError, WeightsError: see `onnx.session`.
+    SetupError, WeightsError: see `onnx.run`.
     """
     height, width = rgb.shape[:2]
     scale = SIDE / max(height, width)
@@ -52,8 +52,8 @@ def masks(
     else:
         places = [(box[0], box[1]), (box[2], box[3])]
         labels = [FIRST_CORNER, SECOND_CORNER]
-    logits, scores = session(DECODER).run(
-        None,
+    logits, scores = run(
+        DECODER,
         {
             "embedding": embedding(rgb),
             "points": np.array(places, np.float32)[None] * np.float32(scale),
@@ -82,7 +82,7 @@ def embedding(rgb: Array) -> Array:
     square[:rows, :columns] -= MEAN
     square[:rows, :columns] /= DEVIATION
     picture = np.ascontiguousarray(np.moveaxis(square, -1, 0))[None]
-    result = np.asarray(session(ENCODER).run(None, {"picture": picture})[0])
+    result = run(ENCODER, {"picture": picture})[0]
     _embeddings[key] = result
     while len(_embeddings) > REMEMBERED:
         _embeddings.popitem(last=False)
