@@ -1,0 +1,18 @@
+"""Files of weights whose large tensors are stored as int8."""
+
+import torch
+from safetensors.torch import save_file
+
+from materialist.predict.weights import read_state
+
+
+def test_int8_levels_come_with_their_scales(tmp_path):
+    values = torch.tensor([[0.5, -1.0, 0.25], [100.0, 3.0, -127.0]])
+    scale = values.abs().amax(1) / 127
+    levels = (values / scale[:, None]).round().to(torch.int8)
+    path = tmp_path / "levels.safetensors"
+    save_file({"a.weight": levels, "a.weight.scale": scale, "a.bias": torch.ones(2)}, path)
+    state = read_state(path)
+    assert set(state) == {"a.weight", "a.bias"}
+    # Half a level is the most that rounding may take away.
+    assert (state["a.weight"] - values).abs().amax(1).le(scale / 2 + 1e-6).all()
