@@ -5,6 +5,7 @@ with the IoU that the network expects of it.
 """
 
 import hashlib
+import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from pathlib import Path
@@ -33,6 +34,7 @@ REMEMBERED = 2
 """Photos whose embeddings are kept: encoding takes seconds, decoding a tenth of one."""
 
 _embeddings: OrderedDict[bytes, Array] = OrderedDict()
+_LOCK = threading.Lock()
 
 
 def masks(
@@ -73,17 +75,22 @@ def embedding(rgb: Array) -> Array:
     """[1, 256, 64, 64] float32: what the encoder makes of rgb [H, W, 3] sRGB in [0, 1]; kept for later prompts."""
     levels = np.round(rgb * 255).astype(np.uint8)
     key = hashlib.sha256(repr(levels.shape).encode() + levels.tobytes()).digest()
-    if key in _embeddings:
+    # The lock lets threads that ask for one photo wait for one encoding.
+    with _LOCK:
+        if key not in _embeddings:
+            _embeddings[key] = _encoded(levels)
         _embeddings.move_to_end(key)
+        while len(_embeddings) > REMEMBERED:
+            _embeddings.popitem(last=False)
         return _embeddings[key]
-    rows, columns = resample.with_longer_side(rgb.shape[:2], SIDE)
+
+
+def _encoded(levels: Array) -> Array:
+    """The encoder's answer to a picture [H, W, 3] uint8 sRGB."""
+    rows, columns = resample.with_longer_side(levels.shape[:2], SIDE)
     square = np.zeros((SIDE, SIDE, 3), np.float32)
     square[:rows, :columns] = resample.values(levels.astype(np.float32) / 255, (rows, columns))
     square[:rows, :columns] -= MEAN
     square[:rows, :columns] /= DEVIATION
     picture = np.ascontiguousarray(np.moveaxis(square, -1, 0))[None]
-    result = run(ENCODER, {"picture": picture})[0]
-    _embeddings[key] = result
-    while len(_embeddings) > REMEMBERED:
-        _embeddings.popitem(last=False)
-    return result
+    return run(ENCODER, {"picture": picture})[0]
