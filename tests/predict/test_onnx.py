@@ -4,8 +4,9 @@ import sys
 
 import pytest
 
+from materialist import forks
 from materialist.errors import SetupError, WeightsError
-from materialist.predict.onnx import session
+from materialist.predict.onnx import run, session
 from materialist.predict.sam.masks import DECODER
 
 
@@ -26,3 +27,9 @@ def test_a_missing_runtime_names_its_command(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "onnxruntime", None)
     with pytest.raises(SetupError, match="install onnxruntime"):
         session(tmp_path / "other.onnx")
+
+
+def test_a_fork_is_refused(monkeypatch):
+    monkeypatch.setattr(forks, "_started_in", -1)
+    with pytest.raises(SetupError, match="forked"):
+        run(DECODER, {})

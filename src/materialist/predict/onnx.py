@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from materialist.errors import SetupError, WeightsError
+from materialist.forks import check_process
 from materialist.install import install_command
 from materialist.threads import TORCH_THREADS
 from materialist.types import Array
@@ -19,8 +20,9 @@ if TYPE_CHECKING:
 def run(path: Path, inputs: Mapping[str, Array]) -> list[Array]:
     """What a file's network answers to `inputs` by name, in its own order.
 
-    Raises SetupError where ONNX Runtime is missing, WeightsError for a file that is missing or damaged.
+    Raises SetupError where ONNX Runtime is missing or in a fork, WeightsError for a file that is missing or damaged.
     """
+    check_process()
     loaded = session(path)
     import onnxruntime
 

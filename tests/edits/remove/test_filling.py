@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from materialist.color import linear_to_srgb
+from materialist.edits.remove import filling
 from materialist.edits.remove.filling import NotFilled, filled, remembered, remembered_alone
 
 
@@ -50,6 +52,26 @@ def test_hdr_values_stay():
     hole = hole_in(picture.shape[:2])
     guess = filled(without(40 * picture, hole), hole, ~hole)
     assert np.abs(np.log(guess / (40 * picture)))[hole].mean() < 0.5
+
+
+def test_what_is_taken_away_does_not_change_the_filling():
+    picture, _ = two_walls()
+    hole = hole_in(picture.shape[:2])
+    dim, bright = (
+        filled(np.where(hole[..., None], value, picture), hole, ~hole) for value in (0.9, 1e4)
+    )
+    np.testing.assert_array_equal(bright[hole], dim[hole])
+
+
+def test_blown_whites_of_a_large_photo_are_no_hdr(monkeypatch):
+    # The area mean of this size is above 1 by rounding.
+    photo = np.ones((1080, 1920, 3), np.float32)
+    hole = hole_in((540, 960))
+    seen = []
+    monkeypatch.setattr(filling, "_inpainted", lambda levels, _: seen.append(levels) or levels)
+    photo[500:] = 0.2
+    filled(photo, hole, ~hole)
+    assert seen[0][-1, -1, 0] == round(255 * float(linear_to_srgb(np.float32(0.2))))
 
 
 @pytest.mark.parametrize("place", [np.s_[:70], np.s_[:, 1:], np.s_[30:, 50:], np.s_[:1, :1]])

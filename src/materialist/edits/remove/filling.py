@@ -56,8 +56,10 @@ def filled(photo: Array, hole: Array, usable: Array) -> Array:
     gap = resample.values(hole.astype(np.float32), shape) > 0
     unknown = gap | (resample.values((~usable).astype(np.float32), shape) > 0)
     # --- 8-bit levels, as the network reads them ---
-    top = max(1.0, float(picture.max()))
-    levels = np.round(255 * _encoded(picture, top)).astype(np.uint8)
+    # What is taken away says nothing of the range, and area means of white are a little above 1.
+    brightest = float(picture[~unknown].max(initial=0)) if photo.max() > 1 else 0.0
+    top = max(1.0, brightest)
+    levels = np.round(255 * _encoded(np.minimum(picture, top), top)).astype(np.uint8)
     painted = _decoded(_kept(levels, unknown).astype(np.float32) / 255, top)
     return np.where(gap[..., None], painted, picture).astype(np.float32)
 
