@@ -36,6 +36,8 @@ ALIGNED = np.array([[1.17386, 0.00042, 6.523], [0.00028, 1.17358, 3.178]])
 """Pixel of PLATE -> pixel of PHOTO: 245 of 263 SIFT matches agree within 2 pixels."""
 MAPS = "official_indoor/maps"
 """The published network's maps of the photo, which are tried, too, where they are."""
+TRIES = 1000
+"""Holes drawn for one of a size that is asked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,12 +132,16 @@ class PlateBench(Benchmark):
         self, things: list[dict[str, Any]], shape: tuple[int, ...], rng: np.random.Generator
     ) -> Array:
         """[H, W] bool: an outline at a random place, of a size between `smallest` and `largest` of the picture."""
-        while True:
+        for _ in range(TRIES):
             outline = drawn(things[rng.integers(len(things))], shape)
             moved = np.roll(outline, rng.integers(0, shape), (0, 1))
             hole = _widened(moved, max(1, self.size // 100))
             if self.smallest < hole.mean() < self.largest:
                 return hole
+        raise InputError(
+            f"No hole is between {self.smallest} and {self.largest} of a picture; give --smallest and --largest "
+            "farther apart."
+        )
 
     def _removed(self, photo: Any, predictor: str, mask: Array) -> Array:
         shared: dict[str, Any] = {"seed": self.seed, "device": self.device}
