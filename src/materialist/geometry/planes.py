@@ -108,6 +108,18 @@ def upright(normal: Array, plane: Array) -> Array | None:
     return None
 
 
+def level_frame(normal: Array, plane: Array) -> Array:
+    """[3, 3] rotation whose columns are right, up and back of one who stands level behind the camera.
+
+    Up is that of `upright`, the camera's own where no plane faces upwards.
+    """
+    up = upright(normal, plane)
+    if up is None:
+        return np.eye(3)
+    right = unit(np.cross(up, [0.0, 0, 1]))
+    return np.stack([right, up, np.cross(right, up)], -1)
+
+
 @dataclass(frozen=True)
 class _Maps:
     """What the search looks at, at full or reduced resolution."""

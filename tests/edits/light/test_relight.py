@@ -45,6 +45,27 @@ def test_a_positive_turn_moves_what_is_ahead_to_the_right():
     np.testing.assert_array_equal(relight(SCENE, rotate=360).envmap, SCENE.envmap)
 
 
+def test_a_suns_elevation_is_above_the_horizon_of_the_floor():
+    pitch = np.radians(40)
+    up = np.array([0, np.cos(pitch), np.sin(pitch)])
+    # A camera that looks down at a table.
+    height, width = SCENE.depth.shape
+    pitched = replace(
+        SCENE,
+        normal=np.broadcast_to(up, (height, width, 3)).astype(np.float32),
+        geometry=replace(SCENE.geometry, plane_label=np.zeros((height, width), np.int8)),
+    )
+    for azimuth, elevation in ((0, 90), (90, 0), (180, 20), (-60, 35)):
+        added = relight(pitched, sun=(azimuth, elevation), ambient=0).envmap
+        weight = luminance(added) * row_solid_angle(len(added))[:, None]
+        towards = (texel_directions(*added.shape[:2]) * weight[..., None]).sum((0, 1))
+        towards /= np.linalg.norm(towards)
+        assert abs(np.degrees(np.arcsin(towards @ up)) - elevation) < 2
+        # To the right of the camera, whose own right is level.
+        right = np.cos(np.radians(elevation)) * np.sin(np.radians(azimuth))
+        assert abs(towards[0] - right) < 0.03
+
+
 def test_sun_stands_where_it_was_asked_for_and_has_its_irradiance():
     h = 64
     envmap = np.ones((h, 2 * h, 3), np.float32)

@@ -159,3 +159,37 @@ def test_a_texture_is_turned_clockwise_in_its_plane():
     assert (np.diff(laid(0), axis=1) < 0).mean() > 0.9
     assert (np.diff(laid(90), axis=0) < 0).mean() > 0.9
     assert (np.diff(laid(180), axis=1) > 0).mean() > 0.9
+
+
+def test_a_new_colour_keeps_the_fine_shading_that_the_fit_put_into_the_albedo():
+    groove = np.ones(MASK.shape, np.float32)
+    groove[:, ::4] = 0.6
+    old = SCENE.prior.materials
+    fitted = replace(SCENE.materials, albedo=(old.albedo * groove[..., None]).astype(np.float32))
+    scene = replace(SCENE, materials=fitted)
+    gold = (1.0, 0.56, 0.08)
+    new = edit(scene, MASK, albedo=gold, metallic=1).materials.albedo
+    # Dark grooves stay dark, in the hue of the new colour.
+    ridges = new[MASK & (groove == 1)]
+    np.testing.assert_allclose(ridges, np.broadcast_to(gold, ridges.shape), atol=1e-6)
+    deep = new[MASK & (groove < 1)]
+    np.testing.assert_allclose(deep / deep[:, :1], np.broadcast_to(gold, deep.shape), rtol=1e-5)
+    assert ((deep[:, 0] > 0.55) & (deep[:, 0] < 0.7)).all()
+    # Without it the colour is flat; half of it is the square root.
+    flat = edit(scene, MASK, albedo=gold, detail=0).materials.albedo
+    np.testing.assert_allclose(flat[MASK], np.broadcast_to(gold, flat[MASK].shape), atol=1e-6)
+    half = edit(scene, MASK, albedo=gold, detail=0.5).materials.albedo[MASK & (groove < 1)]
+    np.testing.assert_allclose(half[:, 0] ** 2, deep[:, 0], rtol=1e-4)
+
+
+def test_fine_shading_never_brightens_a_colour_beyond_white():
+    bright = np.where(MASK, 1.0, 0.5)
+    bright[:, ::3] *= 1.8
+    old = SCENE.prior.materials.albedo * 0.5
+    scene = replace(
+        SCENE,
+        materials=replace(SCENE.materials, albedo=(old * bright[..., None]).astype(np.float32)),
+    )
+    new = edit(scene, MASK, albedo=(0.9, 0.45, 0.0)).materials.albedo[MASK]
+    assert new.max() <= 1 + 1e-6
+    np.testing.assert_allclose(new[:, 1], new[:, 0] / 2, rtol=1e-5)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from materialist.edits.composite.glare import add_glare
 from materialist.edits.composite.glow import light_share
 from materialist.edits.composite.layers import Layers
 from materialist.edits.composite.matte import SETTINGS as MATTE
@@ -65,6 +66,10 @@ def into_photo(
     here = picture[box]
     mixed = np.maximum(share * bodies + (1 - share) * here, 0)
     picture[box] = np.where(share > 0, mixed, here)
+    # --- Lamps glare: only under another light, which changes the whole photo anyhow ---
+    light = np.maximum(share * layers.native.picture[box] - 1, 0)
+    if layers.relit and light.any():
+        add_glare(picture, light, box)
     return picture
 
 

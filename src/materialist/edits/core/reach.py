@@ -6,6 +6,7 @@ import numpy as np
 
 from materialist.camera import pixel_rays
 from materialist.envmap import direction_of
+from materialist.geometry.planes import level_frame
 from materialist.types import Array, Scene
 
 POINTS = 4096
@@ -21,7 +22,8 @@ MUCH = 0.7
 
 def sun_reach(scene: Scene, azimuth: float, elevation: float) -> tuple[float, float]:
     """(share of the photo's surfaces that face a sun, share that it lights); directions as of `relight`."""
-    return _reach(_setup(scene), direction_of(azimuth, elevation))
+    level = level_frame(scene.normal, scene.geometry.plane_label)
+    return _reach(_setup(scene), level @ direction_of(azimuth, elevation))
 
 
 def better_sun(scene: Scene, azimuth: float, elevation: float) -> tuple[tuple[float, float], float]:
@@ -29,7 +31,8 @@ def better_sun(scene: Scene, azimuth: float, elevation: float) -> tuple[tuple[fl
     traced = _setup(scene)
     places = [(float(az), float(el)) for az in AZIMUTHS for el in ELEVATIONS]
     directions = np.array([direction_of(*place) for place in places])
-    shares = np.array([_reach(traced, direction)[1] for direction in directions])
+    level = level_frame(scene.normal, scene.geometry.plane_label)
+    shares = np.array([_reach(traced, level @ direction)[1] for direction in directions])
     cosine = directions @ direction_of(azimuth, elevation)
     cosine[shares < MUCH * shares.max()] = -np.inf
     best = int(np.argmax(cosine))

@@ -16,6 +16,7 @@ from materialist.edits.core.surfaces import triple
 from materialist.edits.light.options import Relight, RelightKeywords
 from materialist.envmap import direction_of, row_solid_angle, texel_directions
 from materialist.errors import InputError
+from materialist.geometry.planes import level_frame
 from materialist.io.photo import decode_photo
 from materialist.io.video import MAX_FRAMES
 from materialist.option_kinds import documented
@@ -203,19 +204,26 @@ def rotated(envmap: Array, degrees: float) -> Array:
 
 
 def with_sun(
-    envmap: Array, azimuth: float, elevation: float, *, power: float = 1.0
+    envmap: Array,
+    azimuth: float,
+    elevation: float,
+    *,
+    power: float = 1.0,
+    level: Array | None = None,
 ) -> tuple[Array, Array]:
     """(map without its brightest spot, the sun alone), both [h, 2h, 3].
 
     azimuth: degrees from straight ahead of the camera, > 0 to the right, in [-360, 360]; 180 is behind the camera.
     elevation: degrees above the horizon, in [-90, 90]. power: irradiance on a surface that faces the sun, as a
-    multiple of the mean irradiance of the map.
+    multiple of the mean irradiance of the map. level: [3, 3], as `planes.level_frame`; None: the map is level.
     """
     if not (np.isfinite(azimuth) and -360 <= azimuth <= 360):
         raise InputError(f"The sun's azimuth is {azimuth:g}; it must lie in [-360, 360] degrees.")
     if not (np.isfinite(elevation) and -90 <= elevation <= 90):
         raise InputError(f"The sun's elevation is {elevation:g}; it must lie in [-90, 90] degrees.")
     towards = direction_of(azimuth, elevation)
+    if level is not None:
+        towards = level @ towards
     # --- A disc with a soft border of one texel around the sun's direction ---
     cosine = texel_directions(*envmap.shape[:2]) @ towards
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))  # [h, 2h]
@@ -237,7 +245,8 @@ def _sunny(
     scene: Scene, light: Array, sun: tuple[float, float], power: float
 ) -> tuple[Array, Array]:
     """(what is left of a light [h, 2h, 3] under a sun, the sun alone), by what surfaces of the photo get of them."""
-    calm, disc = with_sun(light, *sun)
+    level = level_frame(scene.normal, scene.geometry.plane_label)
+    calm, disc = with_sun(light, *sun, level=level)
     normals = scene.normal[scene.depth > 0]
     normals = normals[:: max(1, len(normals) // SETTINGS.normals)]
     old = _irradiance(light, normals)

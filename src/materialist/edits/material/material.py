@@ -11,6 +11,7 @@ from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
+from materialist.edits.material.detail import shaded, shading_detail
 from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
 from materialist.geometry.planes import axes
@@ -28,6 +29,7 @@ def edit(
 ) -> Scene:
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
 
+    A new colour or texture keeps the photo's fine shading (`detail`, see `detail.shading_detail`).
     Saturation and value keep the order of a texture: nothing clips, and grey stays grey. A number for roughness or
     metallic sets it, a text with a sign ("+0.5", "-0.5") shifts it; +-0.5 are the paper's high and low. Hue,
     saturation and value act on a new albedo or texture, too.
@@ -42,6 +44,9 @@ def edit(
     colour, texture = base_colour(scene, weight, changes)
     if changes.hue or changes.saturation or changes.value:
         colour = shifted_hsv(colour, changes.hue, changes.saturation, changes.value)
+    if changes.albedo is not None or changes.texture is not None:
+        region = weight > 0.5 if (weight > 0.5).any() else weight > 0
+        colour = shaded(colour, shading_detail(scene, region, changes.detail))
     # Mixed by the weight, so that a feathered border fades.
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
@@ -55,6 +60,7 @@ def edit(
         "roughness": changes.roughness,
         "metallic": changes.metallic,
         "texture": texture,
+        "detail": changes.detail if changes.detail != 1 else None,
     }
     return noted(
         replace(scene, materials=new), "material", {**facts, "pixels": int((weight > 0.5).sum())}

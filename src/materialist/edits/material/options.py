@@ -45,6 +45,9 @@ class MaterialEdit(OperationOptions):
         unit="degrees",
         needs="texture",
     )
+    detail: float = option(
+        1.0, "How much of the photo's fine shading a new colour or texture keeps.", low=0, high=1
+    )
     # The other maps.
     roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **SHIFT)
     metallic: float | str | None = option(None, "The same for metallic.", **SHIFT)
@@ -70,6 +73,7 @@ class MaterialKeywords(TypedDict, total=False):
     texture: Array | str | Path | None
     texture_scale: float
     texture_turn: float
+    detail: float
     roughness: float | str | None
     metallic: float | str | None
     grow: float
