@@ -29,6 +29,8 @@ class SelectSettings:
     probable_radius: float = 0.08  # taken for the object at first
     max_radius: float = 0.24  # beyond, GrabCut does not look
 
+    min_held: float = 0.8  # of a click's mask, by the mask of its box that replaces it
+
     clicknet_weight: float = (
         0.5  # of ClickNet beside MobileSAM; 0.25 to 2 score alike on 222 made things
     )
@@ -42,7 +44,7 @@ def object_at_points(
 ) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on."""
     if network:
-        return tidy(_at(scene, points), points)
+        return tidy(_whole(scene, tidy(_at(scene, points), points)), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
@@ -94,6 +96,18 @@ def _at(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
         for mask, score in zip(logits, expected, strict=True)
     ]
     return np.asarray(logits[int(np.argmax(marks))] > 0)
+
+
+def _whole(scene: Scene, mask: Array) -> Array:
+    """[H, W] bool: what MobileSAM outlines in the bounding box of a mask, where that holds the mask.
+
+    In a box it outlines legs, rims and covers that it leaves out at a click.
+    """
+    rows, columns = window(mask)
+    box = (columns.start, rows.start, columns.stop, rows.stop)
+    logits, expected = sam.masks(linear_to_srgb(scene.photo.linear), box=box)
+    whole = logits[int(np.argmax(expected))] > 0
+    return whole if (whole & mask).sum() >= SETTINGS.min_held * mask.sum() else mask
 
 
 def _soft_overlap(likely: Array, mask: Array) -> float:
