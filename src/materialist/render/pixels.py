@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.buffers import floats, integers
 from materialist.camera import project
-from materialist.geometry.silhouette import area
+from materialist.geometry.silhouette import Box, area
 from materialist.render.variant import recording
 from materialist.types import Array, Body, Camera
 
@@ -19,8 +19,6 @@ _RAYS = 2**21
 """Rays that look for bodies together: bounds the memory."""
 _PATHS = 2**23
 """Paths traced together, likewise."""
-Box = tuple[slice, slice]
-"""Rows and columns of a part of a picture."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ def first_hits(
     whole = box or (slice(0, size[0]), slice(0, size[1]))
     # --- Only the part of the picture where the bodies can be ---
     rows, columns = _around(scene, camera, bodies, size, whole)
-    values = np.zeros((*(side.stop - side.start for side in whole), 8))
+    values = np.zeros((*(side.stop - side.start for side in whole), 8), np.float32)
     inside = values[
         tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))
     ]
@@ -74,7 +72,7 @@ def first_hits(
         )
 
     channels = (values[..., 0], values[..., 1:4], values[..., 4:7], values[..., 7])
-    return FirstHits(*(np.ascontiguousarray(channel, np.float32) for channel in channels))
+    return FirstHits(*(np.ascontiguousarray(channel) for channel in channels))
 
 
 def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box) -> Box:
@@ -134,7 +132,10 @@ def _strip(
 
 def pixel_numbers(size: tuple[int, ...], where: Box | Array) -> Array:
     """Row-major numbers of some pixels of a picture of `size`: [h, w] of a box, [N] of a mask [H, W] bool."""
-    return np.arange(size[0] * size[1], dtype=np.uint32).reshape(size)[where]
+    if isinstance(where, np.ndarray):
+        return np.flatnonzero(where).astype(np.uint32)
+    rows, columns = (np.arange(n, dtype=np.uint32)[side] for n, side in zip(size, where))
+    return rows[:, None] * np.uint32(size[1]) + columns
 
 
 def directions(camera: Camera, size: tuple[int, ...], pixel: Any, x: Any, y: Any) -> Any:

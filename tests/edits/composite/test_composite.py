@@ -30,6 +30,7 @@ from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
+from materialist.geometry.silhouette import window
 from materialist.io.colour_space import DISPLAY_P3, space, srgb_curve
 from materialist.io.decode import decode
 from materialist.io.out.icc import profile_of
@@ -261,7 +262,11 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
         np.float32
     )  # all in shade, but for the body
     layers = Layers(
-        base, edited, everywhere, changed, native=NativeLayer(inside, share, 0 * grey.original)
+        base,
+        edited,
+        everywhere,
+        changed,
+        native=NativeLayer(inside, window(share >= 0), share, 0 * grey.original),
     )
     out = into_photo(grey, layers)
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)

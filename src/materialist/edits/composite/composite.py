@@ -59,7 +59,7 @@ def composite(
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
     options = RenderOptions(spp, seed, denoise, device, progress)
-    return _Compositor(scene, options, full_render, upscale).picture(edited)
+    return _Compositor(scene, options, full_render, upscale).picture(edited, last=True)
 
 
 def pictures(
@@ -112,8 +112,11 @@ class _Compositor:
         self._last: Scene | None = None
         self._renderer: EditRenderer | None = None
 
-    def picture(self, edited: Scene) -> Array:
-        """[H0, W0, 3] the edit in the photo; [H, W, 3] its plain rendering, or that enlarged."""
+    def picture(self, edited: Scene, *, last: bool = False) -> Array:
+        """[H0, W0, 3] the edit in the photo; [H, W, 3] its plain rendering, or that enlarged.
+
+        last: no other picture follows.
+        """
         options = self._options
         renderer = self._base(edited)
         if self._full_render:
@@ -122,7 +125,9 @@ class _Compositor:
         layers = render_layers(renderer, edited, options)
         dimmed = dimmed_emitters(self._scene, edited)
         lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
-        return into_photo(renderer.scene.photo, layers, lights, options.progress)
+        photo = renderer.scene.photo
+        once = last and photo is not self._scene.photo and photo is not edited.photo
+        return into_photo(photo, layers, lights, options.progress, once=once)
 
     def _base(self, edited: Scene) -> EditRenderer:
         """The renderer of what the edit is compared with."""

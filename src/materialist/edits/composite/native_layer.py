@@ -16,12 +16,9 @@ from materialist.edits.core.renderer import (
 )
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
-from materialist.geometry.silhouette import area, grown, window
+from materialist.geometry.silhouette import Box, area, grown, window
 from materialist.render.bodies import is_transparent
 from materialist.types import Array, Scene
-
-Box = tuple[slice, slice]
-"""Rows and columns of a part of a picture."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +43,12 @@ class NativeLayer:
 
     inside: Array
     """[H, W] float32 in [0, 1]: share of each pixel of working size that they cover."""
+    box: Box
+    """The native pixels that they may cover."""
     share: Array
-    """[H0, W0] float32: the same of each native pixel."""
+    """[h0, w0] float32: the same of each native pixel of the box."""
     picture: Array
-    """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
+    """[h0, w0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
 
 
 def native_layer(
@@ -108,19 +107,16 @@ def native_layer(
         picture = spread_known(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
 
     # --- Coverage and radiance at native size ---
-    share = np.zeros(native, np.float32)
-    whole = np.zeros((*native, 3), np.float32)
     bodies_share, hidden = _behind_things(
         target.mi_scene, sight, alone, scene, there, gap, stands=stands
     )
-    share[there] = bodies_share
     # A share of a pixel's body takes the place of what it hides, not of the thing before it.
     colours = _resized(picture, sight.share.shape) + scene.photo.original[there] - hidden
-    whole[there] = np.where(bodies_share[..., None] > 0, colours, 0)
+    colours = np.where(bodies_share[..., None] > 0, colours, 0).astype(np.float32)
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
         small = np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8)))
-    return NativeLayer(small, share, whole)
+    return NativeLayer(small, there, bodies_share, colours)
 
 
 def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Box]:
@@ -164,7 +160,7 @@ def _behind_things(
     whole[there] = spread_known(alone.depth)
     depth = spread_known(_resized(whole, working, cv2.INTER_NEAREST))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
-    before = matte(thing, scene.photo.original)[there]
+    before = matte(thing, scene.photo.original, there)
     _, behind = unmixed(before, photo, max(1.0, native[1] / working[1]))
     # Where nothing but the thing is seen, nothing is known of what it hides.
     mixed = near & (before > 0) & (before < 1)

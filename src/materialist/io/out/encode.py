@@ -38,6 +38,8 @@ LOSSLESS = 100
 """Quality from which WebP loses nothing."""
 MAX_SIDE = {"JPEG": 65_535, "WEBP": 16_383, "AVIF": 65_535}
 """Longest side that the format has, pixels."""
+_PNG_EFFORT = 4
+"""Of 9: a third of the time of 6, Pillow's, and 6 % more bytes of a photo of 50 megapixels."""
 _SUBSAMPLING = {"JPEG": 0, "AVIF": "4:4:4"}
 """Colour at every pixel: borders of edits are where both change."""
 _EXIF_BYTES = 65_000
@@ -135,7 +137,7 @@ def check_image_output(
 
 def _encoded(
     kind: str, levels: Array, colours: PhotoColours, photo: Photo | None, quality: int | None
-) -> tuple[bytes, tuple[str, ...]]:
+) -> tuple[bytes | memoryview, tuple[str, ...]]:
     """The file's bytes, and notes on what it lacks."""
     exif = copied_exif(photo, srgb=colours.space is None)
     if kind == "TIFF":
@@ -155,6 +157,8 @@ def _encoded(
         settings["quality"] = QUALITY[kind] if quality is None else quality
     if kind in _SUBSAMPLING:
         settings["subsampling"] = _SUBSAMPLING[kind]
+    if kind == "PNG":
+        settings["compress_level"] = _PNG_EFFORT
     if kind == "WEBP" and quality == LOSSLESS:
         settings |= {"lossless": True, "quality": 75}  # then it says how hard it tries
     buffer = io.BytesIO()
@@ -162,7 +166,7 @@ def _encoded(
         Image.fromarray(levels).save(buffer, kind, **settings)
     except (OSError, ValueError) as error:  # what the encoders raise, for example out of memory
         raise OutputError(f"The picture cannot be encoded as {kind}: {error}.") from error
-    return buffer.getvalue(), notes
+    return buffer.getbuffer(), notes
 
 
 def _deep_png(levels: Array, exif: bytes, profile: bytes) -> bytes:
