@@ -19,6 +19,7 @@ from materialist.io.out.colours import photo_colours
 from materialist.io.out.depth import is_deep
 from materialist.io.out.encode import save_image
 from materialist.io.out.exif import copied_exif
+from materialist.memory import give_back
 from materialist.options import PATHS
 from materialist.spelling import spelled
 from materialist.types import Array, Photo, Scene
@@ -59,7 +60,9 @@ def composite(
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
     options = RenderOptions(spp, seed, denoise, device, progress)
-    return _Compositor(scene, options, full_render, upscale).picture(edited, last=True)
+    picture = _Compositor(scene, options, full_render, upscale).picture(edited, last=True)
+    give_back()
+    return picture
 
 
 def pictures(
