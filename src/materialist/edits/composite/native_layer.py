@@ -26,6 +26,7 @@ class NativeSettings:
     """Resolution and paths of the native-resolution layer; tuned by eye unless derived."""
 
     max_pixels: int = 1_500_000  # a larger layer is traced smaller, and enlarged; derived: time
+    finest_glass: float = 8.0  # traced pixels a working pixel, along a side, which maps have
     min_paths: int = 32  # a native pixel, as the denoiser needs
     max_path_factor: int = 4  # on the picture's paths a pixel, twice that in glass; derived: time
     path_budget: float = 0.5  # all paths, of those of a whole working-size picture; derived: time
@@ -59,7 +60,7 @@ def native_layer(
     The photo's own lights are left to its outlines. Under another light every lamp counts as new: it stays as bright as
     it was, and what changes beside it must not colour its rim.
     """
-    from materialist.render.pixels import first_hits, only, radiance
+    from materialist.render.pixels import coverage, first_hits, only, radiance
 
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps)) if is_relit(scene, edited)]
@@ -75,21 +76,23 @@ def native_layer(
     working = scene.depth.shape
     chosen = {name: bodies.get(name) for name in names}
     # Where they are seen: at working size, then at native size, in the scene and by themselves
-    small = first_hits(target.mi_scene, camera, chosen, working).share
+    small = coverage(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
     there = window(small > 0, native, SETTINGS.denoiser_margin)
-    sight = first_hits(target.mi_scene, camera, chosen, native, there)
+    sight = coverage(target.mi_scene, camera, chosen, native, there)
     everything = [*bodies, *(f"lamp{k}" for k in range(len(edited.lamps)))]
     bare = only(target.mi_scene, everything)  # without the photo's surface
-    alone = first_hits(bare, camera, chosen, native, there)
+    alone = coverage(bare, camera, chosen, native, there)
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     stands = names != lamps
     gap = (SETTINGS.max_contact if stands else SETTINGS.max_lamp_contact) * _extent(alone)
 
     # --- Their radiance: as many paths as the budget allows ---
-    size, part = _traced_size(native, there)
-    has_glass = any(body and is_transparent(body.surface) for body in chosen.values())
+    clear = [body is not None and is_transparent(body.surface) for body in chosen.values()]
+    has_glass = any(clear)
+    finest = SETTINGS.finest_glass if all(clear) else np.inf
+    size, part = _traced_size(native, there, finest * working[1] / native[1])
     max_factor = SETTINGS.max_path_factor * (1 + has_glass)
     budget = int(SETTINGS.path_budget * options.spp * small.size / area(part))
     paths = max(SETTINGS.min_paths, min(max_factor * options.spp, budget))
@@ -103,7 +106,7 @@ def native_layer(
     few = _resized(hidden, picture.shape[:2])[..., None] > 0
     picture = spread_known(np.where(few, 0, picture))
     if options.denoise:
-        guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
+        guide = first_hits(bare, camera, chosen, size, part)
         picture = spread_known(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
 
     # --- Coverage and radiance at native size ---
@@ -119,9 +122,9 @@ def native_layer(
     return NativeLayer(small, there, bodies_share, colours)
 
 
-def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Box]:
-    """Size of the picture that is traced, and the native box in it."""
-    factor = min(1.0, np.sqrt(SETTINGS.max_pixels / area(box)))
+def _traced_size(native: tuple[int, ...], box: Box, largest: float) -> tuple[tuple[int, int], Box]:
+    """Size of the picture that is traced, at most `largest` times the native one, and the native box in it."""
+    factor = min(1.0, largest, np.sqrt(SETTINGS.max_pixels / area(box)))
     size = tuple(max(2, round(n * factor)) for n in native)
     sides = []
     for side, whole, traced in zip(box, native, size):
@@ -143,7 +146,7 @@ def _behind_things(
     pixels there; `matte` finds the thing's outline in the photo. A surface less than `gap` before a body is the ground
     that it `stands` on, and hides nothing: its bumps would make the foot ragged.
     """
-    from materialist.render.pixels import first_hits
+    from materialist.render.pixels import coverage
 
     native = scene.photo.original.shape[:2]
     working = scene.depth.shape
@@ -151,7 +154,7 @@ def _behind_things(
     photo = scene.photo.original[there]
     hidden = alone.share > sight.share + 0.05
     if hidden.any():
-        ground = first_hits(mi_scene, scene.camera, {"surface": None}, native, there)
+        ground = coverage(mi_scene, scene.camera, ("surface",), native, there)
         hidden &= (ground.share > 0) & (alone.depth - ground.depth > gap)
     if not hidden.any():
         return share, photo

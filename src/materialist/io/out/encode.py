@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from PIL import Image, features
 
+from materialist.color import ROWS
 from materialist.errors import InputError, OutputError, SetupError
 from materialist.install import install_command
 from materialist.io.atomic import ensure_writable, whole_file
@@ -169,7 +170,8 @@ def _encoded(
 
 def _png(levels: Array, exif: bytes, profile: bytes) -> list[bytes | memoryview]:
     """A PNG of 8 or 16 bits, with the chunks that OpenCV does not write."""
-    cv2.cvtColor(levels, cv2.COLOR_RGB2BGR, dst=levels)  # in place, for the memory
+    for start in range(0, len(levels), ROWS):  # in place, for the memory
+        levels[start : start + ROWS] = levels[start : start + ROWS, :, ::-1].copy()
     effort = [cv2.IMWRITE_PNG_COMPRESSION, _PNG_EFFORT]
     plain = memoryview(cv2.imencode(".png", levels, effort)[1]).cast("B")
     chunks = _chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))
