@@ -15,10 +15,10 @@ from materialist.types import Array, Body, Camera
 
 GRID = 4
 """Rays along each side of a pixel."""
-_RAYS = 2**21
+_RAYS = 2**20
 """Rays that look for bodies together: bounds the memory."""
 _PATHS = 2**23
-"""Paths traced together, likewise."""
+"""Paths traced together unless the caller says otherwise, likewise."""
 
 
 @dataclass(frozen=True)
@@ -240,12 +240,14 @@ def radiance(
     seed: int,
     max_depth: int,
     names: Sequence[str] | None = None,
+    at_once: int = _PATHS,
 ) -> Array:
     """[..., 3] float32 linear radiance of pixels of a `RenderScene`, path traced, with at least `spp` paths each.
 
     size: (H, W) of the whole picture. where: a box, or a mask [H, W] bool, whose pixels come in rows [N, 3]. Paths have
     random numbers by seed and pixel, whatever else of the picture is traced.
     names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
+    at_once: paths traced together; the random numbers follow from it, too.
     """
     mi = target.mi
     masked = isinstance(where, np.ndarray)
@@ -257,7 +259,7 @@ def radiance(
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
     sampler = mi.load_dict({"type": "multijitter", "sample_count": paths})
     sampler.set_samples_per_wavefront(paths)
-    pixels_at_once = max(1, _PATHS // paths)  # bounded wavefronts
+    pixels_at_once = max(1, at_once // paths)  # bounded wavefronts
     # Strips are numbered over the whole picture, so that a pixel's seed does not depend on the
     # mask.
     for k, first in enumerate(range(0, pixels.size, pixels_at_once)):

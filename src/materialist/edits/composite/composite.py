@@ -19,7 +19,6 @@ from materialist.io.out.colours import photo_colours
 from materialist.io.out.depth import is_deep
 from materialist.io.out.encode import save_image
 from materialist.io.out.exif import copied_exif
-from materialist.memory import give_back
 from materialist.options import PATHS
 from materialist.spelling import spelled
 from materialist.types import Array, Photo, Scene
@@ -140,6 +139,8 @@ class _Compositor:
         dimmed = dimmed_emitters(self._scene, edited)
         lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
         if last:
+            from materialist.render.variant import give_back
+
             give_back()  # before what takes most memory
         photo = renderer.scene.photo
         once = last and photo is not self._scene.photo and photo is not edited.photo

@@ -30,6 +30,7 @@ class NativeSettings:
     min_paths: int = 32  # a native pixel, as the denoiser needs
     max_path_factor: int = 4  # on the picture's paths a pixel, twice that in glass; derived: time
     path_budget: float = 0.5  # all paths, of those of a whole working-size picture; derived: time
+    paths_at_once: int = 2**21  # traced together; derived: memory
     denoiser_margin: int = 3  # working pixels around the bodies that the denoiser sees
     max_contact: float = 0.05  # share of a body's extent: a nearer surface is what it stands on
     max_lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
@@ -99,7 +100,14 @@ def native_layer(
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
     picture = radiance(
-        target, size, part, spp=paths, seed=options.seed, max_depth=depth, names=names
+        target,
+        size,
+        part,
+        spp=paths,
+        seed=options.seed,
+        max_depth=depth,
+        names=names,
+        at_once=SETTINGS.paths_at_once,
     )
     # Where most of a pixel's body is hidden, too few paths met it: its neighbours' radiance is taken.
     hidden = (sight.share < alone.share / 2).astype(np.float32)
