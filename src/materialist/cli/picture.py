@@ -105,7 +105,8 @@ def _last_picture(scene: Any, edited: Any, rendering: Rendering, progress: Any) 
 
     settings = dict(rendering.compositing)
     names = ("spp", "seed", "denoise", "device")
-    options = RenderOptions(*(settings.pop(name) for name in names), progress)
+    chosen = {name: settings.pop(name) for name in names}
+    options = RenderOptions(**chosen, progress=progress)
     return spent_composite(scene, edited, options, **settings)
 
 

@@ -125,7 +125,7 @@ def _outline(mask: Array, native: tuple[int, ...]) -> Array:
     if native == mask.shape:
         return hard.astype(np.float32)
     smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
-    share = np.asarray(cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC))
+    share: Array = np.asarray(cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC))
     share *= 4  # in place, for the memory
     share -= 2
     np.clip(share, 0, 1, out=share)

@@ -173,7 +173,8 @@ def _png(levels: Array, exif: bytes, profile: bytes) -> list[bytes | memoryview]
     for start in range(0, len(levels), ROWS):  # in place, for the memory
         levels[start : start + ROWS] = levels[start : start + ROWS, :, ::-1].copy()
     effort = [cv2.IMWRITE_PNG_COMPRESSION, _PNG_EFFORT]
-    plain = memoryview(cv2.imencode(".png", levels, effort)[1]).cast("B")
+    encoded: Array = cv2.imencode(".png", levels, effort)[1]
+    plain = encoded.data.cast("B")
     chunks = _chunk(b"iCCP", b"ICC profile\0\0" + zlib.compress(profile))
     chunks += _chunk(b"eXIf", exif.removeprefix(b"Exif\0\0"))
     return [plain[:_IN_PNG_BEFORE], chunks, plain[_IN_PNG_BEFORE:]]
