@@ -19,7 +19,7 @@ from materialist.io import colour_space as spaces
 from materialist.io.bitmap import turned_upright
 from materialist.io.exr import read_exr
 from materialist.io.icc import matrix_profile
-from materialist.io.out.encode import _deep_png
+from materialist.io.out.encode import _png
 from materialist.io.out.exif import SOFTWARE
 from materialist.io.out.icc import profile_of, srgb_profile
 from materialist.io.out.tiff import tiff_bytes
@@ -170,7 +170,7 @@ def test_turned_photos_of_wide_colours_keep_their_levels(tmp_path, kind, dtype, 
         settings = {"exif": exif, "icc_profile": P3, "lossless": True}
         Image.fromarray(LEVELS).save(path, **settings)
         if dtype == np.uint16:
-            path.write_bytes(_deep_png(levels, exif.tobytes(), P3))
+            path.write_bytes(b"".join(_png(levels.copy(), exif.tobytes(), P3)))
     photo = read_photo(path)
     mt.save_image(tmp_path / "out.tif", photo.original, photo)
     written = tifffile.imread(tmp_path / "out.tif")

@@ -1,8 +1,10 @@
 """Files of weights whose large tensors are stored as int8."""
 
+import pytest
 import torch
 from safetensors.torch import save_file
 
+from materialist.errors import WeightsError
 from materialist.predict.weights import read_state
 
 
@@ -16,3 +18,12 @@ def test_int8_levels_come_with_their_scales(tmp_path):
     assert set(state) == {"a.weight", "a.bias"}
     # Half a level is the most that rounding may take away.
     assert (state["a.weight"] - values).abs().amax(1).le(scale / 2 + 1e-6).all()
+
+
+@pytest.mark.parametrize("scales", [1, 3])
+def test_scales_of_another_length_are_damage(tmp_path, scales):
+    path = tmp_path / "levels.safetensors"
+    levels = torch.ones(2, 3, dtype=torch.int8)
+    save_file({"a.weight": levels, "a.weight.scale": torch.ones(scales)}, path)
+    with pytest.raises(WeightsError, match=rf"levels.safetensors is damaged: .*{scales} scales"):
+        read_state(path)

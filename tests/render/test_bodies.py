@@ -7,7 +7,7 @@ import pytest
 from render_scenes import empty, wall
 
 from materialist.render.bodies import is_transparent
-from materialist.render.pixels import first_hits, radiance
+from materialist.render.pixels import coverage, first_hits, radiance
 from materialist.render.scene import GLASS_DEPTH, RenderScene
 from materialist.types import Body, Camera, Surface
 from materialist_lab.procedural.objects import shapes
@@ -90,10 +90,19 @@ def test_the_share_of_a_pixel_covered_by_a_body():
     target = RenderScene(empty(CAMERA), CAMERA, bodies=(body,))
     for scale in (1, 4):
         size = (scale * CAMERA.height, scale * CAMERA.width)
-        share = first_hits(target.mi_scene, CAMERA, {"body0": body}, size).share
+        share = coverage(target.mi_scene, CAMERA, ["body0"], size).share
         assert share.shape == size and ((share > 0) & (share < 1)).any()
         assert share.sum() == pytest.approx(np.pi * (scale * outline()) ** 2, rel=0.02)
-    assert not first_hits(target.mi_scene, CAMERA, {"body1": None}, size).share.any()
+    assert not coverage(target.mi_scene, CAMERA, ["body1"], size).share.any()
+
+
+def test_coverage_is_that_of_the_first_hits():
+    body = sphere(surface())
+    scene = RenderScene(empty(CAMERA), CAMERA, bodies=(body,)).mi_scene
+    hits = first_hits(scene, CAMERA, {"body0": body}, (64, 96))
+    seen = coverage(scene, CAMERA, ["body0"], (64, 96))
+    np.testing.assert_array_equal(seen.share, hits.share)
+    np.testing.assert_allclose(seen.depth, hits.depth, rtol=1e-5)
 
 
 @pytest.mark.parametrize(

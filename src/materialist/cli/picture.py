@@ -83,7 +83,7 @@ def write_result(
 ) -> None:
     start = time.monotonic()
     with stage_progress(quiet=rendering.as_json) as progress:
-        picture = mt.composite(scene, edited, progress=progress, **rendering.compositing)
+        picture = _last_picture(scene, edited, rendering, progress)
     notes = write_picture(output, picture, scene, edited, rendering)
     facts = {"image": str(output), "spp": rendering.spp, "seconds": time.monotonic() - start}
     finish_command(
@@ -96,6 +96,18 @@ def write_result(
         facts,
         notes=notes,
     )
+
+
+def _last_picture(scene: Any, edited: Any, rendering: Rendering, progress: Any) -> Any:
+    """The composite of a scene that the command makes no other picture of."""
+    from materialist.edits.composite.composite import spent_composite
+    from materialist.edits.core.renderer import RenderOptions
+
+    settings = dict(rendering.compositing)
+    names = ("spp", "seed", "denoise", "device")
+    chosen = {name: settings.pop(name) for name in names}
+    options = RenderOptions(**chosen, progress=progress)
+    return spent_composite(scene, edited, options, **settings)
 
 
 def write_picture(

@@ -147,15 +147,15 @@ def _surface(scene: Scene, size: tuple[int, int], device: str) -> dict[str, Arra
 
 def _things(scene: Scene, size: tuple[int, int], device: str) -> dict[str, Array]:
     """Coverage [H, W] of each body, by a name that no other has."""
-    from materialist.render.pixels import first_hits
+    from materialist.render.pixels import coverage
 
-    coverage: dict[str, Array] = {}
+    shares: dict[str, Array] = {}
     built = _built(scene, device) if scene.bodies else None
     for k, body in enumerate(scene.bodies):
         # Layers of one name would overwrite each other.
-        name = body.name if body.name not in coverage else f"{body.name} {k + 1}"
-        coverage[name] = first_hits(built, scene.camera, {f"body{k}": body}, size).share
-    return coverage
+        name = body.name if body.name not in shares else f"{body.name} {k + 1}"
+        shares[name] = coverage(built, scene.camera, [f"body{k}"], size).share
+    return shares
 
 
 def _built(scene: Scene, device: str):

@@ -7,6 +7,9 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 from materialist.errors import InputError
 from materialist.types import Array, Camera
 
+Box = tuple[slice, slice]
+"""Rows and columns of a part of a picture."""
+
 
 def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
     """[H, W] bool: pixels of the mask that have a surface. Raises InputError for other sizes or when none is left."""
@@ -21,9 +24,7 @@ def surface_in(mask: Array, depth: Array, camera: Camera) -> Array:
     return inside
 
 
-def window(
-    mask: Array, native: tuple[int, ...] | None = None, margin: int = 0
-) -> tuple[slice, slice]:
+def window(mask: Array, native: tuple[int, ...] | None = None, margin: int = 0) -> Box:
     """Rows and columns of the pixels of a mask [H, W] bool that is not empty, and of `margin` around them.
 
     native: size of a larger picture whose rows and columns they are; None: those of the mask.
@@ -39,9 +40,25 @@ def window(
     return sides[0], sides[1]
 
 
-def area(box: tuple[slice, slice]) -> int:
+def area(box: Box) -> int:
     """Pixels of a window."""
-    return (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
+    return max(box[0].stop - box[0].start, 0) * max(box[1].stop - box[1].start, 0)
+
+
+def common(first: Box, second: Box) -> Box:
+    """The part of a picture that is in both windows; of area 0 where there is none."""
+    rows, columns = (
+        slice(max(a.start, b.start), min(a.stop, b.stop)) for a, b in zip(first, second)
+    )
+    return rows, columns
+
+
+def within(part: Box, box: Box) -> Box:
+    """A part of a picture, as rows and columns of a window that holds it."""
+    rows, columns = (
+        slice(a.start - b.start, a.stop - b.start) for a, b in zip(part, box, strict=True)
+    )
+    return rows, columns
 
 
 def disc(radius: int) -> Array:

@@ -10,11 +10,16 @@ from typing import TYPE_CHECKING
 from materialist.errors import SetupError, WeightsError
 from materialist.forks import check_process
 from materialist.install import install_command
+from materialist.predict.weights import verify_file
 from materialist.threads import TORCH_THREADS
 from materialist.types import Array
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
+
+
+REINSTALL = "install materialist again"
+"""What to do about a damaged file of the package."""
 
 
 def run(path: Path, inputs: Mapping[str, Array]) -> list[Array]:
@@ -48,8 +53,10 @@ def session(path: Path) -> InferenceSession:
     options.add_session_config_entry("session.disable_quant_qdq", "1")
     options.log_severity_level = 3
     if not path.is_file():
-        raise WeightsError(f"{path} is missing; install materialist again.")
+        raise WeightsError(f"{path} is missing; {REINSTALL}.")
+    # The runtime reads a damaged or exchanged file without a word, and then answers wrongly.
+    verify_file(path, remedy=REINSTALL)
     try:
         return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime raises classes of its own for each kind of damage
-        raise WeightsError(f"{path} is damaged ({error}); install materialist again.") from error
+        raise WeightsError(f"{path} is damaged ({error}); {REINSTALL}.") from error

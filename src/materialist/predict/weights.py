@@ -19,7 +19,9 @@ INSTEAD = 'use another predictor (`predictor="auto"`), or read another tool\'s m
 SCALE = ".scale"
 """Suffix of the scales of a tensor that is stored as int8."""
 CHECKSUMS = "SHA256SUMS"
-"""List beside every download: one line a file, as `sha256sum` writes and checks them."""
+"""List beside every download and every ONNX file: one line a file, as `sha256sum` writes and checks them."""
+FETCH = f"fetch it again (materialist models download NAME --force), or {INSTEAD}"
+"""What to do about a damaged download."""
 
 
 def sha256(path: Path) -> str:
@@ -33,17 +35,16 @@ def sha256(path: Path) -> str:
         ) from error
 
 
-def verify_file(path: Path, expected: str = "") -> str:
+def verify_file(path: Path, expected: str = "", remedy: str = FETCH) -> str:
     """The file's sha256, which must be `expected`, or the digest in the list beside the file where that names it.
 
-    Raises WeightsError, with both digests, when they differ.
+    Raises WeightsError, with both digests and the remedy, when they differ.
     """
     digest = sha256(path)
     expected = expected or _listed(path.parent).get(path.name, digest)
     if expected != digest:
         raise WeightsError(
-            f"{path} is damaged: its sha256 is {digest}, expected {expected}; fetch it again "
-            f"(materialist models download NAME --force), or {INSTEAD}."
+            f"{path} is damaged: its sha256 is {digest}, expected {expected}; {remedy}."
         )
     return digest
 
@@ -120,6 +121,11 @@ def read_state(path: Path) -> dict[str, Tensor]:
     # --- Levels times scales ---
     for name in [name for name in state if f"{name}{SCALE}" in state]:
         scale = state.pop(f"{name}{SCALE}")
+        if scale.numel() != (state[name].shape or [1])[0]:
+            raise WeightsError(
+                f"{path} is damaged: {name} has the shape {list(state[name].shape)} and {scale.numel()} scales, and "
+                f"needs one for each output; fetch or copy it again, or {INSTEAD}."
+            )
         state[name] = state[name] * scale.reshape(-1, *[1] * (state[name].ndim - 1))
     return state
 

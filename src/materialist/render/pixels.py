@@ -1,6 +1,6 @@
 """Pixels of a picture, at the camera's resolution or another: what is met first there, and radiance, path traced."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -9,32 +9,36 @@ import numpy as np
 
 from materialist.buffers import floats, integers
 from materialist.camera import project
-from materialist.geometry.silhouette import area
+from materialist.geometry.silhouette import Box, area
 from materialist.render.variant import recording
 from materialist.types import Array, Body, Camera
 
 GRID = 4
 """Rays along each side of a pixel."""
-_RAYS = 2**21
+_RAYS = 2**20
 """Rays that look for bodies together: bounds the memory."""
 _PATHS = 2**23
-"""Paths traced together, likewise."""
-Box = tuple[slice, slice]
-"""Rows and columns of a part of a picture."""
+"""Paths traced together unless the caller says otherwise, likewise."""
 
 
 @dataclass(frozen=True)
-class FirstHits:
-    """What rays through the pixels of a box meet first, of some bodies; means over the rays that meet one."""
+class Coverage:
+    """Where rays through the pixels of a box meet some bodies first."""
 
     share: Array
-    """[h, w] float32 in [0, 1]: coverage, the share of each pixel in which one of the bodies is seen."""
+    """[h, w] float32 in [0, 1]: the share of each pixel in which one of the bodies is seen."""
+    depth: Array
+    """[h, w] float32 planar, scene units, the mean over the rays that meet one; 0 where none is seen."""
+
+
+@dataclass(frozen=True)
+class FirstHits(Coverage):
+    """What they meet there; means over the rays that meet one."""
+
     albedo: Array
     """[h, w, 3] float32 in [0, 1]; 0 where none is seen. White for glass and mirrors, as denoisers want it."""
     normal: Array
     """[h, w, 3] float32, camera frame; 0 where none is seen."""
-    depth: Array
-    """[h, w] float32 planar, scene units; 0 where none is seen."""
 
 
 def only(scene, names: Sequence[str]):
@@ -58,10 +62,41 @@ def first_hits(
     bodies: by the names of their shapes; None for one without a material, as lamps, which is taken as white.
     size: (H, W) of the whole picture. box: the part of it that is wanted, None for all.
     """
+
+    def surfaces(strip: Box) -> Array:
+        return _surfaces(scene, camera, bodies, size, strip)
+
+    values = _by_strips(surfaces, 8, scene, camera, bodies, size, box)
+    channels = (values[..., 0], values[..., 7], values[..., 1:4], values[..., 4:7])
+    return FirstHits(*(np.ascontiguousarray(channel) for channel in channels))
+
+
+def coverage(
+    scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box | None = None
+) -> Coverage:
+    """See `Coverage`; of the named shapes, otherwise as `first_hits`, of which it takes a third of the time."""
+
+    def hits(strip: Box) -> Array:
+        return _hits(scene, camera, names, size, strip)
+
+    values = _by_strips(hits, 2, scene, camera, names, size, box)
+    return Coverage(*(np.ascontiguousarray(values[..., k]) for k in (0, 1)))
+
+
+def _by_strips(
+    traced: Callable[[Box], Array],
+    channels: int,
+    scene,
+    camera: Camera,
+    names: Collection[str],
+    size: tuple[int, ...],
+    box: Box | None,
+) -> Array:
+    """[h, w, channels] float32: what `traced` gives of a part of the picture, some rows at a time."""
     whole = box or (slice(0, size[0]), slice(0, size[1]))
     # --- Only the part of the picture where the bodies can be ---
-    rows, columns = _around(scene, camera, bodies, size, whole)
-    values = np.zeros((*(side.stop - side.start for side in whole), 8))
+    rows, columns = _around(scene, camera, names, size, whole)
+    values = np.zeros((*(side.stop - side.start for side in whole), channels), np.float32)
     inside = values[
         tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))
     ]
@@ -69,12 +104,8 @@ def first_hits(
     step = max(1, _RAYS // GRID**2 // max(columns.stop - columns.start, 1))
     for first in range(rows.start, rows.stop, step) if area((rows, columns)) else ():
         strip = slice(first, min(first + step, rows.stop))
-        inside[first - rows.start : strip.stop - rows.start] = _strip(
-            scene, camera, bodies, size, (strip, columns)
-        )
-
-    channels = (values[..., 0], values[..., 1:4], values[..., 4:7], values[..., 7])
-    return FirstHits(*(np.ascontiguousarray(channel, np.float32) for channel in channels))
+        inside[first - rows.start : strip.stop - rows.start] = traced((strip, columns))
+    return values
 
 
 def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box) -> Box:
@@ -98,7 +129,34 @@ def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...]
     return sides[0], sides[1]
 
 
-def _strip(
+def _hits(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], box: Box) -> Array:
+    """[h, w, 2] share and depth of a few rows."""
+    import drjit as dr
+    import mitsuba as mi
+
+    pixel = pixel_numbers(size, box)
+    # --- The rays of one pixel after the other, so that they are summed where they are traced ---
+    rays = GRID**2
+    slot = dr.arange(mi.UInt32, pixel.size * rays)
+    place = slot % rays
+    x, y = ((mi.Float(way) + 0.5) / GRID for way in (place % GRID, place // GRID))
+    way = directions(
+        camera, size, dr.gather(mi.UInt32, integers(mi, pixel.ravel()), slot // rays), x, y
+    )
+    met = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(0), way))
+    known = mi.Bool(False)
+    for shape in scene.shapes():
+        if shape.id() in names:
+            known |= met.shape == mi.ShapePtr(shape)
+    known &= met.is_valid()
+    values = [dr.select(known, value, 0) for value in (mi.Float(1), -way.z * met.t)]
+    dr.eval(values)
+    count, depth = (np.array(dr.block_sum(value, rays)) for value in values)
+    means = np.stack([count / rays, depth / np.maximum(count, 1)], -1)
+    return means.reshape(*pixel.shape, 2)
+
+
+def _surfaces(
     scene, camera: Camera, bodies: Mapping[str, Body | None], size: tuple[int, ...], box: Box
 ) -> Array:
     """[h, w, 8] share, albedo, normal and depth of a few rows."""
@@ -134,7 +192,10 @@ def _strip(
 
 def pixel_numbers(size: tuple[int, ...], where: Box | Array) -> Array:
     """Row-major numbers of some pixels of a picture of `size`: [h, w] of a box, [N] of a mask [H, W] bool."""
-    return np.arange(size[0] * size[1], dtype=np.uint32).reshape(size)[where]
+    if isinstance(where, np.ndarray):
+        return np.flatnonzero(where).astype(np.uint32)
+    rows, columns = (np.arange(n, dtype=np.uint32)[side] for n, side in zip(size, where))
+    return rows[:, None] * np.uint32(size[1]) + columns
 
 
 def directions(camera: Camera, size: tuple[int, ...], pixel: Any, x: Any, y: Any) -> Any:
@@ -179,12 +240,14 @@ def radiance(
     seed: int,
     max_depth: int,
     names: Sequence[str] | None = None,
+    at_once: int = _PATHS,
 ) -> Array:
     """[..., 3] float32 linear radiance of pixels of a `RenderScene`, path traced, with at least `spp` paths each.
 
     size: (H, W) of the whole picture. where: a box, or a mask [H, W] bool, whose pixels come in rows [N, 3]. Paths have
     random numbers by seed and pixel, whatever else of the picture is traced.
     names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
+    at_once: paths traced together; the random numbers follow from it, too.
     """
     mi = target.mi
     masked = isinstance(where, np.ndarray)
@@ -196,7 +259,7 @@ def radiance(
     integrator = mi.load_dict({"type": "path", "max_depth": max_depth})
     sampler = mi.load_dict({"type": "multijitter", "sample_count": paths})
     sampler.set_samples_per_wavefront(paths)
-    pixels_at_once = max(1, _PATHS // paths)  # bounded wavefronts
+    pixels_at_once = max(1, at_once // paths)  # bounded wavefronts
     # Strips are numbered over the whole picture, so that a pixel's seed does not depend on the
     # mask.
     for k, first in enumerate(range(0, pixels.size, pixels_at_once)):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from glob import glob
 
+from materialist import memory
 from materialist.errors import InputError, SetupError
 from materialist.forks import check_process
 from materialist.install import install_command
@@ -228,3 +229,12 @@ def _register_plugins(variant: str) -> None:
     bsdf.register_disney()
     bodies.register_outside()
     frosted.register_frosted()
+
+
+def give_back() -> None:
+    """Give back what renderings have used; the renderer would keep it for more of them."""
+    import drjit
+
+    drjit.sync_thread()  # what is being freed is not in its cache yet
+    drjit.flush_malloc_cache()
+    memory.give_back()

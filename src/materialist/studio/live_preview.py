@@ -24,7 +24,6 @@ from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
 from materialist.jobs.limited import Limits, run_limited
-from materialist.memory import give_back
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
 from materialist.studio.edit_list import is_shaded, kept, key_of, step_summary
@@ -79,7 +78,9 @@ class LivePreview:
             _THREAD.submit(self._prepare, built)
         else:
             if built.exception() is None:
-                _give_back()
+                from materialist.render.variant import give_back
+
+                give_back()
             self.prepared.set()
 
     @property
@@ -263,15 +264,6 @@ def _build(scene: Scene, file: Path | None) -> Any:
     from materialist.edits.preview import Preview
 
     return Preview(scene, file)
-
-
-def _give_back() -> None:
-    """Give back what the tracing of all rays has used; the renderer would keep it for more of them."""
-    import drjit
-
-    drjit.sync_thread()  # what is being freed is not in its cache yet
-    drjit.flush_malloc_cache()
-    give_back()
 
 
 def load_renderer(device: str) -> None:

@@ -19,17 +19,20 @@ from materialist.edits.composite.composite import (
     developed,
     is_deep,
     pictures,
+    spent_composite,
     write_composite,
 )
 from materialist.edits.composite.into_photo import SETTINGS, into_photo
 from materialist.edits.composite.layers import Layers, significance, without_fireflies
 from materialist.edits.composite.matte import matte
 from materialist.edits.composite.native_layer import NativeLayer
-from materialist.edits.core.renderer import EditRenderer
+from materialist.edits.core.renderer import EditRenderer, RenderOptions
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
+from materialist.edits.remove.remove import remove
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
+from materialist.geometry.silhouette import window
 from materialist.io.colour_space import DISPLAY_P3, space, srgb_curve
 from materialist.io.decode import decode
 from materialist.io.out.icc import profile_of
@@ -51,6 +54,26 @@ def test_an_edit_that_changes_nothing_gives_the_photo():
     np.testing.assert_array_equal(
         composite(scene, relight(scene, rotate=0), spp=6), scene.photo.original
     )
+
+
+def test_a_photo_that_is_given_up_becomes_the_same_picture():
+    """Commands write over the photo of a removal: the picture is the same bit for bit, the first photo stays."""
+    scene = rendered_scene(2)
+    before = scene.photo.original.copy()
+    options = RenderOptions(spp=6)
+    pictures = []
+    removed = remove(scene, MASK)
+    filled = removed.photo.original.copy()
+    pictures.append(composite(scene, removed, spp=6))
+    np.testing.assert_array_equal(removed.photo.original, filled)
+    pictures.append(spent_composite(scene, removed, options))
+    assert pictures[1] is removed.photo.original
+    np.testing.assert_array_equal(*pictures)
+    painted = edit(scene, MASK, albedo=(0.1, 0.2, 0.05))
+    np.testing.assert_array_equal(
+        spent_composite(scene, painted, options), composite(scene, painted, spp=6)
+    )
+    np.testing.assert_array_equal(scene.photo.original, before)
 
 
 def test_pixels_out_of_reach_keep_their_bits():
@@ -261,7 +284,11 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
         np.float32
     )  # all in shade, but for the body
     layers = Layers(
-        base, edited, everywhere, changed, native=NativeLayer(inside, share, 0 * grey.original)
+        base,
+        edited,
+        everywhere,
+        changed,
+        native=NativeLayer(inside, window(share >= 0), share, 0 * grey.original),
     )
     out = into_photo(grey, layers)
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)

@@ -20,6 +20,16 @@ def test_matte_finds_the_share_of_mixed_pixels():
     assert (alpha[:, :20] == 1).all() and (alpha[:, 44:] == 0).all()
 
 
+def test_a_part_of_a_matte_is_that_of_the_whole():
+    large = np.random.default_rng(0).random((240, 300, 3), np.float32)
+    rows, columns = np.mgrid[:60, :75]
+    mask = np.hypot(rows - 28, columns - 34) < 19
+    large[np.kron(mask, np.ones((4, 4), bool))] *= 0.5
+    whole = matte(mask, large)
+    for box in (np.s_[0:240, 0:300], np.s_[37:111, 150:151], np.s_[200:240, 0:90]):
+        np.testing.assert_array_equal(matte(mask, large, box), whole[box])
+
+
 def test_a_pattern_with_the_colour_of_what_is_behind_it_has_no_holes():
     rows, columns = np.mgrid[:80, :80]
     dark = (rows // 5 + columns // 5) % 2 == 1

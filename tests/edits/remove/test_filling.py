@@ -83,12 +83,28 @@ def test_holes_of_any_shape(place):
     assert np.isfinite(guess).all() and guess.min() >= 0
 
 
-@pytest.mark.parametrize("size", [(9, 9), (30, 400), (700, 20)])
+def test_a_lamp_leaves_the_dark_its_levels(monkeypatch):
+    picture, _ = two_walls()
+    hole = hole_in(picture.shape[:2])
+    lamp = 0.1 * picture
+    lamp[80:90, 100:110] = 500
+    seen = []
+    monkeypatch.setattr(filling, "_inpainted", lambda levels, _: seen.append(levels) or levels)
+    guess = filled(lamp, hole, ~hole)
+    assert (guess[80:90, 100:110] == 500).all()
+    few = np.round(255 * filling._encoded(lamp[:70], 500)).astype(np.uint8)
+    assert len(np.unique(seen[0][:70])) > 2 * len(np.unique(few))
+
+
+@pytest.mark.parametrize("size", [(9, 9), (30, 400), (700, 20), (1, 400), (400, 1), (1, 1500)])
 def test_photos_of_any_shape(size):
     hole = np.zeros(size, bool)
     hole[3:6, 4:7] = True
+    hole[size[0] // 2, size[1] // 2] = True
     guess = filled(np.full((*size, 3), 0.4), hole, ~hole)
-    assert guess.shape == (*size, 3) and np.abs(guess - 0.4)[hole].max() < 0.3
+    scale = min(1, filling.SETTINGS.max_side / max(size))
+    assert guess.shape == (*(max(1, round(n * scale)) for n in size), 3)
+    assert np.abs(guess - 0.4).max() < 0.3
 
 
 def test_a_large_photo_is_filled_at_a_smaller_size():

@@ -5,6 +5,7 @@ import pytest
 from edit_scenes import scene_of
 from PIL import Image
 
+from materialist.edits.select import objects
 from materialist.edits.select import select as selecting
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.select import select
@@ -49,6 +50,40 @@ def test_several_clicks_and_the_other_object(table):
     scene, first, second = table
     assert overlap(select(scene, click=(130, 85)), second) > 0.85
     assert overlap(select(scene, click=[(50, 50), (60, 80)]), first) > 0.9
+
+
+def test_what_is_selected_holds_the_clicks(table, monkeypatch):
+    """Whatever the networks prefer: MobileSAM's best mask of a part may lie beside the click."""
+    scene, first, second = table
+    masks = np.where(np.stack([first, second, first | second]), 1, -1).astype(np.float32)
+    expected = np.array([0.5, 0.99, 0.1])
+    monkeypatch.setattr(objects.sam, "masks", lambda *_: (masks, expected))
+    assert select(scene, click=(50, 50))[50, 50]
+    both = select(scene, click=[(50, 50), (130, 85)])
+    assert both[50, 50] and both[85, 130]
+    with pytest.raises(InputError, match="No object is found that holds the click at 5,110"):
+        select(scene, click=(5, 110))
+
+
+def test_a_line_that_is_clicked_stays(table):
+    mask = np.zeros((60, 80), bool)
+    mask[20, 10:70] = True
+    mask[30:50, 10:70] = True
+    assert objects.tidy(mask, [(40, 20)])[20, 40]
+    assert not objects.tidy(mask, [(40, 40)])[20, 40]
+
+
+def test_a_click_off_the_object_is_told(table, monkeypatch):
+    scene, first, second = table
+
+    def masks(_, points):
+        one = {(50, 50): first, (130, 85): second}.get(points[0])
+        mask = one if len(points) == 1 else np.ones(first.shape, bool)
+        return np.where(mask, 1, -1)[None].repeat(3, 0).astype(np.float32), np.ones(3)
+
+    monkeypatch.setattr(objects.sam, "masks", masks)
+    with pytest.raises(InputError, match="100% of the photo together, and each alone at most 15%"):
+        select(scene, click=[(50, 50), (130, 85)])
 
 
 def test_given_masks_are_taken_as_they_are(table, tmp_path):

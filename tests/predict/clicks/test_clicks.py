@@ -96,25 +96,28 @@ def test_photos_of_any_shape(untrained, size):
     )
 
 
-@pytest.mark.parametrize("box", [(158, 0, 160, 1), (0, 0, 160, 119), (3, 50, 4, 120)])
-def test_boxes_of_any_shape(untrained, box):
-    photo, _ = scene()
-    found = object_likelihood(*photo, box=box, weights=untrained)
-    assert found.shape == (120, 160) and np.isfinite(found).all()
-
-
-@pytest.mark.parametrize(
-    "where", [{}, {"clicks": [(160, 3)]}, {"box": (5, 5, 5, 9)}, {"box": (0, 0, 161, 9)}]
-)
-def test_places_outside_are_errors(untrained, where):
+@pytest.mark.parametrize("clicks", [[], [(160, 3)]])
+def test_places_outside_are_errors(untrained, clicks):
     with pytest.raises(InputError, match="inside 160 x 120 pixels"):
-        object_likelihood(*scene()[0], **where, weights=untrained)
+        object_likelihood(*scene()[0], clicks, weights=untrained)
 
 
-@pytest.mark.parametrize(
-    "where", [{"clicks": [(80, 66)]}, {"clicks": [(92, 80)]}, {"box": (48, 34, 112, 98)}]
-)
-def test_the_weights_that_ship_find_a_ball(where):
+def test_the_number_of_threads_changes_no_bit(untrained):
+    photo, _ = scene()
+    before = torch.get_num_threads()
+    found = []
+    try:
+        for threads in (1, 3):
+            torch.set_num_threads(threads)
+            found.append(object_likelihood(*photo, [(80, 66)]))
+            assert torch.get_num_threads() == threads
+    finally:
+        torch.set_num_threads(before)
+    np.testing.assert_array_equal(*found)
+
+
+@pytest.mark.parametrize("click", [(80, 66), (92, 80)])
+def test_the_weights_that_ship_find_a_ball(click):
     photo, ball = scene()
-    found = object_likelihood(*photo, **where) > 0.5
+    found = object_likelihood(*photo, [click]) > 0.5
     assert (found & ball).sum() / (found | ball).sum() > 0.6

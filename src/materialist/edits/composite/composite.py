@@ -59,7 +59,20 @@ def composite(
     `full_render` of glass of the two-interface model, which only the photo shows.
     """
     options = RenderOptions(spp, seed, denoise, device, progress)
-    return _Compositor(scene, options, full_render, upscale).picture(edited)
+    return _Compositor(scene, options, full_render, upscale).picture(edited, last=True)
+
+
+def spent_composite(
+    scene: Scene,
+    edited: Scene,
+    options: RenderOptions,
+    *,
+    full_render: bool = False,
+    upscale: Upscale | None = None,
+) -> Array:
+    """`composite` of an edit of which no other picture is made: a photo of its own is written over, for the memory."""
+    compositor = _Compositor(scene, options, full_render, upscale)
+    return compositor.picture(edited, last=True, spent=True)
 
 
 def pictures(
@@ -112,19 +125,28 @@ class _Compositor:
         self._last: Scene | None = None
         self._renderer: EditRenderer | None = None
 
-    def picture(self, edited: Scene) -> Array:
-        """[H0, W0, 3] the edit in the photo; [H, W, 3] its plain rendering, or that enlarged."""
+    def picture(self, edited: Scene, *, last: bool = False, spent: bool = False) -> Array:
+        """[H0, W0, 3] the edit in the photo; [H, W, 3] its plain rendering, or that enlarged.
+
+        last: no other picture follows. spent: the edited scene's own photo is not needed any more.
+        """
         options = self._options
-        renderer = self._base(edited)
+        renderer = self._base(edited, spent)
         if self._full_render:
             return self._plain(renderer, edited)
         # The difference of two renderings, laid on the photo, with in-photo emitters that it dims.
         layers = render_layers(renderer, edited, options)
         dimmed = dimmed_emitters(self._scene, edited)
         lights = (renderer.emitter_pixels(edited), dimmed) if dimmed else None
-        return into_photo(renderer.scene.photo, layers, lights, options.progress)
+        if last:
+            from materialist.render.variant import give_back
 
-    def _base(self, edited: Scene) -> EditRenderer:
+            give_back()  # before what takes most memory
+        photo = renderer.scene.photo
+        once = last and photo is not self._scene.photo and photo is not edited.photo
+        return into_photo(photo, layers, lights, options.progress, once=once)
+
+    def _base(self, edited: Scene, spent: bool) -> EditRenderer:
         """The renderer of what the edit is compared with."""
         last = self._last
         self._last = edited
@@ -133,7 +155,7 @@ class _Compositor:
             if self._full_render:
                 base = base_scene(self._scene, edited)
             else:
-                base = base_without_shadow(self._scene, edited, self._options)
+                base = base_without_shadow(self._scene, edited, self._options, spent=spent)
             self._renderer = EditRenderer(base, device=self._options.device)
         return self._renderer
 

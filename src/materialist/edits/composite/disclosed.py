@@ -52,11 +52,15 @@ def base_without_shadow(
     scene: Scene,
     edited: Scene,
     options: RenderOptions,
+    *,
+    spent: bool = False,
 ) -> Scene:
     """`base_scene`, whose photo changes around the hole as the rendering does when the object goes.
 
     The object's shadow and reflection go, and the light that it shed on other things. Filled pixels, which are like
     their surroundings, change by the ratio of the surroundings.
+
+    spent: the edited scene's own photo is not needed any more, and may be written over.
     """
     base = base_scene(scene, edited)
     if base.photo is scene.photo:
@@ -90,12 +94,9 @@ def base_without_shadow(
     layers = replace(
         layers, base=photo.linear, edited=photo.linear * np.exp(log_ratio), reached=reached
     )
-    return replace(
-        base,
-        photo=replace(
-            photo, original=into_photo(photo, layers), linear=onto_working(photo, layers)
-        ),
-    )
+    linear = onto_working(photo, layers)
+    original = into_photo(photo, layers, once=spent)
+    return replace(base, photo=replace(photo, original=original, linear=linear))
 
 
 def _disclosed(scene: Scene, edited: Scene) -> Array:

@@ -14,7 +14,7 @@ from materialist.edits.composite.matte import SETTINGS as MATTE
 from materialist.edits.composite.matte import matte, unmixed
 from materialist.edits.composite.upsample import GuidedUpsample, strips
 from materialist.geometry.membrane import nearest
-from materialist.geometry.silhouette import disc, grown, window
+from materialist.geometry.silhouette import Box, disc, grown, window, within
 from materialist.types import Array, Photo, Progress
 
 
@@ -40,6 +40,8 @@ def into_photo(
     layers: Layers,
     lights: tuple[Array, dict] | None = None,
     progress: Progress | None = None,
+    *,
+    once: bool = False,
 ) -> Array:
     """[H0, W0, 3] the photo with the difference of two renderings added.
 
@@ -51,52 +53,61 @@ def into_photo(
     pixel, and its outline would be ragged.
 
     lights: of in-photo emitters that are dimmed: where they are seen, and what is known of them; see `in_photo`.
+    once: nobody needs the photo's native pixels any more: without `lights` the result takes their place.
     """
     tick = progress or (lambda *_: None)
-    picture = _changed(photo, layers, tick) if layers.reached.any() else photo.original.copy()
+    picture = photo.original if once and lights is None else photo.original.copy()
+    if layers.reached.any():
+        _change(picture, photo, layers, tick)
     if lights is not None:
         picture = in_photo(picture, photo, *lights)
-    if layers.native is None or not layers.native.share.any():
+    if layers.native is None:
         return picture
     # --- New bodies, where they are seen ---
-    box = window(layers.native.share > 0)
-    share = layers.native.share[box][..., None]
-    bodies = layers.native.picture[box]
+    box = layers.native.box
+    share = layers.native.share[..., None]
+    bodies = layers.native.picture
     bodies = bodies if photo.hdr else np.where(share < 1, np.minimum(bodies, 1), bodies)
     here = picture[box]
     mixed = np.maximum(share * bodies + (1 - share) * here, 0)
     picture[box] = np.where(share > 0, mixed, here)
     # --- Lamps glare: only under another light, which changes the whole photo anyhow ---
-    light = np.maximum(share * layers.native.picture[box] - 1, 0)
+    light = np.maximum(share * layers.native.picture - 1, 0)
     if layers.relit and light.any():
         add_glare(picture, light, box)
     return picture
 
 
-def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
-    """[H0, W0, 3] the same without the new bodies."""
+def _change(out: Array, photo: Photo, layers: Layers, tick: Progress) -> None:
+    """The same without the new bodies, in `out` [H0, W0, 3], which holds the photo's own pixels."""
     # --- All terms at working size; each side of the border of a replaced surface is a picture of its own ---
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     native = photo.original.shape[:2]
     clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside == 0
-    alpha = matte(layers.changed, photo.original)
     sides = [
         _alone(stack, photo.linear, side & clear, native)
         for side in (layers.changed, ~layers.changed)
     ]
     # Beyond its own pixels a change goes as far as the border may move.
     reached = grown((stack[..., :3] != 0).any(-1), int(np.ceil(MATTE.reach + MATTE.width)))
-    out = photo.original.copy()
     if not reached.any():
-        return out
+        return
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
+    # --- Share and colours of the photo, with what the means of mixed pixels look up around them ---
+    scale = max(1.0, native[1] / photo.linear.shape[1])
+    margin = int(np.ceil(4 * scale))
+    held = (_wider(box, margin, native[0]), _wider(columns, margin, native[1]))
+    alpha = matte(layers.changed, photo.original, held)
+    original = photo.original[held]
+    original = original.copy() if out is photo.original else original
 
-    def laid(block: tuple[slice, slice]) -> None:
+    def laid(block: Box) -> None:
         rows, columns = block
-        share = alpha[rows, columns]
-        colours = _side_colours(alpha, photo, rows, columns)
-        moved = out[rows, columns].copy()
+        inner = within(block, held)
+        share = alpha[inner]
+        colours = _side_colours(alpha, original, inner, scale)
+        moved = original[inner].copy()
         for part, colour, side in zip((share, 1 - share), colours, sides, strict=True):
             # Only the columns that this side has a share in.
             used = np.flatnonzero((part > 0).any(0))
@@ -118,7 +129,11 @@ def _changed(photo: Photo, layers: Layers, tick: Progress) -> Array:
         for done, _ in enumerate(threads.map(laid, parts)):
             tick("photo", done, len(parts))
     tick("photo", len(parts), len(parts))
-    return out
+
+
+def _wider(side: slice, margin: int, size: int) -> slice:
+    """Rows or columns with `margin` more at both ends, of `size`."""
+    return slice(max(side.start - margin, 0), min(side.stop + margin, size))
 
 
 def _alone(stack: Array, guide: Array, side: Array, native: tuple[int, ...]) -> GuidedUpsample:
@@ -137,28 +152,25 @@ def _alone(stack: Array, guide: Array, side: Array, native: tuple[int, ...]) -> 
     return GuidedUpsample(stack[source], guide[source], native)
 
 
-def _side_colours(alpha: Array, photo: Photo, rows: slice, columns: slice) -> tuple[Array, Array]:
-    """Colours [h, w, 3] of both sides of the border in a native window: the photo's, unmixed where both share it."""
-    here = photo.original[rows, columns]
-    mixed = np.flatnonzero(((alpha[rows, columns] > 0) & (alpha[rows, columns] < 1)).any(0))
+def _side_colours(alpha: Array, photo: Array, box: Box, scale: float) -> tuple[Array, Array]:
+    """Colours [h, w, 3] of both sides of the border in a window: the photo's, unmixed where both share it.
+
+    photo: [H0, W0, 3] linear. alpha: [H0, W0] share of the first side. scale: native pixels a working pixel.
+    """
+    rows, columns = box
+    here = photo[box]
+    mixed = np.flatnonzero(((alpha[box] > 0) & (alpha[box] < 1)).any(0))
     if not mixed.size:
         return here, here
     # --- Only the columns with mixed pixels, and what their means look up ---
-    scale = max(1.0, photo.original.shape[1] / photo.linear.shape[1])
     margin = int(np.ceil(4 * scale))
-    left = columns.start + int(mixed[0])
-    right = columns.start + int(mixed[-1]) + 1
-    around = np.s_[
-        max(rows.start - margin, 0) : rows.stop + margin, max(left - margin, 0) : right + margin
-    ]
-    pictures = unmixed(alpha[around], photo.original[around], scale)
-    top = rows.start - around[0].start
-    first = left - around[1].start
-    inner = np.s_[top : top + len(here), first : first + right - left]
+    part = (rows, slice(columns.start + int(mixed[0]), columns.start + int(mixed[-1]) + 1))
+    around = (_wider(rows, margin, len(photo)), _wider(part[1], margin, photo.shape[1]))
+    pictures = unmixed(alpha[around], photo[around], scale)
     sides = []
     for picture in pictures:
         side = here.copy()
-        side[:, left - columns.start : right - columns.start] = picture[inner]
+        side[within(part, box)] = picture[within(part, around)]
         sides.append(side)
     return sides[0], sides[1]
 
@@ -248,6 +260,7 @@ def _unclipped(photo: Array, base: Array) -> Array:
 def in_photo(picture: Array, photo: Photo, seen: Array, emitters: dict) -> Array:
     """[H0, W0, 3] a composite in which emitters show the photo itself, dimmed: with the trees in the window.
 
+    The composite `picture` is changed in place.
     Clipped pixels have the estimated radiance of the emitters. seen: [H, W] bool: where lights are seen. emitters:
     `core.surfaces.KEY` of the provenance.
     """
@@ -255,7 +268,6 @@ def in_photo(picture: Array, photo: Photo, seen: Array, emitters: dict) -> Array
     if dim == 1 or not seen.any():
         return picture
     share = light_share(seen, photo)
-    picture = picture.copy()
     box = window(share > 0)
     share = share[box][..., None]
     original = photo.original[box]

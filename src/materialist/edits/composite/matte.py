@@ -9,7 +9,7 @@ from skimage.segmentation import random_walker
 
 from materialist.color import linear_to_srgb
 from materialist.edits.composite.upsample import strips
-from materialist.geometry.silhouette import disc, window
+from materialist.geometry.silhouette import Box, area, common, disc, window, within
 from materialist.types import Array
 
 
@@ -46,21 +46,22 @@ STAIRS = 0.5
 """Standard deviation, pixels, of the Gaussian that takes steps out of a border that is enlarged; by eye."""
 
 
-def matte(mask: Array, large: Array) -> Array:
+def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
     """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
 
     large: [H0, W0, 3] linear, the photo. The border moves to the photo's edges within `reach` of the mask's own, and
     runs along that one where the photo has none. Beside it a pixel's place on the line between the mean colours of both
     sides is its share; where both look alike, or the pixel is no mixture of them, the border decides. Exactly 0 and 1
-    further away.
+    further away. box: the native rows and columns that are wanted, None for all.
     """
     height, width = large.shape[:2]
+    wanted = box or (slice(0, height), slice(0, width))
     scale = max(height / mask.shape[0], width / mask.shape[1])
     distance = _signed_distance(mask, STAIRS * (scale > 1))
+    hard = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+    alpha: Array = np.asarray(hard[wanted]).astype(np.float32)
     if mask.all() or not mask.any():
-        return np.full((height, width), float(mask.all()), np.float32)
-    size = (width, height)
-    alpha = cv2.resize(mask.astype(np.float32), size, interpolation=cv2.INTER_NEAREST)
+        return alpha
     # --- Tile by tile along the border, each with what its pixels look up around it ---
     border = np.abs(distance) <= SETTINGS.reach + SETTINGS.width + 1
     margin = int(np.ceil(3 * SETTINGS.near + SETTINGS.reach + SETTINGS.width))
@@ -70,16 +71,14 @@ def matte(mask: Array, large: Array) -> Array:
                 continue
             tile_mask = np.zeros_like(border)
             tile_mask[tile, part] = True
-            rows, columns = window(tile_mask, (height, width))
+            native = window(tile_mask, (height, width))
+            here = common(native, wanted)
+            if area(here) == 0:
+                continue
             small = window(tile_mask, margin=margin)
             around = window(tile_mask, (height, width), margin)
             shares = _shares(distance[small], large[around], scale)
-            top = rows.start - around[0].start
-            left = columns.start - around[1].start
-            inner = np.s_[
-                top : top + rows.stop - rows.start, left : left + columns.stop - columns.start
-            ]
-            alpha[rows, columns] = shares[inner]
+            alpha[within(here, wanted)] = shares[within(here, around)]
     return alpha
 
 

@@ -16,12 +16,9 @@ from materialist.edits.core.renderer import (
 )
 from materialist.edits.core.surfaces import PHOTO_LIGHT
 from materialist.geometry.membrane import nearest
-from materialist.geometry.silhouette import area, grown, window
+from materialist.geometry.silhouette import Box, area, grown, window
 from materialist.render.bodies import is_transparent
 from materialist.types import Array, Scene
-
-Box = tuple[slice, slice]
-"""Rows and columns of a part of a picture."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +26,11 @@ class NativeSettings:
     """Resolution and paths of the native-resolution layer; tuned by eye unless derived."""
 
     max_pixels: int = 1_500_000  # a larger layer is traced smaller, and enlarged; derived: time
+    finest_glass: float = 8.0  # traced pixels a working pixel, along a side, which maps have
     min_paths: int = 32  # a native pixel, as the denoiser needs
     max_path_factor: int = 4  # on the picture's paths a pixel, twice that in glass; derived: time
     path_budget: float = 0.5  # all paths, of those of a whole working-size picture; derived: time
+    paths_at_once: int = 2**21  # traced together; derived: memory
     denoiser_margin: int = 3  # working pixels around the bodies that the denoiser sees
     max_contact: float = 0.05  # share of a body's extent: a nearer surface is what it stands on
     max_lamp_contact: float = 2.0  # the same of lamps, which a surface cuts
@@ -46,10 +45,12 @@ class NativeLayer:
 
     inside: Array
     """[H, W] float32 in [0, 1]: share of each pixel of working size that they cover."""
+    box: Box
+    """The native pixels that they may cover."""
     share: Array
-    """[H0, W0] float32: the same of each native pixel."""
+    """[h0, w0] float32: the same of each native pixel of the box."""
     picture: Array
-    """[H0, W0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
+    """[h0, w0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
 
 
 def native_layer(
@@ -60,7 +61,7 @@ def native_layer(
     The photo's own lights are left to its outlines. Under another light every lamp counts as new: it stays as bright as
     it was, and what changes beside it must not colour its rim.
     """
-    from materialist.render.pixels import first_hits, only, radiance
+    from materialist.render.pixels import coverage, first_hits, only, radiance
 
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps)) if is_relit(scene, edited)]
@@ -76,56 +77,62 @@ def native_layer(
     working = scene.depth.shape
     chosen = {name: bodies.get(name) for name in names}
     # Where they are seen: at working size, then at native size, in the scene and by themselves
-    small = first_hits(target.mi_scene, camera, chosen, working).share
+    small = coverage(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
     there = window(small > 0, native, SETTINGS.denoiser_margin)
-    sight = first_hits(target.mi_scene, camera, chosen, native, there)
+    sight = coverage(target.mi_scene, camera, chosen, native, there)
     everything = [*bodies, *(f"lamp{k}" for k in range(len(edited.lamps)))]
     bare = only(target.mi_scene, everything)  # without the photo's surface
-    alone = first_hits(bare, camera, chosen, native, there)
+    alone = coverage(bare, camera, chosen, native, there)
     # A lamp that touches a surface is cut by it, not hidden by a thing before it.
     stands = names != lamps
     gap = (SETTINGS.max_contact if stands else SETTINGS.max_lamp_contact) * _extent(alone)
 
     # --- Their radiance: as many paths as the budget allows ---
-    size, part = _traced_size(native, there)
-    has_glass = any(body and is_transparent(body.surface) for body in chosen.values())
+    clear = [body is not None and is_transparent(body.surface) for body in chosen.values()]
+    has_glass = any(clear)
+    finest = SETTINGS.finest_glass if all(clear) else np.inf
+    size, part = _traced_size(native, there, finest * working[1] / native[1])
     max_factor = SETTINGS.max_path_factor * (1 + has_glass)
     budget = int(SETTINGS.path_budget * options.spp * small.size / area(part))
     paths = max(SETTINGS.min_paths, min(max_factor * options.spp, budget))
     paths = 1 << paths.bit_length() - 1  # every number of paths is compiled anew: few of them
     depth = path_depth(edited)
     picture = radiance(
-        target, size, part, spp=paths, seed=options.seed, max_depth=depth, names=names
+        target,
+        size,
+        part,
+        spp=paths,
+        seed=options.seed,
+        max_depth=depth,
+        names=names,
+        at_once=SETTINGS.paths_at_once,
     )
     # Where most of a pixel's body is hidden, too few paths met it: its neighbours' radiance is taken.
     hidden = (sight.share < alone.share / 2).astype(np.float32)
     few = _resized(hidden, picture.shape[:2])[..., None] > 0
     picture = spread_known(np.where(few, 0, picture))
     if options.denoise:
-        guide = alone if size == native else first_hits(bare, camera, chosen, size, part)
+        guide = first_hits(bare, camera, chosen, size, part)
         picture = spread_known(np.where(few, 0, denoised(picture, guide.albedo, guide.normal)))
 
     # --- Coverage and radiance at native size ---
-    share = np.zeros(native, np.float32)
-    whole = np.zeros((*native, 3), np.float32)
     bodies_share, hidden = _behind_things(
         target.mi_scene, sight, alone, scene, there, gap, stands=stands
     )
-    share[there] = bodies_share
     # A share of a pixel's body takes the place of what it hides, not of the thing before it.
     colours = _resized(picture, sight.share.shape) + scene.photo.original[there] - hidden
-    whole[there] = np.where(bodies_share[..., None] > 0, colours, 0)
+    colours = np.where(bodies_share[..., None] > 0, colours, 0).astype(np.float32)
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
         small = np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8)))
-    return NativeLayer(small, share, whole)
+    return NativeLayer(small, there, bodies_share, colours)
 
 
-def _traced_size(native: tuple[int, ...], box: Box) -> tuple[tuple[int, int], Box]:
-    """Size of the picture that is traced, and the native box in it."""
-    factor = min(1.0, np.sqrt(SETTINGS.max_pixels / area(box)))
+def _traced_size(native: tuple[int, ...], box: Box, largest: float) -> tuple[tuple[int, int], Box]:
+    """Size of the picture that is traced, at most `largest` times the native one, and the native box in it."""
+    factor = min(1.0, largest, np.sqrt(SETTINGS.max_pixels / area(box)))
     size = tuple(max(2, round(n * factor)) for n in native)
     sides = []
     for side, whole, traced in zip(box, native, size):
@@ -147,7 +154,7 @@ def _behind_things(
     pixels there; `matte` finds the thing's outline in the photo. A surface less than `gap` before a body is the ground
     that it `stands` on, and hides nothing: its bumps would make the foot ragged.
     """
-    from materialist.render.pixels import first_hits
+    from materialist.render.pixels import coverage
 
     native = scene.photo.original.shape[:2]
     working = scene.depth.shape
@@ -155,7 +162,7 @@ def _behind_things(
     photo = scene.photo.original[there]
     hidden = alone.share > sight.share + 0.05
     if hidden.any():
-        ground = first_hits(mi_scene, scene.camera, {"surface": None}, native, there)
+        ground = coverage(mi_scene, scene.camera, ("surface",), native, there)
         hidden &= (ground.share > 0) & (alone.depth - ground.depth > gap)
     if not hidden.any():
         return share, photo
@@ -164,7 +171,7 @@ def _behind_things(
     whole[there] = spread_known(alone.depth)
     depth = spread_known(_resized(whole, working, cv2.INTER_NEAREST))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
-    before = matte(thing, scene.photo.original)[there]
+    before = matte(thing, scene.photo.original, there)
     _, behind = unmixed(before, photo, max(1.0, native[1] / working[1]))
     # Where nothing but the thing is seen, nothing is known of what it hides.
     mixed = near & (before > 0) & (before < 1)

@@ -164,13 +164,11 @@ class EditRenderer:
 
     def _seen(self, scene: Scene, names: list[str]) -> Array:
         """[H, W] share of each pixel in which the named bodies are seen."""
-        from materialist.render.pixels import first_hits
+        from materialist.render.pixels import coverage
 
         if not names:
             return np.zeros(scene.depth.shape, np.float32)
-        return first_hits(
-            self._target(scene).mi_scene, scene.camera, dict.fromkeys(names), scene.depth.shape
-        ).share
+        return coverage(self._target(scene).mi_scene, scene.camera, names, scene.depth.shape).share
 
     def _target(self, scene: Scene):
         """A `RenderScene` of its geometry, lamps and bodies, with the materials and light of its last use."""

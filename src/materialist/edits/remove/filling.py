@@ -17,6 +17,7 @@ import numpy as np
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.errors import MaterialistError
 from materialist.geometry.membrane import membrane
+from materialist.geometry.silhouette import grown
 from materialist.io.atomic import write_whole
 from materialist.predict import resample
 from materialist.predict.onnx import run
@@ -32,7 +33,10 @@ class FillingSettings:
 
     max_side: int = 1024  # longer side of the photo that the network's square is cut from
     min_side: int = 512  # longer side that it is enlarged to where it is smaller
+    least_side: int = 4  # shorter side that the network reads; derived: it fails below
     floor: float = 0.05  # radiance: HDR values differ by sums below, by ratios above
+    rim: float = 0.1  # around a hole in an HDR photo, longer sides: there the range is measured
+    brightest: float = 99.0  # percentile there that is white: a lamp would leave few levels
 
 
 SETTINGS = FillingSettings()
@@ -56,12 +60,19 @@ def filled(photo: Array, hole: Array, usable: Array) -> Array:
     gap = resample.values(hole.astype(np.float32), shape) > 0
     unknown = gap | (resample.values((~usable).astype(np.float32), shape) > 0)
     # --- 8-bit levels, as the network reads them ---
-    # What is taken away says nothing of the range, and area means of white are a little above 1.
-    brightest = float(picture[~unknown].max(initial=0)) if photo.max() > 1 else 0.0
-    top = max(1.0, brightest)
+    # Area means of white are a little above 1.
+    top = _white(picture, gap, unknown) if photo.max() > 1 else 1.0
     levels = np.round(255 * _encoded(np.minimum(picture, top), top)).astype(np.uint8)
     painted = _decoded(_kept(levels, unknown).astype(np.float32) / 255, top)
     return np.where(gap[..., None], painted, picture).astype(np.float32)
+
+
+def _white(picture: Array, gap: Array, unknown: Array) -> float:
+    """The radiance of the highest level, at least 1, in an HDR picture [h, w, 3]; what is taken away says nothing."""
+    rim = grown(gap, max(1, round(SETTINGS.rim * max(gap.shape)))) & ~unknown
+    if not rim.any():
+        return 1.0
+    return max(1.0, float(np.percentile(picture[rim].max(-1), SETTINGS.brightest)))
 
 
 def _encoded(linear: Array, top: float) -> Array:
@@ -118,6 +129,11 @@ def _kept(levels: Array, unknown: Array) -> Array:
 
 def _inpainted(levels: Array, unknown: Array) -> Array:
     """uint8 levels [h, w, 3] with `unknown` [h, w] bool filled."""
+    # --- What is too thin goes on beyond its sides ---
+    height, width = unknown.shape
+    more = [(0, max(0, SETTINGS.least_side - n)) for n in (height, width)]
+    levels = np.pad(levels, [*more, (0, 0)], mode="edge")
+    unknown = np.pad(unknown, more, mode="edge")
     size = unknown.shape[::-1]
     # --- The network's borders of the hole are soft: nothing of the old colours may be left there ---
     spanned = np.asarray(membrane(levels.astype(np.float32), ~unknown))
@@ -131,4 +147,5 @@ def _inpainted(levels: Array, unknown: Array) -> Array:
     channels_first = np.ascontiguousarray(np.moveaxis(picture, -1, 0))
     painted = run(NETWORK, {"image": channels_first[None], "mask": known[None, None]})[0]
     result = np.ascontiguousarray(np.moveaxis(painted[0], 0, -1))
-    return np.asarray(cv2.resize(result, size, interpolation=cv2.INTER_AREA))
+    result = np.asarray(cv2.resize(result, size, interpolation=cv2.INTER_AREA))
+    return np.ascontiguousarray(result[:height, :width])

@@ -107,11 +107,11 @@ def carried(values: Array, photo: Array, hole: Array) -> Array:
 
 def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
     """The photo with a picture [h, w, 3] linear of any size in the hole [H, W] bool; elsewhere bit for bit itself."""
-    original = photo.original.copy()
-    share = _outline(hole, photo.original.shape[:2])
-    box = window(hole, share.shape)
-    over = share[box][..., None]
-    large = resample.values(picture, share.shape)[box]
+    native = photo.original.shape[:2]
+    box = window(hole, native)
+    over = _outline(hole, native)[box][..., None].copy()
+    large = resample.values(picture, native)[box].copy()
+    original = photo.original.copy()  # last, for the memory
     original[box] = np.where(over > 0, over * large + (1 - over) * original[box], original[box])
     linear = np.where(hole[..., None], resample.values(picture, hole.shape), photo.linear).astype(
         np.float32
@@ -125,10 +125,15 @@ def _outline(mask: Array, native: tuple[int, ...]) -> Array:
     if native == mask.shape:
         return hard.astype(np.float32)
     smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
-    share = np.clip(4 * cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC) - 2, 0, 1)
+    share: Array = np.asarray(cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC))
+    share *= 4  # in place, for the memory
+    share -= 2
+    np.clip(share, 0, 1, out=share)
+    share *= hard
     # A smoothed outline would lose lines one pixel wide: they stay hard.
     thin = mask & (
         cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) == 0
     )
     thin = cv2.resize(thin.astype(np.uint8), native[::-1], interpolation=cv2.INTER_NEAREST)
-    return np.where(thin > 0, 1, hard * share).astype(np.float32)
+    share[thin > 0] = 1
+    return share

@@ -9,6 +9,7 @@ from scipy import ndimage
 from skimage.morphology import remove_small_holes
 
 from materialist.color import linear_to_srgb
+from materialist.errors import InputError
 from materialist.geometry.silhouette import disc, window
 from materialist.predict.bundled.edges import grabcut
 from materialist.predict.clicks import segment
@@ -23,6 +24,8 @@ class SelectSettings:
 
     min_box_overlap: float = 0.25  # IoU of the object's box with the given one; less: misplaced
     gap: float = 0.015  # half of the gap across which two parts are one
+    # share of the photo from which several clicks must each select half of what they select together
+    most: float = 0.5
 
     # GrabCut: radii around a click; tuned on 54 clicks.
     core_radius: float = 0.01  # certainly of the object
@@ -42,9 +45,13 @@ SETTINGS = SelectSettings()
 def object_at_points(
     scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True
 ) -> Array:
-    """[H, W] bool of the object that all (column, row) points lie on."""
+    """[H, W] bool of the object that all (column, row) points lie on: it holds them all.
+
+    Raises InputError where the network finds no such object, or where most of the photo is the smallest one.
+    """
     if network:
-        return tidy(_whole(scene, tidy(_at(scene, points), points)), points)
+        mask = tidy(_together(scene, points), points)
+        return tidy(_whole(scene, mask, points), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
@@ -82,24 +89,45 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     return label
 
 
+def _together(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] bool: the mask at all points. Raises InputError where one off the object makes it most of the photo."""
+    mask = _at(scene, points)
+    share = mask.mean()
+    if len(points) > 1 and share > SETTINGS.most:
+        largest = max(_at(scene, [point]).mean() for point in points)
+        if largest < share / 2:
+            raise InputError(
+                f"The clicks select {share:.0%} of the photo together, and each alone at most {largest:.0%}: one of "
+                "them is off the object. Leave it out; where so much is meant, give a box or a mask."
+            )
+    return mask
+
+
 def _at(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool: of MobileSAM's masks at points (column, row), the one that is meant.
+    """[H, W] bool: of MobileSAM's masks that hold all points (column, row), the one that is meant.
 
     MobileSAM outlines parts and wholes well and guesses badly which of them is meant; ClickNet, which also sees normals
     and depth, outlines badly and guesses better.
     """
     photo = linear_to_srgb(scene.photo.linear)
     logits, expected = sam.masks(photo, points)
+    columns, rows = np.transpose(points)
+    holding = (logits[:, rows, columns] > 0).all(-1)
+    if not holding.any():
+        places = " and ".join(f"{x},{y}" for x, y in points)
+        raise InputError(
+            f"No object is found that holds the click at {places}; click another place on it, or give a box or a mask."
+        )
     likely = segment.object_likelihood(photo, scene.normal, scene.depth, points)
     marks = [
         score + SETTINGS.clicknet_weight * _soft_overlap(likely, mask > 0)
         for mask, score in zip(logits, expected, strict=True)
     ]
-    return np.asarray(logits[int(np.argmax(marks))] > 0)
+    return np.asarray(logits[int(np.argmax(np.where(holding, marks, -np.inf)))] > 0)
 
 
-def _whole(scene: Scene, mask: Array) -> Array:
-    """[H, W] bool: what MobileSAM outlines in the bounding box of a mask, where that holds the mask.
+def _whole(scene: Scene, mask: Array, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] bool: what MobileSAM outlines in the bounding box of a mask, where that holds the mask and the points.
 
     In a box it outlines legs, rims and covers that it leaves out at a click.
     """
@@ -107,7 +135,8 @@ def _whole(scene: Scene, mask: Array) -> Array:
     box = (columns.start, rows.start, columns.stop, rows.stop)
     logits, expected = sam.masks(linear_to_srgb(scene.photo.linear), box=box)
     whole = logits[int(np.argmax(expected))] > 0
-    return whole if (whole & mask).sum() >= SETTINGS.min_held * mask.sum() else mask
+    holds = (whole & mask).sum() >= SETTINGS.min_held * mask.sum()
+    return whole if holds and all(whole[y, x] for x, y in points) else mask
 
 
 def _soft_overlap(likely: Array, mask: Array) -> float:
@@ -120,8 +149,9 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
 
     Without points, or where no part holds one, all parts are kept that are not crumbs.
     """
-    # Opening takes away lines of single pixels.
+    # Opening takes away lines of single pixels, unless one was clicked.
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
+    opened = opened if all(opened[y, x] for x, y in points) else mask
     # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
     wide = disc(max(2, round(SETTINGS.gap * max(mask.shape))))
     closed = cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, wide) > 0
