@@ -57,12 +57,36 @@ def test_what_is_selected_holds_the_clicks(table, monkeypatch):
     scene, first, second = table
     masks = np.where(np.stack([first, second, first | second]), 1, -1).astype(np.float32)
     expected = np.array([0.5, 0.99, 0.1])
-    monkeypatch.setattr(objects.sam, "masks", lambda *_: (masks, expected))
+    monkeypatch.setattr(objects.sam, "masks", lambda *_, box=None: (masks, expected))
     assert select(scene, click=(50, 50))[50, 50]
     both = select(scene, click=[(50, 50), (130, 85)])
     assert both[50, 50] and both[85, 130]
     with pytest.raises(InputError, match="No object is found that holds the click at 5,110"):
         select(scene, click=(5, 110))
+
+
+@pytest.mark.parametrize("legs_in_box", [True, False])
+def test_a_click_takes_what_is_outlined_in_the_box_of_its_mask(table, monkeypatch, legs_in_box):
+    scene, first, _ = table
+    rows, columns = np.nonzero(first)
+    seat = first.copy()
+    seat[(rows.min() + rows.max()) // 2 :, : columns.max() - 5] = False
+    # In the box either the whole thing, or something else.
+    boxed = first if legs_in_box else first & ~seat
+    boxes = []
+
+    def masks(_, points=(), box=None):
+        boxes.append(box)
+        mask = seat if box is None else boxed
+        return np.where(mask, 1, -1)[None].repeat(3, 0).astype(np.float32), np.ones(3)
+
+    monkeypatch.setattr(objects.sam, "masks", masks)
+    y, x = (int(v) for v in np.argwhere(seat)[len(np.argwhere(seat)) // 3])
+    selected = select(scene, click=(x, y))
+    expected = first if legs_in_box else seat
+    assert objects.overlap(selected, expected) > 0.95
+    held = np.argwhere(objects.tidy(seat, [(x, y)]))
+    assert boxes[-1] == (*held.min(0)[::-1], *(held.max(0)[::-1] + 1))
 
 
 def test_a_line_that_is_clicked_stays(table):
@@ -76,7 +100,7 @@ def test_a_line_that_is_clicked_stays(table):
 def test_a_click_off_the_object_is_told(table, monkeypatch):
     scene, first, second = table
 
-    def masks(_, points):
+    def masks(_, points=(), box=None):
         one = {(50, 50): first, (130, 85): second}.get(points[0])
         mask = one if len(points) == 1 else np.ones(first.shape, bool)
         return np.where(mask, 1, -1)[None].repeat(3, 0).astype(np.float32), np.ones(3)
