@@ -209,7 +209,7 @@ def load(report: Reporter, scene: str) -> None:
     """Load what glass needs, but PyTorch, half of the memory: `trace` loads it while it does other things."""
     import onnxruntime  # noqa: F401
 
-    import materialist.edits.glass.glass_preview  # noqa: F401
+    import materialist.edits.glass.glass_preview
     import materialist.render.pixels  # noqa: F401
     from materialist.render.denoise import require_denoiser
     from materialist.render.variant import setup
