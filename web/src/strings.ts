@@ -13,6 +13,7 @@ export const t = {
   falling: "It falls …",
   selecting: "Finding the object …",
   pointing: "Looking …",
+  looking: "Looking at the photo …",
   preparing: "Getting the live preview ready; select something meanwhile",
   stopped: "Stopped; nothing was changed.",
   traced: (seconds: number) => `Path traced in ${seconds} s.`,
