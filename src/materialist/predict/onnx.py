@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 def run(path: Path, inputs: Mapping[str, Array], *, once: bool = False) -> list[Array]:
     """What a file's network answers to `inputs` by name, in its own order.
 
-    once: it is not kept for another time, which takes its memory and saves a tenth of a second. Raises SetupError where ONNX Runtime is missing or in a fork, WeightsError for a file that is missing or damaged.
+    once: it is not kept for another time, which takes its memory and saves a tenth of a second.
+
+    Raises SetupError where ONNX Runtime is missing or in a fork, WeightsError for a file that is missing or damaged.
     """
     check_process()
     loaded = session.__wrapped__(path) if once else session(path)
