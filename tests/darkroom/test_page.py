@@ -652,8 +652,9 @@ def drop_picture(page):
     page.evaluate(DROP, ["dropped.png", [*content.getvalue()]])
 
 
+@pytest.mark.slow
 def test_a_removal_and_glass_go_on_over_a_reload(page):
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(40_000)
     select_block(page)
     page.get_by_role("button", name="Glass", exact=True).click()
     page.wait_for_selector("#steps >> text=Glass")
@@ -661,6 +662,7 @@ def test_a_removal_and_glass_go_on_over_a_reload(page):
     page.wait_for_selector("#stage .badge >> text=/^Glass traced/")
     page.evaluate(RESET)
     select_block(page)
+    page.locator("summary >> text=Remove it").click()
     page.locator("#remove").click()
     page.wait_for_selector("#progress .stop")
     page.reload()
@@ -689,7 +691,7 @@ def test_a_studio_that_is_ended_in_a_final_picture_keeps_what_was_saved(browser,
         assert len(started) > 1
         process.terminate()
         process.wait(10)
-        gone, left = psutil.wait_procs(started, 5)
+        _, left = psutil.wait_procs(started, 5)
         assert not left
         page.close()
     assert {n: c for n, c in kept(work).items() if n in before} == before
