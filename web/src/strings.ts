@@ -101,7 +101,7 @@ export const t = {
   solid: "Solid",
   hollow: "Hollow",
   open: "Open at the top",
-  glassHint: "Its body is built once, in half a minute or so; then the picture follows the sliders.",
+  glassHint: "Its body is built once, in some seconds; then the picture follows the sliders.",
   environment: "Light from all around",
   ownLight: "The photo's own",
   ownMap: "Your own map (HDR, EXR) …",

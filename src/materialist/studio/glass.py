@@ -234,7 +234,7 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
         edited = apply(loaded, list(others)) if others else loaded
         return GlassPreview(edited, region_of(loaded, fixed), options_of(fixed))
 
-    # Building takes half a minute: meanwhile a newer request may have come.
+    # Building takes seconds: meanwhile a newer request may have come.
     with remembered(step.folder):
         preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:
