@@ -84,10 +84,10 @@ def client(local):
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory):
-    """(address, work folder) of the darkroom in a process of its own, on the small scene."""
+    """(address, work folder, process) of the darkroom in a process of its own, on the small scene."""
     folder = tmp_path_factory.mktemp("browser")
     with studio_server.studio(folder, str(package(folder))) as (process, address):
-        yield address, folder / "work"
+        yield address, folder / "work", process
         # Whatever the tests did: what is large is in the processes of the photos alone.
         maps = Path(f"/proc/{process.pid}/maps")
         loaded = maps.read_text() if maps.is_file() else ""

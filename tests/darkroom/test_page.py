@@ -2,12 +2,15 @@
 
 import io
 import re
+import resource
 import time
 
 import numpy as np
+import psutil
 import pytest
+import studio_server
 from PIL import Image
-from studio_scenes import zipped_package
+from studio_scenes import package, zipped_package
 
 AREA = """() => { const m = document.querySelector('.marks').getBoundingClientRect();
   return m.width * m.height / (innerWidth * innerHeight); }"""
@@ -28,6 +31,12 @@ DISCARD = """async () => {
   const {project} = await (await fetch('/api/state', {headers})).json();
   await fetch('/api/discard', {method: 'POST', headers, body: JSON.stringify({project: project.name})}); }"""
 """Deletes the photo that a page shows."""
+
+DROP = """([name, bytes]) => {
+  const carried = new DataTransfer();
+  carried.items.add(new File([Uint8Array.from(bytes)], name));
+  for (const kind of ['dragenter', 'dragover', 'drop'])
+    document.body.dispatchEvent(new DragEvent(kind, {bubbles: true, cancelable: true, dataTransfer: carried})); }"""
 
 
 @pytest.fixture(scope="module")
@@ -605,6 +614,93 @@ def test_by_keyboard_alone(page):
     page.wait_for_selector("#steps >> text=hue 1")
     page.keyboard.press("Delete")
     page.wait_for_selector("#steps >> text=No edits yet")
+
+
+def kept(folder):
+    """What lies in a work folder but uploads: each file with its content."""
+    files = (f for f in folder.rglob("*") if f.is_file() and "cache" not in str(f))
+    return {file.name: file.read_bytes() for file in files}
+
+
+@pytest.mark.skipif(not hasattr(resource, "prlimit"), reason="no limit of another process")
+def test_a_full_disk_is_said_and_leaves_all_as_it_was(page, running):
+    _, work, process = running
+    select_block(page)
+    page.get_by_role("button", name="Gold").click()
+    page.wait_for_selector("#steps >> text=metallic 1")
+    before = kept(work)
+    limits = resource.prlimit(process.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (0, limits[1]))
+    try:
+        page.get_by_role("button", name="Rubber").click()
+        page.wait_for_selector("#message >> text=edits.yaml cannot be written")
+        assert "metallic 1" in page.locator("#steps").inner_text()
+        drop_picture(page)
+        page.wait_for_selector("#message >> text=dropped.png cannot be written")
+        page.wait_for_selector("#progress", state="hidden")
+        assert kept(work) == before
+    finally:
+        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, limits)
+    page.locator("#message button").click()
+    page.get_by_role("button", name="Rubber").click()
+    page.wait_for_selector("#steps >> text=metallic 0")
+
+
+def drop_picture(page):
+    content = io.BytesIO()
+    Image.new("RGB", (64, 48), (200, 120, 60)).save(content, "PNG")
+    page.evaluate(DROP, ["dropped.png", [*content.getvalue()]])
+
+
+@pytest.mark.slow
+def test_a_removal_and_glass_go_on_over_a_reload(page):
+    page.set_default_timeout(40_000)
+    select_block(page)
+    page.get_by_role("button", name="Glass", exact=True).click()
+    page.wait_for_selector("#steps >> text=Glass")
+    page.reload()
+    page.wait_for_selector("#stage .badge >> text=/^Glass traced/")
+    page.evaluate(RESET)
+    select_block(page)
+    page.locator("summary >> text=Remove it").click()
+    page.locator("#remove").click()
+    page.wait_for_selector("#progress .stop")
+    page.reload()
+    page.wait_for_selector("#progress .stop")
+    page.wait_for_selector("#steps >> text=Removed")
+    assert not page.errors
+
+
+@pytest.mark.slow
+def test_a_studio_that_is_ended_in_a_final_picture_keeps_what_was_saved(browser, tmp_path):
+    scene = str(package(tmp_path))
+    work = tmp_path / "work"
+    with studio_server.studio(tmp_path, scene) as (process, address):
+        page = browser.new_page()
+        page.goto(address)
+        page.wait_for_selector(".marks")
+        page.wait_for_selector("#progress", state="hidden")
+        select_block(page)
+        page.get_by_role("button", name="Gold").click()
+        page.wait_for_selector("#steps >> text=metallic 1")
+        before = kept(work)
+        page.locator("#final").click()
+        page.wait_for_selector("#progress .stop")
+        page.wait_for_timeout(1500)
+        started = psutil.Process(process.pid).children(recursive=True)
+        assert len(started) > 1
+        process.terminate()
+        process.wait(10)
+        _, left = psutil.wait_procs(started, 5)
+        assert not left
+        page.close()
+    assert {n: c for n, c in kept(work).items() if n in before} == before
+    assert not [file for file in work.rglob("*") if "partial" in file.name or "cache" in file.name]
+    with studio_server.studio(tmp_path, scene) as (process, address):
+        page = browser.new_page()
+        page.goto(address)
+        page.wait_for_selector("#steps >> text=metallic 1")
+        page.close()
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from materialist.errors import InputError
 from materialist.io.photo import example_path
 from materialist.jobs.queue import QUEUED, STOPPED, Job, JobQueue
 from materialist.studio import SETTINGS, StudioSettings, archives, stage, tasks
+from materialist.studio import studio as module
 from materialist.studio.access import quota
 from materialist.studio.access.quota import Allowance
 from materialist.studio.reporting import quality
@@ -317,19 +318,38 @@ def test_a_scene_that_is_unpacked_counts_as_stored(studio, tmp_path, monkeypatch
 
 
 def test_a_process_that_gets_ready_leaves_it_to_a_job_that_waits(monkeypatch):
-    stages = []
-
-    def invert(photo, *, progress, **options):
-        for name in ("read", "predict", "geometry"):
-            progress(name, 0, 1)
+    done = []
 
     class Report:
         outdated = False
 
-        def __call__(self, stage, done, total):
-            stages.append(stage)
-            self.outdated = stage == "predict"
+    def invert(photo, *, progress, on_stage, **options):
+        progress("predict", 0, 1)
+        done.append("first maps")
+        Report.outdated = True
+        on_stage("materials", None)
+        done.append("second maps")
 
     monkeypatch.setattr(tasks.mt, "invert", invert)
     tasks.warm(Report())
-    assert stages == ["read", "predict"]
+    assert done == ["first maps"]
+
+
+def test_the_preview_of_the_next_photo_gets_ready_and_does_not_wait_for_ever(shared, monkeypatch):
+    class Process:
+        running = True
+
+        def close(self):
+            self.running = False
+
+    made = []
+    monkeypatch.setattr(module, "warmed", lambda device: made.append(Process()) or made[-1])
+    monkeypatch.setattr(shared.jobs, "warm", lambda task, seconds: None)
+    shared.keeps_ready = True
+    shared.get_ready()
+    shared.get_ready()
+    shared.leave_idle()
+    assert len(made) == 1 and made[0].running
+    shared._spare_until = 0.0
+    shared.leave_idle()
+    assert not made[0].running

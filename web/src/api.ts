@@ -38,6 +38,15 @@ export async function bytes(place: string): Promise<ArrayBuffer> {
   return answer.ok ? answer.arrayBuffer() : read(answer);
 }
 
+/** An answer as an object; a proxy between may answer with a page of its own. */
+function parsed(text: string): { file?: string; error?: string } {
+  try {
+    return JSON.parse(text || "{}");
+  } catch {
+    return {};
+  }
+}
+
 /** Send a file; returns the id by which requests may name it. */
 export function upload(file: File, progress: (part: number) => void): Promise<string> {
   return new Promise((done, failed) => {
@@ -48,7 +57,7 @@ export function upload(file: File, progress: (part: number) => void): Promise<st
     request.upload.onprogress = (event) => progress(event.loaded / Math.max(event.total, 1));
     request.onerror = () => failed(new Refusal("The file could not be sent."));
     request.onload = () => {
-      const body = JSON.parse(request.responseText || "{}");
+      const body = parsed(request.responseText);
       if (request.status === 200) done(body.file as string);
       else failed(new Refusal(body.error ?? "The file was refused."));
     };

@@ -3,9 +3,11 @@ import { post } from "./api";
 
 type Point = [number, number];
 const REST = 110; // milliseconds
+const LONG = 400; // milliseconds after which the page says that it is looking
 
 class Pointing {
   outline = "";
+  looking = false;
   changed: () => void = () => undefined;
   private asked: Point | null = null;
   private shape: Path2D | null = null;
@@ -45,13 +47,22 @@ class Pointing {
     this.changed();
   }
 
+  private look(looking: boolean): void {
+    if (looking === this.looking) return;
+    this.looking = looking;
+    this.changed();
+  }
+
   private async ask(): Promise<void> {
     if (this.busy || !this.at) return;
     const asked = this.at;
     this.busy = true;
+    const late = window.setTimeout(() => this.look(true), LONG);
     // Where nothing is found, as in the sky, nothing is outlined.
     const { region } = await post<{ region: string }>("point", { at: asked }).catch(() => ({ region: "" }));
     this.busy = false;
+    clearTimeout(late);
+    this.look(false);
     if (!this.at) return;
     const shape = region ? new Path2D(region) : null;
     if (shape && this.context.isPointInPath(shape, this.at[0], this.at[1], "evenodd")) this.show(region, asked);

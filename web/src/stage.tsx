@@ -261,7 +261,7 @@ export function Stage() {
     <div
       ref={frame}
       id="stage"
-      class={`stage ${usable ? (dropper ? "dropper" : tool) : "idle"} ${hint ? "busy" : ""}`}
+      class={`stage ${usable ? (dropper ? "dropper" : tool) : "idle"} ${hint || pointing.looking ? "busy" : ""}`}
       tabIndex={0}
       role="application"
       aria-label={t.stage}
@@ -296,6 +296,7 @@ export function Stage() {
       {comparing && usable && !empty && <Divider box={box} frame={frame} />}
       {usable && stage?.badge && !before && !dropper && <span class="badge">{stage.badge}</span>}
       {dropper && <span class="badge hint">{t.dropperHint}</span>}
+      {pointing.looking && !dropper && !before && <span class="badge hint looking">{t.looking}</span>}
       {before && <span class="badge">{t.beforeLabel}</span>}
       {usable && !empty && (
         <div class="zoom" onPointerDown={(event) => event.stopPropagation()}>

@@ -1,6 +1,6 @@
 // The list of edits, always in sight: switch, choose, order, remove.
 import { Icon } from "./icons";
-import { useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { change, useView } from "./store";
 import { t } from "./strings";
 import type { Step } from "./types";
@@ -28,9 +28,14 @@ function Chip({ step, index, count, current }: { step: Step; index: number; coun
     setHeld(!step.on);
     void act("toggle").then(() => setHeld(null));
   };
+  // A long list is cut off at the side: what is worked on stays in sight.
+  const chip = useRef<HTMLLIElement>(null);
+  useEffect(() => {
+    if (current) chip.current!.scrollIntoView({ block: "nearest", inline: "nearest" });
+  }, [current]);
   const [kind, ...rest] = step.text.split(": ");
   return (
-    <li class={`chip ${current ? "current" : ""} ${step.on ? "" : "off"}`}>
+    <li ref={chip} class={`chip ${current ? "current" : ""} ${step.on ? "" : "off"}`}>
       <input type="checkbox" checked={held ?? step.on} aria-label={t.toggle(step.text)} onChange={toggle} />
       <button class="text" aria-current={current ? "true" : undefined} title={step.text} onClick={() => void act("choose")}>
         <b>{kind}</b> <span>{rest.join(": ")}</span>

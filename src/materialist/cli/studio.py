@@ -65,6 +65,7 @@ def studio_command(
     """Open the studio: a page in the browser to take photos apart and edit them."""
     from materialist.darkroom import application, require_packages
     from materialist.studio import server
+    from materialist.studio.workspace import Project
 
     require_packages()
     # --- Who may reach it, checked before anything is made ---
@@ -87,6 +88,9 @@ def studio_command(
         device=serving.device,
     )
     studio.start = None if first is None else server.first_shown(studio.work, first)
+    if not (isinstance(studio.start, Project) or studio.last):
+        # Long before the page is there: somebody chooses a photo next.
+        studio.get_ready()
     if not serving.as_json:
         typer.echo(f"Scenes and edits are kept in {studio.work.root}")
 

@@ -16,6 +16,7 @@ from materialist.darkroom.endpoint import desk_of
 from materialist.darkroom.state import example_file, project_facts, state
 from materialist.darkroom.taking import follow_finals
 from materialist.errors import InputError
+from materialist.io.atomic import writing
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS
 from materialist.studio.access.gate import promised_size
@@ -52,7 +53,8 @@ async def _written(request: Request, file: Path, size: int) -> int:
     """Write a body to a file; returns its bytes. Raises InputError where they are not as many as promised."""
     stored = 0
     parts = request.stream()
-    with file.open("wb") as out:
+    # On a full disk it is the file that cannot be written, not this program that fails.
+    with writing(file.name), file.open("wb") as out:
         while True:
             try:
                 part = await asyncio.wait_for(anext(parts), SETTINGS.body_seconds)

@@ -20,6 +20,9 @@ BLACK = 0.1
 WHITE = 0.9
 """Brightness up to which a pixel of a mask is black, and from which it is white."""
 
+COMPRESSION = 3
+"""Of PNG files: a tenth larger than at the usual 6, and written in a third of the time."""
+
 
 def write_png(path: str | Path, picture: Array) -> None:
     """Write RGB [H, W, 3] or grey [H, W] as an 8-bit PNG: uint8 as it is, linear values clipped and sRGB-encoded.
@@ -28,7 +31,7 @@ def write_png(path: str | Path, picture: Array) -> None:
     """
     with writing(path):
         Image.fromarray(picture if picture.dtype == np.uint8 else srgb_levels(picture)).save(
-            path, format="PNG"
+            path, format="PNG", compress_level=COMPRESSION
         )
 
 

@@ -54,8 +54,8 @@ class StudioSettings:
     free_for_scene: float = 0.8e9  # before another scene is opened, and
     free_a_pixel: float = 2600.0  # for each of its pixels at working size; from 1.2 megapixels
     free_for_glass: float = 2.0e9  # before glass is traced
-    # The process that waits for the next photo.
-    ready_seconds: float = 300.0  # after which it ends
+    # The processes that wait for the next photo.
+    ready_seconds: float = 300.0  # after which they end
     # The process of a photo's live preview.
     preview_idle: float = 900.0  # seconds without a question after which it ends
     # The process that traces glass.

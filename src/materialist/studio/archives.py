@@ -20,7 +20,8 @@ from materialist.io.decode import image_size
 from materialist.io.package import load_scene
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.access.quota import Allowance, folder_size
-from materialist.studio.workspace import store, with_plain_files
+from materialist.studio.stored import store
+from materialist.studio.workspace import with_plain_files
 
 _MEMBER = re.compile(rf"{SCENE_FILES.pattern}|original\.[a-z0-9]{{1,5}}")
 """The files of a scene package; nothing else is unpacked."""

@@ -26,7 +26,7 @@ _NAMES = {
 _OURS = re.compile(r"(?:thing|light)-([a-z]+)")
 """The name of a file that the studio computes."""
 _UPLOADED = re.compile(r"[a-z]+-[0-9a-f]{12}")
-"""The name that `workspace.store` gives an uploaded file."""
+"""The name that `stored.store` gives an uploaded file."""
 
 _SLIDES = re.compile(r"#\w{6}|[-+.,\de]+")
 """Values that sliders and colour pickers set: numbers and colours."""

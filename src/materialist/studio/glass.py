@@ -5,8 +5,10 @@ The worker keeps the last few bodies and makes one picture after the other; only
 
 import json
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -96,6 +98,14 @@ class GlassClient:
                 self._send(*request)
             self.changed.notify_all()
 
+    def get_ready(self) -> None:
+        """Let the process load what glass needs, while somebody looks at what they have selected."""
+        with self.changed:
+            # Without it the first picture starts it, or says why it cannot.
+            if self._worker is None:
+                with suppress(OSError, InputError):
+                    self._start().begin(load, {"scene": self._scene})
+
     def pane(self, step: Step) -> Pane | None:
         """The last picture of a glass step, perhaps with earlier values."""
         return self._panes.get(place(step), (None, None))[1]
@@ -114,7 +124,8 @@ class GlassClient:
         places = {place(step) for step in steps if is_traced(step)}
         with self.changed:
             self._panes = {name: pane for name, pane in self._panes.items() if name in places}
-        if not places:
+            had_glass = self._asked is not None
+        if had_glass and not places:
             self.stop()
 
     def stop(self) -> None:
@@ -132,28 +143,26 @@ class GlassClient:
     def _send(self, others: tuple[Step, ...], step: Step) -> None:
         """Send a request to the process; start one where none runs."""
         try:
-            if self._worker is None:
-                # Tracing needs a scene of its own in memory.
-                if psutil.virtual_memory().available < SETTINGS.free_for_glass:
-                    raise InputError(
-                        "This machine has too little memory free to trace glass while sliders move; press Final "
-                        "picture instead."
-                    )
-                self._worker = Worker(
-                    niceness=SETTINGS.glass_niceness,
-                    idle=SETTINGS.glass_idle,
-                    memory=SETTINGS.job_memory,
-                )
-                threading.Thread(
-                    target=self._listen, args=(self._worker,), name="glass", daemon=True
-                ).start()
+            worker = self._worker or self._start()
         except (OSError, InputError) as error:
             self.state = GlassState(False, str(error), True)
             return
         self.state = GlassState(True, "Getting the glass ready …")
-        self._number = self._worker.begin(
-            trace, {"scene": self._scene, "others": others, "step": step}
+        self._number = worker.begin(trace, {"scene": self._scene, "others": others, "step": step})
+
+    def _start(self) -> Worker:
+        """Start the process. Raises OSError, and InputError where memory is short."""
+        # Tracing needs a scene of its own in memory.
+        if psutil.virtual_memory().available < SETTINGS.free_for_glass:
+            raise InputError(
+                "This machine has too little memory free to trace glass while sliders move; press Final picture "
+                "instead."
+            )
+        self._worker = worker = Worker(
+            niceness=SETTINGS.glass_niceness, idle=SETTINGS.glass_idle, memory=SETTINGS.job_memory
         )
+        threading.Thread(target=self._listen, args=(worker,), name="glass", daemon=True).start()
+        return worker
 
     def _listen(self, worker: Worker) -> None:
         """Take the messages of a process until it ends."""
@@ -196,6 +205,20 @@ def _loaded(path: str) -> Scene:
     return mt.load_scene(path)
 
 
+def load(report: Reporter, scene: str) -> None:
+    """Load what glass needs, but PyTorch, half of the memory: `trace` loads it while it does other things."""
+    import onnxruntime  # noqa: F401
+
+    import materialist.edits.glass.glass_preview
+    import materialist.render.pixels  # noqa: F401
+    from materialist.render.denoise import require_denoiser
+    from materialist.render.variant import setup
+
+    setup()
+    require_denoiser()
+    _loaded(scene)
+
+
 def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) -> Pane | None:
     """The pane of a glass step after other steps; None where a newer request came meanwhile. Raises InputError."""
     options = options_of(step)
@@ -206,12 +229,12 @@ def trace(report: Reporter, scene: str, others: tuple[Step, ...], step: Step) ->
     def build() -> Any:
         from materialist.edits.glass.glass_preview import GlassPreview
 
+        threading.Thread(target=import_module, args=("torch",), daemon=True).start()
         loaded = _loaded(scene)
-        return GlassPreview(
-            apply(loaded, list(others)), region_of(loaded, fixed), options_of(fixed)
-        )
+        edited = apply(loaded, list(others)) if others else loaded
+        return GlassPreview(edited, region_of(loaded, fixed), options_of(fixed))
 
-    # Building takes half a minute: meanwhile a newer request may have come.
+    # Building takes seconds: meanwhile a newer request may have come.
     with remembered(step.folder):
         preview = kept(_BODIES, (*others, fixed), build, SETTINGS.glass_bodies)
     if report.outdated:

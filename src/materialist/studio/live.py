@@ -20,6 +20,7 @@ from materialist.errors import InputError, MaterialistError
 from materialist.io.package import load_scene
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, Reporter
+from materialist.memory import give_back
 from materialist.studio import SETTINGS, views
 from materialist.studio.access.quota import Allowance
 from materialist.studio.edit_list import key_of
@@ -223,7 +224,8 @@ def warmed(device: str) -> Worker | None:
 def _new_worker() -> Worker:
     # What it opens may be a stranger's: it does not see the password.
     return Worker(
-        environment={"MATERIALIST_PASSWORD": ""},
+        # Of its many threads each would keep freed memory of its own: a tenth of all.
+        environment={"MATERIALIST_PASSWORD": "", "MALLOC_ARENA_MAX": "1"},
         memory=SETTINGS.job_memory,
         threads=SETTINGS.requests,
     )
@@ -278,6 +280,9 @@ def open_preview(report: Reporter, package: str, file: str, device: str) -> None
     _OPENED.set_result(preview)
     preview.wait()
     report.intermediate(fine=preview.fine)
+    # While the page is looked at: a pointer that moves would wait for it.
+    views.look_ahead(preview)
+    give_back()
     preview.prepared.wait()
     report.intermediate(fine=preview.fine)
 

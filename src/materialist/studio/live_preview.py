@@ -57,7 +57,7 @@ class LivePreview:
         self.scene = scene
         self._package = package
         self._asked = float("-inf")
-        """When a picture was last asked for, by the monotonic clock."""
+        """When a picture was last asked for, or there could be one, by the monotonic clock."""
         self.prepared = threading.Event()
         """Whether everything is there for fine pictures, also under another light."""
         self._kept: dict[str, Any] = {}
@@ -69,6 +69,9 @@ class LivePreview:
 
     def _prepare(self, built: Future[Any]) -> None:
         """Get ready for another light part by part, while nobody moves a slider: a part takes longer than a picture."""
+        if self._asked == float("-inf"):
+            # First comes what a pointer needs (`views.look_ahead`).
+            self._asked = time.monotonic()
         quiet = SETTINGS.quiet_seconds - (time.monotonic() - self._asked)
         if quiet > 0:
             later = threading.Timer(quiet, _THREAD.submit, (self._prepare, built))

@@ -213,6 +213,8 @@ class Session:
                 )
             self.selection = after
             self._note_history()
+            if after.mask is not None and self.glass is not None:
+                self.glass.get_ready()
 
     def _follows_selection(self) -> bool:
         """Whether the current edit is one of a region that the preview shows soon enough."""

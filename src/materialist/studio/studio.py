@@ -53,7 +53,7 @@ class Studio:
     seed: int = 0
     device: str = "auto"
     keeps_ready: bool = False
-    """Whether a process gets ready for the next photo as soon as somebody is about to choose one."""
+    """Whether processes get ready for the next photo as soon as somebody is about to choose one."""
     last: dict[str, str] = field(default_factory=dict)
     """Person -> the project last opened or begun; a page goes on with it, after a restart, too."""
     files: HandedFiles = field(default_factory=HandedFiles)
@@ -64,7 +64,9 @@ class Studio:
     _left: list[Session] = field(default_factory=list)
     """Sessions that no page shows any more, whose memory is not given back yet."""
     _spare: Worker | None = None
-    """A process that has loaded what a preview needs, for the photo that is being taken apart."""
+    """A process that has loaded what a preview needs, for the next photo."""
+    _spare_until: float = 0.0
+    """Until when it waits for one, by the monotonic clock; longer where a photo is being taken apart."""
     _closer: ThreadPoolExecutor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer")
     )
@@ -114,7 +116,8 @@ class Studio:
         for one in live:
             if one is not None:
                 one.rest(SETTINGS.preview_idle)
-        if not self.jobs.unfinished(kind=tasks.invert.__name__):
+        late = time.monotonic() > self._spare_until
+        if late and not self.jobs.unfinished(kind=tasks.invert.__name__):
             spare = self._take_spare()
             if spare is not None:
                 spare.close()
@@ -276,11 +279,12 @@ class Studio:
         return job
 
     def get_ready(self) -> None:
-        """Let a process load what taking a photo apart needs, while somebody chooses one."""
+        """Let processes load what taking a photo apart and its preview need, while somebody chooses one."""
         if self.keeps_ready and not self.jobs.unfinished():
             self.jobs.warm(
                 partial(tasks.on_device, self.device, tasks.warm), SETTINGS.ready_seconds
             )
+            self._warm_preview()
 
     def begin(
         self, session: Session, source: Path, predictor: str, size: int, fov: str
@@ -313,16 +317,21 @@ class Studio:
             shutil.rmtree(project.folder, ignore_errors=True)
             raise
         if self.keeps_ready:
-            threading.Thread(target=self._warm_preview, args=(job,), daemon=True).start()
+            threading.Thread(target=self._warm_later, args=(job,), daemon=True).start()
         return project, job
 
-    def _warm_preview(self, job: Job) -> None:
-        """Let a process load what the preview needs, once an inversion has found the first maps, which come first."""
+    def _warm_later(self, job: Job) -> None:
+        """`_warm_preview` once an inversion has found the first maps, which come first."""
         while all(result["name"] == tasks.PHOTO for result in job.intermediate):
             if job.over:
                 return
             time.sleep(0.1)
+        self._warm_preview()
+
+    def _warm_preview(self) -> None:
+        """Let a process load what the preview of the next photo needs, unless there is one."""
         with self._lock:
+            self._spare_until = time.monotonic() + SETTINGS.ready_seconds
             if self._spare is None or not self._spare.running:
                 self._spare = warmed(self.device)
 

@@ -74,17 +74,16 @@ class _Awaited(Exception):
 
 
 def warm(report: Reporter) -> None:
-    """Load all that `invert` needs, by an inversion of a few pixels, which a waiting job ends at its next stage."""
+    """Load all that `invert` needs, by an inversion of a few pixels, which a waiting job ends at its next step."""
 
-    def tick(stage: str, done: int, total: int) -> None:
+    def look(*_: Any) -> None:
         if report.outdated:
             raise _Awaited
-        report(stage, done, total)
 
     grey = np.full((WARM_SIDE, WARM_SIDE, 3), 0.5, np.float32)
     grey[: WARM_SIDE // 2] = 0.3
     with suppress(_Awaited):
-        mt.invert(grey, encoded=False, size=WARM_SIDE, progress=tick)
+        mt.invert(grey, encoded=False, size=WARM_SIDE, progress=look, on_stage=look)
 
 
 def invert(

@@ -19,7 +19,7 @@ from materialist.io.image import read_map, write_image
 from materialist.jobs.limited import Limits, run_limited
 from materialist.studio import SETTINGS
 from materialist.studio.access.quota import Allowance
-from materialist.studio.workspace import store
+from materialist.studio.stored import store
 
 MESHES = (".glb", ".ply", ".obj", ".stl")
 PHOTO = "photo"

@@ -1,6 +1,7 @@
 """What is made of a live preview, in its process: pictures, meshes, maps, words. Each is a call of `studio.live`."""
 
 import json
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,15 @@ def unfilled(live: LivePreview, steps: Steps) -> bool:
 def picture(live: LivePreview, steps: Steps, panes: Panes, coarse: bool = False) -> bytes:
     """The edits in the photo at working size, as a JPEG."""
     return encoded(live.picture(steps, panes, coarse=coarse))
+
+
+def look_ahead(live: LivePreview) -> None:
+    """Do what the first selection in a photo takes longest for: reading the networks, and the photo by them."""
+    rows, columns = np.nonzero(live.scene.depth)
+    middle = len(rows) // 2
+    # What fails here fails at a click, which says why.
+    with suppress(MaterialistError):
+        select(live.scene, click=(int(columns[middle]), int(rows[middle])))
 
 
 def selected(live: LivePreview, where: dict[str, Any]) -> Array:

@@ -28,6 +28,7 @@ from materialist.errors import InputError
 from materialist.io.atomic import make_folder, write_whole, writing
 from materialist.io.display import encoded
 from materialist.studio import SETTINGS
+from materialist.studio.stored import store
 from materialist.types import Array
 
 CARD = "project.json"
@@ -266,14 +267,6 @@ def _shown(title: str) -> str:
 def write_mask(workspace: Path, mask: Array) -> str:
     """Write a mask [H, W] bool; returns its name: no other photo has one of that name."""
     return store(workspace, "mask", encoded(mask.astype(np.uint8) * 255), ".png")
-
-
-def store(workspace: Path, stem: str, content: bytes, suffix: str) -> str:
-    """Write a file whole unless it exists; returns its name, which holds its hash."""
-    file = workspace / f"{stem}-{hashlib.sha256(content).hexdigest()[:12]}{suffix}"
-    if not file.is_file():
-        write_whole(file, content)
-    return file.name
 
 
 def read_steps(workspace: Path, file: Path) -> tuple[Step, ...]:

