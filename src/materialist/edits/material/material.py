@@ -46,7 +46,7 @@ def edit(
         colour = shifted_hsv(colour, changes.hue, changes.saturation, changes.value)
     if changes.albedo is not None or changes.texture is not None:
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
-        colour = shaded(colour, shading_detail(scene, region, changes.detail))
+        colour = shaded(colour, shading_detail(scene, region, changes.detail), region)
     # Mixed by the weight, so that a feathered border fades.
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
