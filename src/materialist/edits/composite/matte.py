@@ -52,14 +52,14 @@ def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
     large: [H0, W0, 3] linear, the photo. The border moves to the photo's edges within `reach` of the mask's own, and
     runs along that one where the photo has none. Beside it a pixel's place on the line between the mean colours of both
     sides is its share; where both look alike, or the pixel is no mixture of them, the border decides. Exactly 0 and 1
-    further away. box: the native rows and columns that are wanted, None for all.
+    further away. box: the native rows and columns to make, None for all.
     """
     height, width = large.shape[:2]
-    wanted = box or (slice(0, height), slice(0, width))
+    region = box or (slice(0, height), slice(0, width))
     scale = max(height / mask.shape[0], width / mask.shape[1])
     distance = _signed_distance(mask, STAIRS * (scale > 1))
     hard = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
-    alpha: Array = np.asarray(hard[wanted]).astype(np.float32)
+    alpha: Array = np.asarray(hard[region]).astype(np.float32)
     if mask.all() or not mask.any():
         return alpha
     # --- Tile by tile along the border, each with what its pixels look up around it ---
@@ -72,13 +72,13 @@ def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
             tile_mask = np.zeros_like(border)
             tile_mask[tile, part] = True
             native = window(tile_mask, (height, width))
-            here = common(native, wanted)
+            here = common(native, region)
             if area(here) == 0:
                 continue
             small = window(tile_mask, margin=margin)
             around = window(tile_mask, (height, width), margin)
             shares = _shares(distance[small], large[around], scale)
-            alpha[within(here, wanted)] = shares[within(here, around)]
+            alpha[within(here, region)] = shares[within(here, around)]
     return alpha
 
 
