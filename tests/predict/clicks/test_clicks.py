@@ -105,15 +105,15 @@ def test_places_outside_are_errors(untrained, clicks):
 def test_the_number_of_threads_changes_no_bit(untrained):
     photo, _ = scene()
     before = torch.get_num_threads()
-    found = []
+    likelihoods = []
     try:
         for threads in (1, 3):
             torch.set_num_threads(threads)
-            found.append(object_likelihood(*photo, [(80, 66)]))
+            likelihoods.append(object_likelihood(*photo, [(80, 66)]))
             assert torch.get_num_threads() == threads
     finally:
         torch.set_num_threads(before)
-    np.testing.assert_array_equal(*found)
+    np.testing.assert_array_equal(*likelihoods)
 
 
 @pytest.mark.parametrize("click", [(80, 66), (92, 80)])

@@ -72,9 +72,10 @@ def into_photo(
     mixed = np.maximum(share * bodies + (1 - share) * here, 0)
     picture[box] = np.where(share > 0, mixed, here)
     # --- Lamps glare: only under another light, which changes the whole photo anyhow ---
-    light = np.maximum(share * layers.native.picture - 1, 0)
-    if layers.relit and light.any():
-        add_glare(picture, light, box)
+    if layers.relit:
+        light = np.maximum(share * layers.native.picture - 1, 0)
+        if light.any():
+            add_glare(picture, light, box)
     return picture
 
 
