@@ -28,7 +28,7 @@ def shared(tmp_path):
     made = Studio(work, JobQueue(1), single_user=False)
     made.start = work.new("Room", "nobody", scene=package(tmp_path))
     yield made
-    made.jobs.close()
+    made.close()
 
 
 @pytest.fixture
@@ -66,7 +66,7 @@ def local(tmp_path_factory):
             studio.page("b" * 32, "me").session.live.wait()
             client.studio = studio
             yield client
-    studio.jobs.close()
+    studio.close()
 
 
 @pytest.fixture

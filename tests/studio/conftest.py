@@ -18,7 +18,7 @@ def studio(tmp_path_factory):
     made = Studio(work, JobQueue(1))
     made.start = work.new("Room", "me", scene=package(folder))
     yield made
-    made.jobs.close()
+    made.close()
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def shared(tmp_path):
     """A studio that several people reach."""
     made = Studio(WorkFolder(tmp_path), JobQueue(1), single_user=False)
     yield made
-    made.jobs.close()
+    made.close()
 
 
 @pytest.fixture(scope="module")

@@ -133,6 +133,7 @@ def serve(
         studio.jobs.close()
         server.should_exit = True
         thread.join(3)
+        studio.close()
         shutil.rmtree(studio.work.cache, ignore_errors=True)
 
 

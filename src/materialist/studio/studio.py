@@ -381,6 +381,18 @@ class Studio:
         if had_scene:
             give_back()
 
+    def close(self) -> None:
+        """End all that works for it: jobs, previews, and the process that waits for a photo."""
+        self.jobs.close()
+        with self._lock:
+            pages = [*self._pages]
+        for name in pages:
+            self.leave(name)
+        spare = self._take_spare()
+        if spare is not None:
+            spare.close()
+        self._closer.shutdown()
+
     def public_copy(self, person: str, file: Path, name: str = "") -> str:
         """A copy of a result for a person, in the cache, the only place of served files; its path.
 
