@@ -97,6 +97,24 @@ def test_a_line_that_is_clicked_stays(table):
     assert not objects.tidy(mask, [(40, 40)])[20, 40]
 
 
+def test_parts_a_little_apart_are_one_and_keep_their_outline():
+    mask = np.zeros((120, 160), bool)
+    mask[60:116, 20:60] = True
+    mask[60:116, 64:100] = True
+    mask[60:80, 30:50] = False  # a corner inwards
+    far = mask.copy()
+    far[10:40, 120:150] = True
+    # What is far away is left out, and neither the gap nor the frame nor the corner is filled.
+    kept = objects.tidy(far, [(40, 100)])
+    assert not (kept & ~mask).any()
+    assert (mask & ~kept).sum() < 20  # corners
+
+
+def test_the_whole_photo_may_be_a_box(table):
+    scene, *_ = table
+    assert select(scene, box=(0, 0, 160, 120)).any()
+
+
 def test_a_click_off_the_object_is_told(table, monkeypatch):
     scene, first, second = table
 
@@ -128,7 +146,7 @@ def test_given_masks_are_taken_as_they_are(table, tmp_path):
         ({"click": ("a", 2)}, "must be 2 numbers"),
         ({"click": []}, "empty"),
         ({"box": (10, 10, 11, 50)}, "3 x 3"),
-        ({"box": (0, 0, 160, 120)}, "whole photo"),
+        ({"box": (0, 0, 160, 120), "method": "grabcut"}, "whole photo"),
         ({"box": (1, 2, 3)}, "must be 4 numbers"),
         ({"mask": np.zeros((120, 160), bool)}, "empty"),
         ({"mask": np.ones((12, 16), bool)}, "(12, 16)"),

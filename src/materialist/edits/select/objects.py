@@ -152,12 +152,12 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     # Opening takes away lines of single pixels, unless one was clicked.
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
     opened = opened if all(opened[y, x] for x, y in points) else mask
-    # A highlight or a thin shadow may cut an object in two: parts a little apart are one, with the gap.
+    # A highlight or a thin shadow may cut an object in two: parts a little apart are one.
     wide = disc(max(2, round(SETTINGS.gap * max(mask.shape))))
-    closed = cv2.morphologyEx(opened.astype(np.uint8), cv2.MORPH_CLOSE, wide) > 0
-    parts, count = ndimage.label(opened | closed)
+    groups, count = ndimage.label(cv2.dilate(opened.astype(np.uint8), wide))
     if count == 0:
         return mask
+    parts = groups * opened
     sizes = np.bincount(parts.ravel())[1:]
     keep = {int(parts[y, x]) for x, y in points if parts[y, x]}
     keep = keep or set((np.flatnonzero(sizes >= 0.1 * sizes.max()) + 1).tolist())

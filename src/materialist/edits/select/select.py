@@ -62,6 +62,8 @@ def select(
     points = [] if click is None else _points(scene, click)
     frame = None if box is None else _box(scene, box)
     if frame is not None:
+        if method == "grabcut":
+            _check_background(scene, frame)
         region = object_in(scene, frame, network=method == "network")
     else:
         region = object_at_points(scene, points, network=method == "network")
@@ -109,6 +111,10 @@ def _box(scene: Scene, box: Sequence[float]) -> Box:
         raise InputError(
             f"The box {x0:g},{y0:g},{x1:g},{y1:g} covers less than 3 x 3 pixels of the photo ({width} x {height})."
         )
-    if right - left >= width and bottom - top >= height:
-        raise InputError("The box is the whole photo; leave some background around the object.")
     return int(left), int(top), int(right), int(bottom)
+
+
+def _check_background(scene: Scene, box: Box) -> None:
+    """Raise InputError for the whole photo: GrabCut needs to see what is not of the object."""
+    if box == (0, 0, scene.camera.width, scene.camera.height):
+        raise InputError("The box is the whole photo; leave some background around the object.")
