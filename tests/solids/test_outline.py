@@ -57,6 +57,16 @@ def test_on_the_ground_it_stands_where_it_stands(vase):
     assert 0 < ((body.body(CAMERA).vertices - FOOT) @ UP).min() < 0.02
 
 
+def test_it_stands_on_the_ground_at_its_foot(vase):
+    """A relief's ground often falls off behind the object, and only at the foot do both meet."""
+    depth, normal, mask, _ = vase
+    rows, _ = np.indices(mask.shape)
+    foot = np.flatnonzero(mask.any(1)).max()
+    falling = GROUND * (1 + 0.01 * np.maximum(foot - rows, 0))
+    body, _ = surface_of_revolution(depth, normal, mask, CAMERA, up=UP, behind=falling)
+    assert abs(((body.body(CAMERA).vertices - FOOT) @ UP).min()) < 0.03
+
+
 def test_boxes_rings_and_what_is_cut_lopsided_or_a_line_are_none(vase):
     front, mask = view(turned(arc((0.45, 0.06), 0.06, -180, 180, 120)))
     assert surface_of_revolution(front.depth, front.normal, mask, CAMERA, up=UP) is None

@@ -21,6 +21,9 @@ class RevolutionSettings:
     # wall thicknesses below the rim to which the lid changes the inside; by eye
     lid_reach: float = 3.5
     lip_points: int = 12  # of the rounded rim of an open vessel
+    foot_share: float = (
+        0.05  # of the object's outline, from below, at which its ground is looked for; by eye
+    )
 
 
 SETTINGS = RevolutionSettings()
@@ -132,11 +135,19 @@ class Revolution:
 
 
 def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) -> float:
-    """Height above the foot of the lowest of what stands behind the object; -inf where there is nothing."""
+    """Height above the foot of what stands behind the lowest part of the object; -inf where there is nothing.
+
+    There the object meets its ground. Farther up the ground is seen behind it, and a relief may rise or fall there.
+    """
     if behind is None or not (known := inside & (np.asarray(behind) > 0)).any():
         return -np.inf
-    points = rays[known] * np.asarray(behind)[known][:, None]
-    return float(np.percentile((points - axis.foot) @ axis.up, 2))
+    level = rays @ axis.up
+    low, high = np.percentile(level[inside], [0, 100])
+    lowest = known & (level <= low + SETTINGS.foot_share * (high - low))
+    if not lowest.any():
+        return -np.inf
+    points = rays[lowest] * np.asarray(behind)[lowest][:, None]
+    return float(np.median((points - axis.foot) @ axis.up))
 
 
 def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:

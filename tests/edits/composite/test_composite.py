@@ -23,7 +23,7 @@ from materialist.edits.composite.composite import (
     write_composite,
 )
 from materialist.edits.composite.into_photo import SETTINGS, into_photo
-from materialist.edits.composite.layers import Layers, significance, without_fireflies
+from materialist.edits.composite.layers import Layers, _gain, significance, without_fireflies
 from materialist.edits.composite.matte import matte
 from materialist.edits.composite.native_layer import NativeLayer
 from materialist.edits.core.renderer import EditRenderer, RenderOptions
@@ -180,6 +180,20 @@ def test_noise_alone_is_no_edit_and_a_change_is_one(change):
     quiet = np.random.default_rng(0).normal(0, 0.05, (2, 40, 50, 3))
     assert (significance(*quiet) > 0).mean() < 0.02
     assert (significance(*(quiet[..., :1] + np.array(change))) > 0.5).mean() > 0.99
+
+
+def test_a_shadow_with_sparkles_in_it_is_seen():
+    """Under glass single paths bring much light: they must not make its shadow look like chance."""
+    rng = np.random.default_rng(0)
+    shadow = np.zeros((40, 50, 1))
+    shadow[10:30, 15:35] = 0.2
+    base = [0.5 + rng.normal(0, 0.05, (40, 50, 3)) for _ in range(2)]
+    edited = [picture - shadow for picture in base]
+    for picture in edited:
+        picture[rng.random((40, 50)) < 0.01] = 20
+    gain = _gain(base[0], edited[0], base[1], edited[1])
+    assert gain[10:30, 15:35].min() > 0.5
+    assert not gain[:, :5].any()
 
 
 def test_a_lamp_in_the_picture_is_a_disc_at_native_size():

@@ -209,7 +209,12 @@ def difference(
     e = (e0 + e1) / 2
     if not differs.any():
         return Layers(b, b, differs, differs)
-    gain = np.where(changed, 1, np.where(near, _gain(b0, e0, b1, e1), 0)).astype(np.float32)
+    measured = window(near, margin=SETTINGS.window)
+    gain = changed.astype(np.float32)
+    gain[measured] = np.maximum(
+        gain[measured],
+        near[measured] * _gain(*(p[measured] for p in (b0, e0, b1, e1))),
+    )
 
     # --- Denoise both, and keep the difference by its gain ---
     if guides is not None:
@@ -229,7 +234,11 @@ def inner(hidden: Array) -> Array:
 
 
 def _gain(b0: Array, e0: Array, b1: Array, e1: Array) -> Array:
-    """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen."""
+    """[H, W] `significance` of the edit in two halves, 0 where its mean over the window is too small to be seen.
+
+    Fireflies are brought down first, as in what is shown: a few would hide the shadow that they lie in.
+    """
+    b0, e0, b1, e1 = (without_fireflies(picture) for picture in (b0, e0, b1, e1))
     base = np.maximum(_mean(((b0 + b1) / 2).astype(np.float32)), 0)
     edited = np.maximum(_mean(((e0 + e1) / 2).astype(np.float32)), 0)
     # Above white both are scaled down together: a change there is seen by its share.
