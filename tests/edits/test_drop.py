@@ -81,6 +81,17 @@ def test_inside_of_something_there_is_no_room(box):
         drop(scene, [box], AT, frames=2)
 
 
+@pytest.mark.parametrize(
+    "remedy", [{"scale": 0.25}, {"height": 8}], ids=lambda value: next(iter(value))
+)
+def test_what_the_message_advises_makes_room(box, remedy):
+    scene = insert(floor_scene(96, 72), box, AT, scale=4)
+    beside = (38.0, 50.0)
+    with pytest.raises(InputError, match="a smaller scale, or a larger height"):
+        drop(scene, [box], beside, frames=2)
+    assert len(drop(scene, [box], beside, frames=2, **remedy)) == 2
+
+
 def test_it_spins_about_its_centre_of_mass_which_falls_as_newton_says():
     """Straight down, wherever the middle of the box around the thing is."""
     off = np.array([0.15, 0.0, 0.05])

@@ -5,7 +5,7 @@ import torch
 from safetensors.torch import save_file
 
 from materialist.errors import WeightsError
-from materialist.predict.weights import read_state
+from materialist.predict.weights import metadata, read_state, write_weights
 
 
 def test_int8_levels_come_with_their_scales(tmp_path):
@@ -27,3 +27,13 @@ def test_scales_of_another_length_are_damage(tmp_path, scales):
     save_file({"a.weight": levels, "a.weight.scale": torch.ones(scales)}, path)
     with pytest.raises(WeightsError, match=rf"levels.safetensors is damaged: .*{scales} scales"):
         read_state(path)
+
+
+def test_written_weights_are_as_open_to_others_as_any_file(tmp_path):
+    plain = tmp_path / "plain.txt"
+    plain.touch()
+    path = tmp_path / "own.safetensors"
+    write_weights(path, {"a": torch.tensor([0.5, -2.0])}, {"format": "one"})
+    assert path.stat().st_mode == plain.stat().st_mode
+    assert read_state(path)["a"].tolist() == [0.5, -2.0]
+    assert metadata(path) == {"format": "one"}

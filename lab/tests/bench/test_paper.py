@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from materialist import __version__
 from materialist.errors import InputError
 from materialist_lab import bench
 from materialist_lab.bench import benchmark_class, edits, paper
@@ -109,6 +110,18 @@ def test_finished_rows_are_kept_until_the_commit_or_the_settings_change(
     monkeypatch.setattr(paper, "commit", lambda: "abc1234")
     assert run(seed=1, quick=False) == ["light", "whdr"]
     assert json.loads((tmp_path / "rows" / "light.json").read_text())["commit"] == "abc1234"
+
+
+def test_an_installed_package_names_its_version_for_a_commit(stubs, tmp_path, monkeypatch):
+    def no_git(*words, **options):
+        raise FileNotFoundError(words[0][0])
+
+    monkeypatch.setattr(paper.subprocess, "run", no_git)
+    monkeypatch.setattr(paper, "commit", paper.commit.__wrapped__)
+    bench.run("paper", output=tmp_path, quick=True, only="light")
+    text = (tmp_path / "report.md").read_text("utf-8")
+    version = f"of version {__version__}"
+    assert f"Written at commit {version}, " in text and f"\nCommit {version}, " in text
 
 
 def test_a_name_that_is_no_measure_is_refused(tmp_path):

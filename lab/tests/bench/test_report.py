@@ -130,7 +130,13 @@ def test_what_cannot_be_is_told_before_anything_is_written(
     monkeypatch.chdir(tmp_path / "empty")
     with pytest.raises(InputError, match=words):
         bench.run(name, output=tmp_path / "report", **options)
-    assert not list(tmp_path.glob("report/*"))
+    assert [path.name for path in tmp_path.iterdir()] == ["empty"]
+
+
+def test_a_run_that_cannot_begin_keeps_a_folder_that_was_there(tmp_path):
+    with pytest.raises(InputError, match="nothing to measure"):
+        bench.run("glass", output=tmp_path, shapes=0)
+    assert tmp_path.is_dir()
 
 
 def test_options_are_brought_to_the_kind_that_is_taken():

@@ -81,6 +81,14 @@ def test_a_run_learns_and_tells(run):
     assert (folder / "sheet.png").stat().st_size > 1000
 
 
+def test_a_run_that_cannot_be_scored_says_why(tasks, tmp_path):
+    notes: list[str] = []
+    trainer = made_runs.trainer(tasks["refraction"](), tmp_path / "run", steps=1, notes=notes)
+    trainer.fit()
+    assert "step 1  no scores, since the data are too few to keep some aside" in notes
+    assert not (tmp_path / "run" / checkpoint.SCORES).exists()
+
+
 def test_its_averaged_weights_predict_and_begin_another_run(run, data):
     folder, _ = run
     predictor = BundledPredictor(folder / checkpoint.WEIGHTS)

@@ -163,14 +163,15 @@ def load_weights(network: nn.Module, state: Mapping[str, Tensor], path: Path) ->
 def write_weights(path: Path, tensors: Mapping[str, Tensor], texts: dict[str, str]) -> None:
     """Write tensors as float16, with `texts` in the header, whole or not at all."""
     import torch
-    from safetensors.torch import save_file
+    from safetensors.torch import save
 
     half = {
         name: tensor.detach().cpu().to(torch.float16).contiguous()
         for name, tensor in tensors.items()
     }
     with whole_file(path, force=True) as file:
-        save_file(half, str(file), texts)
+        # Files that safetensors itself writes can be read by their owner alone.
+        file.write_bytes(save(half, texts))
 
 
 def metadata(path: Path) -> dict[str, str]:

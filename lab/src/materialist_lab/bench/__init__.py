@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from materialist.errors import InputError
+from materialist.errors import InputError, MaterialistError
 
 BENCHMARKS = (
     "real",
@@ -55,8 +55,15 @@ def run_benchmark(
     """As `run`, of a benchmark that has its options."""
     from materialist_lab.bench.report import claim
 
+    was_there = Path(output).exists()
     folder = claim(Path(output), force=force or getattr(benchmark, "resume", False))
-    benchmark.run(None if data is None else Path(data), folder)
+    try:
+        benchmark.run(None if data is None else Path(data), folder)
+    except MaterialistError:
+        # A run that could not begin leaves no empty folder.
+        if not was_there and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
     return folder
 
 

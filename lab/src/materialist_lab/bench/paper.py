@@ -170,7 +170,11 @@ class PaperBench(OperationOptions):
 
 @cache
 def commit() -> str:
-    """The last commit of product and laboratory, `+` and a digest where they have changes since; else the version."""
+    """The last commit of product and laboratory, `+` and a digest where they have changes since.
+
+    Of an installed package, which has no commits: "of version X".
+    """
+    released = f"of version {materialist.__version__}"
     folders = [str(Path(materialist.__file__).parent), str(Path(__file__).parents[1])]
     git: Any = partial(subprocess.run, cwd=folders[-1], capture_output=True, check=True)
     try:
@@ -179,8 +183,8 @@ def commit() -> str:
             for words in (("log", "-1", "--format=%h"), ("diff", "HEAD"))
         )
     except (OSError, subprocess.CalledProcessError):
-        return materialist.__version__
-    return (last.decode().strip() or materialist.__version__) + (
+        return released
+    return (last.decode().strip() or released) + (
         f"+{hashlib.sha256(since).hexdigest()[:6]}" if since else ""
     )
 

@@ -180,10 +180,9 @@ class Trainer:
         }
         if scores:
             checkpoint.append_line(self.folder / checkpoint.SCORES, line)
-        self.note(
-            f"step {self.schedule.step}  "
-            + "  ".join(f"{k} {v}" for k, v in self.last_scores.items())
-        )
+        figures = [f"{name} {value}" for name, value in self.last_scores.items()]
+        figures = figures or ["no scores, since the data are too few to keep some aside"]
+        self.note("  ".join([f"step {self.schedule.step}", *figures]))
         return scores
 
     def _batches(self) -> Iterator[Batch]:

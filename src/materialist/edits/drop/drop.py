@@ -203,7 +203,7 @@ def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, options: 
     if clear >= options.metres:
         raise InputError(
             f"There is no room at {places[0][0]:g},{places[0][1]:g}: the things would start inside of something; "
-            "choose another place, or a larger height."
+            "choose a place with more room around it, a smaller scale, or a larger height."
         )
     # --- Where they start, and what the provenance keeps ---
     starts = [(bodies, np.array([0, 0, lift + clear])) for (bodies, *_), lift in zip(stood, lifts)]
