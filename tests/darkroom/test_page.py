@@ -439,8 +439,10 @@ def test_the_page_draws_changes_as_the_server_does(page):
     there = (0.72, 0.86, 0.74, 0.88)
     before = seen(page, *there)
     drag(page, ".handle.thing", 0.45 * page.locator(".marks").bounding_box()["width"], 0)
-    page.wait_for_timeout(200)
-    assert np.abs(seen(page, *there) - before).max() > 15
+    end = time.monotonic() + 30
+    while np.abs(seen(page, *there) - before).max() <= 15:
+        assert time.monotonic() < end
+        page.wait_for_timeout(100)
     held.release()
     assert np.abs(seen(page, *there) - before).max() > 15
     assert not page.errors

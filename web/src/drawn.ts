@@ -355,7 +355,8 @@ class Drawn {
     this.panel = panel;
     if (!pending()) this.moved = {};
     clearTimeout(this.timer);
-    if (!this.wanted()) return;
+    const kind = HOME[panel];
+    if (!this.wanted()) return this.tell(kind && this.ready(kind) ? kind : "");
     this.tell("");
     this.timer = window.setTimeout(() => void this.ask(), REST);
   }

@@ -251,9 +251,11 @@ function hear(news: News): void {
     const known = view.jobs.find((one) => one.number === job.number);
     if (known && known.state !== job.state) ended(job);
   }
-  const finer = news.fine && !view.fine && state?.steps.some((step) => step.on);
-  set({ jobs: news.jobs, glass: news.glass, fine: news.fine });
+  set({ jobs: news.jobs, glass: news.glass });
   if (!state || pending()) return;
+  // Finer tables draw changes, too, also where there is no edit yet.
+  const finer = news.fine && !view.fine;
+  set({ fine: news.fine });
   const ready = news.ready && !state.ready && state.project;
   if (news.revision > state.revision || ready || traced || finer) void refresh();
 }
