@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import sph_harm_y
 
 from materialist.camera import pixel_rays, project, unit
+from materialist.color import luminance
 from materialist.types import Array, Camera
 
 
@@ -152,7 +153,8 @@ def with_mirrored_photo(envmap: Array, photo: Array, camera: Camera) -> Array:
 
     A fitted light is smooth: diffuse surfaces tell no more. As in Khan et al. 2006 (image-based material editing) the
     photo stands for what is behind the camera: mirrored and stretched from the right edge of the frame round to the
-    left one. Only its ratio to its own broad colours is taken, so that the light on diffuse surfaces stays.
+    left one. Only the ratio of its luminance to its own broad luminance is taken: the light on diffuse surfaces
+    stays, and no colour of an object that is edited is left in its mirrors.
 
     envmap: [h, 2h, 3] linear. photo: [H, W, 3] linear.
     """
@@ -165,17 +167,17 @@ def with_mirrored_photo(envmap: Array, photo: Array, camera: Camera) -> Array:
     turned = (np.abs(azimuth) - half_fov) / (180 - half_fov)
     column = np.where(azimuth > 0, 1 - turned / 2, turned / 2)
     row = 0.5 - elevation / (2 * DETAIL.last_elevation)
-    # --- The photo at the size at which the map shows it, over its own broad colours ---
+    # --- The photo's luminance at the size at which the map shows it, over its broad luminance ---
     size = (
         max(2, round(w * (1 - camera.fov / 360))),
         max(2, round(h * DETAIL.last_elevation / 90)),
     )
     small = cv2.resize(np.ascontiguousarray(photo, np.float32), size, interpolation=cv2.INTER_AREA)
-    log = np.log(np.maximum(small, 0) + DETAIL.floor)
+    log = np.log(np.maximum(luminance(small), 0) + DETAIL.floor)
     widths = [DETAIL.coarse * max(photo.shape) * n / m for n, m in zip(size[::-1], photo.shape)]
-    fine = log - gaussian_filter(log, (*widths, 0))
+    fine = log - gaussian_filter(log, widths)
     ratio = np.exp(np.clip(fine, -DETAIL.max_log, DETAIL.max_log))
-    ratio /= gaussian_filter(ratio, (*widths, 0))
+    ratio /= gaussian_filter(ratio, widths)
     # --- Laid on the map, fading out at the frame, at the poles and on lamps ---
     place = [
         np.clip(share * length - 0.5, 0, length - 1).astype(np.float32)
@@ -191,4 +193,4 @@ def with_mirrored_photo(envmap: Array, photo: Array, camera: Camera) -> Array:
     )
     dim, bright = DETAIL.lamp
     fade = fade * np.clip((bright - envmap.max(-1)) / (bright - dim), 0, 1)
-    return (envmap * (1 + fade[..., None] * (detail - 1))).astype(np.float32)
+    return (envmap * (1 + fade * (detail - 1))[..., None]).astype(np.float32)
