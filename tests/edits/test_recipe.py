@@ -13,6 +13,8 @@ from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 
+pytestmark = pytest.mark.usefixtures("filled_once")
+
 SCENE = flat_scene()
 
 

@@ -39,6 +39,8 @@ from materialist.io.out.icc import profile_of
 from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
 
+pytestmark = pytest.mark.usefixtures("filled_once")
+
 FLAT = flat_scene()
 
 

@@ -15,6 +15,8 @@ from materialist.errors import InputError
 from materialist.solids.revolution import Revolution
 from materialist.types import Camera
 
+pytestmark = pytest.mark.usefixtures("filled_once")
+
 PAPER = {"model": "two-interface", "thickness": "symmetry"}
 
 
