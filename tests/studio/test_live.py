@@ -66,3 +66,13 @@ def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     until(lambda: not psutil.pid_exists(third))
     with pytest.raises(InputError, match="was closed"):
         live.call(views.check, steps=())
+
+
+def test_a_studio_that_ends_takes_its_previews_along(shared, tmp_path):
+    project = shared.work.new("Room", "me", scene=package(tmp_path))
+    page = shared.page("page", "me")
+    shared.open(page, project.name)
+    process = page.session.live.process
+    assert psutil.pid_exists(process)
+    shared.close()
+    until(lambda: not psutil.pid_exists(process))

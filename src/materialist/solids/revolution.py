@@ -142,8 +142,8 @@ def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) 
     if behind is None or not (known := inside & (np.asarray(behind) > 0)).any():
         return -np.inf
     level = rays @ axis.up
-    low, high = np.percentile(level[inside], [0, 100])
-    lowest = known & (level <= low + SETTINGS.foot_share * (high - low))
+    low = level[inside].min()
+    lowest = known & (level <= low + SETTINGS.foot_share * np.ptp(level[inside]))
     if not lowest.any():
         return -np.inf
     points = rays[lowest] * np.asarray(behind)[lowest][:, None]
