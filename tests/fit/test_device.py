@@ -79,7 +79,7 @@ def elsewhere(monkeypatch):
     "engine, preset",
     [
         ("transport", DEFAULT),
-        ("transport", PAPER),
+        pytest.param("transport", PAPER, marks=pytest.mark.slow),
         pytest.param("path", PAPER, marks=pytest.mark.slow),
     ],
 )

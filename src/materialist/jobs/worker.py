@@ -109,6 +109,8 @@ def main(descriptor: int, niceness: int, idle: float, memory: int, threads: int 
         try:
             content = tasks.get(timeout=idle or None)
         except queue.Empty:
+            if connection.poll():
+                continue  # the receiving thread is late
             os._exit(0)
         if pool is not None:
             pool.submit(do, content)

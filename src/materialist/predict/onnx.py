@@ -51,6 +51,8 @@ def session(path: Path) -> InferenceSession:
     options = onnxruntime.SessionOptions()
     # How sums are split decides their last bits: one number of threads everywhere.
     options.intra_op_num_threads = TORCH_THREADS
+    # Waiting threads sleep: beside another process that computes, spinning costs a fifth.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     # Weights alone are int8: they become float32 again as they are loaded, and nothing else is quantised.
     options.add_session_config_entry("session.disable_quant_qdq", "1")
     options.log_severity_level = 3

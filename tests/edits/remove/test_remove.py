@@ -15,6 +15,8 @@ from materialist.errors import InputError
 from materialist.geometry.build import build_geometry
 from materialist.pipeline import render_scene
 
+pytestmark = pytest.mark.usefixtures("filled_once")
+
 
 def far_from(mask, pixels):
     return cv2.dilate(mask.astype(np.uint8), np.ones((2 * pixels + 1,) * 2, np.uint8)) == 0
