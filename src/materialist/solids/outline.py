@@ -101,7 +101,7 @@ def _fitted_body(up: Array, seen: _ObjectMaps) -> tuple[Revolution, Array] | Non
     if np.linalg.norm(np.cross(up, middle)) < SETTINGS.min_view_sine * np.linalg.norm(middle):
         return None
     # --- The axis: it lies in the upright plane at which the mask mirrors itself ---
-    across, overlap = _mirror_plane(seen.inside, seen.rays, up, seen.camera)
+    across, overlap = mirror_plane(seen.inside, seen.rays, up, seen.camera)
     if overlap < SETTINGS.min_mirror_overlap:
         return None
     ahead = np.cross(across, up)
@@ -155,7 +155,7 @@ def _step_ratio(body_side: Array, map_side: Array) -> float:
     return float(total_squares - explained.max()) / max(line, 1e-9)
 
 
-def _mirror_plane(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
+def mirror_plane(inside: Array, rays: Array, up: Array, camera: Camera) -> tuple[Array, float]:
     """The upright plane through the camera at which the mask mirrors itself best.
 
     Returns its unit normal [3], and the share of the mask that lies inside the mirrored mask.
@@ -169,13 +169,7 @@ def _mirror_plane(inside: Array, rays: Array, up: Array, camera: Camera) -> tupl
         return np.cos(angle) * first + np.sin(angle) * second
 
     def mismatch(angle: float) -> float:
-        normal = plane(angle)
-        mirrored = object_rays - 2 * (object_rays @ normal)[:, None] * normal
-        place, ahead = project(mirrored, camera)
-        x, y = np.floor(place).astype(int).T
-        in_frame = (ahead > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
-        hits = inside[np.where(in_frame, y, 0), np.where(in_frame, x, 0)] & in_frame
-        return 1 - float(hits.mean())
+        return 1 - float(has_mirror_image(inside, rays, plane(angle), camera)[inside].mean())
 
     # The mismatch has steps of whole pixels: a coarse search first, then a local one that may not do worse.
     width = np.ptp(object_rays @ first) / np.linalg.norm(middle)
@@ -185,6 +179,18 @@ def _mirror_plane(inside: Array, rays: Array, up: Array, camera: Camera) -> tupl
     )
     angle = min((best, float(refined.x)), key=mismatch)
     return plane(angle), 1 - mismatch(angle)
+
+
+def has_mirror_image(inside: Array, rays: Array, across: Array, camera: Camera) -> Array:
+    """[H, W] bool: pixels of a mask whose mirror image at the plane with normal `across` [3] is in the mask."""
+    object_rays = rays[inside]
+    mirrored = object_rays - 2 * (object_rays @ across)[:, None] * across
+    place, ahead = project(mirrored, camera)
+    x, y = np.floor(place).astype(int).T
+    in_frame = (ahead > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+    result = np.zeros(inside.shape, bool)
+    result[inside] = inside[np.where(in_frame, y, 0), np.where(in_frame, x, 0)] & in_frame
+    return result
 
 
 def _placed(

@@ -10,7 +10,7 @@ from geometry_scenes import plane_depth, sphere_depth
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import LID, NARROW, NO_ROOM, SOLID, glass
 from materialist.edits.glass.glass_preview import GlassPreview
-from materialist.edits.glass.thickness import object_thickness, objects_in
+from materialist.edits.glass.thickness import object_thickness, objects_in, thick_parts
 from materialist.errors import InputError
 from materialist.solids.revolution import Revolution
 from materialist.types import Camera
@@ -147,6 +147,26 @@ def test_two_objects_are_as_thick_together_as_alone():
         own = vertices[np.abs(vertices[:, 0] - centre[0]) < 0.6]
         away = np.linalg.norm(own - centre, axis=1)
         assert np.abs(away / radius - 1).max() < 0.05, "each is its own ball"
+
+
+def test_a_ball_with_a_handle_is_a_ball_and_a_handle():
+    scene, number = balls(((-0.5, -0.2, -3), 0.4))
+    rows, columns = np.indices(number.shape)
+    ball = number == 0
+    middle = int(np.median(np.nonzero(ball)[0]))
+    right = np.flatnonzero(ball[middle])[-1]
+    away = np.hypot(rows - middle, columns - right)
+    ring = (away > 4) & (away < 7.5) & (columns >= right - 2)
+    near = np.where(ring & ~ball, np.float32(3), scene.depth)
+    scene = replace(scene, depth=near)
+    body, handle = thick_parts(scene, ball | ring)
+    assert body.thickness.method == "revolution" and not body.is_handle
+    assert handle.is_handle and (handle.mask & ball).sum() < 0.2 * handle.mask.sum()
+    edited = glass(scene, ball | ring, hollow=True)
+    assert edited.provenance["edits"][-1]["thickness"] == "revolution, outline"
+    assert NO_ROOM not in edited.report.warnings, "a handle is solid without a note"
+    # By another method it is one object.
+    assert len(thick_parts(scene, ball | ring, "symmetry")) == 1
 
 
 def test_a_round_body_without_room_for_an_opening_says_so(monkeypatch):

@@ -65,6 +65,7 @@ class GlassBench(Benchmark):
     )
 
     shapes: int = option(2, "Objects of each group.", **COUNT_OR_0)
+    jugs: int = option(0, "Jugs with a handle, besides.", **COUNT_OR_0)
     envmaps: int = option(2, "Lights of each object.", **COUNT)
     iors: str = option("1.1,1.3", "Indices of refraction.", kind="name")
     background: str = option(
@@ -82,7 +83,7 @@ class GlassBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         iors = numbers("iors", self.iors, 1.001, 3, float)
-        for case, behind in self._cases(data, iors) if self.shapes else ():
+        for case, behind in self._cases(data, iors):
             shown: dict[str, Array] = {}
             yield from self._compared(case, behind, shown)
             # --- The pictures: truth and predictions inside the mask, the room around them ---
@@ -100,7 +101,8 @@ class GlassBench(Benchmark):
     ) -> Iterator[tuple[Case, dict[str, Background]]]:
         """Every case with what is behind its object: the 'true' room, and what the photo tells, 'inpainted'."""
         lights = {group: count() for group in scenes.GROUPS}  # both groups see the same ones
-        for thing in scenes.things(data, self.shapes, self.seed):
+        things = scenes.things(data, self.shapes, self.seed) if self.shapes else []
+        for thing in [*things, *scenes.jugs(self.jugs, self.seed)]:
             stage = scenes.GlassScene(thing, self.size, self.seed, self.background)
             for j in range(self.envmaps):
                 light = scenes.environment(
@@ -148,6 +150,9 @@ class GlassBench(Benchmark):
                 yield row(f"{name}, {source} d", model(case, thickness, true), thickness)
             inpainted = model(case, d["predicted"], behind["inpainted"])
             yield row(f"{name}, predicted d, inpainted", inpainted, d["predicted"])
+        # --- The body of the edit, which may have several parts ---
+        if stage.room.items:
+            yield row("closed, of the edit", models.edited(case, true))
         # --- How much the normal of the back is worth ---
         for source in ("true", "network"):
             leaning = replace(d[source], back=stage.front.back)

@@ -11,6 +11,7 @@ import numpy as np
 
 from materialist.edits.core.renderer import denoised
 from materialist.edits.glass import two_interface as interfaces
+from materialist.edits.glass.glass import glass
 from materialist.edits.glass.options import Glass
 from materialist.edits.glass.thickness import object_thickness
 from materialist.edits.remove.filling import filled
@@ -141,6 +142,12 @@ def closed(case: Case, thickness: Thickness, behind: Background) -> Array:
     body = closed_proxy(
         depth, normal, mask, thickness.solid, scene.camera, behind=beyond, back=thickness.back
     )
+    return before(case, body, behind)
+
+
+def edited(case: Case, behind: Background) -> Array:
+    """[H, W, 3] linear, inside the object's mask: the body that `materialist glass` makes, before the background."""
+    body: Any = glass(case.scene, case.stage.mask).bodies[-1]
     return before(case, body, behind)
 
 

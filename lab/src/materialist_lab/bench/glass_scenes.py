@@ -19,7 +19,7 @@ from materialist_lab.bench.edits import LIFT, staged
 from materialist_lab.procedural import lights, patterns
 from materialist_lab.procedural.arrangements import Item, in_camera
 from materialist_lab.procedural.objects import shapes
-from materialist_lab.procedural.objects.glassware import KINDS, make_shape
+from materialist_lab.procedural.objects.glassware import KINDS, jug, make_shape
 from materialist_lab.procedural.objects.shapes import Solid
 from materialist_lab.procedural.synthetic import TrueScene
 from materialist_lab.procedural.thickness.dataset import CameraPose, look
@@ -71,6 +71,15 @@ class SeenSide:
     """[H, W] from the first to the last surface along the ray."""
     back: Array
     """[H, W, 3] unit normal of that last surface, away from the viewer."""
+
+
+def jugs(count: int, seed: int = 0) -> list[GlassObject]:
+    """Solid jugs with a handle at one side."""
+    solids = [jug(np.random.default_rng([seed, 11, k])) for k in range(count)]
+    return [
+        GlassObject(f"jug {k}", "symmetric", shapes.grounded(shapes.placed(solid, scale=0.7)))
+        for k, solid in enumerate(solids)
+    ]
 
 
 def things(data: Path | None, count: int, seed: int = 0) -> list[GlassObject]:

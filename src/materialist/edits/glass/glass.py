@@ -11,7 +11,7 @@ from materialist.edits.core.notes import noted, warned
 from materialist.edits.core.region import checked_region
 from materialist.edits.core.surfaces import PHOTO_GLASS
 from materialist.edits.glass.options import Glass, GlassKeywords
-from materialist.edits.glass.thickness import object_thickness, objects_in, wall_of
+from materialist.edits.glass.thickness import ThickPart, thick_parts, wall_of
 from materialist.edits.remove.remove import remove
 from materialist.geometry.membrane import nearest
 from materialist.geometry.slopes import blurred_normals
@@ -50,19 +50,14 @@ def glass(
     options = Glass.merged(options, **values)
     region = checked_region(scene, mask) > 0.5
     removed = remove(scene, mask, options, fitted=fitted)
-    # --- The thickness of each object under the mask ---
-    each = [
-        (part, object_thickness(scene, part, options.thickness, behind=removed.depth))
-        for part in objects_in(region)
-    ]
+    parts = thick_parts(scene, region, options.thickness, behind=removed.depth)
     if options.model == "two-interface":
-        edited = _two_interface(scene, removed, each, options, (fitted or scene).envmap)
+        edited = _two_interface(scene, removed, parts, options, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if options.hollow else edited
     else:
-        # All objects are one body: they have one material, and none touches another.
+        # All parts are one body: they have one material.
         shells, notes = zip(
-            *(_shell(scene, removed, part, thick, options.hollow) for part, thick in each),
-            strict=True,
+            *(_shell(scene, removed, part, options.hollow) for part in parts), strict=True
         )
         shell = joined_shells(shells)
         body = Body(
@@ -82,25 +77,28 @@ def glass(
         "hollow": options.hollow,
         "model": options.model,
         "back": options.back,
-        "thickness": ", ".join(dict.fromkeys(thick.method for _, thick in each)),
+        "thickness": ", ".join(dict.fromkeys(part.thickness.method for part in parts)),
         "pixels": int(region.sum()),
     }
     return noted(edited, "glass", facts)
 
 
 def _shell(
-    scene: Scene, removed: Scene, part: Array, thick: Thickness, hollow: bool | str
+    scene: Scene, removed: Scene, part: ThickPart, hollow: bool | str
 ) -> tuple[Shell, list[str]]:
-    """(the body of one object, notes on a wall or an opening that could not be made)."""
+    """(the body of one part, notes on a wall or an opening that could not be made)."""
     camera = scene.camera
+    thick = part.thickness
     revolution = thick.revolution
-    wall = wall_of(scene, part, thick) if hollow else None
+    # Handles are solid, also those of a hollow jug.
+    hollow = False if part.is_handle else hollow
+    wall = wall_of(scene, part.mask, thick) if hollow else None
     if revolution is None:
         depth, normal = thick.front or (scene.depth, scene.normal)
         shell = closed_proxy(
             depth,
             normal,
-            part,
+            part.mask,
             thick.solid,
             camera,
             wall=wall,
@@ -136,7 +134,7 @@ def glass_surface(scene: Scene, options: Glass) -> Surface:
 
 
 def _two_interface(
-    scene: Scene, removed: Scene, each: list[tuple[Array, Thickness]], options: Glass, envmap: Array
+    scene: Scene, removed: Scene, parts: list[ThickPart], options: Glass, envmap: Array
 ) -> Scene:
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
     from materialist.edits.glass.two_interface import Backdrop, two_interface
@@ -146,8 +144,9 @@ def _two_interface(
     picture: Array = np.zeros(scene.photo.linear.shape, np.float32)
     clear = options.transmission
     behind = Backdrop(photo.linear, removed.depth, envmap)
-    for part, thick in each:
-        seen, front, facing = _front(scene, part, thick)
+    for part in parts:
+        thick = part.thickness
+        seen, front, facing = _front(scene, part.mask, thick)
         glass_picture = two_interface(
             scene.camera, facing, front, seen, thick.solid, behind, options, thick.back
         )

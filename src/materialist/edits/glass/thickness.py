@@ -18,6 +18,7 @@ from materialist.predict.refraction.thickness import (
     of_outline,
     thickness,
 )
+from materialist.solids.handles import without_handles
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
 
@@ -54,6 +55,50 @@ def objects_in(mask: Array) -> list[Array]:
     return [mask & (whose == k) for k in large]
 
 
+@dataclass(frozen=True)
+class ThickPart:
+    """A part of what is turned to glass."""
+
+    mask: Array
+    """[H, W] bool."""
+    thickness: Thickness
+    is_handle: bool = False
+    """Stands out from a surface of revolution."""
+
+
+def thick_parts(
+    scene: Scene, mask: Array, method: str | Array | Path = "auto", *, behind: Array | None = None
+) -> list[ThickPart]:
+    """The objects under a mask [H, W] bool and their thickness; a jug is a surface of revolution and its handle.
+
+    method, behind, errors: as for `object_thickness`.
+    """
+    parts: list[ThickPart] = []
+    for one in objects_in(mask):
+        whole = object_thickness(scene, one, method, behind=behind)
+        jug = None
+        if isinstance(method, str) and method == "auto" and whole.revolution is None:
+            jug = _jug(scene, one, behind)
+        parts += jug or [ThickPart(one, whole)]
+    return parts
+
+
+def _jug(scene: Scene, mask: Array, behind: Array | None) -> list[ThickPart] | None:
+    """An object as a surface of revolution, and its handles inflated from their outlines; None where it is none."""
+    up = _up(scene, mask)
+    body = None if up is None else without_handles(mask, up, scene.camera)
+    if body is None:
+        return None
+    round_body = object_thickness(scene, body, behind=behind)
+    if round_body.revolution is None:
+        return None
+    handles = [
+        ThickPart(one, object_thickness(scene, one, "outline", behind=behind), is_handle=True)
+        for one in objects_in(mask & ~body)
+    ]
+    return [ThickPart(body, round_body), *handles]
+
+
 def object_thickness(
     scene: Scene, mask: Array, method: str | Array | Path = "auto", *, behind: Array | None = None
 ) -> Thickness:
@@ -80,8 +125,12 @@ def object_thickness(
         return thickness(*maps)
     if method == "outline":
         return of_outline(thickness(*maps).hollow, inside, scene.normal, scene.depth, scene.camera)
-    up = upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
-    return best_thickness(*maps, up=up, behind=behind)
+    return best_thickness(*maps, up=_up(scene, inside), behind=behind)
+
+
+def _up(scene: Scene, inside: Array) -> Array | None:
+    """[3] unit: upright in the camera's frame, by the planes beside the object; None where none tells it."""
+    return upright(scene.normal, np.where(inside, -1, scene.geometry.plane_label))
 
 
 def wall_of(scene: Scene, mask: Array, thick: Thickness) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from materialist.camera import unit
@@ -118,6 +119,28 @@ def _mug(rng: np.random.Generator) -> Solid:
     line = np.stack([x, y, 0 * t], -1)
     handle = shapes.tube(line, width * rng.uniform(0.06, 0.14), 12)
     return shapes.joined([solid, handle])
+
+
+def jug(rng: np.random.Generator) -> Solid:
+    """A solid of revolution with a handle at one side, as one closed surface; it stands."""
+    # --- The radius at even heights from 0 to 1; the handle is a bent rod that ends in the body ---
+    knots = np.linspace(0, 1, 4)
+    radius = PchipInterpolator(knots, rng.uniform(0.28, 0.5, 4))
+    t = np.linspace(-1.5, 1.5, 200)
+    low, high = rng.uniform([0.15, 0.7], [0.3, 0.9])
+    inner = float(min(radius(low), radius(high))) - 0.03
+    x = inner + rng.uniform(0.2, 0.35) * np.cos(t)
+    y = (low + high) / 2 + (high - low) / 2 * np.sin(t)
+    rod = cKDTree(np.stack([x, y - 0.5, 0 * t], -1))
+    thick = rng.uniform(0.035, 0.06)
+
+    def field(p: Array) -> Array:
+        """[...] about the distance of points [..., 3] from the surface, negative inside."""
+        away = np.hypot(p[..., 0], p[..., 2]) - radius(np.clip(p[..., 1] + 0.5, 0, 1))
+        body = np.maximum(away, np.abs(p[..., 1]) - 0.5)
+        return np.minimum(body, rod.query(p)[0] - thick)
+
+    return level_set(field, 0.9, points=128)
 
 
 def _goblet(rng: np.random.Generator) -> Solid:
