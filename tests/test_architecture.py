@@ -45,7 +45,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "fit": {"io", "bsdf", "geometry", "transport", "render"},
     "edits.core": SCENE,
     "edits.select": SCENE | {"edits.core", "predict"},
-    "edits.material": SCENE | {"edits.core"},
+    "edits.material": SCENE | {"edits.core", "solids"},
     "edits.composite": SCENE | {"edits.core"},
     "edits.light": SCENE | {"edits.core", "edits.composite"},
     "edits.remove": SCENE | {"edits.core", "edits.composite", "edits.select", "predict"},

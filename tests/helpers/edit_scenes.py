@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
+from geometry_scenes import plane_depth, sphere_depth
 
 from materialist.geometry.build import build_geometry
 from materialist.pipeline import render_scene
@@ -102,3 +103,20 @@ def tetrahedron() -> Body:
     grey = np.full((1, 1), 0.5, np.float32)
     red = np.float32([[[0.7, 0.05, 0.05]]])
     return Body(corners, faces, normals, np.zeros((4, 2), np.float32), Surface(red, grey, 0 * grey))
+
+
+def balls(*spheres):
+    """(scene, number of the ball [H, W]): balls on a floor before a wall."""
+    camera = Camera(96, 72, 45.0)
+    floor = plane_depth(camera, (0, 1, 0), -0.6)
+    depth = np.minimum(floor, 5.0)
+    normal = np.where((floor < 5)[..., None], [0.0, 1, 0], [0.0, 0, 1])
+    number = np.full(depth.shape, -1)
+    for k, sphere in enumerate(spheres):
+        front, outward = sphere_depth(camera, *sphere)
+        here = front < depth
+        depth[here], normal[here], number[here] = front[here], outward[here], k
+    light = (0.4 * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None] * np.ones(3)).astype(
+        np.float32
+    )
+    return scene_of(camera, depth, normal, np.full((*depth.shape, 3), 0.4), photo=light), number

@@ -127,9 +127,9 @@ class Preview:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
 
         `coarse`: another light by a seventh of the rays, surfaces passing on what they did in the picture before.
-        Raises InputError when its geometry is not that of the scene this preview was built for.
+        Normals are those of the scene this preview was built for. Raises InputError for other surfaces than its own.
         """
-        if edited.geometry is not self.scene.geometry:
+        if edited.geometry.mesh.vertices is not self.scene.geometry.mesh.vertices:
             raise InputError(
                 "The preview was built for another geometry; build one for this scene."
             )

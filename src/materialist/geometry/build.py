@@ -85,6 +85,23 @@ def continued_as(geometry: Geometry, other: Geometry) -> Geometry:
     return Geometry(_tidy(mesh), other.plane_label)
 
 
+def with_normals(geometry: Geometry, normal: Array, region: Array) -> Geometry:
+    """The same surfaces with the normals of a map [H, W, 3] inside a region [H, W] bool; its border keeps its own.
+
+    Points and faces are shared with the geometry that is given.
+    """
+    mesh = geometry.mesh
+    inside = (mesh.face_plane < 0) & region.ravel()[mesh.face_pixel]
+    total = np.zeros((len(mesh.vertices), 3))
+    np.add.at(total, mesh.faces[inside], normal.reshape(-1, 3)[mesh.face_pixel[inside], None])
+    changed = np.zeros(len(mesh.vertices), bool)
+    changed[mesh.faces[inside]] = True
+    changed[mesh.faces[~inside]] = False
+    normals = mesh.normals.copy()
+    normals[changed] = face_camera(total[changed], mesh.vertices[changed])
+    return replace(geometry, mesh=replace(mesh, normals=normals))
+
+
 def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     """The mesh with a vertex for each normal where pixels of different normals meet; its points stay where they are.
 

@@ -4,16 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import INNER, MASK, flat_scene, rendered_scene, scene_of
-from geometry_scenes import plane_depth, sphere_depth
+from edit_scenes import INNER, MASK, balls, flat_scene, rendered_scene
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.glass.glass import LID, NARROW, NO_ROOM, SOLID, glass
 from materialist.edits.glass.glass_preview import GlassPreview
-from materialist.edits.glass.thickness import object_thickness, objects_in, thick_parts
+from materialist.edits.glass.thickness import object_thickness, thick_parts
 from materialist.errors import InputError
+from materialist.solids.parts import objects_in
 from materialist.solids.revolution import Revolution
-from materialist.types import Camera
 
 pytestmark = pytest.mark.usefixtures("filled_once")
 
@@ -117,23 +116,6 @@ def test_what_a_vessel_cannot_be_is_said():
     for hollow in (True, "open"):
         thin = glass(scene, MASK, hollow=hollow, thickness=np.full(MASK.shape, 0.01, np.float32))
         assert NO_ROOM in thin.report.warnings and LID not in thin.report.warnings
-
-
-def balls(*spheres):
-    """(scene, number of the ball [H, W]): balls on a floor before a wall."""
-    camera = Camera(96, 72, 45.0)
-    floor = plane_depth(camera, (0, 1, 0), -0.6)
-    depth = np.minimum(floor, 5.0)
-    normal = np.where((floor < 5)[..., None], [0.0, 1, 0], [0.0, 0, 1])
-    number = np.full(depth.shape, -1)
-    for k, sphere in enumerate(spheres):
-        front, outward = sphere_depth(camera, *sphere)
-        here = front < depth
-        depth[here], normal[here], number[here] = front[here], outward[here], k
-    light = (0.4 * np.clip(normal @ [0.3, 0.7, 0.6], 0.1, 1)[..., None] * np.ones(3)).astype(
-        np.float32
-    )
-    return scene_of(camera, depth, normal, np.full((*depth.shape, 3), 0.4), photo=light), number
 
 
 def test_two_objects_are_as_thick_together_as_alone():

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import MASK, flat_scene
+from edit_scenes import MASK, balls, flat_scene
 from made_meshes import floor_scene
 
+from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.edits.material.material import edit, projected, shifted_hsv
+from materialist.edits.preview import Preview
 from materialist.errors import InputError
+from materialist.geometry.build import with_normals
 
 SCENE = flat_scene()
 
@@ -200,3 +203,54 @@ def test_a_bright_colour_is_darkened_until_the_fine_shading_has_room():
     # A darker one has room.
     grey = edit(scene, MASK, albedo=(0.4, 0.4, 0.4)).materials.albedo
     np.testing.assert_allclose(grey[MASK & (shading == 1)], 0.4, rtol=0.01)
+
+
+def uneven_ball():
+    """(scene with a ball whose normals are uneven, its mask [H, W], its true normals [H, W, 3])."""
+    scene, number = balls(((-0.3, -0.2, -3), 0.4))
+    ball = number == 0
+    rows, columns = np.indices(ball.shape)
+    waves = 0.3 * np.stack([np.sin(rows), np.cos(columns), 0 * rows], -1)
+    normal = unit(scene.normal + np.where(ball[..., None], waves, 0)).astype(np.float32)
+    uneven = replace(scene, normal=normal, geometry=with_normals(scene.geometry, normal, ball))
+    return uneven, ball, scene.normal
+
+
+def test_metal_has_the_normals_of_a_round_body():
+    scene, ball, truth = uneven_ball()
+    gold = edit(scene, ball, metallic=1, roughness=0.1)
+    np.testing.assert_array_equal(gold.normal[~ball], scene.normal[~ball])
+    off = [
+        np.degrees(np.arccos((n * truth)[ball].sum(-1).clip(-1, 1)))
+        for n in (scene.normal, gold.normal)
+    ]
+    assert np.median(off[1]) < 4 < 10 < np.median(off[0])
+    # The surfaces stay where they are; their normals are the map's.
+    mesh = gold.geometry.mesh
+    assert mesh.vertices is scene.geometry.mesh.vertices
+    inside = ball.ravel()[mesh.face_pixel]
+    turned = (
+        mesh.normals[mesh.faces[inside]] != scene.geometry.mesh.normals[mesh.faces[inside]]
+    ).any()
+    assert turned
+    np.testing.assert_array_equal(
+        mesh.normals[mesh.faces[~inside]], scene.geometry.mesh.normals[mesh.faces[~inside]]
+    )
+    assert gold.provenance["edits"][-1]["normals"] == "outline"
+    # The preview shades it with the photo's.
+    assert np.isfinite(Preview(scene).picture(gold)).all()
+
+
+@pytest.mark.parametrize(
+    "change", [{"roughness": 0.1}, {"metallic": 0.3}, {"metallic": 1, "normals": "maps"}]
+)
+def test_other_edits_leave_its_normals(change):
+    scene, ball, _ = uneven_ball()
+    edited = edit(scene, ball, **change)
+    assert edited.normal is scene.normal and edited.geometry is scene.geometry
+    assert "normals" not in edited.provenance["edits"][-1]
+
+
+def test_metal_that_is_not_round_keeps_its_normals():
+    edited = edit(SCENE, MASK, metallic=1)
+    assert edited.normal is SCENE.normal and edited.geometry is SCENE.geometry

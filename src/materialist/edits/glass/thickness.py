@@ -4,13 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import label
 
 from materialist.camera import pixel_rays
 from materialist.errors import InputError
-from materialist.geometry.membrane import nearest
 from materialist.geometry.planes import upright
-from materialist.geometry.silhouette import object_size, silhouette_field, surface_in
+from materialist.geometry.silhouette import object_size, surface_in
 from materialist.io.image import read_map
 from materialist.predict.refraction.thickness import (
     Thickness,
@@ -19,6 +17,7 @@ from materialist.predict.refraction.thickness import (
     thickness,
 )
 from materialist.solids.handles import without_handles
+from materialist.solids.parts import objects_in
 from materialist.solids.symmetry import symmetric_thickness
 from materialist.types import Array, Scene
 
@@ -28,31 +27,14 @@ METHODS = ("auto", "outline", "network", "symmetry")
 
 @dataclass(frozen=True)
 class WallSettings:
-    """The wall of a hollow object, as parts of its size, and what an object is; tuned by eye."""
+    """The wall of a hollow object, as parts of its size; tuned by eye."""
 
     default_share: float = 0.05  # of the object's size, where nothing tells the wall
     min_share: float = 0.015  # bounds on what RefractionNet predicts
     max_share: float = 0.12
-    min_depth_pixels: float = 0.02  # inside its outline that a part must reach; derived
-    min_part: float = 0.01  # share of the mask's largest part from which a part is an object
 
 
 WALL = WallSettings()
-
-
-def objects_in(mask: Array) -> list[Array]:
-    """[H, W] bool masks of the connected objects under a mask [H, W] bool; together they are the mask.
-
-    Specks, and lines too thin for a body, count to the nearest object.
-    """
-    # Connected parts, diagonally as well; thin ones have no pixel deep enough inside.
-    number, _ = label(mask, np.ones((3, 3)))
-    thick = np.isin(number, number[mask & (silhouette_field(mask) > WALL.min_depth_pixels)])
-    area = np.bincount(number[thick] if thick.any() else number.ravel())
-    area[0] = 0
-    large = np.flatnonzero(area >= max(WALL.min_part * area.max(), 1))
-    whose = number[nearest(np.isin(number, large))]
-    return [mask & (whose == k) for k in large]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Edits of albedo, roughness and metallic inside a region (paper, Opaque Material Editing)."""
 
+import hashlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -14,10 +15,16 @@ from materialist.edits.core.region import checked_region, reshaped
 from materialist.edits.material.detail import shaded, shading_detail
 from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
-from materialist.geometry.planes import axes
+from materialist.geometry.build import with_normals
+from materialist.geometry.planes import axes, upright
 from materialist.io.photo import decode_photo
 from materialist.option_kinds import documented
+from materialist.solids.parts import outline_normals
 from materialist.types import Array, Materials, Scene
+
+MAX_KEPT = 4
+"""Normal maps that are kept."""
+_KEPT: dict[str, Array] = {}
 
 
 @documented(MaterialEdit)
@@ -53,6 +60,11 @@ def edit(
         _mix(materials.roughness, _changed(materials.roughness, changes.roughness), weight),
         _mix(materials.metallic, _changed(materials.metallic, changes.metallic), weight),
     )
+    region = weight > 0.5
+    metal = changes.metallic is not None and region.any() and new.metallic[region].mean() > 0.5
+    edited = replace(scene, materials=new)
+    if metal and changes.normals == "auto":
+        edited = _round(edited, region)
     names = ("hue", "saturation", "value", "grow", "feather")
     facts: dict[str, Any] = {name: getattr(changes, name) or None for name in names}
     facts |= {
@@ -61,10 +73,32 @@ def edit(
         "metallic": changes.metallic,
         "texture": texture,
         "detail": changes.detail if changes.detail != 1 else None,
+        "normals": "outline" if edited.normal is not scene.normal else None,
     }
-    return noted(
-        replace(scene, materials=new), "material", {**facts, "pixels": int((weight > 0.5).sum())}
-    )
+    return noted(edited, "material", {**facts, "pixels": int(region.sum())})
+
+
+def _round(scene: Scene, region: Array) -> Scene:
+    """The scene with the normals of bodies where the region [H, W] bool has surfaces of revolution."""
+    normal = _outline_normals(scene, region)
+    changed = (normal != scene.normal).any(-1)
+    if not changed.any():
+        return scene
+    return replace(scene, normal=normal, geometry=with_normals(scene.geometry, normal, changed))
+
+
+def _outline_normals(scene: Scene, region: Array) -> Array:
+    """`outline_normals` of a region; kept for the next value of a slider, since it takes a second."""
+    digest = hashlib.sha256(repr(scene.camera).encode())
+    for array in (scene.depth, scene.normal, scene.geometry.plane_label, region):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    key = digest.hexdigest()
+    if key not in _KEPT:
+        up = upright(scene.normal, np.where(region, -1, scene.geometry.plane_label))
+        while len(_KEPT) >= MAX_KEPT:
+            _KEPT.pop(next(iter(_KEPT)), None)
+        _KEPT[key] = outline_normals(scene.depth, scene.normal, region, scene.camera, up)
+    return _KEPT[key]
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:

@@ -51,6 +51,12 @@ class MaterialEdit(OperationOptions):
     # The other maps.
     roughness: float | str | None = option(None, "Set to V, or shift by +D or -D.", **SHIFT)
     metallic: float | str | None = option(None, "The same for metallic.", **SHIFT)
+    normals: str = option(
+        "auto",
+        "Of metal; auto: of its outline where that is round and upright, as of a jug; maps: as they are.",
+        kind="word",
+        choices=("auto", "maps"),
+    )
     # The region.
     grow: float = option(
         0.0,
@@ -76,5 +82,6 @@ class MaterialKeywords(TypedDict, total=False):
     detail: float
     roughness: float | str | None
     metallic: float | str | None
+    normals: str
     grow: float
     feather: float
