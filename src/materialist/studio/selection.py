@@ -155,6 +155,6 @@ def read_pick(data: Any) -> dict[str, Any]:
     return {"tool": tool, "mode": mode, "at": numbers, "points": points, "radius": radius}
 
 
-def data_url(data: bytes, kind: str) -> str:
-    """A picture file (`png` or `jpeg`) as a data URL."""
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+def data_url(data: bytes) -> str:
+    """A JPEG file as a data URL."""
+    return f"data:image/jpeg;base64,{base64.b64encode(data).decode()}"

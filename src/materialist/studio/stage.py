@@ -118,7 +118,7 @@ def stage(
             "waiting": False,
             "bad": True,
         }
-    return {**shown, "picture": data_url(made, "jpeg"), "coarse": coarse}
+    return {**shown, "picture": data_url(made), "coarse": coarse}
 
 
 def _lamps(edits: EditList) -> list[list[float]]:
@@ -157,12 +157,12 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
 
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
-    return data_url(views.encoded(linear), "jpeg")
+    return data_url(views.encoded(linear))
 
 
 def jpeg_file(file: Path) -> str:
     """A JPEG file as a data URL."""
-    return data_url(file.read_bytes(), "jpeg")
+    return data_url(file.read_bytes())
 
 
 def failure_message(job: Job) -> str:

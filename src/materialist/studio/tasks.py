@@ -48,6 +48,8 @@ KINDS = {
 """Kind of result -> its title, and the suffix of the file."""
 _NEEDED = {"usd": "pxr", "turn": "imageio_ffmpeg"}
 """Kind -> the module that it does not work without."""
+_JPEG_SIDE = 2048
+"""Longest side of the small picture beside a result, pixels."""
 
 
 @cache
@@ -134,30 +136,27 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
 
 def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg; the photo so."""
-    from materialist.edits.composite.composite import write_composite
-
     loaded, edited = _edited(report, scene, steps)
     picture = mt.composite(loaded, edited, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
-        write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
+        mt.save_image(out.with_suffix(suffix), picture, loaded.photo, force=True)
     for file, shown in (
         (out.with_suffix(".jpg"), picture),
         (before_of(out), loaded.photo.original),
     ):
-        write_jpeg(file, shown, longest=2048)
+        write_jpeg(file, shown)
 
 
 def converted(report: Reporter, scene: str, source: str, output: str) -> None:
     """A path-traced picture, SOURCE.exr of `final`, in another format, as the photo's own file would be."""
-    from materialist.edits.composite.composite import write_composite
     from materialist.io.exr import read_exr
 
     report("export", 0, 1)
     photo = mt.load_scene(scene).photo
     # An EXR is in the unit of the photo's file.
     picture = read_exr(source) * np.float32(2.0**photo.stops)
-    write_composite(output, picture, photo, force=True)
+    mt.save_image(output, picture, photo, force=True)
 
 
 def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
@@ -299,9 +298,9 @@ def _zipped(output: Path) -> Iterator[Path]:
         shutil.rmtree(place, ignore_errors=True)
 
 
-def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
-    """A linear picture [H, W, 3] as a JPEG of at most `longest` pixels a side."""
-    scale = min(1.0, longest / max(linear.shape[:2]))
+def write_jpeg(path: Path, linear: Array) -> None:
+    """A linear picture [H, W, 3] as a JPEG of at most _JPEG_SIDE pixels a side."""
+    scale = min(1.0, _JPEG_SIDE / max(linear.shape[:2]))
     size = (max(1, round(linear.shape[1] * scale)), max(1, round(linear.shape[0] * scale)))
     small = (
         np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear
