@@ -81,6 +81,15 @@ def maps(of: Prediction | Scene) -> dict[str, Array]:
     }
 
 
+def shrunk(picture: Array, longest: int) -> Array:
+    """[H, W, ...] with at most `longest` pixels on the longer side: area averages."""
+    scale = longest / max(picture.shape[:2])
+    if scale >= 1:
+        return picture
+    height, width = (max(1, round(side * scale)) for side in picture.shape[:2])
+    return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+
+
 def encoded(pixels: Array, kind: str = "PNG", **settings: int) -> bytes:
     """A PNG or JPEG file of [H, W, 3] or [H, W] uint8; `settings` are Pillow's."""
     buffer = io.BytesIO()

@@ -9,7 +9,6 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 import materialist as mt
@@ -300,12 +299,7 @@ def _zipped(output: Path) -> Iterator[Path]:
 
 def write_jpeg(path: Path, linear: Array) -> None:
     """A linear picture [H, W, 3] as a JPEG of at most _JPEG_SIDE pixels a side."""
-    scale = min(1.0, _JPEG_SIDE / max(linear.shape[:2]))
-    size = (max(1, round(linear.shape[1] * scale)), max(1, round(linear.shape[0] * scale)))
-    small = (
-        np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear
-    )
-    write_pixels(path, srgb_levels(small))
+    write_pixels(path, srgb_levels(display.shrunk(linear, _JPEG_SIDE)))
 
 
 def write_pixels(path: Path, pixels: Array) -> None:
