@@ -13,7 +13,7 @@ import numpy as np
 
 import materialist as mt
 from materialist.color import srgb_levels
-from materialist.edits.core.operation import PreviewMode
+from materialist.edits.core.operation import PreviewMode, new_edits
 from materialist.edits.recipe import Step
 from materialist.io import display
 from materialist.io.atomic import partial, write_whole
@@ -144,7 +144,7 @@ def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
         (out.with_suffix(".jpg"), picture),
         (before_of(out), loaded.photo.original),
     ):
-        write_jpeg(file, shown)
+        write_pixels(file, srgb_levels(display.shrunk(shown, _JPEG_SIDE)))
 
 
 def converted(report: Reporter, scene: str, source: str, output: str) -> None:
@@ -169,12 +169,16 @@ def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
 
     report("load", 0, 1)
     loaded = mt.load_scene(scene)
-    earlier = [step for step in steps[:-1] if step.operation.preview is not PreviewMode.SHADED]
     with remembered(Path(fillings)):
-        before = apply(loaded, earlier)
+        before = apply(loaded, _surface_steps(steps[:-1]))
         report("removal", 0, 1)
         step = steps[-1]
         disclosed(before, region_of(loaded, step), options_of(step), loaded)
+
+
+def _surface_steps(steps: Steps) -> list[Step]:
+    """The steps that move a surface or change the photo."""
+    return [step for step in steps if step.operation.preview is not PreviewMode.SHADED]
 
 
 def before_of(output: Path) -> Path:
@@ -192,13 +196,12 @@ def fallen(report: Reporter, scene: str, steps: Steps) -> dict[str, Any]:
 
     loaded = mt.load_scene(scene)
     # A fall meets surfaces alone: colours and light are left out.
-    earlier = [step for step in steps[:-1] if step.operation.preview is not PreviewMode.SHADED]
-    before = apply(loaded, earlier)
+    before = apply(loaded, _surface_steps(steps[:-1]))
     after = apply(loaded, [steps[-1]], onto=before)
     return {
         "bodies": after.bodies[len(before.bodies) :],
         "warnings": warnings_since(before, after),
-        "edits": after.provenance["edits"][len(before.provenance.get("edits", ())) :],
+        "edits": new_edits(before, after),
     }
 
 
@@ -295,11 +298,6 @@ def _zipped(output: Path) -> Iterator[Path]:
         os.replace(shutil.make_archive(str(folder), "zip", place, folder.name), output)
     finally:
         shutil.rmtree(place, ignore_errors=True)
-
-
-def write_jpeg(path: Path, linear: Array) -> None:
-    """A linear picture [H, W, 3] as a JPEG of at most _JPEG_SIDE pixels a side."""
-    write_pixels(path, srgb_levels(display.shrunk(linear, _JPEG_SIDE)))
 
 
 def write_pixels(path: Path, pixels: Array) -> None:
