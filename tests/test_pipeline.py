@@ -8,7 +8,7 @@ from geometry_scenes import room, sphere_depth
 
 import materialist as mt
 from materialist.color import srgb_levels
-from materialist.edits.composite.composite import composite, write_composite
+from materialist.edits.composite.composite import composite
 from materialist.edits.material.material import edit
 from materialist.errors import InputError
 from materialist.io.exr import read_exr, write_exr
@@ -258,7 +258,7 @@ def test_the_unit_of_an_hdr_photo_does_not_matter(folder, tmp_path):
         mask = np.zeros(scene.depth.shape, bool)
         mask[4:12, 5:15] = True
         picture = composite(scene, edit(scene, mask, hue=120), spp=4)
-        write_composite(tmp_path / f"{unit}.exr", picture, scene.photo)
+        mt.save_image(tmp_path / f"{unit}.exr", picture, scene.photo)
         out = read_exr(tmp_path / f"{unit}.exr")
         assert (out[mask] != unit * linear[mask]).any()
         same = (picture == scene.photo.original).all(-1)

@@ -82,11 +82,6 @@ def examine(device: str = "auto") -> list[Finding]:
     ]
 
 
-def _pip(name: str) -> str:
-    """Install into this very Python, whichever `pip` the shell would find."""
-    return install_command(name)
-
-
 def _llvm() -> tuple[Finding, str | None]:
     try:
         llvm = find_llvm()
@@ -140,7 +135,7 @@ def _package(name: str, extra: str = "", purpose: str = "") -> Finding:
     except PackageNotFoundError:
         if extra:
             return Finding(name, "missing", f"optional: {purpose}", extra_command(extra))
-        return Finding(name, "broken", "not installed", _pip(name))
+        return Finding(name, "broken", "not installed", install_command(name))
 
 
 def _weights() -> Finding:

@@ -192,12 +192,10 @@ def _prior(
                 )
         return picture, known
     from materialist.predict import get_predictor
+    from materialist.predict.protocol import MAPS
 
     # --- Else a predictor, with maps that are known in place of its own ---
-    parts = {
-        name: getattr(choices, name)
-        for name in ("albedo", "roughness", "metallic", "normal", "depth")
-    }
+    parts = {name: getattr(choices, name) for name in MAPS}
     source = get_predictor(choices.predictor, device=choices.device, prior=known, **parts)
     picture = _seen_by(source, picture)
     source.on_materials = partial(tell, "materials")

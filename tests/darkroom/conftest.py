@@ -12,7 +12,7 @@ from live_here import live_here
 from starlette.testclient import TestClient
 from studio_scenes import package
 
-from materialist.darkroom import application
+from materialist.darkroom.app import application
 from materialist.jobs.queue import JobQueue
 from materialist.studio.studio import Studio
 from materialist.studio.workspace import WorkFolder

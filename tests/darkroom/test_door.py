@@ -7,8 +7,7 @@ import pytest
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from materialist.darkroom import application
-from materialist.darkroom.app import STATIC
+from materialist.darkroom.app import STATIC, application
 from materialist.studio import StudioSettings
 from materialist.studio.access import gate, quota
 

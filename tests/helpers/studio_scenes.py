@@ -9,7 +9,6 @@ import numpy as np
 from edit_scenes import scene_of
 
 from materialist.io.package import save_scene
-from materialist.studio.selection import read_pick
 from materialist.types import Camera, FitReport, Scene
 
 HEIGHT = 48
@@ -64,4 +63,4 @@ def zipped_package(folder: Path, root: str = "", **more: str) -> Path:
 
 def click(session, x: float = 25, y: float = 24, mode: str = "new") -> None:
     """A click of the page at a working pixel; by default on the block."""
-    session.pick(read_pick({"tool": "click", "mode": mode, "at": [x, y]}))
+    session.pick("click", mode=mode, at=[x, y])

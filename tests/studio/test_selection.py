@@ -2,13 +2,11 @@
 
 from functools import partial
 
-import pytest
 from studio_scenes import block, room
 
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.select import select
-from materialist.errors import InputError
-from materialist.studio.selection import Selection, read_pick
+from materialist.studio.selection import Selection
 
 CHOOSE = partial(select, room())
 
@@ -45,23 +43,3 @@ def test_box_and_brush():
     painted = Selection().brush(scene, [[10, 40], [30, 40]], 3, "add", CHOOSE)
     assert painted.mask is not None and painted.mask[40, 10:31].all() and not painted.mask[34].any()
     assert painted.brush(scene, [[0, 40], [63, 40]], 8, "remove", CHOOSE).mask is None
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        None,
-        {},
-        {"tool": "click"},
-        {"tool": "click", "at": [1]},
-        {"tool": "rm", "at": []},
-        {"tool": "click", "at": ["a", 1]},
-        {"tool": "click", "at": [float("nan"), 1]},
-        {"tool": "click", "at": [1, 2], "mode": "x"},
-        {"tool": "brush", "points": [[1]]},
-        {"tool": "box", "at": [1, 2, 3]},
-    ],
-)
-def test_nonsense_from_the_page(data):
-    with pytest.raises(InputError):
-        read_pick(data)

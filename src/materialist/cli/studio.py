@@ -63,11 +63,13 @@ def studio_command(
     ] = None,
 ) -> None:
     """Open the studio: a page in the browser to take photos apart and edit them."""
-    from materialist.darkroom import application, require_packages
+    from materialist.darkroom import require_packages
+
+    require_packages()
+    from materialist.darkroom.app import application
     from materialist.studio import server
     from materialist.studio.workspace import Project
 
-    require_packages()
     # --- Who may reach it, checked before anything is made ---
     password = server.password_of(
         serving.password or os.environ.get("MATERIALIST_PASSWORD"), serving.password_file

@@ -6,8 +6,6 @@ changed, and how far jobs are. A `desk` holds what a page needs beside its sessi
 folder are the studio's.
 """
 
-from typing import Any
-
 from materialist.errors import SetupError
 from materialist.install import extra_command
 
@@ -21,11 +19,3 @@ def require_packages() -> None:
         from pydantic import BaseModel  # noqa: F401
     except ImportError as error:
         raise SetupError(f"The studio needs one more package: {extra_command('studio')}") from error
-
-
-def application(*arguments: Any, **options: Any) -> Any:
-    """`app.application`. Raises SetupError where the studio extra is not installed."""
-    require_packages()
-    from materialist.darkroom import app
-
-    return app.application(*arguments, **options)

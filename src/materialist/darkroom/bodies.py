@@ -5,7 +5,6 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
-Text = Annotated[str, Field(max_length=200)]
 Name = Annotated[str, Field(max_length=100)]
 Place = tuple[Number, Number]
 """(x, y) in working pixels."""

@@ -13,18 +13,20 @@ from materialist.errors import InputError
 from materialist.option_kinds import declarations
 from materialist.studio import objects, reopening, uploads, views
 from materialist.studio.lights import change_lamp, light_file, number_text, place_lamp
-from materialist.studio.selection import read_pick
 from materialist.studio.session import Session
 
 State = dict[str, Any]
 CLEARED = {"texture", "envmap", "gain", "mesh", "lamps"}
 """Options that a request may clear, and sets by other means."""
+_NUMBERS = {"click": 2, "box": 4, "brush": 0}
+"""Tool -> how many numbers say where it was used."""
 
 
 def pick(desk: Desk, body: bodies.Pick) -> State:
     """A click, a box or a brush stroke."""
-    given = body.model_dump()
-    if body.tool == "click" and body.mode == "new" and len(body.at) == 2:
+    if len(body.at) != _NUMBERS[body.tool] or min(body.at, default=0) < 0:
+        raise InputError("The click could not be read; reload the page.")
+    if body.tool == "click" and body.mode == "new":
         # What was edited already opens its edit, with the selection that it was made with.
         index = edit_at(desk.session, *body.at)
         if index is not None:
@@ -32,9 +34,9 @@ def pick(desk: Desk, body: bodies.Pick) -> State:
             return state(desk)
     known = None
     # What the page outlined under the pointer is what the click takes.
-    if body.tool == "click" and len(body.at) == 2:
+    if body.tool == "click":
         known = desk.pointed(*body.at, compute=body.mode != "remove")
-    desk.session.pick(read_pick(given), known)
+    desk.session.pick(**body.model_dump(), region=known)
     return state(desk)
 
 

@@ -37,14 +37,10 @@ def posted(desks: Desks, kind: type[Kind], change: Callable[[Desk, Kind], Any]) 
     async def answer(request: Request) -> Response:
         raw = await request.body()
 
-        def work() -> Any:
-            desk = desk_of(desks, request)
-            body = kind.model_validate_json(raw or b"{}")
-            # Counted: one page must not keep all threads busy.
-            with desk.session.allowance.request(), desk.page.at_work():
-                return change(desk, body)
+        def changed(desk: Desk) -> Any:
+            return change(desk, kind.model_validate_json(raw or b"{}"))
 
-        return JSONResponse(await run_in_threadpool(work))
+        return JSONResponse(await run_in_threadpool(_at_desk, desks, request, changed))
 
     return guarded(desks.studio, answer)
 
@@ -53,14 +49,20 @@ def got(desks: Desks, make: Callable[[Desk, Request], Response]) -> Answerer:
     """An endpoint that answers with make(desk, request)."""
 
     async def answer(request: Request) -> Response:
-        def work() -> Response:
-            desk = desk_of(desks, request)
-            with desk.session.allowance.request(), desk.page.at_work():
-                return make(desk, request)
+        def made(desk: Desk) -> Response:
+            return make(desk, request)
 
-        return await run_in_threadpool(work)
+        return await run_in_threadpool(_at_desk, desks, request, made)
 
     return guarded(desks.studio, answer)
+
+
+def _at_desk(desks: Desks, request: Request, work: Callable[[Desk], Any]) -> Any:
+    """What work(desk) gives at the desk of the page that asks."""
+    desk = desk_of(desks, request)
+    # Counted: one page must not keep all threads busy.
+    with desk.session.allowance.request(), desk.page.at_work():
+        return work(desk)
 
 
 def guarded(studio: Studio, answer: Answerer) -> Answerer:

@@ -10,6 +10,7 @@ from materialist.edits.remove.operation import REMOVE
 from materialist.jobs.worker import DONE
 from materialist.studio import tasks, views
 from materialist.studio.edit_list import EditList, with_options
+from materialist.studio.live import Live
 from materialist.studio.session import Session
 
 
@@ -19,7 +20,6 @@ def take_away(desk: Desk, options: dict[str, Any]) -> None:
     Raises InputError where nothing is selected, and for values that are not valid.
     """
     session = desk.session
-    project = session.opened
     with session.lock:
         planned = session.planned(REMOVE.name)
         index = planned.current or 0
@@ -28,27 +28,15 @@ def take_away(desk: Desk, options: dict[str, Any]) -> None:
         options_of(step)
         if planned is session.edits and step == before:
             return
-        # Only the newest counts.
-        session.stop(desk.studio.jobs, tasks.removal.__name__)
         earlier = [one for one in planned.steps[:index] if not one.skipped]
-    job = desk.studio.submit(
-        session,
-        tasks.removal,
-        session.workspace,
-        scene=str(project.scene),
-        steps=(*earlier, replace(step, options={**step.options, "skip": "false"})),
-        fillings=str(session.workspace),
-    )
 
-    def then(entry: Followed) -> None:
-        if entry.job.state != DONE or session.live is None or not session.shows(project):
-            return
+    def then(_: Followed, live: Live) -> None:
         # Applied once before the lock: other requests go on meanwhile.
-        session.live.call(views.check, steps=_with(session, before, step).active)
+        live.call(views.check, steps=_with(session, before, step).active)
         with session.lock:
             session.change(REMOVE.name, _with(session, before, step))
 
-    desk.follow(job, then)
+    _fill(desk, (*earlier, replace(step, options={**step.options, "skip": "false"})), then)
 
 
 def when_filled(desk: Desk, after: EditList, change: Callable[[], None]) -> None:
@@ -61,8 +49,22 @@ def when_filled(desk: Desk, after: EditList, change: Callable[[], None]) -> None
     removals = [k for k, step in enumerate(steps, 1) if step.kind == REMOVE.name]
     if not removals or not session.preview.call(views.unfilled, steps=steps):
         return change()
-    project = session.opened
     before = session.edits
+
+    def then(entry: Followed, _: Live) -> None:
+        with session.lock:
+            if session.edits == before:
+                change()
+            else:
+                entry.notes.append("The list of edits has changed meanwhile; do it again.")
+
+    _fill(desk, steps[: removals[-1]], then)
+
+
+def _fill(desk: Desk, steps: tuple[Step, ...], then: Callable[[Followed, Live], None]) -> None:
+    """Begin to fill what the last of the steps hides; `then` follows where the photo is still open."""
+    session = desk.session
+    project = session.opened
     # Only the newest counts.
     session.stop(desk.studio.jobs, tasks.removal.__name__)
     job = desk.studio.submit(
@@ -70,20 +72,15 @@ def when_filled(desk: Desk, after: EditList, change: Callable[[], None]) -> None
         tasks.removal,
         session.workspace,
         scene=str(project.scene),
-        steps=steps[: removals[-1]],
+        steps=steps,
         fillings=str(session.workspace),
     )
 
-    def then(entry: Followed) -> None:
-        if entry.job.state != DONE or session.live is None or not session.shows(project):
-            return
-        with session.lock:
-            if session.edits == before:
-                change()
-            else:
-                entry.notes.append("The list of edits has changed meanwhile; do it again.")
+    def done(entry: Followed) -> None:
+        if entry.job.state == DONE and session.live is not None and session.shows(project):
+            then(entry, session.live)
 
-    desk.follow(job, then)
+    desk.follow(job, done)
 
 
 def _with(session: Session, before: Step, step: Step) -> EditList:

@@ -192,19 +192,13 @@ def photo_jpeg(path: str, changed: float, longest: int) -> bytes:
     picture = cv2.imread(path, cv2.IMREAD_COLOR_RGB)
     if picture is None:
         raise InputError("That picture has no thumbnail.")
-    scale = min(1.0, longest / max(picture.shape[:2]))
-    if scale < 1:
-        picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return display.encoded(np.asarray(picture), "JPEG", quality=92)
+    return display.encoded(display.shrunk(picture, longest), "JPEG", quality=92)
 
 
 def native_jpeg(desk: Desk, longest: int = SHOWN_SIDE, quality: int = 93) -> bytes:
     """The open photo at its own resolution, up to `longest` pixels a side, as a JPEG."""
-    photo = desk.session.scene.photo.original
-    scale = min(1.0, longest / max(photo.shape[:2]))
-    if scale < 1:
-        photo = cv2.resize(photo, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    return display.encoded(srgb_levels(np.asarray(photo)), "JPEG", quality=quality)
+    photo = display.shrunk(desk.session.scene.photo.original, longest)
+    return display.encoded(srgb_levels(photo), "JPEG", quality=quality)
 
 
 def working_jpeg(desk: Desk) -> bytes:

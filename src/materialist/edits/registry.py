@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from materialist.edits.core.operation import Operation
+from materialist.edits.core.operation import Operation, new_edits
 from materialist.edits.drop.operation import DROP
 from materialist.edits.glass.operation import GLASS
 from materialist.edits.insert.operation import INSERT
@@ -23,8 +23,7 @@ OPERATIONS: dict[str, Operation] = {
 
 def picture_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
     """What the edits between two scenes say of their picture, or of a film's most changed frame; see `mean_change`."""
-    new = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
-    kinds = {facts["kind"] for facts in new}
+    kinds = {facts["kind"] for facts in new_edits(scene, edited)}
     notes: list[str] = []
     for operation in OPERATIONS.values():
         if operation.notes is not None and operation.kind in kinds:

@@ -17,7 +17,7 @@ from materialist.errors import SetupError
 from materialist.exporters.advice import advice
 from materialist.exporters.exported import Exported, export_folder
 from materialist.exporters.parts import Part, farthest
-from materialist.io.atomic import ensure_writable, whole_file
+from materialist.io.atomic import whole_file
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.render.bodies import LEAST_IOR, SMOOTH, is_glowing, is_transparent
@@ -46,7 +46,6 @@ def export_blend(
     wants_file = path.suffix.lower() == ".blend"
     program = None
     if wants_file:
-        ensure_writable(path, force, None)
         program = find_blender(blender)
     if program is not None:
         with tempfile.TemporaryDirectory() as scratch, whole_file(path, force) as result:

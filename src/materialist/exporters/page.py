@@ -12,6 +12,7 @@ import numpy as np
 from jinja2 import Template
 
 from materialist.color import srgb_levels
+from materialist.edits.core.surfaces import texels
 from materialist.exporters.parts import Part, farthest
 from materialist.geometry.boundary import joined_faces
 from materialist.io import display
@@ -136,10 +137,7 @@ def _vertices(part: Part) -> Array:
     vertices["normal"][:, :3] = np.round(np.clip(mesh.normals, -1, 1) * 127)
     vertices["uv"] = np.round(np.clip(mesh.uv, 0, 1) * 65535)
     if part.constant or part.surface is not None:
-        albedo = part.materials.albedo  # of a body it repeats
-        height, width = albedo.shape[:2]
-        column, row = np.floor(mesh.uv * (width, height)).astype(int).T
-        vertices["colour"][:, :3] = srgb_levels(albedo[row % height, column % width])
+        vertices["colour"][:, :3] = srgb_levels(texels(part.materials.albedo, mesh.uv))
         vertices["colour"][:, 3] = 255
     return vertices
 

@@ -190,6 +190,5 @@ def _usd(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
 def _html(path: Path, scene: Scene, parts: list[Part], force: bool) -> Exported:
     from materialist.exporters.page import page
 
-    ensure_writable(path, force, None)
     write_whole(path, page(scene, parts), force)
     return Exported(path)

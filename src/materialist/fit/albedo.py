@@ -23,7 +23,6 @@ def solve_albedo(
     start: torch.Tensor,
     settings: MaterialSettings,
     *,
-    name: str = "albedo",
     progress: Progress | None = None,
     stop: Stop = never,
 ) -> tuple[torch.Tensor, StageResult]:
@@ -38,7 +37,7 @@ def solve_albedo(
     losses = [0.0, 0.0]
     for number, first in enumerate(strips):
         if progress is not None:
-            progress(name, number, len(strips))
+            progress("albedo", number, len(strips))
         if stop():
             break
         rows = slice(first, first + STRIP_PIXELS)
@@ -70,9 +69,9 @@ def solve_albedo(
             cost = error_at(encoded).square() + weight * (encoded - before).square()
             losses[k] += float(cost.sum()) / photo.numel()
     if progress is not None:
-        progress(name, len(strips), len(strips))
+        progress("albedo", len(strips), len(strips))
     seconds = time.perf_counter() - begin
-    return maps, StageResult(name, HALVINGS, seconds, tuple(losses))
+    return maps, StageResult("albedo", HALVINGS, seconds, tuple(losses))
 
 
 def _error(

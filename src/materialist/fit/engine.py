@@ -129,21 +129,20 @@ class TransportEngine:
 class PathEngine:
     """The paper's engine: Mitsuba's PRB integrator on a `RenderScene`, a fresh seed in every step."""
 
+    SPP = 64
+    PATH_DEPTH = 4
+
     def __init__(
         self,
         scene,
         camera: Camera,
         pixels: Array,
         *,
-        spp: int = 64,
-        max_depth: int = 4,
         envmap_height: int = 256,
         seed: int = 0,
     ):
         self.scene = scene
         self.camera = camera
-        self.spp = spp
-        self.max_depth = max_depth
         self.pixels = torch.from_numpy(pixels.astype(np.int64))
         self.envmap_height = envmap_height
         self.seed = seed
@@ -153,9 +152,9 @@ class PathEngine:
         self._step += 1
         return self.scene.render_torch(
             *maps_and_envmap,
-            spp=self.spp,
+            spp=self.SPP,
             seed=self.seed + 2 * self._step,
-            max_depth=self.max_depth,
+            max_depth=self.PATH_DEPTH,
         )
 
     def light_problem(self, materials: Materials, sent: Array | None = None) -> LightProblem:

@@ -37,15 +37,13 @@ class EnvmapMLP(nn.Module):
     With `coordinates="uv"` the encoding is of (u, v) instead: the paper's ablation of coordinate systems.
     """
 
-    def __init__(
-        self, *, coordinates: str = "direction", bands: int = 4, width: int = 128, layers: int = 3
-    ):
+    BANDS = 4
+
+    def __init__(self, *, coordinates: str = "direction"):
         super().__init__()
         self.coordinates = coordinates
-        self.bands = bands
-        self.net = mlp(
-            2 * bands * (3 if coordinates == "direction" else 2), 3, width=width, layers=layers
-        )
+        inputs = 3 if coordinates == "direction" else 2
+        self.net = mlp(2 * self.BANDS * inputs, 3, width=128, layers=3)
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
         """Radiance [h, 2h, 3] at texel centres, or at random points of the texels when a generator is given."""
@@ -59,7 +57,7 @@ class EnvmapMLP(nn.Module):
             theta = math.pi * v
             phi = 2 * math.pi * (u - 0.5)
             x = torch.stack([theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()], -1)
-        return functional.softplus(self.net(positional_encoding(x, self.bands)))
+        return functional.softplus(self.net(positional_encoding(x, self.BANDS)))
 
 
 class EnvmapTexels(nn.Module):
@@ -75,15 +73,16 @@ class EnvmapTexels(nn.Module):
 
 
 class EnvmapSH(nn.Module):
-    """Softplus of real spherical harmonics up to `degree` (the paper's appendix compares degree 3)."""
+    """Softplus of real spherical harmonics up to degree 3, which the paper's appendix compares."""
 
-    def __init__(self, degree: int = 3):
+    DEGREE = 3
+
+    def __init__(self):
         super().__init__()
-        self.degree = degree
-        self.coefficients = nn.Parameter(torch.zeros((degree + 1) ** 2, 3))
+        self.coefficients = nn.Parameter(torch.zeros((self.DEGREE + 1) ** 2, 3))
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
-        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.degree)).to(
+        basis = torch.from_numpy(sh_basis(texel_directions(height, 2 * height), self.DEGREE)).to(
             self.coefficients
         )
         return functional.softplus(basis @ self.coefficients)
@@ -125,35 +124,29 @@ class MaterialMLP(nn.Module):
     input is joined once more to the first and the third hidden layer. From m_p alone, equal priors would move alike.
     """
 
+    BANDS = 2
+    UNITS = 256
+    ZETA = 1.3
     prior: torch.Tensor
     code: torch.Tensor
 
-    def __init__(
-        self,
-        prior: torch.Tensor,
-        pixels: torch.Tensor,
-        height: int,
-        width: int,
-        *,
-        bands: int = 2,
-        units: int = 256,
-        zeta: float = 1.3,
-    ):
+    def __init__(self, prior: torch.Tensor, pixels: torch.Tensor, height: int, width: int):
         """prior: [P, 5] albedo, roughness, metallic of the row-major `pixels` [P] of a picture."""
         super().__init__()
         # In pixels of a picture with 512 on its longer side, which the published code always has.
         place = torch.stack([pixels // width, pixels % width], 1) * (512 / max(height, width))
         place = place.to(prior)
-        waves = [wave(2.0**k * place) for k in range(bands) for wave in (torch.sin, torch.cos)]
+        waves = [wave(2.0**k * place) for k in range(self.BANDS) for wave in (torch.sin, torch.cos)]
         self.register_buffer("prior", prior)
         self.register_buffer("code", torch.cat([place, *waves, prior], 1))
         inputs = self.code.shape[1]
+        units = self.UNITS
         joined = nn.Linear(inputs, units - inputs), nn.Linear(units, units - inputs)
         plain = nn.Linear(units, units), nn.Linear(units, units)
         self.hidden = nn.ModuleList([joined[0], plain[0], joined[1], plain[1]])
         self.last = nn.Linear(units, 5)
         _silence(self.last)
-        self.zeta = nn.Parameter(torch.tensor(zeta))
+        self.zeta = nn.Parameter(torch.tensor(self.ZETA))
 
     def forward(self, rows: Rows = ALL) -> torch.Tensor:
         code = self.code[rows]

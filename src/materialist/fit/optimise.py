@@ -45,15 +45,11 @@ class StageResult:
 class Adam:
     """Adam (Kingma and Ba 2015), step for step `torch.optim.Adam`, which first imports a compiler for seconds."""
 
-    def __init__(
-        self,
-        tensors: list[torch.Tensor],
-        betas: tuple[float, float] = (0.9, 0.999),
-        eps: float = 1e-8,
-    ):
+    BETAS = (0.9, 0.999)
+    EPSILON = 1e-8
+
+    def __init__(self, tensors: list[torch.Tensor]):
         self.tensors = tensors
-        self.betas = betas
-        self.eps = eps
         self.steps = 0
         self.means, self.squares = ([torch.zeros_like(t) for t in tensors] for _ in range(2))
 
@@ -61,7 +57,7 @@ class Adam:
     def step(self, rate: float) -> None:
         """Move the tensors along their gradients, and forget those."""
         self.steps += 1
-        first, second = self.betas
+        first, second = self.BETAS
         rate = rate / (1 - first**self.steps)
         root = math.sqrt(1 - second**self.steps)
         for tensor, mean, square in zip(self.tensors, self.means, self.squares, strict=True):
@@ -69,7 +65,7 @@ class Adam:
                 continue
             mean.lerp_(tensor.grad, 1 - first)
             square.mul_(second).addcmul_(tensor.grad, tensor.grad, value=1 - second)
-            tensor.addcdiv_(mean, (square.sqrt() / root).add_(self.eps), value=-rate)
+            tensor.addcdiv_(mean, (square.sqrt() / root).add_(self.EPSILON), value=-rate)
             tensor.grad = None
 
 

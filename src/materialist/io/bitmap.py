@@ -86,11 +86,8 @@ def check_size(width: int, height: int, name: object) -> None:
         )
 
 
-def light_and_alpha(
-    light: Array, alpha: Array | None, warnings: list[str] | None = None
-) -> Decoded:
+def light_and_alpha(light: Array, alpha: Array | None, notes: list[str]) -> Decoded:
     """A scene-linear file of [H, W, 3] light with [H, W, 1] alpha, which is dropped where it is opaque."""
-    notes = warnings or []
     if alpha is None or bool(np.all(alpha >= 1)):
         return Decoded(light, True, warnings=notes)
     return Decoded(

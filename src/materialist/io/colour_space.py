@@ -161,12 +161,8 @@ def _power(encoded: Array, exponent: float) -> Array:
     return np.sign(encoded) * np.abs(encoded) ** exponent
 
 
-def narrow(curve: Curve) -> Curve:
-    """The curve of a video signal, whose black and white are the levels 16 and 235 of 255."""
-    return partial(_narrow, curve=curve)
-
-
-def _narrow(encoded: Array, curve: Curve) -> Array:
+def narrow_curve(encoded: Array, curve: Curve) -> Array:
+    """A curve of a video signal, whose black and white are the levels 16 and 235 of 255."""
     return curve(np.clip((encoded * 255 - 16) / 219, 0, 1))
 
 

@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -117,7 +118,7 @@ def cicp_space(
     if name in HDR_NOTES:
         notes.append(HDR_NOTES[name])
     if not full_range:
-        curve = spaces.narrow(curve)
+        curve = partial(spaces.narrow_curve, curve=curve)
     stated = space(
         name, _PRIMARIES.get(primaries, spaces.REC709), curve, is_light=name in HDR_NOTES
     )

@@ -23,82 +23,74 @@ from materialist.types import Array
 RAW_SUFFIXES = frozenset(
     f".{name}"
     for name in (
-        *(
-            "3fr",
-            "ari",
-            "arw",
-            "cr2",
-            "cr3",
-            "crw",
-            "dcr",
-            "dng",
-            "erf",
-            "fff",
-            "iiq",
-            "k25",
-            "kdc",
-            "mef",
-            "mos",
-        ),
-        *(
-            "mrw",
-            "nef",
-            "nrw",
-            "orf",
-            "pef",
-            "raf",
-            "raw",
-            "rw2",
-            "rwl",
-            "sr2",
-            "srf",
-            "srw",
-            "x3f",
-        ),
+        "3fr",
+        "ari",
+        "arw",
+        "cr2",
+        "cr3",
+        "crw",
+        "dcr",
+        "dng",
+        "erf",
+        "fff",
+        "iiq",
+        "k25",
+        "kdc",
+        "mef",
+        "mos",
+        "mrw",
+        "nef",
+        "nrw",
+        "orf",
+        "pef",
+        "raf",
+        "raw",
+        "rw2",
+        "rwl",
+        "sr2",
+        "srf",
+        "srw",
+        "x3f",
     )
 )
 """File names that mean camera RAW: most are TIFF inside, so the content cannot tell."""
 SUFFIXES = RAW_SUFFIXES | {
     f".{name}"
     for name in (
-        *(
-            "png",
-            "apng",
-            "jpg",
-            "jpeg",
-            "jpe",
-            "jif",
-            "jfif",
-            "mpo",
-            "webp",
-            "heic",
-            "heif",
-            "hif",
-            "avif",
-            "bmp",
-            "dib",
-        ),
-        *(
-            "gif",
-            "tif",
-            "tiff",
-            "jp2",
-            "j2k",
-            "jpx",
-            "jpf",
-            "exr",
-            "hdr",
-            "tga",
-            "ppm",
-            "pgm",
-            "pnm",
-        ),
+        "png",
+        "apng",
+        "jpg",
+        "jpeg",
+        "jpe",
+        "jif",
+        "jfif",
+        "mpo",
+        "webp",
+        "heic",
+        "heif",
+        "hif",
+        "avif",
+        "bmp",
+        "dib",
+        "gif",
+        "tif",
+        "tiff",
+        "jp2",
+        "j2k",
+        "jpx",
+        "jpf",
+        "exr",
+        "hdr",
+        "tga",
+        "ppm",
+        "pgm",
+        "pnm",
     )
 }
 """Usual file names of photos; `decode` reads others, too."""
 
 _EXR = b"\x76\x2f\x31\x01"
-_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 """How files of these formats begin."""
 
 
@@ -114,7 +106,7 @@ def image_size(path: Path) -> tuple[int, int]:
         return max((exr_size(header) for header in exr_headers(path)), key=math.prod)
     if head.startswith(MAGIC):
         return radiance_header(path).size
-    if head.startswith(_TIFF):  # Pillow does not know some layouts, such as float RGB
+    if head.startswith(TIFF):  # Pillow does not know some layouts, such as float RGB
         with unprinted(), TiffFile(path) as tiff:
             page: Any = tiff.pages[0]
             return int(page.imagewidth), int(page.imagelength)
@@ -176,7 +168,7 @@ def decode(path: Path, layer: str | None = None) -> Decoded:
             return read_exr_photo(path, layer)
         if head.startswith(MAGIC):
             return read_radiance(path)
-        if head.startswith(_TIFF):
+        if head.startswith(TIFF):
             return read_tiff(path)
         return bitmap.read_bitmap(path)
     except (MaterialistError, MemoryError):

@@ -1,20 +1,16 @@
-"""Maps, errors and light as pictures for people: [H, W, 3] uint8; sheets of them; and their PNG and JPEG files."""
+"""Maps, errors and light as pictures for people: [H, W, 3] uint8, and their PNG and JPEG files."""
 
 import io
-from pathlib import Path
 
 import cv2
 import numpy as np
 from PIL import Image
 
 from materialist.color import linear_to_srgb, luminance, srgb_levels
-from materialist.io.atomic import write_whole
 from materialist.types import Array, Prediction, Scene
 
 ERROR_GAIN = 4
 """What errors are multiplied by to be seen."""
-_SIDE = 144
-"""Pixels of a picture's longer side in a sheet."""
 
 
 def to_bytes(values: Array) -> Array:
@@ -85,22 +81,13 @@ def maps(of: Prediction | Scene) -> dict[str, Array]:
     }
 
 
-def strip(image: Array, *predictions: Prediction) -> Array:
-    """The linear picture and, under each other, the maps of each prediction: one row of a sheet, uint8 RGB."""
-    rows = [np.concatenate([srgb_levels(image), *maps(p).values()], 1) for p in predictions]
-    joined = np.concatenate(rows, 0)
-    factor = _SIDE / max(image.shape[:2])
-    size = (max(1, round(joined.shape[1] * factor)), max(1, round(joined.shape[0] * factor)))
-    return cv2.resize(joined, size, interpolation=cv2.INTER_AREA)
-
-
-def write_sheet(strips: list[Array], path: Path) -> None:
-    """Strips under each other as a PNG, written whole or not at all."""
-    if not strips:
-        return
-    wide = max(s.shape[1] for s in strips)
-    padded = [np.pad(s, ((0, 6), (0, wide - s.shape[1]), (0, 0))) for s in strips]
-    write_whole(path, encoded(np.concatenate(padded, 0)))
+def shrunk(picture: Array, longest: int) -> Array:
+    """[H, W, ...] with at most `longest` pixels on the longer side: area averages."""
+    scale = longest / max(picture.shape[:2])
+    if scale >= 1:
+        return picture
+    height, width = (max(1, round(side * scale)) for side in picture.shape[:2])
+    return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
 
 
 def encoded(pixels: Array, kind: str = "PNG", **settings: int) -> bytes:

@@ -27,7 +27,7 @@ PROGRESS = "progress"
 INTERMEDIATE = "intermediate"
 DONE = "done"
 FAILED = "failed"
-"""Kinds of messages. Facts of PROGRESS: stage, done, total; of INTERMEDIATE: whatever the task passes to
+"""Kinds of messages. Facts of PROGRESS: stage, done, total; of INTERMEDIATE: what the task passes to `intermediate`;
 DONE: what the task returned; of FAILED: see `failure_facts`."""
 _NO_MEMORY = (
     "Insufficient memory",

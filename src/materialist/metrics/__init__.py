@@ -24,11 +24,6 @@ def mse(a: Array, b: Array, *, mask: Array | None = None) -> float:
     return _mean_square(linear_to_srgb(_checked(a, b)), linear_to_srgb(b), mask)
 
 
-def mse_linear(a: Array, b: Array) -> float:
-    """Mean squared error of [H, W, 3] arrays as they are: linear, not clipped (the paper's MSE of envmaps)."""
-    return _mean_square(_checked(a, b), np.asarray(b, np.float32))
-
-
 def psnr(a: Array, b: Array, *, mask: Array | None = None) -> float:
     """Peak signal-to-noise ratio in dB of linear images [H, W, 3], on their sRGB encoding in [0, 1]; inf when equal."""
     error = mse(a, b, mask=mask)
@@ -142,21 +137,6 @@ def sh_error_relative(estimate: Array, truth: Array) -> float:
     norm = _rms_norm(sh_coefficients(truth))
     error = sh_error(estimate, truth)
     return error / norm if norm > 0 else (0.0 if error == 0 else float("inf"))
-
-
-def envmap_metrics(estimate: Array, truth: Array) -> dict[str, float]:
-    """The paper's envmap figures (table "Quantitative evaluation of envmap optimization").
-
-    SSIM and PSNR are on the maps as they are: the photo fixes the scale of the light. MSE is on linear radiance without
-    clipping. Raises InputError for maps of two sizes.
-    """
-    return {
-        "envmap_ssim": ssim(estimate, truth),
-        "envmap_psnr": psnr(estimate, truth),
-        "envmap_mse": mse_linear(estimate, truth),
-        "sh_error": sh_error(estimate, truth),
-        "sh_error_relative": sh_error_relative(estimate, truth),
-    }
 
 
 def _rms_norm(coefficients: Array) -> float:

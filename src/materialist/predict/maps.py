@@ -28,8 +28,6 @@ class MapSettings:
 
 
 SETTINGS = MapSettings()
-_CHANNELS = {"albedo": (3,), "normal": (3,)}
-"""Channels of the maps that have several."""
 
 
 class MapsPredictor(Predictor):

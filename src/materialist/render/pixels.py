@@ -9,7 +9,7 @@ import numpy as np
 
 from materialist.buffers import floats, integers
 from materialist.camera import project
-from materialist.geometry.silhouette import Box, area
+from materialist.geometry.silhouette import Box, area, within
 from materialist.render.variant import recording
 from materialist.types import Array, Body, Camera
 
@@ -97,9 +97,7 @@ def _by_strips(
     # --- Only the part of the picture where the bodies can be ---
     rows, columns = _around(scene, camera, names, size, whole)
     values = np.zeros((*(side.stop - side.start for side in whole), channels), np.float32)
-    inside = values[
-        tuple(slice(a.start - b.start, a.stop - b.start) for a, b in zip((rows, columns), whole))
-    ]
+    inside = values[within((rows, columns), whole)]
     # --- Some rows at a time, so that the rays fit into memory ---
     step = max(1, _RAYS // GRID**2 // max(columns.stop - columns.start, 1))
     for first in range(rows.start, rows.stop, step) if area((rows, columns)) else ():

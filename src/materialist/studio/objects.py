@@ -91,15 +91,11 @@ def let_fall(session: Session, height: float) -> list[str]:
         return [n for n in live.call(views.check, steps=after.active) if n not in known]
 
 
-def file_of(name: str) -> str:
-    return f"thing-{name.lower()}.ply"
-
-
 def library_file(session: Session, name: str) -> str:
     """A computed mesh as a file in the workspace: +Y up, longest side 1."""
     import numpy as np
 
-    file = session.workspace / file_of(name)
+    file = session.workspace / f"thing-{name.lower()}.ply"
     if not file.is_file():
         maker, options = _SHAPES[name]
         mesh = getattr(creation, maker)(**options)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +13,6 @@ from materialist.color import linear_to_srgb
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
-REPLACE = "new"
 ADD = "add"
 REMOVE = "remove"
 Choose = Callable[..., Array]
@@ -79,7 +77,7 @@ class Selection:
             region = choose(click=(x, y))
         return self._with(region, mode)
 
-    def box(self, scene: Scene, box: list[float], mode: str, choose: Choose) -> Selection:
+    def box(self, scene: Scene, box: Sequence[float], mode: str, choose: Choose) -> Selection:
         if mode == REMOVE:
             x0, y0, x1, y1 = (round(v) for v in box)
             gone = np.zeros(scene.depth.shape, bool)
@@ -90,13 +88,13 @@ class Selection:
     def brush(
         self,
         scene: Scene,
-        points: list[list[float]],
+        points: Sequence[Sequence[float]],
         radius: float,
         mode: str,
         choose: Choose,
     ) -> Selection:
         """With a stroke through pixels (x, y): added, or rubbed out."""
-        if not points or len(points) > 20_000 or not 0.5 <= radius <= 500:
+        if not points or not 0.5 <= radius <= 500:
             raise InputError("The brush stroke could not be read; paint again.")
         stroke = np.zeros(scene.depth.shape, np.uint8)
         line = np.round(np.clip(np.array(points, np.float64)[:, :2], -1e4, 1e4)).astype(np.int32)
@@ -132,29 +130,6 @@ def piece_at(scene: Scene, mask: Array | None, row: int, column: int) -> Array:
     return (cv2.morphologyEx(piece, cv2.MORPH_CLOSE, kernel) > 0) & mask
 
 
-def read_pick(data: Any) -> dict[str, Any]:
-    """A pointer event as the page sends it, with everything checked. Raises InputError."""
-    try:
-        tool = str(data["tool"])
-        mode = str(data.get("mode", REPLACE))
-        numbers = [float(v) for v in data.get("at", ())]
-        points = [[float(x), float(y)] for x, y in data.get("points", ())]
-        radius = float(data.get("radius", 1))
-        if (
-            not np.isfinite([*numbers, radius, *(v for p in points for v in p)]).all()
-            or min(numbers, default=0) < 0
-        ):
-            raise ValueError("not a place")
-        # Each tool sends as many numbers as it needs.
-        if {"click": 2, "box": 4, "brush": 0, "lamp": 2, "place": 2}[tool] != len(numbers):
-            raise ValueError("not the numbers of the tool")
-        if mode not in (REPLACE, ADD, REMOVE):
-            raise ValueError("not a mode")
-    except (TypeError, ValueError, KeyError, AttributeError) as error:
-        raise InputError("The click could not be read; reload the page.") from error
-    return {"tool": tool, "mode": mode, "at": numbers, "points": points, "radius": radius}
-
-
-def data_url(data: bytes, kind: str) -> str:
-    """A picture file (`png` or `jpeg`) as a data URL."""
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+def data_url(data: bytes) -> str:
+    """A JPEG file as a data URL."""
+    return f"data:image/jpeg;base64,{base64.b64encode(data).decode()}"

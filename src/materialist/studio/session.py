@@ -1,7 +1,7 @@
 """What one person does with one photo: scene, selection, list of edits and undo history, for all pages that show it."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -186,23 +186,31 @@ class Session:
         """Whether there is a change to take back, and one to do again."""
         return bool(self._past), bool(self._future)
 
-    def pick(self, pick: dict[str, Any], region: Array | None = None) -> None:
-        """A click, a box or a brush stroke, as `selection.read_pick` gives it. Raises InputError.
+    def pick(
+        self,
+        tool: str,
+        *,
+        mode: str = "new",
+        at: Sequence[float] = (),
+        points: Sequence[Sequence[float]] = (),
+        radius: float = 1.0,
+        region: Array | None = None,
+    ) -> None:
+        """A click or a box at two or four numbers, or a brush stroke through points. Raises InputError.
 
         region: [H, W] bool of the object at a click, where it is known already.
         """
         with self.lock:
             scene = self.scene
             choose = self.preview.select
-            mode = pick["mode"]
             before = self.selection
-            if pick["tool"] == "click":
-                x, y = self.pixel(*pick["at"])
+            if tool == "click":
+                x, y = self.pixel(*at)
                 after = before.click(scene, x, y, mode, choose, region)
-            elif pick["tool"] == "box":
-                after = before.box(scene, pick["at"], mode, choose)
+            elif tool == "box":
+                after = before.box(scene, at, mode, choose)
             else:
-                after = before.brush(scene, pick["points"], pick["radius"], mode, choose)
+                after = before.brush(scene, points, radius, mode, choose)
             if after.mask is None or mode not in (ADD, REMOVE) or not self._follows_selection():
                 self.remember("select")
                 self.edits = self.edits.chosen(None)

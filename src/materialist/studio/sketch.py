@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 
 from materialist.camera import project, unit, unproject
+from materialist.edits.core.surfaces import texels
 from materialist.envmap import environment, row_solid_angle, sh_basis, texel_directions
 from materialist.studio import SETTINGS
 from materialist.types import Array, Body, Lamp, Scene
@@ -144,9 +145,9 @@ def _shaded(
     """[F, 3] radiance of triangles by the light from all around and the lamps."""
     surface = body.surface
     place = places.mean(1)
-    albedo = _looked_up(surface.albedo, place) * np.asarray(surface.tint, np.float32)
-    roughness = _looked_up(surface.roughness, place)[:, None]
-    metallic = _looked_up(surface.metallic, place)[:, None]
+    albedo = texels(surface.albedo, place) * np.asarray(surface.tint, np.float32)
+    roughness = texels(surface.roughness, place)[:, None]
+    metallic = texels(surface.metallic, place)[:, None]
     # --- Matt: irradiance by spherical harmonics, and the lamps ---
     weight = row_solid_angle(len(sky))[:, None, None]
     basis = sh_basis(texel_directions(*sky.shape[:2]), 2)
@@ -161,11 +162,3 @@ def _shaded(
     sharp = environment(mirrored, sky)
     around = sharp + roughness * (light / np.pi - sharp)
     return (matt + (0.04 + (albedo - 0.04) * metallic) * around).astype(np.float32)
-
-
-def _looked_up(texture: Array, place: Array) -> Array:
-    """[F] or [F, C] values of a repeated map [h, w(, C)] at texture coordinates [F, 2]."""
-    height, width = texture.shape[:2]
-    rows = (np.floor(place[:, 1] * height) % height).astype(int)
-    columns = (np.floor(place[:, 0] * width) % width).astype(int)
-    return texture[rows, columns]

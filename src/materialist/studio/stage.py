@@ -1,6 +1,5 @@
 """What a page shows: the picture with its label, maps, a report, the list of edits, and jobs in words."""
 
-from pathlib import Path
 from shlex import quote
 from time import time
 from typing import Any
@@ -79,7 +78,8 @@ def stage(
     if final is not None and final.of(steps):
         badge = f"Path traced{off}"
         picture, before = (
-            jpeg_file(file) for file in (final.path.with_suffix(".jpg"), before_of(final.path))
+            data_url(file.read_bytes())
+            for file in (final.path.with_suffix(".jpg"), before_of(final.path))
         )
         return {**shown, "picture": picture, "before": before, "badge": badge}
     # --- Glass is asked for while everything else is shown ---
@@ -118,7 +118,7 @@ def stage(
             "waiting": False,
             "bad": True,
         }
-    return {**shown, "picture": data_url(made, "jpeg"), "coarse": coarse}
+    return {**shown, "picture": data_url(made), "coarse": coarse}
 
 
 def _lamps(edits: EditList) -> list[list[float]]:
@@ -157,12 +157,7 @@ def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: b
 
 def jpeg_url(linear: Array) -> str:
     """A linear picture [H, W, 3] as a data URL."""
-    return data_url(views.encoded(linear), "jpeg")
-
-
-def jpeg_file(file: Path) -> str:
-    """A JPEG file as a data URL."""
-    return data_url(file.read_bytes(), "jpeg")
+    return data_url(views.encoded(linear))
 
 
 def failure_message(job: Job) -> str:

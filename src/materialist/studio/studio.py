@@ -70,7 +70,7 @@ class Studio:
     _closer: ThreadPoolExecutor = field(
         default_factory=lambda: ThreadPoolExecutor(1, thread_name_prefix="closer")
     )
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _lock: threading.RLock = field(default_factory=threading.RLock)
 
     def __post_init__(self) -> None:
         self.quota = Quota(self.work.cache, self.work.root, patient=self.single_user)
@@ -139,11 +139,8 @@ class Studio:
     def session_on(self, project: Project, person: str) -> Session | None:
         """The session in which pages of a person show a photo; None where none does."""
         with self._lock:
-            return self._session_on(project, person)
-
-    def _session_on(self, project: Project, person: str) -> Session | None:
-        sessions = (page.session for page in self._pages.values() if page.person == person)
-        return next((one for one in sessions if one.shows(project)), None)
+            sessions = (page.session for page in self._pages.values() if page.person == person)
+            return next((one for one in sessions if one.shows(project)), None)
 
     def _new_session(self, person: str) -> Session:
         allowance = Allowance(self.quota, lambda: self.sender(person))
@@ -192,13 +189,12 @@ class Studio:
         project = self.project(name, page.person)
         if page.left:
             raise InputError("The page was closed.")
-        with self._lock:
-            session = self._session_on(project, page.person)
+        session = self.session_on(project, page.person)
         if session is not page.session or session is None:
             # The old scene goes first: both at once may not fit into memory.
             self.put_away(page)
         with self._lock:
-            session = self._session_on(project, page.person) or page.session
+            session = self.session_on(project, page.person) or page.session
             session.expected = project
             page.session = session
         try:

@@ -9,12 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 import materialist as mt
 from materialist.color import srgb_levels
-from materialist.edits.core.operation import PreviewMode
+from materialist.edits.core.operation import PreviewMode, new_edits
 from materialist.edits.recipe import Step
 from materialist.io import display
 from materialist.io.atomic import partial, write_whole
@@ -48,6 +47,8 @@ KINDS = {
 """Kind of result -> its title, and the suffix of the file."""
 _NEEDED = {"usd": "pxr", "turn": "imageio_ffmpeg"}
 """Kind -> the module that it does not work without."""
+_JPEG_SIDE = 2048
+"""Longest side of the small picture beside a result, pixels."""
 
 
 @cache
@@ -134,30 +135,27 @@ def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
 
 def final(report: Reporter, scene: str, steps: Steps, output: str) -> None:
     """`materialist apply`: the path-traced composite as OUTPUT.png, OUTPUT.exr and a small OUTPUT.jpg; the photo so."""
-    from materialist.edits.composite.composite import write_composite
-
     loaded, edited = _edited(report, scene, steps)
     picture = mt.composite(loaded, edited, progress=report)
     out = Path(output)
     for suffix in (".png", ".exr"):
-        write_composite(out.with_suffix(suffix), picture, loaded.photo, force=True)
+        mt.save_image(out.with_suffix(suffix), picture, loaded.photo, force=True)
     for file, shown in (
         (out.with_suffix(".jpg"), picture),
         (before_of(out), loaded.photo.original),
     ):
-        write_jpeg(file, shown, longest=2048)
+        write_pixels(file, srgb_levels(display.shrunk(shown, _JPEG_SIDE)))
 
 
 def converted(report: Reporter, scene: str, source: str, output: str) -> None:
     """A path-traced picture, SOURCE.exr of `final`, in another format, as the photo's own file would be."""
-    from materialist.edits.composite.composite import write_composite
     from materialist.io.exr import read_exr
 
     report("export", 0, 1)
     photo = mt.load_scene(scene).photo
     # An EXR is in the unit of the photo's file.
     picture = read_exr(source) * np.float32(2.0**photo.stops)
-    write_composite(output, picture, photo, force=True)
+    mt.save_image(output, picture, photo, force=True)
 
 
 def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
@@ -171,12 +169,16 @@ def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
 
     report("load", 0, 1)
     loaded = mt.load_scene(scene)
-    earlier = [step for step in steps[:-1] if step.operation.preview is not PreviewMode.SHADED]
     with remembered(Path(fillings)):
-        before = apply(loaded, earlier)
+        before = apply(loaded, _surface_steps(steps[:-1]))
         report("removal", 0, 1)
         step = steps[-1]
         disclosed(before, region_of(loaded, step), options_of(step), loaded)
+
+
+def _surface_steps(steps: Steps) -> list[Step]:
+    """The steps that move a surface or change the photo."""
+    return [step for step in steps if step.operation.preview is not PreviewMode.SHADED]
 
 
 def before_of(output: Path) -> Path:
@@ -194,13 +196,12 @@ def fallen(report: Reporter, scene: str, steps: Steps) -> dict[str, Any]:
 
     loaded = mt.load_scene(scene)
     # A fall meets surfaces alone: colours and light are left out.
-    earlier = [step for step in steps[:-1] if step.operation.preview is not PreviewMode.SHADED]
-    before = apply(loaded, earlier)
+    before = apply(loaded, _surface_steps(steps[:-1]))
     after = apply(loaded, [steps[-1]], onto=before)
     return {
         "bodies": after.bodies[len(before.bodies) :],
         "warnings": warnings_since(before, after),
-        "edits": after.provenance["edits"][len(before.provenance.get("edits", ())) :],
+        "edits": new_edits(before, after),
     }
 
 
@@ -297,16 +298,6 @@ def _zipped(output: Path) -> Iterator[Path]:
         os.replace(shutil.make_archive(str(folder), "zip", place, folder.name), output)
     finally:
         shutil.rmtree(place, ignore_errors=True)
-
-
-def write_jpeg(path: Path, linear: Array, longest: int = 1024) -> None:
-    """A linear picture [H, W, 3] as a JPEG of at most `longest` pixels a side."""
-    scale = min(1.0, longest / max(linear.shape[:2]))
-    size = (max(1, round(linear.shape[1] * scale)), max(1, round(linear.shape[0] * scale)))
-    small = (
-        np.asarray(cv2.resize(linear, size, interpolation=cv2.INTER_AREA)) if scale < 1 else linear
-    )
-    write_pixels(path, srgb_levels(small))
 
 
 def write_pixels(path: Path, pixels: Array) -> None:

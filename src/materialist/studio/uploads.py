@@ -107,8 +107,8 @@ def checked_upload(report: Any, file: Path, option: str) -> Path:
     return _shrunk(file) if option in _COLOURS else _read_map(file)
 
 
-def checked_picture(path: Path) -> str:
-    """The suffix of an uploaded picture. Raises InputError for what is no picture, or too large, by its header."""
+def checked_picture(path: Path) -> None:
+    """Raise InputError for an uploaded file that is no picture, or too large, by its header."""
     suffix = path.suffix.lower()
     shown = shown_name(path)
     if suffix not in SUFFIXES:
@@ -134,19 +134,16 @@ def checked_picture(path: Path) -> str:
                 f"{SETTINGS.opening_memory / 1e9:g} GB: shrink it, or save its colours alone."
             )
         check_size(width, height, shown)
-    return suffix
 
 
-def checked_mesh(path: Path) -> str:
-    """The suffix of an uploaded mesh, whose reader follows no reference out of its folder. Raises InputError."""
-    suffix = path.suffix.lower()
+def checked_mesh(path: Path) -> None:
+    """Raise InputError for an uploaded file that is no mesh whose reader stays in its folder."""
     shown = shown_name(path)
-    if suffix not in MESHES:
+    if path.suffix.lower() not in MESHES:
         raise InputError(
             f"{shown} is not a mesh the studio takes; give one .glb, .ply, .obj or .stl file."
         )
     check_bytes(path, shown)
-    return suffix
 
 
 def _read_mesh(path: Path) -> None:

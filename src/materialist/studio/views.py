@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import srgb_levels
+from materialist.edits.core.surfaces import texels
 from materialist.edits.recipe import Step, region_of
 from materialist.edits.remove.filling import NotFilled, remembered_alone
 from materialist.edits.select.select import select
@@ -131,11 +132,8 @@ def _surface(scene: Scene) -> tuple[Array, Array]:
 
 def _of_body(body: Body) -> tuple[Array, Array, Array]:
     """Vertices [V, 3], faces [F, 3] and sRGB colours [V, 4] of a thing that stands in the scene."""
-    albedo = body.surface.albedo
-    height, width = albedo.shape[:2]
-    rows = (np.floor(body.uv[:, 1] * height) % height).astype(int)
-    columns = (np.floor(body.uv[:, 0] * width) % width).astype(int)
-    levels = srgb_levels(albedo[rows, columns] * np.asarray(body.surface.tint, np.float32))
+    albedo = texels(body.surface.albedo, body.uv)
+    levels = srgb_levels(albedo * np.asarray(body.surface.tint, np.float32))
     return body.vertices, body.faces, np.c_[levels, np.full(len(levels), 255, np.uint8)]
 
 

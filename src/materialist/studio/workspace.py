@@ -128,9 +128,7 @@ class WorkFolder:
                     edits.rename(_free_name(target))
             if _COOKIE.fullmatch(project.owner):
                 # The card names its owner, too.
-                card = json.loads((project.folder / CARD).read_text("utf-8"))
-                card["owner"] = person_of(project.owner)
-                write_whole(project.folder / CARD, json.dumps(card, indent=1))
+                _change_card(project, owner=person_of(project.owner))
 
     def projects(self, person: str | None = None) -> list[Project]:
         """All projects, or those of one person; the newest first."""
@@ -162,10 +160,9 @@ class WorkFolder:
 
     def rename(self, project: Project, title: str) -> Project:
         """Give a project another title. Raises OutputError where it cannot be written."""
-        card = json.loads((project.folder / CARD).read_text("utf-8"))
-        card["title"] = _shown(title)
-        write_whole(project.folder / CARD, json.dumps(card, indent=1))
-        return replace(project, title=card["title"])
+        renamed = replace(project, title=_shown(title))
+        _change_card(project, title=renamed.title)
+        return renamed
 
     def write_last(self, last: dict[str, str]) -> None:
         """Keep which project each person had last, for a studio that is started again. Raises OutputError."""
@@ -205,6 +202,12 @@ class WorkFolder:
             ours = project.scene.parent == project.folder and not [*project.folder.glob("edits-*")]
             if idle and ours and not project.ready:
                 shutil.rmtree(project.folder, ignore_errors=True)
+
+
+def _change_card(project: Project, **facts: str) -> None:
+    """Write other facts of a project. Raises OutputError."""
+    card = json.loads((project.folder / CARD).read_text("utf-8"))
+    write_whole(project.folder / CARD, json.dumps({**card, **facts}, indent=1))
 
 
 def _free_name(folder: Path) -> Path:

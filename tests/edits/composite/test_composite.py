@@ -20,7 +20,6 @@ from materialist.edits.composite.composite import (
     is_deep,
     pictures,
     spent_composite,
-    write_composite,
 )
 from materialist.edits.composite.into_photo import SETTINGS, into_photo
 from materialist.edits.composite.layers import Layers, _gain, significance, without_fireflies
@@ -35,6 +34,7 @@ from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import window
 from materialist.io.colour_space import DISPLAY_P3, space, srgb_curve
 from materialist.io.decode import decode
+from materialist.io.out.encode import save_image
 from materialist.io.out.icc import profile_of
 from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
@@ -335,7 +335,7 @@ def test_every_value_comes_back(tmp_path, dtype, side, suffix):
     pixels = np.arange(side**2).astype(dtype).reshape(side, side)[..., None].repeat(3, -1)
     cv2.imwrite(str(tmp_path / f"a.{suffix}"), pixels)
     photo = photo_from(tmp_path / f"a.{suffix}")
-    write_composite(tmp_path / "b.png", photo.original, photo)
+    save_image(tmp_path / "b.png", photo.original, photo)
     back = cv2.imread(str(tmp_path / "b.png"), cv2.IMREAD_UNCHANGED)
     assert back.dtype == dtype and is_deep(photo) == (dtype == np.uint16)
     np.testing.assert_array_equal(back, pixels)
@@ -363,7 +363,7 @@ def test_a_saved_edit_keeps_the_exif_of_the_photo(tmp_path):
     again = load_scene(tmp_path / "b.scene")
     assert again.photo.exif == once.photo.exif and again.photo.source is None
     for saved in (again, developed(again, again, again.photo.original)):
-        write_composite(tmp_path / "o.jpg", saved.photo.original, saved.photo, force=True)
+        save_image(tmp_path / "o.jpg", saved.photo.original, saved.photo, force=True)
         found = Image.open(tmp_path / "o.jpg").getexif()
         assert found[0x010F] == "Canon" and found.get_ifd(0x8769)[0xA405] == 28
 

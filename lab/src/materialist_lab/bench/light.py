@@ -32,6 +32,7 @@ from materialist.types import Array, Geometry, Materials, Prediction, Scene
 from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, names, timed
 from materialist_lab.bench.edits import sample_and_light, staged, true_scene
 from materialist_lab.bench.report import CEILING, Column, Report
+from materialist_lab.metrics.envmaps import envmap_metrics
 from materialist_lab.procedural.synthetic import SyntheticSample, photographed
 
 NEUTRAL = (0.5, 0.5, NEUTRAL_METALLIC)
@@ -207,7 +208,7 @@ class _Stage:
         """The map against the true one, and the true scene under it against the photo."""
         # Other seeds than the photo's: the same noise would flatter.
         picture = self.sample.scene.render(envmap, spp=self.bench.spp, seed=self.bench.seed + 4)
-        of_map = metrics.envmap_metrics(envmap, self.sample.envmap)
+        of_map = envmap_metrics(envmap, self.sample.envmap)
         for part, mask in (("render", None), ("surface", self.sample.truth.depth > 0)):
             for name in ("ssim", "psnr", "mse") if mask is None else ("ssim", "psnr"):
                 of_map[f"{part}_{name}"] = getattr(metrics, name)(picture, self.photo, mask=mask)

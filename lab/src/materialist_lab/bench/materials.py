@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.io.display import strip
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
@@ -32,6 +31,7 @@ from materialist_lab.bench.benchmark import COUNT_OR_0, Benchmark, Row, names, s
 from materialist_lab.bench.report import Column, Report
 from materialist_lab.data.datasets import InteriorVerse, open_sources
 from materialist_lab.data.samples import Sample, SampleFolder
+from materialist_lab.data.sheets import strip
 from materialist_lab.metrics.maps import ordinal_accuracy, score, summary
 from materialist_lab.procedural.photographic import as_photo
 

@@ -12,9 +12,10 @@ import numpy as np
 from materialist.color import linear_to_srgb
 from materialist.errors import OutputError
 from materialist.io.atomic import make_folder, require_parent, write_whole, writing
-from materialist.io.display import encoded, write_sheet
+from materialist.io.display import encoded
 from materialist.plain import plain
 from materialist.types import Array
+from materialist_lab.data.sheets import write_sheet
 
 CEILING = "ceiling"
 """In the method names of rows that are given the truth: they do not compete for the best figure."""

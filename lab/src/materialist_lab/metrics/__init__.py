@@ -1,1 +1,1 @@
-"""Figures that only benchmarks and training need: how good predicted maps are, and LPIPS."""
+"""Figures that only benchmarks and training need: how good predicted maps and lights are, and LPIPS."""

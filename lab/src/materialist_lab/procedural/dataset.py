@@ -9,10 +9,10 @@ import numpy as np
 from materialist import __version__
 from materialist.errors import InputError, OutputError
 from materialist.io.atomic import write_whole
-from materialist.io.display import strip, write_sheet
 from materialist.render.variant import setup
 from materialist.types import Progress
 from materialist_lab.data.samples import SampleFolder, claim_folder, described, make_missing
+from materialist_lab.data.sheets import strip, write_sheet
 from materialist_lab.procedural.catalog.cache import CREDITS, listing
 from materialist_lab.procedural.objects import shapes
 from materialist_lab.procedural.options import DataSetOptions

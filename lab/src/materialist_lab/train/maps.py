@@ -9,9 +9,9 @@ import numpy as np
 from torch import nn
 
 from materialist.errors import InputError
-from materialist.io.display import strip, write_sheet
 from materialist.types import Prediction
 from materialist_lab.data.samples import Sample, Source
+from materialist_lab.data.sheets import strip, write_sheet
 from materialist_lab.metrics.maps import score, summary
 from materialist_lab.procedural.photographic import as_photo
 from materialist_lab.train.task import Recipe, Task

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,11 +16,10 @@ from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.errors import InputError
 from materialist.io.out.colours import photo_colours
 from materialist.io.out.depth import is_deep
-from materialist.io.out.encode import save_image
 from materialist.io.out.exif import copied_exif
 from materialist.options import PATHS
 from materialist.spelling import spelled
-from materialist.types import Array, Photo, Scene
+from materialist.types import Array, Scene
 
 Upscale = Callable[[Array], Array]
 """upscale(picture [H, W, 3] linear) -> a larger one, linear."""
@@ -236,10 +234,3 @@ def developed(
     report = replace(old, stages=(*old.stages, stage), metrics={**old.metrics, **figures})
     saved = replace(edited, photo=photo, rerender=again, report=report)
     return saved if photo_colours(scene.photo).space is None else warned(saved, NARROWED)
-
-
-def write_composite(
-    path: str | Path, picture: Array, photo: Photo, *, force: bool = False
-) -> tuple[str, ...]:
-    """Write linear [H, W, 3] as the photo's own file would be, see `io.out.encode.save_image`; returns its notes."""
-    return save_image(path, picture, photo, force=force)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.edits.core.operation import new_edits
 from materialist.types import Array, Scene
 
 LITTLE = 5 / 255
@@ -56,7 +57,7 @@ def mean_change(scene: Scene, picture: Array) -> float:
 
 def effect_notes(scene: Scene, edited: Scene, change: float) -> list[str]:
     """What to say of another light whose picture, or most changed frame, has no more than that `mean_change`."""
-    asked = edited.provenance.get("edits", ())[len(scene.provenance.get("edits", ())) :]
+    asked = new_edits(scene, edited)
     suns = [step["sun"] for step in asked if step["kind"] == "light" and "sun" in step]
     if suns and (notes := sun_notes(edited, *suns[-1])):
         return notes

@@ -91,3 +91,9 @@ class Operation:
         """What a step of a list of edits may say."""
         declared = declarations(self.options).items()
         return (*self.target.keys, *(name for name, (option, _) in declared if option.written))
+
+
+def new_edits(scene: Scene, edited: Scene) -> list[dict[str, Any]]:
+    """What the provenance of an edited scene says of the edits between the two."""
+    before = scene.provenance.get("edits", ())
+    return [*edited.provenance.get("edits", ())[len(before) :]]

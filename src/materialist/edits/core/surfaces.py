@@ -31,6 +31,13 @@ def uniform_surface(
     return Surface(colour, flat(roughness), flat(metallic), **fields)
 
 
+def texels(texture: Array, place: Array) -> Array:
+    """[N] or [N, C] values of a repeated map [h, w(, C)] at texture coordinates [N, 2], the nearest."""
+    height, width = texture.shape[:2]
+    column, row = np.floor(place * (width, height)).astype(int).T
+    return texture[row % height, column % width]
+
+
 def triple(values: Array | Sequence[float]) -> tuple[float, float, float]:
     """Three numbers as a tuple of plain floats, as files and comparisons want them."""
     a, b, c = (float(v) for v in values)

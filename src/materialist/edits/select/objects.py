@@ -63,8 +63,7 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside = np.zeros(scene.depth.shape, np.uint8)
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
-        logits, expected = sam.masks(linear_to_srgb(scene.photo.linear), box=box)
-        return tidy((logits[int(np.argmax(expected))] > 0) & (inside > 0), ())
+        return tidy(_outlined(scene, box) & (inside > 0), ())
     return tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
 
 
@@ -133,10 +132,15 @@ def _whole(scene: Scene, mask: Array, points: Sequence[tuple[int, int]]) -> Arra
     """
     rows, columns = window(mask)
     box = (columns.start, rows.start, columns.stop, rows.stop)
-    logits, expected = sam.masks(linear_to_srgb(scene.photo.linear), box=box)
-    whole = logits[int(np.argmax(expected))] > 0
+    whole = _outlined(scene, box)
     holds = (whole & mask).sum() >= SETTINGS.min_held * mask.sum()
     return whole if holds and all(whole[y, x] for x, y in points) else mask
+
+
+def _outlined(scene: Scene, box: Box) -> Array:
+    """[H, W] bool: what MobileSAM thinks most of, in a box."""
+    logits, expected = sam.masks(linear_to_srgb(scene.photo.linear), box=box)
+    return np.asarray(logits[int(np.argmax(expected))] > 0)
 
 
 def _soft_overlap(likely: Array, mask: Array) -> float:

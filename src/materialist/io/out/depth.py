@@ -6,10 +6,9 @@ from typing import Any
 
 from tifffile import TiffFile
 
-from materialist.io.decode import RAW_SUFFIXES
+from materialist.io.decode import RAW_SUFFIXES, TIFF
 from materialist.types import Photo
 
-_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _HEIC = tuple(
     b"ftyp" + brand for brand in (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1")
 )
@@ -18,7 +17,7 @@ _HEIC = tuple(
 
 def is_tiff(content: bytes) -> bool:
     """Whether a file begins as a TIFF does."""
-    return content[:4] in _TIFF
+    return content[:4] in TIFF
 
 
 def is_deep(photo: Photo) -> bool:

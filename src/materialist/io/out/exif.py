@@ -14,26 +14,22 @@ from materialist.io.out.depth import is_tiff
 from materialist.types import Photo
 
 _KEPT = (
-    *(
-        "ImageDescription",
-        "Make",
-        "Model",
-        "DateTime",
-        "Artist",
-        "Copyright",
-        "HostComputer",
-        "Rating",
-    ),
-    *(
-        "XResolution",
-        "YResolution",
-        "ResolutionUnit",
-        "XPTitle",
-        "XPComment",
-        "XPAuthor",
-        "XPKeywords",
-        "XPSubject",
-    ),
+    "ImageDescription",
+    "Make",
+    "Model",
+    "DateTime",
+    "Artist",
+    "Copyright",
+    "HostComputer",
+    "Rating",
+    "XResolution",
+    "YResolution",
+    "ResolutionUnit",
+    "XPTitle",
+    "XPComment",
+    "XPAuthor",
+    "XPKeywords",
+    "XPSubject",
 )
 """Tags of the main directory that are of the photograph and not of how its file lays out pixels."""
 _NUMBER = {name: number for number, name in ExifTags.TAGS.items()}

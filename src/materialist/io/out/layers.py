@@ -132,10 +132,10 @@ def cryptomatte_id(name: str) -> float:
     return float(struct.unpack("<f", struct.pack("<I", number))[0])
 
 
-def murmur3(content: bytes, seed: int = 0) -> int:
-    """MurmurHash3 of 32 bits (Appleby), by which cryptomattes name things."""
+def murmur3(content: bytes) -> int:
+    """MurmurHash3 of 32 bits (Appleby) with seed 0, by which cryptomattes name things."""
     whole = len(content) - len(content) % 4
-    state = seed
+    state = 0
     for (block,) in struct.iter_unpack("<I", content[:whole]):
         state = (_rotated(state ^ _scrambled(block), 13) * 5 + 0xE6546B64) & 0xFFFFFFFF
     state ^= _scrambled(int.from_bytes(content[whole:], "little")) ^ len(content)

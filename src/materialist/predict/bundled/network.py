@@ -34,6 +34,8 @@ ALBEDO_SLOPE = 4.0
 """With it, sigmoid(slope * (encoded - 0.5)) is about the encoded photo itself."""
 PATCH_DROPOUT = 0.1
 """Share of the transformer's channels that a step of training does not see, so that none is relied on alone."""
+_HEAD_SIZE = 32
+"""Channels of a head of attention."""
 LOG_FLOOR = 2.0**-7
 """Radiance below which the logarithmic input no longer tells pixels apart."""
 
@@ -237,9 +239,9 @@ def _same_subpixels(conv: nn.Conv2d) -> None:
 class _AttentionBlock(nn.Module):
     """Pre-norm transformer block over cells [B, n, C]; cells know their place from their rays."""
 
-    def __init__(self, channels: int, head_size: int = 32):
+    def __init__(self, channels: int):
         super().__init__()
-        self.heads = channels // head_size
+        self.heads = channels // _HEAD_SIZE
         self.norm1 = nn.LayerNorm(channels)
         self.norm2 = nn.LayerNorm(channels)
         self.qkv = nn.Linear(channels, 3 * channels)
@@ -292,15 +294,18 @@ class LightHead(nn.Module):
     """Pixels on a side of a cell."""
     CELL_CHANNELS = 17
     """Channels of a cell beside its features."""
+    CHANNELS = 128
+    BLOCKS = 3
 
-    def __init__(self, rows: int, features: int, channels: int = 128, blocks: int = 3):
+    def __init__(self, rows: int, features: int):
         super().__init__()
+        channels = self.CHANNELS
         self.rows = rows
         self.cells = nn.Linear(features + self.CELL_CHANNELS, channels)
         self.directions = nn.Sequential(
             nn.Linear(_HARMONICS, channels), nn.GELU(), nn.Linear(channels, channels)
         )
-        self.blocks = nn.ModuleList(_LightBlock(channels) for _ in range(blocks))
+        self.blocks = nn.ModuleList(_LightBlock(channels) for _ in range(self.BLOCKS))
         self.norm = nn.LayerNorm(channels)
         self.out = nn.Linear(channels, 4)
         nn.init.zeros_(self.out.weight)
@@ -344,15 +349,15 @@ class LightHead(nn.Module):
 class _LightBlock(nn.Module):
     """Directions [B, n, C] attend to cells [B, m, C], and to each other."""
 
-    def __init__(self, channels: int, head_size: int = 32):
+    def __init__(self, channels: int):
         super().__init__()
-        self.heads = channels // head_size
+        self.heads = channels // _HEAD_SIZE
         self.norm = nn.LayerNorm(channels)
         self.cell_norm = nn.LayerNorm(channels)
         self.query = nn.Linear(channels, channels)
         self.keys = nn.Linear(channels, 2 * channels)
         self.out = nn.Linear(channels, channels)
-        self.among = _AttentionBlock(channels, head_size)
+        self.among = _AttentionBlock(channels)
 
     def forward(self, queries: Tensor, cells: Tensor) -> Tensor:
         batch, count, channels = queries.shape

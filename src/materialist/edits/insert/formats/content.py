@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from materialist.geometry.boundary import joined_faces
 from materialist.types import Array, Surface
 
 
@@ -84,17 +85,14 @@ def joined_part(parts: list[MeshPart]) -> MeshPart:
     """Parts of one material as one; all of them have normals, or none, and all have colours, or none."""
     if len(parts) == 1:
         return parts[0]
-    # Faces count from the first vertex of their own part.
     sizes = [len(part.vertices) for part in parts]
-    first = np.cumsum(sizes) - sizes
     uv = None
     if any(part.uv is not None for part in parts):
         uv = np.concatenate(
             [np.zeros((n, 2)) if p.uv is None else p.uv for p, n in zip(parts, sizes)]
         )
     return MeshPart(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.faces + start for part, start in zip(parts, first)]).astype(np.int32),
+        *joined_faces(parts),
         parts[0].paint,
         parts[0].name,
         None if parts[0].normals is None else np.concatenate([part.normals for part in parts]),

@@ -46,8 +46,6 @@ class PrimitiveInstance:
     node: int
     mesh: dict[str, Any]
     primitive: dict[str, Any]
-    triangles: int
-    """How many one copy has at most."""
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -128,15 +126,9 @@ class _Reader:
                 corners = self.file.count(
                     primitive.get("indices", primitive["attributes"]["POSITION"])
                 )
-                instance = PrimitiveInstance(
-                    node=node,
-                    mesh=mesh,
-                    primitive=primitive,
-                    triangles=corners // 3 if mode == TRIANGLES else max(corners - 2, 0),
-                )
-                instances.append(instance)
+                instances.append(PrimitiveInstance(node=node, mesh=mesh, primitive=primitive))
                 copies += count
-                triangles += count * instance.triangles
+                triangles += count * (corners // 3 if mode == TRIANGLES else max(corners - 2, 0))
                 self.file.source.check("copies", copies)
         self.file.source.check("faces", triangles)
         self._note_left_out()

@@ -160,9 +160,8 @@ def _table(source: MeshSource, rows: list[list[bytes]], columns: int) -> Array:
         columns = 6
         rows = [row[:3] if len(row) < 6 else row for row in rows]  # x y z w
         lengths = set(map(len, rows))
-    if len(lengths) == 1 and lengths >= {columns}:
-        return parse_floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
-    rows = [[*row, *[b"nan"] * columns][:columns] for row in rows]
+    if lengths != {columns}:
+        rows = [[*row, *[b"nan"] * columns][:columns] for row in rows]
     return parse_floats(source, list(chain.from_iterable(rows))).reshape(-1, columns)
 
 
