@@ -47,7 +47,7 @@ class Edit:
     """One edit with its truth."""
 
     kind: str
-    change: Callable[[Scene], Scene]
+    change: Callable[..., Scene]
     """The edit of any scene fitted to the sample's photo."""
     truth: TrueScene
     """The true scene after it."""

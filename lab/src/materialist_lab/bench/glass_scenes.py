@@ -21,7 +21,7 @@ from materialist_lab.procedural.arrangements import Item, in_camera
 from materialist_lab.procedural.objects import shapes
 from materialist_lab.procedural.objects.glassware import KINDS, jug, make_shape
 from materialist_lab.procedural.objects.shapes import Solid
-from materialist_lab.procedural.synthetic import TrueScene
+from materialist_lab.procedural.synthetic import SyntheticSample, TrueScene, photographed
 from materialist_lab.procedural.thickness.dataset import CameraPose, look
 from materialist_lab.procedural.thickness.ray_paths import ShapeTracer
 from materialist_lab.procedural.world import Viewpoint, orbit
@@ -180,6 +180,16 @@ def environment(index: int, scene: GlassScene, *, data: Path | None, seed: int =
         else cv2.resize(full, (2 * rows, rows), interpolation=cv2.INTER_AREA)
     )
     return np.minimum(small, PROTOCOL.brightest * luminance(small).mean()).astype(np.float32)
+
+
+def photo_and_light(
+    stage: GlassScene, index: int, data: Path | None, spp: int
+) -> tuple[SyntheticSample, Array]:
+    """The photo of a grey object under one light, and another light [h, 2h, 3] at its exposure."""
+    first, second = (environment(k, stage, data=data) for k in (index, index + 1))
+    gain = room_exposure(stage.room.render(first, spp, seed=1))
+    grey = stage.grey.render(first * gain, spp, seed=2)
+    return photographed(stage.grey, grey, first * gain, stage.thing.name), second * gain
 
 
 def room_exposure(background: Array) -> float:

@@ -13,7 +13,8 @@ darkness). The others are edits, as in `bench edit`, by PSNR inside: `relight` a
 the picture, since the brightness of a light cannot be told from that of surfaces; `insert` also with `screen space`
 shadows of the fitted light; `glass` is the largest object turned to glass, `remove` the picture without it. `shadow` is
 the PSNR where the true picture changes outside: in shadows and reflections. sheet.png: photo, truth, and the pictures
-of the rows after `untouched`. An edit that the program refuses leaves the photo as it was.
+of the rows after `untouched`; `metal: normals of the maps` is the edit without the normals of round bodies. With
+`--jugs`, photos of one jug in a room come last. An edit that the program refuses leaves the photo as it was.
 """
 
 from collections.abc import Iterator
@@ -29,6 +30,7 @@ from materialist.errors import InputError
 from materialist.fit.settings import PAPER
 from materialist.option_kinds import option
 from materialist.types import Array, Prediction, Scene
+from materialist_lab.bench import glass_scenes
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row, names, timed
 from materialist_lab.bench.edits import KINDS, Edit, edits, sample_and_light, true_scene
 from materialist_lab.bench.report import CEILING, Column, Report, side_by_side
@@ -66,7 +68,8 @@ class PhotoAloneBench(Benchmark):
         Column("seconds", "fit s", "lower", 1),
     )
 
-    scenes: int = option(24, "Photos.", **COUNT)
+    scenes: int = option(24, "Photos.", **COUNT_OR_0)
+    jugs: int = option(0, "Photos of one jug each, besides.", **COUNT_OR_0)
     size: int = option(256, "Their width and height.", **SIZE)
     kinds: str = option(",".join(KINDS[:6]), "Edits, with commas.", kind="name")
     predictor: str = option("bundled", "Where the maps come from.", kind="name")
@@ -84,8 +87,7 @@ class PhotoAloneBench(Benchmark):
 
     def rows(self, data: Path | None, report: Report) -> Iterator[Row]:
         kinds = names("kinds", self.kinds, KINDS)
-        for scene in range(self.scenes):
-            sample, light = unseen_sample(scene, data, self.size)
+        for sample, light in self._samples(data):
             scenes = {}
             # --- Inversions, and how far their maps are from the truth ---
             for name, fitted, cost in self._fitted(sample):
@@ -114,6 +116,14 @@ class PhotoAloneBench(Benchmark):
             for edit in edits(sample, light, kinds):
                 for row in self._compared(edit, sample, before, scenes, report):
                     yield {**row, "sample": sample.name}
+
+    def _samples(self, data: Path | None) -> Iterator[tuple[SyntheticSample, Array]]:
+        """Photos, and the other light that each is shown under."""
+        for scene in range(self.scenes):
+            yield unseen_sample(scene, data, self.size)
+        for k, jug in enumerate(glass_scenes.jugs(self.jugs, SCENE_SEED)):
+            stage = glass_scenes.GlassScene(jug, self.size, SCENE_SEED)
+            yield glass_scenes.photo_and_light(stage, k, data, self.truth_spp)
 
     def _fitted(self, sample: SyntheticSample) -> Iterator[tuple[str, Scene, dict[str, float]]]:
         """Names of rows, their scenes, and figures of those that are inversions."""
@@ -191,6 +201,14 @@ class PhotoAloneBench(Benchmark):
             except InputError:
                 edited = scene
                 picture = sample.photo.linear
+            if (edit.kind, name) == ("metal", "fitted"):
+                plain = edit.change(scene, normals="maps")
+                other = composite(scene, plain, spp=self.spp, seed=self.seed, device=self.device)
+                shown.append(other)
+                yield {
+                    "method": "metal: normals of the maps",
+                    **self._scores(edit, other, after, *region),
+                }
             if (edit.kind, name) == ("insert", "fitted"):
                 # The baseline: shadows in screen space, without a mesh.
                 photo = sample.photo.linear
