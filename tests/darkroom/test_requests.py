@@ -307,6 +307,7 @@ def test_a_removal_is_a_job_that_can_be_stopped(client, heard):
     assert answer.status_code == 400 and "must lie in" in answer.json()["error"]
 
 
+@pytest.mark.slow
 def test_removals_are_switched_by_a_job_and_at_once_when_that_was_done(client, heard):
     """The second hides something else without the first."""
 

@@ -114,7 +114,9 @@ def test_its_averaged_weights_predict_and_begin_another_run(run, data):
         other.network()
 
 
-@pytest.mark.parametrize("kind", ["matnet", "clicks", "refraction"])
+@pytest.mark.parametrize(
+    "kind", [pytest.param("matnet", marks=pytest.mark.slow), "clicks", "refraction"]
+)
 def test_a_run_that_was_killed_ends_as_one_that_was_not(kind, tasks, tmp_path):
     # Bit for bit: order, variants, moments and averages go on where they stopped.
     whole = made_runs.trainer(tasks[kind](), tmp_path / "whole", steps=6)
