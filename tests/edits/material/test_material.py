@@ -9,6 +9,7 @@ from made_meshes import floor_scene
 
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
+from materialist.edits.material import material
 from materialist.edits.material.material import edit, projected, shifted_hsv
 from materialist.edits.preview import Preview
 from materialist.errors import InputError
@@ -254,3 +255,21 @@ def test_other_edits_leave_its_normals(change):
 def test_metal_that_is_not_round_keeps_its_normals():
     edited = edit(SCENE, MASK, metallic=1)
     assert edited.normal is SCENE.normal and edited.geometry is SCENE.geometry
+
+
+def test_normals_of_metal_are_not_shared_with_the_next_edit():
+    scene, ball, _ = uneven_ball()
+    first = edit(scene, ball, metallic=1).normal
+    kept = first.copy()
+    first[:] = 0
+    np.testing.assert_array_equal(edit(scene, ball, metallic=0.9).normal, kept)
+
+
+def test_normals_of_metal_are_there_though_another_thread_throws_them_away(monkeypatch):
+    class Emptied(dict):
+        def __setitem__(self, key, value):
+            """As if others had kept many in the meantime."""
+
+    scene, ball, _ = uneven_ball()
+    monkeypatch.setattr(material, "_KEPT", Emptied())
+    assert (edit(scene, ball, metallic=1).normal != scene.normal).any()
