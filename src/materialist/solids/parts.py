@@ -55,8 +55,9 @@ def outline_normals(
     """
     result = np.array(normal, np.float32)
     rays = pixel_rays(camera).astype(np.float64)
-    objects = [] if up is None else objects_in(mask & (depth > 0))
-    for one in objects if len(objects) <= SETTINGS.max_round else ():
+    if up is None or len(objects := objects_in(mask & (depth > 0))) > SETTINGS.max_round:
+        return result
+    for one in objects:
         # --- The whole object, or without its handles ---
         inside = surface_in(one, depth, camera)
         fitted = surface_of_revolution(depth, normal, inside, camera, up=up)
