@@ -63,3 +63,11 @@ def test_masks_of_any_shape(vase, place):
     mask[place] = True
     body = without_handles(mask, UP, CAMERA)
     assert body is None or not (body & ~mask).any()
+
+
+def test_what_is_as_thick_as_a_leg_is_no_handle(vase):
+    """Another thing before the left of the foot: what it leaves of the foot stands out at one side."""
+    rows, columns = np.indices(vase.shape)
+    middle = int(np.median(np.nonzero(vase)[1]))
+    low = rows > np.percentile(np.nonzero(vase)[0], 80)
+    assert without_handles(vase & ~(low & (columns < middle)), UP, CAMERA) is None

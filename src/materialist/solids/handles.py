@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from materialist.camera import pixel_rays
-from materialist.geometry.silhouette import grown
+from materialist.geometry.silhouette import border_distance, grown
 from materialist.solids.outline import has_mirror_image, mirror_plane
 from materialist.types import Array, Camera
 
@@ -18,6 +18,7 @@ class HandleSettings:
     min_height: float = 0.15  # upright extent of the body; a handle beside a spout has less
     rounding: float = 0.02  # by which corners of the body are given back
     min_width: float = 0.012  # of a handle: what is thinner belongs to the body's outline
+    max_half_width: float = 0.085  # thicker is what another thing or no symmetry leaves; 38 handles
     min_body: float = 0.75  # share of the object that the body has
 
 
@@ -28,7 +29,7 @@ def without_handles(inside: Array, up: Array, camera: Camera) -> Array | None:
     """[H, W] bool: what of an object mirrors itself at an upright plane, without what stands out at one side.
 
     inside: [H, W] bool, one object. up: [3] unit, the upright direction in the camera's frame.
-    None where nothing stands out, or where the rest is too small a part of the object.
+    None where nothing stands out, where it is too thick for a handle, or the rest too small a part of the object.
     """
     size = float(np.sqrt(inside.sum()))
     rays = pixel_rays(camera).astype(np.float64)
@@ -47,5 +48,7 @@ def without_handles(inside: Array, up: Array, camera: Camera) -> Array | None:
     aside = cv2.morphologyEx((inside & ~body).astype(np.uint8), cv2.MORPH_OPEN, disc) > 0
     body = inside & ~aside
     if not aside.any() or body.sum() < SETTINGS.min_body * inside.sum():
+        return None
+    if border_distance(aside).max() > SETTINGS.max_half_width * size:
         return None
     return body

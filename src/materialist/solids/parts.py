@@ -20,6 +20,9 @@ class PartSettings:
 
     min_depth_pixels: float = 0.02  # inside its outline that a part must reach; derived
     min_part: float = 0.01  # share of the mask's largest part from which a part is an object
+    max_round: int = (
+        16  # objects of a mask among which round ones are looked for; each takes about a second
+    )
 
 
 SETTINGS = PartSettings()
@@ -46,13 +49,15 @@ def outline_normals(
     """[H, W, 3] float32 unit: a normal map in which round objects have the normals of their bodies.
 
     Where an object under the mask is a surface of revolution, with handles or without, normals come from its outline;
-    all others stay. A mirror shows every unevenness of predicted normals.
+    all others stay, and all where the mask has very many objects. A mirror shows every unevenness of predicted normals.
     depth: [H, W] planar, scene units, 0 = none. normal: [H, W, 3] unit. mask: [H, W] bool. up: [3] unit, upright in
     the camera's frame; None: no object is round. Raises InputError for maps of different sizes.
     """
     result = np.array(normal, np.float32)
     rays = pixel_rays(camera).astype(np.float64)
-    for one in objects_in(mask & (depth > 0)) if up is not None and mask.any() else ():
+    if up is None or len(objects := objects_in(mask & (depth > 0))) > SETTINGS.max_round:
+        return result
+    for one in objects:
         # --- The whole object, or without its handles ---
         inside = surface_in(one, depth, camera)
         fitted = surface_of_revolution(depth, normal, inside, camera, up=up)

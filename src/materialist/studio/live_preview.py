@@ -209,9 +209,9 @@ class LivePreview:
         return _THREAD.submit(preview.rows, self._surfaces(steps), region).result()
 
     def _surfaces(self, steps: tuple[Step, ...]) -> Scene:
-        """The scene as it is shaded: the cache knows only the geometry of the fit."""
+        """The scene as it is shaded: the cache knows only the surfaces of the fit."""
         edited = self.edited(steps)
-        if edited.geometry is self.scene.geometry:
+        if edited.geometry.mesh.vertices is self.scene.geometry.mesh.vertices:
             return edited
         return self.edited(tuple(step for step in steps if is_shaded(step)))
 

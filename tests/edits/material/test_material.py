@@ -9,10 +9,12 @@ from made_meshes import floor_scene
 
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
+from materialist.edits.composite.disclosed import base_scene
+from materialist.edits.material import material
 from materialist.edits.material.material import edit, projected, shifted_hsv
 from materialist.edits.preview import Preview
 from materialist.errors import InputError
-from materialist.geometry.build import with_normals
+from materialist.geometry.build import rebuilt, with_normals
 
 SCENE = flat_scene()
 
@@ -254,3 +256,48 @@ def test_other_edits_leave_its_normals(change):
 def test_metal_that_is_not_round_keeps_its_normals():
     edited = edit(SCENE, MASK, metallic=1)
     assert edited.normal is SCENE.normal and edited.geometry is SCENE.geometry
+
+
+def test_normals_of_metal_are_not_shared_with_the_next_edit():
+    scene, ball, _ = uneven_ball()
+    first = edit(scene, ball, metallic=1).normal
+    kept = first.copy()
+    first[:] = 0
+    np.testing.assert_array_equal(edit(scene, ball, metallic=0.9).normal, kept)
+
+
+def test_normals_of_metal_are_there_though_another_thread_throws_them_away(monkeypatch):
+    class Emptied(dict):
+        def __setitem__(self, key, value):
+            """As if others had kept many in the meantime."""
+
+    scene, ball, _ = uneven_ball()
+    monkeypatch.setattr(material, "_KEPT", Emptied())
+    assert (edit(scene, ball, metallic=1).normal != scene.normal).any()
+
+
+def test_a_removal_beside_metal_is_compared_with_the_normals_of_the_photo():
+    """Else the photo of the round thing changes as if a shadow had gone from it."""
+    scene, ball, _ = uneven_ball()
+    hole = np.zeros_like(ball)
+    hole[-12:-4, -20:-8] = True
+    gold = edit(scene, ball, metallic=1)
+    photo = replace(scene.photo, linear=np.where(hole[..., None], 0.1, scene.photo.linear))
+
+    def removed(other):
+        depth = np.where(hole, 1.1 * scene.depth, scene.depth).astype(np.float32)
+        geometry = rebuilt(scene, depth, other.normal, scene.camera)
+        return replace(other, photo=photo, depth=depth, geometry=geometry)
+
+    def shading(base):
+        """[P, 3] mean normal of the corners of each pixel with a surface."""
+        mesh = base.geometry.mesh
+        corners = mesh.faces[: 2 * int((base.depth > 0).sum())].reshape(-1, 6)
+        return mesh.normals[corners].mean(1)
+
+    plain = base_scene(scene, removed(scene))
+    base = base_scene(scene, removed(gold))
+    np.testing.assert_array_equal(base.normal, plain.normal)
+    np.testing.assert_array_equal(base.materials.metallic, plain.materials.metallic)
+    off = [np.abs(shading(one) - shading(plain)).max() for one in (base, removed(gold))]
+    assert off[0] < 0.1 < 0.2 < off[1]

@@ -8,7 +8,7 @@ from materialist.edits.composite.into_photo import SETTINGS, into_photo, onto_wo
 from materialist.edits.composite.layers import difference, inner
 from materialist.edits.core.renderer import EditRenderer, RenderOptions
 from materialist.edits.core.surfaces import base_of
-from materialist.geometry.build import continued_as
+from materialist.geometry.build import continued_as, with_normals
 from materialist.geometry.membrane import membrane
 from materialist.geometry.silhouette import grown
 from materialist.types import Array, Materials, Scene
@@ -23,8 +23,9 @@ RIM = 3
 def base_scene(scene: Scene, edited: Scene) -> Scene:
     """The scene that edits are compared with.
 
-    If an edit removed something, its filled photo and maps replace the fitted ones inside the hole. In-photo emitters
-    are surfaces where the edit has them as such (`core.surfaces`).
+    If an edit removed something, its filled photo and maps replace the fitted ones inside the hole; outside it new
+    materials and normals belong to the edit. In-photo emitters are surfaces where the edit has them as such
+    (`core.surfaces`).
     """
     base = base_of(scene, edited)
     if edited.photo is scene.photo:
@@ -37,14 +38,20 @@ def base_scene(scene: Scene, edited: Scene) -> Scene:
         np.where(hole, new.roughness, old.roughness),
         np.where(hole, new.metallic, old.metallic),
     )
+    normal = np.where(hole[..., None], edited.normal, scene.normal)
+    geometry = edited.geometry
+    others = (normal != edited.normal).any(-1)
+    if others.any():
+        # Pixels beside them have corners in common with them.
+        geometry = with_normals(geometry, normal, grown(others, 1))
     return replace(
         base,
         photo=edited.photo,
         rerender=edited.rerender,
         materials=materials,
         depth=edited.depth,
-        normal=edited.normal,
-        geometry=edited.geometry,
+        normal=normal,
+        geometry=geometry,
     )
 
 

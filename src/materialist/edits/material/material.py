@@ -93,12 +93,15 @@ def _outline_normals(scene: Scene, region: Array) -> Array:
     for array in (scene.depth, scene.normal, scene.geometry.plane_label, region):
         digest.update(np.ascontiguousarray(array).tobytes())
     key = digest.hexdigest()
-    if key not in _KEPT:
+    normal = _KEPT.get(key)
+    if normal is None:
         up = upright(scene.normal, np.where(region, -1, scene.geometry.plane_label))
-        while len(_KEPT) >= MAX_KEPT:
-            _KEPT.pop(next(iter(_KEPT)), None)
-        _KEPT[key] = outline_normals(scene.depth, scene.normal, region, scene.camera, up)
-    return _KEPT[key]
+        normal = outline_normals(scene.depth, scene.normal, region, scene.camera, up)
+        # Other threads may do the same: what one of them took out is no error.
+        for old in list(_KEPT)[: 1 - MAX_KEPT]:
+            _KEPT.pop(old, None)
+        _KEPT[key] = normal
+    return normal.copy()
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:
