@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from edit_scenes import MASK, rendered_scene
 
+from materialist.camera import unit
 from materialist.edits.core.renderer import EditRenderer
 from materialist.edits.light.relight import relight
 from materialist.edits.material.material import edit
 from materialist.edits.preview import Preview
+from materialist.geometry.build import with_normals
 from materialist.metrics import psnr
 
 
@@ -49,6 +51,30 @@ def test_light_change_agrees_with_the_path_tracer(preview):
     edited = relight(preview.scene, envmap=light)
     assert psnr(preview.render(edited), traced(edited)) > 30
     # And back again: the first light's tables are not mixed up with the second's.
+    assert psnr(preview.render(preview.scene), traced(preview.scene)) > 30
+
+
+def turned(scene):
+    """Polished copper whose normals lean to one side."""
+    normal = np.where(MASK[..., None], unit(scene.normal + np.array([0.5, 0.2, 0])), scene.normal)
+    copper = edit(scene, MASK, metallic=1, roughness=0.15, albedo=(0.9, 0.6, 0.4), normals="maps")
+    geometry = with_normals(scene.geometry, normal, MASK)
+    return replace(copper, normal=normal.astype(np.float32), geometry=geometry)
+
+
+@pytest.mark.parametrize("coarse", [False, True])
+def test_new_normals_agree_with_the_path_tracer(preview, coarse):
+    light = np.full((8, 16, 3), 0.2, np.float32)
+    light[:, 3:8] = [1.5, 1.0, 0.5]
+    copper = turned(preview.scene)
+    straight = replace(copper, normal=preview.scene.normal, geometry=preview.scene.geometry)
+    for edited, other in ((copper, straight), *[(relight(copper, envmap=light),) * 2]):
+        truth = traced(edited)[MASK]
+        score = psnr(preview.render(edited, coarse=coarse)[MASK], truth)
+        assert score > 27
+        if other is straight:
+            assert psnr(preview.render(straight, coarse=coarse)[MASK], truth) < score - 6
+    # Nothing of it stays behind.
     assert psnr(preview.render(preview.scene), traced(preview.scene)) > 30
 
 

@@ -63,6 +63,10 @@ class Preview:
         self._file = file
         self._key = _key(scene)
         self._other: tuple[Array, Tables] | None = None
+        self._turned: tuple[Array, Any] | None = None
+        """Normals [H, W, 3] of an edit, and the rays of the pixels where they differ."""
+        self._turned_tables: tuple[Tables, Tables] | None = None
+        """Tables of the scene's own normals, and the same with those of `_turned`."""
         self._passed_on = scene.rerender
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
@@ -127,7 +131,7 @@ class Preview:
         """[H, W, 3] float32 linear: the edited scene by cached transport, noise-free.
 
         `coarse`: another light by a seventh of the rays, surfaces passing on what they did in the picture before.
-        Normals are those of the scene this preview was built for. Raises InputError for other surfaces than its own.
+        Raises InputError for other surfaces than its own; they may have other normals.
         """
         if edited.geometry.mesh.vertices is not self.scene.geometry.mesh.vertices:
             raise InputError(
@@ -139,7 +143,37 @@ class Preview:
 
     def _tables_of(self, seen: Scene, coarse: bool = False) -> Tables:
         fitted = np.array_equal(seen.envmap, self.scene.envmap)
-        return self._tables if fitted else self._tables_under(seen, coarse)
+        tables = self._tables if fitted else self._tables_under(seen, coarse)
+        turned = (seen.normal != self.scene.normal).any(-1)
+        return self._with_normals(tables, seen, turned) if turned.any() else tables
+
+    def _with_normals(self, tables: Tables, seen: Scene, turned: Array) -> Tables:
+        """The tables with those of the edit's normals at the pixels [H, W] bool where these are not the scene's."""
+        import torch
+
+        from materialist.transport.cache import CacheSettings, Tables, TransportCache
+        from materialist.transport.filter import filter_tables, surface_guide
+        from materialist.transport.shading import at_roughness
+
+        if self._turned is None or not np.array_equal(self._turned[0], seen.normal):
+            rays = CacheSettings(*RAYS)
+            cache = TransportCache(seen.geometry, seen.camera, rays, region=turned)
+            self._turned = (seen.normal, cache)
+            self._turned_tables = None
+        if self._turned_tables is None or self._turned_tables[0] is not tables:
+            cache = self._turned[1]
+            fitted = tables is self._tables
+            passed_on = self.scene.rerender if fitted else self._passed_on
+            rows = torch.from_numpy(np.searchsorted(self._pixels, cache.pixels))
+            own = cache.gather(seen.envmap, passed_on)
+            if len(tables.levels) == 1:  # coarse ones, of one roughness [P]
+                own = at_roughness(own, tables.levels[0][rows])
+            own = filter_tables(cache, own, surface_guide(cache), sharpest=SHARPEST)
+            mixed = Tables(tables.diffuse.clone(), tables.specular.clone(), tables.levels)
+            mixed.diffuse[rows] = own.diffuse
+            mixed.specular[:, rows] = own.specular
+            self._turned_tables = (tables, mixed)
+        return self._turned_tables[1]
 
     def rows(self, edited: Scene, region: Array) -> dict[str, Array]:
         """What shading the surface pixels of a region [H, W] bool of a scene takes, in the order of the picture.

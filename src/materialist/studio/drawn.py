@@ -20,7 +20,7 @@ from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
 from materialist.edits.light.relight import kelvin_colour
-from materialist.edits.material.material import base_colour, weight_of
+from materialist.edits.material.material import base_colour, changed, is_metal, weight_of
 from materialist.edits.material.operation import EDIT
 from materialist.edits.recipe import Step, options_of
 from materialist.geometry.silhouette import window
@@ -54,6 +54,8 @@ class Drawing:
     fixed: Step
     """The own step without what the page draws."""
     region: Array | None = None
+    metal: bool = False
+    """Whether the own step gives the region the normals of metal."""
 
     @property
     def others(self) -> tuple[Step, ...]:
@@ -64,7 +66,7 @@ class Drawing:
         steps = (*self.before, self.fixed, *self.after)
         panes = [id(self.panes.get(glass.place(step))) for step in steps if glass.is_traced(step)]
         region = b"" if self.region is None else np.packbits(self.region).tobytes()
-        parts = [id(live), live.fine, len(self.before), key_of(steps), panes]
+        parts = [id(live), live.fine, len(self.before), key_of(steps), panes, self.metal]
         return hashlib.sha1(json.dumps(parts).encode() + region).hexdigest()[:16]
 
 
@@ -129,12 +131,19 @@ def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
     panes = client.panes(active)
     if kind == "material" and own.kind == EDIT.name and mask is not None:
         fixed = with_options(own, **dict.fromkeys((*MOVED, *REGION)))
-        return live, Drawing(panes, *around, fixed, mask)
+        metal = has_outline_normals(live.scene, own, mask)
+        return live, Drawing(panes, *around, fixed, mask, metal)
     if kind == "thing" and own.kind == INSERT.name:
         return live, Drawing(panes, *around, own)
     if kind == "lamps" and "lamps" in own.options:
         return live, Drawing(panes, *around, with_options(own, lamps=None))
     return None
+
+
+def has_outline_normals(scene: Scene, own: Step, region: Array) -> bool:
+    """Whether a material step gives a region [H, W] bool the normals of metal, as far as the fitted scene tells."""
+    options = options_of(own)
+    return is_metal(changed(scene.materials.metallic, options.metallic), region, options)
 
 
 Made = tuple[dict[str, Any], dict[str, Array]] | None
@@ -164,7 +173,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     if waits or later:
         return None
     # --- The pixels, and their tables ---
-    rows = live.rows(steps, inside)
+    rows = live.rows(steps, inside, weight > 0.5 if drawing.metal else None)
     overall = rows.pop("overall", None)
     pixels = rows.pop("pixels")
     materials = before.materials

@@ -19,6 +19,7 @@ from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import KEY
+from materialist.edits.material.material import with_outline_normals
 from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
@@ -202,11 +203,16 @@ class LivePreview:
         """[H, W] bool: where the photo of an edited scene is filled in."""
         return (edited.photo.linear != self.scene.photo.linear).any(-1)
 
-    def rows(self, steps: tuple[Step, ...], region: Array) -> dict[str, Array]:
-        """`Preview.rows` of the scene after the steps."""
+    def rows(
+        self, steps: tuple[Step, ...], region: Array, metal: Array | None = None
+    ) -> dict[str, Array]:
+        """`Preview.rows` of the scene after the steps, with the normals of metal under a mask [H, W] bool."""
         preview = self._preview.result()
         self._asked = time.monotonic()
-        return _THREAD.submit(preview.rows, self._surfaces(steps), region).result()
+        scene = self._surfaces(steps)
+        if metal is not None:
+            scene = with_outline_normals(scene, metal)
+        return _THREAD.submit(preview.rows, scene, region).result()
 
     def _surfaces(self, steps: tuple[Step, ...]) -> Scene:
         """The scene as it is shaded: the cache knows only the surfaces of the fit."""
@@ -255,7 +261,7 @@ class LivePreview:
 
 def _look_alike(scene: Scene, other: Scene) -> bool:
     """Whether shading, which knows no bodies, makes the same picture of two edits of a scene."""
-    maps = [(*vars(one.materials).values(), one.envmap) for one in (scene, other)]
+    maps = [(*vars(one.materials).values(), one.envmap, one.normal) for one in (scene, other)]
     return (
         bool(scene.lamps) == bool(other.lamps)
         and scene.provenance.get(KEY) == other.provenance.get(KEY)

@@ -85,7 +85,8 @@ class TransportCache:
     """Traced visibility of one camera and mesh; equal seeds of the point sets give equal caches.
 
     The faces of the mesh carry the pixel whose radiance a ray that hits them sees. roughness: [H, W] perceptual, where
-    it is known and stays: the specular lobe is then tabulated at it alone, which takes a sixth of the rays.
+    it is known and stays: the specular lobe is then tabulated at it alone, which takes a sixth of the rays. region:
+    [H, W] bool of the pixels that are shaded; None: all.
     """
 
     def __init__(
@@ -95,6 +96,7 @@ class TransportCache:
         settings: CacheSettings | None = None,
         *,
         roughness: Array | None = None,
+        region: Array | None = None,
         seed: int = 0,
         progress=None,
     ):
@@ -111,7 +113,7 @@ class TransportCache:
         )
         self.slots = integers(mi, slots)
         """[F] radiance slot of every face: its pixel, or one of its own on a continued plane."""
-        self._primary()
+        self._primary(region)
         self._progress = progress
         self._set_lobes(s, roughness)
 
@@ -140,11 +142,13 @@ class TransportCache:
         """Rays a pixel and alpha of the diffuse lobe, and of the specular one at each level."""
         self._hits: list[mi.UInt32] = []
 
-    def _primary(self) -> None:
+    def _primary(self, region: Array | None) -> None:
         """Trace one ray through each pixel; keep what the pixels with a surface need for shading."""
         # --- Primary rays, in the camera frame: pinhole at the origin, looking down -Z ---
         cam = self.camera
         index = dr.arange(mi.UInt32, cam.width * cam.height)
+        if region is not None:
+            index = integers(mi, np.flatnonzero(region))
         columns = dr.opaque(mi.UInt32, cam.width)
         # Numbers of one photo are data: as literals they would have the kernel compiled anew.
         middle_x = dr.opaque(mi.Float, (cam.width - 1) / 2)
@@ -156,9 +160,9 @@ class TransportCache:
         dr.eval(d, si)  # together, or each part of it would trace the rays again
 
         # --- Surface points of the pixels that see one ---
-        pixels = dr.compress(si.is_valid())
-        self.pixels = np.array(pixels)  # [P] row-major indices of the pixels with a surface
-        take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(pixels))  # noqa: E731
+        seen = dr.compress(si.is_valid())
+        take: Any = lambda v: dr.gather(type(v), v, mi.UInt32(seen))  # noqa: E731
+        self.pixels = np.array(take(index))  # [P] row-major indices of the pixels with a surface
         normal = take(si.sh_frame.n)
         view = -take(d)
         # `face` keeps sampled directions above the triangle, `frame` shades by the smooth normal.

@@ -57,14 +57,13 @@ def edit(
     # Mixed by the weight, so that a feathered border fades.
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
-        _mix(materials.roughness, _changed(materials.roughness, changes.roughness), weight),
-        _mix(materials.metallic, _changed(materials.metallic, changes.metallic), weight),
+        _mix(materials.roughness, changed(materials.roughness, changes.roughness), weight),
+        _mix(materials.metallic, changed(materials.metallic, changes.metallic), weight),
     )
     region = weight > 0.5
-    metal = changes.metallic is not None and region.any() and new.metallic[region].mean() > 0.5
     edited = replace(scene, materials=new)
-    if metal and changes.normals == "auto":
-        edited = _round(edited, region)
+    if is_metal(new.metallic, region, changes):
+        edited = with_outline_normals(edited, region)
     names = ("hue", "saturation", "value", "grow", "feather")
     facts: dict[str, Any] = {name: getattr(changes, name) or None for name in names}
     facts |= {
@@ -78,13 +77,20 @@ def edit(
     return noted(edited, "material", {**facts, "pixels": int(region.sum())})
 
 
-def _round(scene: Scene, region: Array) -> Scene:
+def is_metal(metallic: Array, region: Array, changes: MaterialEdit) -> bool:
+    """Whether an edit to a new metallic [H, W] takes the normals of bodies inside a region [H, W] bool."""
+    if changes.metallic is None or changes.normals != "auto" or not region.any():
+        return False
+    return bool(metallic[region].mean() > 0.5)
+
+
+def with_outline_normals(scene: Scene, region: Array) -> Scene:
     """The scene with the normals of bodies where the region [H, W] bool has surfaces of revolution."""
     normal = _outline_normals(scene, region)
-    changed = (normal != scene.normal).any(-1)
-    if not changed.any():
+    turned = (normal != scene.normal).any(-1)
+    if not turned.any():
         return scene
-    return replace(scene, normal=normal, geometry=with_normals(scene.geometry, normal, changed))
+    return replace(scene, normal=normal, geometry=with_normals(scene.geometry, normal, turned))
 
 
 def _outline_normals(scene: Scene, region: Array) -> Array:
@@ -152,8 +158,8 @@ def base_colour(
     return scene.materials.albedo, None
 
 
-def _changed(old: Array, value: float | str | None) -> Array:
-    """[H, W] property set to a number, or shifted by a signed text, and kept in [0, 1]."""
+def changed(old: Array, value: float | str | None) -> Array:
+    """[H, W] roughness or metallic set to a number, or shifted by a signed text, and kept in [0, 1]."""
     if value is None:
         return old
     return np.clip(old + float(value), 0, 1) if isinstance(value, str) else np.full_like(old, value)
