@@ -268,6 +268,19 @@ def test_box_brush_shift_and_alt(page):
             page.keyboard.up(key)
         until(page, f"(old) => ({outline})() !== old", before)
     assert page.evaluate(outline).count("M") >= first.count("M")
+    # --- A click takes less or more; either there is such a thing, or the page says that there is none ---
+    assert page.locator("#larger").count() == 0
+    page.keyboard.press("1")
+    page.keyboard.press("Escape")
+    until(page, f"() => ({outline})() === ''")
+    select_block(page)
+    for name, key in (("larger", "]"), ("smaller", "[")):
+        page.wait_for_selector(f"#{name}")
+        before = page.evaluate(outline)
+        page.keyboard.press(key)
+        said = f"document.body.innerText.includes('Nothing {name}')"
+        until(page, f"(old) => ({outline})() !== old || {said}", before)
+        page.keyboard.press("Escape") if page.evaluate(f"() => {said}") else None
 
 
 def test_a_swipe_selects_nothing(browser, running):

@@ -51,6 +51,26 @@ def test_select_change_undo(client):
     assert len(state["steps"]) == 1
 
 
+def test_the_selection_of_a_click_grows_and_its_edit_with_it(client, monkeypatch):
+    assert not client.get("/api/state").json()["stage"]["clicked"]
+    session = client.studio.page("b" * 32, "me").session
+    grown = block().copy()
+    grown[:, :20] = True
+    extents = {"auto": block(), "small": block(), "medium": block(), "large": grown}
+    monkeypatch.setattr(session.live, "select", lambda click, extent="auto": extents[extent].copy())
+    assert select_block(client)["stage"]["clicked"]
+    change(client, hue=120)
+    before = client.get("/api/state").json()
+    after = client.post("/api/resize", json={"larger": True}).json()
+    assert after["stage"]["region"] != before["stage"]["region"]
+    assert len(after["steps"]) == 1 and after["steps"][0]["options"]["hue"] == "120"
+    assert after["steps"][0]["options"]["mask"] != before["steps"][0]["options"]["mask"]
+    answer = client.post("/api/resize", json={"larger": True})
+    assert answer.status_code == 400 and "Nothing larger" in answer.json()["error"]
+    undone = client.post("/api/undo", json={}).json()
+    assert undone["steps"] == before["steps"]
+
+
 def test_a_default_is_left_out_of_the_list_and_none_clears(client):
     select_block(client)
     change(client, hue=30, saturation=0.5)
@@ -178,6 +198,8 @@ def test_the_list_is_switched_ordered_and_shortened(client):
         ("pick", {"tool": "click", "at": [1e9, 3]}, "at"),
         ("pick", {"tool": "brush", "points": [[1, 2, 3]], "radius": 2}, "points"),
         ("point", {"at": [-5, 2]}, "outside"),
+        ("resize", {"larger": True}, "Click an object first"),
+        ("resize", {"larger": "x"}, "larger"),
         ("act", {"action": "explode", "index": 0}, "action"),
         ("act", {"action": "up", "index": -1}, "index"),
         ("take", {"kind": "../x"}, "choose one"),

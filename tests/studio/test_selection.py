@@ -2,10 +2,13 @@
 
 from functools import partial
 
+import numpy as np
+import pytest
 from studio_scenes import block, room
 
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.select import select
+from materialist.errors import InputError
 from materialist.studio.selection import Selection
 
 CHOOSE = partial(select, room())
@@ -43,3 +46,31 @@ def test_box_and_brush():
     painted = Selection().brush(scene, [[10, 40], [30, 40]], 3, "add", CHOOSE)
     assert painted.mask is not None and painted.mask[40, 10:31].all() and not painted.mask[34].any()
     assert painted.brush(scene, [[0, 40], [63, 40]], 8, "remove", CHOOSE).mask is None
+
+
+def test_a_click_takes_less_or_more():
+    """Regions of one click by size; what was selected before it stays."""
+    scene = room()
+    sizes = {"auto": 12, "small": 6, "medium": 12, "large": 20}
+
+    def choose(click, extent="auto"):
+        region = np.zeros((48, 64), bool)
+        x, y = click
+        region[y - 4 : y + 4, x : x + sizes[extent]] = True
+        return region
+
+    first = np.zeros((48, 64), bool)
+    first[:5] = True
+    one = Selection((first,)).click(scene, 25, 24, "add", choose)
+    more = one.resized(True, choose)
+    assert more.mask is not None and more.mask.sum() == first.sum() + 8 * 20
+    assert more.resized(False, choose).mask.sum() == one.mask.sum()
+    less = one.resized(False, choose)
+    assert less.mask.sum() == first.sum() + 8 * 6
+    with pytest.raises(InputError, match="Nothing larger"):
+        more.resized(True, choose)
+    with pytest.raises(InputError, match="Nothing smaller"):
+        less.resized(False, choose)
+    for other in (one.brush(scene, [[44, 40]], 4, "add", CHOOSE), Selection((first,))):
+        with pytest.raises(InputError, match="Click an object first"):
+            other.resized(True, choose)

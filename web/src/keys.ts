@@ -1,4 +1,5 @@
 // Keys that work anywhere on the page but where text is typed.
+import { t } from "./strings";
 import { change, set, view, type Panel, type Tool } from "./store";
 
 const TOOLS: Tool[] = ["click", "box", "brush", "lamp", "place"];
@@ -9,6 +10,10 @@ const PANELS: Record<string, Panel> = { Digit1: "material", Digit2: "light", Dig
 export function undo(again: boolean): void {
   // Asked when it is its turn: keys come faster than answers.
   void change("undo", { again }, "", "", () => !!(again ? view.state?.redo : view.state?.undo));
+}
+
+export function resize(larger: boolean): void {
+  if (view.state?.stage.clicked) void change("resize", { larger }, "", t.selecting);
 }
 
 function typing(target: EventTarget | null): boolean {
@@ -38,6 +43,7 @@ export function shortcuts(): () => void {
     const panel = PANELS[event.code];
     if (event.shiftKey && panel) set({ panel });
     else if (tool) set({ tool, dropper: null });
+    else if (key === "[" || key === "]") resize(key === "]");
     else if (key === "b") set({ before: true });
     else if (key === "c") set({ comparing: !view.comparing });
     else if (key === "f") void change("final");

@@ -60,6 +60,8 @@ export const t = {
   add: "Add (Shift)",
   remove: "Take away (Alt)",
   brushSize: "Brush size",
+  smaller: "Select less: a part of it ([)",
+  larger: "Select more: the whole of it (])",
   deselect: "Select nothing (Esc)",
   // Panels
   panels: "Panels",
@@ -199,6 +201,7 @@ export const t = {
     ["1 … 5", "Tools: click, box, brush, lamp, object"],
     ["Shift, Alt", "Add to the selection, take away from it"],
     ["Shift 1 … 4", "Material, light, objects, look"],
+    ["[ and ]", "Select less or more at the last click"],
     ["Esc", "Select nothing; close what is open"],
     ["Ctrl Z, Ctrl Shift Z", "Undo, redo"],
     ["B (hold)", "The photo as it was"],

@@ -1,5 +1,6 @@
 // The tools of the pointer, over the picture's edge.
 import { Icon } from "./icons";
+import { resize } from "./keys";
 import { change, set, useView, type Mode, type Tool } from "./store";
 import { t } from "./strings";
 
@@ -55,6 +56,16 @@ export function Tools() {
           title={t.brushSize}
           onInput={(event) => set({ brush: Number(event.currentTarget.value) })}
         />
+      )}
+      {state?.stage.clicked && (
+        <>
+          <button class="icon-only" id="smaller" aria-label={t.smaller} title={t.smaller} onClick={() => resize(false)}>
+            <Icon name="smaller" />
+          </button>
+          <button class="icon-only" id="larger" aria-label={t.larger} title={t.larger} onClick={() => resize(true)}>
+            <Icon name="larger" />
+          </button>
+        </>
       )}
       {state?.stage.region && (
         <button class="icon-only" id="deselect" aria-label={t.deselect} title={t.deselect} onClick={() => void change("deselect")}>

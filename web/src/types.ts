@@ -22,6 +22,7 @@ export interface Stage {
   kept?: boolean;
   serial?: number;
   region: string;
+  clicked: boolean;
 }
 
 export interface Project {

@@ -97,6 +97,12 @@ class Region(Place):
         choices=("network", "grabcut", "sam2"),
         flag="--with",
     )
+    extent: str = option(
+        "auto",
+        "How much a click takes, where auto takes too little or too much.",
+        kind="word",
+        choices=("auto", "small", "medium", "large"),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,10 +14,17 @@ from materialist.errors import InputError
 
 def chosen_region(scene: Any, region: Place, device: str) -> Any:
     """[H, W] bool from the flags of the command line."""
-    method = region.method if isinstance(region, Region) else "network"
     click = list(region.click) or None
+    chosen = {}
+    if isinstance(region, Region):
+        chosen = {"method": region.method, "extent": region.extent}
     return mt.select(
-        scene, click=click, box=region.box, mask=region.mask, method=method, device=device
+        scene,
+        click=click,
+        box=region.box,
+        mask=region.mask,
+        device=device,
+        **chosen,
     )
 
 

@@ -47,6 +47,7 @@ _POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
     # Selecting.
     "pick": (bodies.Pick, editing.pick),
     "point": (bodies.Pointed, editing.point),
+    "resize": (bodies.Resized, editing.resize),
     "deselect": (bodies.Nothing, editing.deselect),
     "colour": (bodies.Pointed, seeing.colour_at),
     # Changing.

@@ -50,6 +50,10 @@ class Pick(RequestBody):
     radius: Number = 1.0
 
 
+class Resized(RequestBody):
+    larger: bool
+
+
 class Pointed(RequestBody):
     at: Place
 

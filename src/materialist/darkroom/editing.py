@@ -63,6 +63,12 @@ def edit_at(session: Session, x: float, y: float) -> int | None:
     return session.preview.call(reopening.edit_at, **given)
 
 
+def resize(desk: Desk, body: bodies.Resized) -> State:
+    """The selection with the next larger, or smaller, object at the last click."""
+    desk.session.resize_selection(body.larger)
+    return state(desk)
+
+
 def deselect(desk: Desk, body: bodies.Nothing) -> State:
     desk.session.deselect()
     return state(desk)

@@ -54,7 +54,7 @@ def state(
             "expected": project_facts(desk.expected),
             "ready": session.live is not None and session.live.ready,
             "original": _original(desk),
-            "stage": {**shown, "region": outlined},
+            "stage": {**shown, "region": outlined, "clicked": selection.clicked is not None},
             "drawn": drawn.keys(session),
             "steps": [
                 {

@@ -244,7 +244,9 @@ def region_of(scene: Scene, step: Step) -> Array:
         where["box"] = parse_numbers(options["box"], 4, "box")
     if "mask" in options:
         where["mask"] = beside(step.folder, "mask", options["mask"])
-    return select(scene, method=options.get("with", "network"), device=step.device, **where)
+    names = {"method": "with", "extent": "extent"}
+    where |= {name: options[key] for name, key in names.items() if key in options}
+    return select(scene, device=step.device, **where)
 
 
 def _left(scene: Scene, edited: Scene, region: Array) -> Array:

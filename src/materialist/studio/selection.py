@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb
+from materialist.edits.select.objects import EXTENTS
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -17,6 +18,8 @@ ADD = "add"
 REMOVE = "remove"
 Choose = Callable[..., Array]
 """[H, W] bool of a `click`, a `box` or a `mask`, as `select` gives it."""
+LARGER = 1.05
+"""Least ratio of areas from which one region of a click is called larger than another (a definition)."""
 _PIECE_COLOUR = 14.0
 """How far colours of one piece may lie from that of its pixel, in each of L, a and b; tuned by eye."""
 
@@ -27,6 +30,8 @@ class Selection:
 
     parts: tuple[Array, ...] = ()
     """[H, W] bool each."""
+    clicked: tuple[int, int] | None = None
+    """(column, row) of the click that gave the last part, where it was a click."""
     _names: list[str] = field(default_factory=list, compare=False, repr=False, init=False)
 
     @property
@@ -75,7 +80,26 @@ class Selection:
             return Selection(tuple(part for part in self.parts if not part[row, column]))
         if region is None:
             region = choose(click=(x, y))
-        return self._with(region, mode)
+        return replace(self._with(region, mode), clicked=(column, row))
+
+    def resized(self, larger: bool, choose: Choose) -> Selection:
+        """With the next larger, or smaller, region at the last click in place of what that selected.
+
+        Raises InputError where there is none.
+        """
+        if self.clicked is None:
+            raise InputError("Click an object first; then its selection can grow or shrink.")
+        area = int(self.parts[-1].sum())
+        regions = [choose(click=self.clicked, extent=extent) for extent in EXTENTS[1:]]
+        regions.sort(key=np.sum, reverse=not larger)
+        for region in regions:
+            ratio = region.sum() / area
+            if (ratio if larger else 1 / ratio) >= LARGER:
+                return Selection((*self.parts[:-1], region), self.clicked)
+        size = "larger" if larger else "smaller"
+        raise InputError(
+            f"Nothing {size} is found at that click; add another click, or use the brush."
+        )
 
     def box(self, scene: Scene, box: Sequence[float], mode: str, choose: Choose) -> Selection:
         if mode == REMOVE:

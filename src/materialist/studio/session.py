@@ -211,18 +211,27 @@ class Session:
                 after = before.box(scene, at, mode, choose)
             else:
                 after = before.brush(scene, points, radius, mode, choose)
-            if after.mask is None or mode not in (ADD, REMOVE) or not self._follows_selection():
-                self.remember("select")
-                self.edits = self.edits.chosen(None)
-            else:  # the current edit grows or shrinks with its region, whatever that was given as
-                self.put(
-                    self.edits,
-                    **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)},
-                )
-            self.selection = after
-            self._note_history()
-            if after.mask is not None and self.glass is not None:
-                self.glass.get_ready()
+            self._select(after, follows=mode in (ADD, REMOVE))
+
+    def resize_selection(self, larger: bool) -> None:
+        """Take the next larger, or smaller, object at the last click. Raises InputError where there is none."""
+        with self.lock:
+            self._select(self.selection.resized(larger, self.preview.select), follows=True)
+
+    def _select(self, after: Selection, follows: bool) -> None:
+        """Change the selection; the current edit `follows` it, or is put aside."""
+        if after.mask is None or not follows or not self._follows_selection():
+            self.remember("select")
+            self.edits = self.edits.chosen(None)
+        else:  # the current edit grows or shrinks with its region, whatever that was given as
+            self.put(
+                self.edits,
+                **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)},
+            )
+        self.selection = after
+        self._note_history()
+        if after.mask is not None and self.glass is not None:
+            self.glass.get_ready()
 
     def _follows_selection(self) -> bool:
         """Whether the current edit is one of a region that the preview shows soon enough."""

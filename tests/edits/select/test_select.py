@@ -65,6 +65,40 @@ def test_what_is_selected_holds_the_clicks(table, monkeypatch):
         select(scene, click=(5, 110))
 
 
+def test_an_extent_is_one_of_the_masks_by_size(table, monkeypatch):
+    scene, first, second = table
+    part = first.copy()
+    part[:, 70:] = False
+    sizes = {"small": part, "medium": first, "large": first | second}
+    masks = np.where(np.stack([first, first | second, part]), 1, -1).astype(np.float32)
+
+    def answers(*_, box=None):
+        # In its box each mask is outlined as it is.
+        if box is None:
+            return masks, np.array([0.9, 0.5, 0.1])
+        boxed = next(m for m in sizes.values() if objects.box_overlap(m, box) == 1)
+        return np.where(boxed, 1, -1)[None].astype(np.float32), np.ones(1)
+
+    monkeypatch.setattr(objects.sam, "masks", answers)
+    for extent, mask in sizes.items():
+        selected = select(scene, click=(50, 50), extent=extent)
+        # What does not touch the clicked thing is left out, as ever.
+        assert overlap(selected, first if extent == "large" else mask) > 0.95, extent
+
+
+@pytest.mark.parametrize(
+    ("where", "match"),
+    [
+        ({"click": (50, 50), "extent": "huge"}, "extent is 'huge'"),
+        ({"box": (30, 30, 90, 90), "extent": "small"}, "of a click"),
+        ({"click": (50, 50), "method": "grabcut", "extent": "small"}, "network answers"),
+    ],
+)
+def test_extents_that_are_refused(table, where, match):
+    with pytest.raises(InputError, match=match):
+        select(table[0], **where)
+
+
 @pytest.mark.parametrize("legs_in_box", [True, False])
 def test_a_click_takes_what_is_outlined_in_the_box_of_its_mask(table, monkeypatch, legs_in_box):
     scene, first, _ = table

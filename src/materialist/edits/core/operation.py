@@ -12,7 +12,7 @@ from materialist.option_kinds import OperationOptions, declarations
 if TYPE_CHECKING:
     from materialist.types import Scene
 
-REGION = ("mask", "click", "box", "with")
+REGION = ("mask", "click", "box", "with", "extent")
 PLACE = ("mesh", "at")
 
 

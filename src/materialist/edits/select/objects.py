@@ -40,17 +40,24 @@ class SelectSettings:
 
 
 SETTINGS = SelectSettings()
+EXTENTS = ("auto", "small", "medium", "large")
+"""Which of MobileSAM's masks at a click is meant; `auto`: the likeliest."""
 
 
 def object_at_points(
-    scene: Scene, points: Sequence[tuple[int, int]], *, network: bool = True
+    scene: Scene,
+    points: Sequence[tuple[int, int]],
+    *,
+    network: bool = True,
+    extent: str = "auto",
 ) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on: it holds them all.
 
+    extent: one of `EXTENTS`, of the network's masks.
     Raises InputError where the network finds no such object, or where most of the photo is the smallest one.
     """
     if network:
-        mask = tidy(_together(scene, points), points)
+        mask = tidy(_together(scene, points, extent), points)
         return tidy(_whole(scene, mask, points), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
@@ -88,11 +95,11 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     return label
 
 
-def _together(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
+def _together(scene: Scene, points: Sequence[tuple[int, int]], extent: str) -> Array:
     """[H, W] bool: the mask at all points. Raises InputError where one off the object makes it most of the photo."""
-    mask = _at(scene, points)
+    mask = _at(scene, points, extent)
     share = mask.mean()
-    if len(points) > 1 and share > SETTINGS.most:
+    if len(points) > 1 and extent == "auto" and share > SETTINGS.most:
         largest = max(_at(scene, [point]).mean() for point in points)
         if largest < share / 2:
             raise InputError(
@@ -102,7 +109,7 @@ def _together(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
     return mask
 
 
-def _at(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
+def _at(scene: Scene, points: Sequence[tuple[int, int]], extent: str = "auto") -> Array:
     """[H, W] bool: of MobileSAM's masks that hold all points (column, row), the one that is meant.
 
     MobileSAM outlines parts and wholes well and guesses badly which of them is meant; ClickNet, which also sees normals
@@ -117,6 +124,10 @@ def _at(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
         raise InputError(
             f"No object is found that holds the click at {places}; click another place on it, or give a box or a mask."
         )
+    if extent != "auto":
+        by_size = sorted(logits[holding] > 0, key=np.sum)
+        place = {"small": 0, "medium": len(by_size) // 2, "large": -1}
+        return np.asarray(by_size[place[extent]])
     likely = segment.object_likelihood(photo, scene.normal, scene.depth, points)
     marks = [
         score + SETTINGS.clicknet_weight * _soft_overlap(likely, mask > 0)

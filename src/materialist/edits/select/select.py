@@ -12,7 +12,13 @@ from materialist.edits.core.region import (
     checked_pixel,
     checked_region,
 )
-from materialist.edits.select.objects import SETTINGS, box_overlap, object_at_points, object_in
+from materialist.edits.select.objects import (
+    EXTENTS,
+    SETTINGS,
+    box_overlap,
+    object_at_points,
+    object_in,
+)
 from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.geometry.silhouette import window
@@ -35,6 +41,7 @@ def select(
     box: Sequence[float] | None = None,
     mask: Array | str | Path | None = None,
     method: str = "network",
+    extent: str = "auto",
     device: str = "auto",
 ) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or the given mask, checked.
@@ -42,6 +49,8 @@ def select(
     Args:
         click: (x, y) at working size, or several, all of them on the object. box: (x0, y0, x1, y1) around the object.
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
+        extent: of the object at a click: `auto`, or `small`, `medium` or `large`, the part, the thing or the group that
+            the network sees there.
         method: `network` (MobileSAM and ClickNet) or `grabcut` (by colours alone); `sam2` is `network`.
         device: of no effect; both run on the processor.
 
@@ -54,6 +63,10 @@ def select(
     method = FORMER.get(method, method)
     if method not in METHODS:
         raise InputError(f"The method is '{method}'; choose one of {', '.join(METHODS)}.")
+    if extent not in EXTENTS:
+        raise InputError(f"The extent is '{extent}'; choose one of {', '.join(EXTENTS)}.")
+    if extent != "auto" and (click is None or method != "network"):
+        raise InputError("An extent is of a click that the network answers; leave it out.")
     if isinstance(mask, str | Path):
         mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
     if mask is not None:
@@ -66,7 +79,7 @@ def select(
             _check_background(scene, frame)
         region = object_in(scene, frame, network=method == "network")
     else:
-        region = object_at_points(scene, points, network=method == "network")
+        region = object_at_points(scene, points, network=method == "network", extent=extent)
     region = region & (scene.depth > 0)
     if not region.any():
         other = (
