@@ -6,7 +6,7 @@ from functools import partial
 import torch
 
 from materialist.fit.engine import MaterialProblem
-from materialist.fit.losses import decode, encode, residual
+from materialist.fit.losses import decode, encode, encoded_error
 from materialist.fit.optimise import StageResult, Stop, never
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Progress
@@ -84,4 +84,4 @@ def _error(
 ) -> torch.Tensor:
     """[P, 3] encoded rendering minus `seen`, the encoded photo [P, 3], for an encoded albedo [P, 3]."""
     radiance = offset + slope * decode(encoded, settings.encoding)
-    return residual(radiance, photo, settings.encoding, white=settings.white, encoded=seen)
+    return encoded_error(radiance, photo, settings.encoding, white=settings.white, encoded=seen)

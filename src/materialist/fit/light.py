@@ -12,7 +12,7 @@ from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
-from materialist.fit.losses import log_chroma, log_total_variation, rendering_loss, residual
+from materialist.fit.losses import encoded_error, log_chroma, log_total_variation, rendering_loss
 from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import LightSettings
 from materialist.types import Array, Progress
@@ -91,7 +91,9 @@ def fit_light(
 
     def loss(_: int) -> torch.Tensor:
         envmap = _at_height(field, settings, problem.height, jitter)
-        error = residual(problem.render(envmap), target, settings.encoding, white=settings.white)
+        error = encoded_error(
+            problem.render(envmap), target, settings.encoding, white=settings.white
+        )
         value = rendering_loss(error)
         if settings.smooth or settings.chroma or settings.prior:
             change = envmap.clamp_min(1e-6).log() - before

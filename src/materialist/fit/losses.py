@@ -30,7 +30,7 @@ def decode(encoded: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     )
 
 
-def residual(
+def encoded_error(
     radiance: torch.Tensor,
     photo: torch.Tensor,
     encoding: Encoding,

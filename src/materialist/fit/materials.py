@@ -17,7 +17,7 @@ from materialist.fit.fields import (
     Rows,
     Unified,
 )
-from materialist.fit.losses import consistency, encode, rendering_loss, residual
+from materialist.fit.losses import consistency, encode, encoded_error, rendering_loss
 from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera, Progress
@@ -85,7 +85,7 @@ def fit_materials(
                 1,
             )
             radiance = problem(values, rows)
-            error = residual(
+            error = encoded_error(
                 radiance,
                 photo[rows],
                 settings.encoding,

@@ -114,7 +114,12 @@ def optimise(
 
 
 def _stalled(losses: list[float], schedule: Schedule) -> bool:
+    """The stopping rule (paper, Implementation Details): whether `patience` steps improved the loss too little.
+
+    The light ends below 1 % in 100 steps, the materials below 0.5 % in 200; patience 0 never ends early.
+    """
     n = schedule.patience
+    # A tenth step is soon enough for a rule about 100 or 200 of them.
     if n == 0 or len(losses) < n + schedule.averaged or len(losses) % 10:
         return False
     window = np.full(schedule.averaged, 1 / schedule.averaged)

@@ -1,4 +1,8 @@
-"""The edit brought back into the photograph: everything that it does not reach stays as it was taken."""
+"""The edit brought back into the photograph: everything that it does not reach stays as it was taken.
+
+It is photo + (edited - base), of two renderings: `layers.render_layers` has the difference, and `into_photo` lays it on
+the photo.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace

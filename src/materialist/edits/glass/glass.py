@@ -1,4 +1,8 @@
-"""An object of the photo turned to glass (paper, Material Transparency Editing)."""
+"""An object of the photo turned to glass (paper, Material Transparency Editing).
+
+Two models: a closed body that is path-traced (`solids.closed`, `solids.revolution`), and the paper's two interfaces
+(`edits.glass.two_interface`).
+"""
 
 from dataclasses import replace
 from itertools import chain
