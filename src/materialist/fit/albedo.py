@@ -63,6 +63,7 @@ def solve_albedo(
             rises = error.detach() * gain + weight * (middle.detach() - before) > 0
             low = torch.where(rises, low, middle.detach())
             high = torch.where(rises, middle.detach(), high)
+        # --- The solution, and the mean cost before and after ---
         solution = (low + high) / 2
         maps[rows, :3] = decode(solution, settings.encoding)
         for k, encoded in enumerate((before, solution)):
