@@ -78,6 +78,7 @@ def inflated(depth: Array, normal: Array, mask: Array, camera: Camera) -> Inflat
 
 def _membrane(inside: Array) -> Array:
     """[H, W] u >= 0, pixels squared: Laplacian -1 inside [H, W] bool, 0 outside; level where the frame cuts it."""
+    # --- The unknowns, and their distance to the outline ---
     count = int(inside.sum())
     index = np.cumsum(inside.ravel()).reshape(inside.shape) - 1
     margin = np.s_[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN]
