@@ -95,6 +95,7 @@ def pictures(
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
+    # One compositor for all: the base is rendered once.
     options = RenderOptions(spp, seed, denoise, device)
     compositor = _Compositor(scene, options, full_render, upscale)
     tick = progress or (lambda *_: None)

@@ -34,6 +34,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
 
     depth: [H, W] planar, 0 for none. photo: [H, W, 3] linear.
     """
+    # --- How far each pixel is from an occlusion, and so how far it is trusted ---
     side = max(depth.shape)
     beside = _occlusions(depth)
     if not beside.any():
@@ -44,6 +45,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     rows, columns = np.nonzero(trust < 1)
     if not trust.any():
         return pictures
+    # --- Log radiance of all pictures side by side, and colours as the eye sees them ---
     logs = np.concatenate([np.log(np.maximum(p, 0) + SETTINGS.floor) for p in pictures], -1)
     logs = logs.astype(np.float32)
     seen = linear_to_srgb(np.clip(photo, 0, 1)).astype(np.float32)
@@ -75,6 +77,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     mean = total[known] / norm[known, None]
     logs[rows, columns] = share * logs[rows, columns] + (1 - share) * mean
     rims = np.exp(logs[rows, columns]) - SETTINGS.floor
+    # --- Back to pictures: only rims are other than before ---
     results = []
     for k, picture in enumerate(pictures):
         result = picture.astype(np.float32)
