@@ -117,6 +117,7 @@ def _at(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
         raise InputError(
             f"No object is found that holds the click at {places}; click another place on it, or give a box or a mask."
         )
+    # Each mask by its expected IoU, and by how well it agrees with ClickNet.
     likely = segment.object_likelihood(photo, scene.normal, scene.depth, points)
     marks = [
         score + SETTINGS.clicknet_weight * _soft_overlap(likely, mask > 0)
@@ -161,6 +162,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     groups, count = ndimage.label(cv2.dilate(opened.astype(np.uint8), wide))
     if count == 0:
         return mask
+    # Of several parts those that were clicked, else those of a tenth of the largest.
     parts = groups * opened
     sizes = np.bincount(parts.ravel())[1:]
     keep = {int(parts[y, x]) for x, y in points if parts[y, x]}
