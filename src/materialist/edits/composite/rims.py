@@ -49,7 +49,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     logs = np.concatenate([np.log(np.maximum(p, 0) + SETTINGS.floor) for p in pictures], -1)
     logs = logs.astype(np.float32)
     seen = linear_to_srgb(np.clip(photo, 0, 1)).astype(np.float32)
-    own = seen[rows, columns]
+    colours = seen[rows, columns]
     # --- The mean over a disc around each pixel ---
     total = np.zeros((len(rows), logs.shape[-1]), np.float32)
     norm = np.zeros(len(rows), np.float32)
@@ -63,7 +63,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
                 continue
             y = np.clip(rows + down, 0, height - 1)
             x = np.clip(columns + right, 0, width - 1)
-            other = seen[y, x] - own
+            other = seen[y, x] - colours
             like = np.exp(-0.5 / SETTINGS.colour**2 * np.einsum("nc,nc->n", other, other))
             # Standard deviation of half the reach; the constant is for colours that nothing there has.
             weight = trust[y, x] * (like + 1e-4) * np.float32(np.exp(-2 * square))
