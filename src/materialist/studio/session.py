@@ -211,6 +211,7 @@ class Session:
                 after = before.box(scene, at, mode, choose)
             else:
                 after = before.brush(scene, points, radius, mode, choose)
+            # --- A changed selection goes to the current edit, or begins anew without one ---
             if after.mask is None or mode not in (ADD, REMOVE) or not self._follows_selection():
                 self.remember("select")
                 self.edits = self.edits.chosen(None)
@@ -278,6 +279,7 @@ class Session:
         new = with_options(step, **options)
         # A light without options would be a step that does nothing.
         empty = new.operation.target is Target.LIGHT and not {*new.options} - {"skip"}
+        # --- One entry of the history while the same values slide on ---
         after = edits.without(index) if empty else edits.put(index, new)
         if after.steps != self.edits.steps:
             changed = [name for name in options if new.options.get(name) != step.options.get(name)]
