@@ -207,7 +207,7 @@ class Gate:
         login = cookies.get(self._cookie, "")
         if self.password and login not in self._logins:
             return False
-        # Only a person who has a cookie already: a websocket cannot set one.
+        # Only a person who has a cookie already: none is set on a websocket.
         try:
             token = self._logins[login] if self.password else cookies.get(PERSON)
             person = self.studio.person(token)
