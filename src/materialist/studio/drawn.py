@@ -49,7 +49,7 @@ class Drawing:
 
     panes: glass.Panes
     before: tuple[Step, ...]
-    changed: Step
+    step: Step
     after: tuple[Step, ...]
     fixed: Step
     """The changed step without what the page draws."""
@@ -87,7 +87,7 @@ def content(session: Session, kind: str) -> bytes | None:
         return None
     live, drawing = pair
     key = drawing.key(live)
-    steps = (*drawing.before, drawing.changed, *drawing.after)
+    steps = (*drawing.before, drawing.step, *drawing.after)
     content: bytes | None = live.call(block, kind=kind, drawing=drawing, key=key, steps=steps)
     return content
 
@@ -119,33 +119,33 @@ def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
         return None
     active = edits.active
     # --- Which step the page would change ---
-    changed = edits.current_step
+    step = edits.current_step
     if kind == "lamps" and edits.light is not None:
-        changed = edits.steps[edits.light]
-    if kind == "material" and changed is None and mask is not None:
+        step = edits.steps[edits.light]
+    if kind == "material" and step is None and mask is not None:
         # A new edit goes to the end of the list: with the first move of a slider nothing changes here.
-        changed = Step(EDIT.name, {}, session.workspace)
-        active = (*active, changed)
-    if changed not in active:
+        step = Step(EDIT.name, {}, session.workspace)
+        active = (*active, step)
+    if step not in active:
         return None
     # --- The list around it, without what the page draws itself ---
-    place = active.index(changed)
-    around = (active[:place], changed, active[place + 1 :])
+    place = active.index(step)
+    around = (active[:place], step, active[place + 1 :])
     panes = client.panes(active)
-    if kind == "material" and changed.kind == EDIT.name and mask is not None:
-        fixed = with_options(changed, **dict.fromkeys((*MOVED, *REGION)))
-        metal = has_outline_normals(live.scene, changed, mask)
+    if kind == "material" and step.kind == EDIT.name and mask is not None:
+        fixed = with_options(step, **dict.fromkeys((*MOVED, *REGION)))
+        metal = has_outline_normals(live.scene, step, mask)
         return live, Drawing(panes, *around, fixed, mask, metal)
-    if kind == "thing" and changed.kind == INSERT.name:
-        return live, Drawing(panes, *around, changed)
-    if kind == "lamps" and "lamps" in changed.options:
-        return live, Drawing(panes, *around, with_options(changed, lamps=None))
+    if kind == "thing" and step.kind == INSERT.name:
+        return live, Drawing(panes, *around, step)
+    if kind == "lamps" and "lamps" in step.options:
+        return live, Drawing(panes, *around, with_options(step, lamps=None))
     return None
 
 
-def has_outline_normals(scene: Scene, own: Step, region: Array) -> bool:
+def has_outline_normals(scene: Scene, step: Step, region: Array) -> bool:
     """Whether a material step gives a region [H, W] bool the normals of metal, as far as the fitted scene tells."""
-    options = options_of(own)
+    options = options_of(step)
     return is_metal(changed(scene.materials.metallic, options.metallic), region, options)
 
 
@@ -233,7 +233,7 @@ def _thing(live: LivePreview, drawing: Drawing) -> Made:
     """An object as it is sketched: what it leaves of the picture, what it adds; and the picture without it."""
     # --- The object alone: what it hides of a white picture, what it adds to a black one ---
     before = live.edited(drawing.before)
-    alone = live.edited((*drawing.before, drawing.changed)).bodies[len(before.bodies) :]
+    alone = live.edited((*drawing.before, drawing.step)).bodies[len(before.bodies) :]
     scene = replace(live.edited(drawing.others), bodies=alone)
     shape = (*scene.depth.shape, 3)
     added = draw_bodies(np.zeros(shape, np.float32), scene)
@@ -248,10 +248,10 @@ def _thing(live: LivePreview, drawing: Drawing) -> Made:
     scale = DEPTH_SIDE / max(scene.depth.shape)
     depth = cv2.resize(scene.depth, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
     height, width = reached[box].shape
-    options = options_of(drawing.changed)
+    options = options_of(drawing.step)
     header = {
         "box": [box[1].start, box[0].start, width, height],
-        "at": [float(value) for value in drawing.changed.options["at"]],
+        "at": [float(value) for value in drawing.step.options["at"]],
         "scale": options.scale,
         "size": [scene.camera.width, scene.camera.height],
     }
@@ -262,7 +262,7 @@ def _thing(live: LivePreview, drawing: Drawing) -> Made:
 
 def _lamps(live: LivePreview, drawing: Drawing) -> Made:
     """Surfaces as lamps light them, and the picture without the light of lamps."""
-    steps = (*drawing.before, drawing.changed, *drawing.after)
+    steps = (*drawing.before, drawing.step, *drawing.after)
     edited = live.edited(steps)
     shape = edited.depth.shape
 
