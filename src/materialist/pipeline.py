@@ -204,6 +204,7 @@ def _prior(
         raise InputError(
             'The predictor found no surface in the photo; give a depth map, as in `depth="maps:DIR"`.'
         )
+    # --- A scene so small that the renderer's offsets show gets a warning ---
     middle = float(np.median(result.depth[result.depth > 0]))
     # Offsets of rays are absolute: in a tiny scene they are as large as its details.
     if middle < MIN_DEPTH:
@@ -234,11 +235,12 @@ def _report(
     picture: Photo, prior: Prediction, result: FitResult, stages: tuple[dict, ...], start: float
 ) -> FitReport:
     """Figures and warnings of a fit."""
-    # Two halves with independent noise: their difference tells how much of the error is noise.
     materials = result.materials
+    # Two halves with independent noise: their difference tells how much of the error is noise.
     halves = [np.nan_to_num(half, posinf=0) for half in result.halves]
     rerender = (halves[0] + halves[1]) / 2
     surface = prior.depth > 0
+    # How far the fit moved from the prior: mean L1 over the surface.
     distance = {
         f"prior_l1_{name}": float(
             np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean()
@@ -265,6 +267,7 @@ def _report(
         notes.append(
             f"The fit was stopped in its stage '{last['name']}', after {last['steps']} steps."
         )
+    # --- Figures; noise in the re-rendering is no error of the fit ---
     poor = float((residual > 0.1).mean())
     return FitReport(
         stages=stages,

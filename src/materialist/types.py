@@ -162,13 +162,13 @@ class Prior(Record):
 
     def __post_init__(self) -> None:
         """Arrays of whatever was given. Raises InputError for another shape than the map has, no numbers, or a mask."""
-        for name, given in self.known.items():
-            if np.ma.is_masked(given):
+        for name, array in self.known.items():
+            if np.ma.is_masked(array):
                 raise InputError(
                     f"The prior's {name} is a masked array; fill what is masked, as in depth.filled(0)."
                 )
             try:
-                values = np.asarray(given)
+                values = np.asarray(array)
             except Exception as error:  # whatever an object's __array__ raises
                 raise InputError(f"The prior's {name} is no array: {error}") from error
             channels = (3,) if name in ("albedo", "normal") else ()

@@ -11,10 +11,10 @@ from materialist.color import CLIPPED, linear_to_srgb
 from materialist.fit.losses import (
     consistency,
     encode,
+    encoded_error,
     log_chroma,
     log_total_variation,
     rendering_loss,
-    residual,
 )
 from materialist.fit.settings import DEFAULT, PAPER
 
@@ -31,13 +31,13 @@ def test_clipped_channels_are_wrong_on_one_side_only():
     brighter = photo + 0.4
     darker = photo - 0.4
     torch.testing.assert_close(
-        residual(brighter, photo, "linear", white=CLIPPED), torch.tensor([[0.4, 0, 0]])
+        encoded_error(brighter, photo, "linear", white=CLIPPED), torch.tensor([[0.4, 0, 0]])
     )
     torch.testing.assert_close(
-        residual(darker, photo, "linear", white=CLIPPED), torch.full((1, 3), -0.4)
+        encoded_error(darker, photo, "linear", white=CLIPPED), torch.full((1, 3), -0.4)
     )
     torch.testing.assert_close(
-        residual(brighter, photo, "linear", white=math.inf), torch.full((1, 3), 0.4)
+        encoded_error(brighter, photo, "linear", white=math.inf), torch.full((1, 3), 0.4)
     )
 
 

@@ -62,6 +62,7 @@ def list_photos(
 
 
 def _of_folder(folder: Path, runs: Path, notes: list[str]) -> list[Listed]:
+    # --- A walk that enters neither packages, nor other runs, nor a folder twice ---
     photos = list[Listed]()
     others = list[str]()
     seen = {os.path.realpath(runs)}

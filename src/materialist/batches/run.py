@@ -67,6 +67,7 @@ def batch(
     where RUNS cannot be written, SetupError and WeightsError for what every photo needs and is missing here;
     KeyboardInterrupt as pressed, after the workers are ended and the summary is written.
     """
+    # --- Options of the batch, and options of the inversion ---
     start = time.monotonic()
     batch_fields = {entry.name for entry in fields(BatchOptions)}
     values: dict[str, Any] = dict(options)
@@ -85,6 +86,7 @@ def batch(
     check_options(asked)
     if batch_options.recipe is not None:
         check_edits(batch_options.recipe)  # before anything is written
+    # --- What there is to do: photos whose results are not in the ledger ---
     notes: list[str] = []
     photos = list_photos(source, runs=runs, notes=notes)
     require_stores([photo.location for photo in photos])

@@ -94,6 +94,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
             task.batch_options.recipe, task.name, task.batch_options.spp, task.batch_options.quality
         )
     write_whole(task.runs / "thumbs" / f"{task.name}.jpg", _thumbnails(pictures))
+    # --- What the ledger keeps of the result ---
     metrics = scene.report.metrics
     facts |= {
         "scene_hash": package_hash(task.scene),
@@ -106,6 +107,7 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
         "ssim": metrics.get("rerender_ssim_path"),
         "warnings": list(dict.fromkeys(warnings)),
     }
+    # Memory is given back before the next photo of this worker.
     del scene, pictures
     gc.collect()
     peak = peak_rss_mb()
@@ -115,8 +117,10 @@ def process(report: Progress, task: PhotoTask) -> dict[str, Any]:
 
 def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     """The inverted photo, and what of OF_THE_SCENE is known."""
+    # --- The scene of an earlier run, where only the edit is missing ---
     if task.kept:
         return mt.load_scene(task.scene), dict(task.kept)
+    # --- The photo, under a name that does not depend on the machine's copy of it ---
     ensure_writable(task.scene, force=True)
     options = task.named_options()
     size = options.pop("size")
@@ -130,6 +134,7 @@ def _scene(task: PhotoTask, report: Progress) -> tuple[Scene, dict[str, Any]]:
     check_room(task.scene, photo)
     place = task.id if is_url(task.location) else task.location
     photo = replace(photo, path=place.encode("utf-8", "backslashreplace").decode("utf-8"))
+    # --- Inverted and saved ---
     report("start", 0, 1)
     begun = time.perf_counter()
     module, _, attribute = task.batch_options.function.partition(":")
@@ -155,6 +160,7 @@ def _edited(
     from materialist.edits.recipe import apply
     from materialist.edits.registry import picture_notes
 
+    # --- The list of edits, and the composite in the photo's own format ---
     report("edit", 0, 1)
     seed = task.options["seed"]
     device = task.options["device"]

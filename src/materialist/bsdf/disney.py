@@ -1,7 +1,8 @@
 """The formulas of the paper's simplified Disney BRDF (section Preliminary), written once for numpy, torch and Dr.Jit.
 
-f_r = f_s + (1 - M) f_d. Choices that the paper leaves open (docs/rendering.md): the Smith term is separable, as in
-Mitsuba; alpha = R^2 is at least `ggx.MIN_ALPHA`; both sides of a surface shade alike.
+f_r = f_s + (1 - M) f_d: `bsdf.lobes.reflectance` puts it together for the path tracer, `transport.shading.shade` for
+cached light. Choices that the paper leaves open (docs/rendering.md): the Smith term is separable, as in Mitsuba;
+alpha = R^2 is at least `ggx.MIN_ALPHA`; both sides of a surface shade alike.
 """
 
 from materialist.bsdf.ggx import array_module, distribution, smith_g1

@@ -32,6 +32,7 @@ def register_disney() -> None:
             self.roughness = props.get_texture("roughness")
             self.metallic = props.get_texture("metallic")
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
+            # Component 0 is the diffuse lobe, 1 the specular one: `sample` names them so.
             self.m_components = [
                 mi.BSDFFlags.DiffuseReflection | sides,
                 mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.SpatiallyVarying | sides,
@@ -39,6 +40,7 @@ def register_disney() -> None:
             self.m_flags = self.m_components[0] | self.m_components[1]
 
         def traverse(self, cb):
+            # PRB differentiates the picture by all three maps.
             cb.put("base_color", self.base_color, mi.ParamFlags.Differentiable)
             cb.put("roughness", self.roughness, mi.ParamFlags.Differentiable)
             cb.put("metallic", self.metallic, mi.ParamFlags.Differentiable)
@@ -77,6 +79,7 @@ def register_disney() -> None:
 
         def eval_pdf(self, ctx, si, wo, active=True):
             albedo, roughness, metallic = self._materials(si, active)
+            # The density of the mixture counts both lobes, whichever of them drew `wo`.
             probability = self._specular_probability(dr.abs(si.wi.z), albedo, metallic)
             value, pdf = self._both(si, wo, probability, albedo, roughness, metallic)
             return dr.select(active, value, mi.Color3f(0)), dr.select(active, pdf, 0)
@@ -108,6 +111,7 @@ def register_disney() -> None:
 
         def _unlifted(self, wi, wo, probability, albedo, roughness, metallic, active):
             """Value and density of a direction by the shading normal alone, 0 where not `active`."""
+            # On the upper side: both sides shade alike.
             wi, wo = (mi.Vector3f(w.x, w.y, dr.abs(w.z)) for w in (wi, wo))
             value = lobes.reflectance(wi, wo, albedo, roughness, metallic)
             value = dr.select(active, value, mi.Color3f(0))

@@ -70,6 +70,7 @@ def register_frosted() -> None:
             self._tabulate()
 
         def _tabulate(self):
+            # ior and alpha as the interface has them now: `parameters_changed` asks again.
             params = mi.traverse(self.interface)
             ior = float(np.array(params["eta"]).ravel()[0])
             alpha = float(np.array(params["alpha.value"]).ravel()[0])
@@ -99,6 +100,7 @@ def register_frosted() -> None:
             return self.interface.eval(ctx, si, wo, active) * self._gain(si, active)
 
         def pdf(self, ctx, si, wo, active=True):
+            # The gain is on values alone: directions are drawn as before.
             return self.interface.pdf(ctx, si, wo, active)
 
         def eval_pdf(self, ctx, si, wo, active=True):

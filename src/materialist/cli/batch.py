@@ -80,6 +80,7 @@ def _report(outcome: Outcome, output: Path, as_json: bool) -> None:
     lines += [f"... and {len(failed) - 20} more; see summary.csv"] if len(failed) > 20 else []
     lines += [f"Note: {note}" for note in outcome.notes]
     lines.append(f"Look at {output / 'index.html'}")
+    # The same as JSON, with all failures.
     report_success(
         "batch",
         as_json,

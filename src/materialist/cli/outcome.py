@@ -129,6 +129,7 @@ def _interrupted_between_imports() -> Iterator[None]:
         return
     waiting: list[threading.Timer] = []
 
+    # While a library is imported, the signal is sent again a moment later.
     def stop(number: int, frame: Any) -> None:
         if not _is_importing(frame) or len(waiting) * RETRY >= GRACE:
             waiting.clear()

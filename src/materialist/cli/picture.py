@@ -147,6 +147,7 @@ def write_film(
     last = {"scene": scene}
     change = 0.0
 
+    # The last scene and picture, and the largest change, are what the report is of.
     def kept(name: str, items: Iterable[Any]) -> Iterator[Any]:
         nonlocal change
         for item in items:

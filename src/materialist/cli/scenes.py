@@ -40,6 +40,7 @@ def invert_command(
             picture, options, progress=progress, on_stage=stop.on_stage, stop=stop.requested
         )
     mt.save_scene(scene, output, force=run.force)
+    # --- What is said of the result ---
     warnings = scene.warnings
     seconds = time.monotonic() - start
     quality = scene.report.metrics.get("rerender_psnr_path")

@@ -112,6 +112,7 @@ def _routes(desks: Desks) -> list[Any]:
     async def socket(connection: WebSocket) -> None:
         await channel(desks, connection)
 
+    # --- Answers that change nothing, by place ---
     read = {
         "/api/about": lambda desk, request: _json(about(studio, desk.person)),
         "/api/arrive": lambda desk, request: _json(opening.arrive(desk)),
@@ -129,6 +130,7 @@ def _routes(desks: Desks) -> list[Any]:
         "/api/picture/{project}/{name}": _picture,
         "/api/file/{file}": taking.download,
     }
+    # --- The page, what it reads and posts, uploads, the channel, built files ---
     return [
         Route("/", _page),
         *(Route(place, got(desks, make)) for place, make in read.items()),

@@ -59,8 +59,8 @@ def edit_at(session: Session, x: float, y: float) -> int | None:
     edits = session.edits
     if not edits.active:
         return None
-    given = {"listed": edits.steps, "current": edits.current, "column": column, "row": row}
-    return session.preview.call(reopening.edit_at, **given)
+    arguments = {"listed": edits.steps, "current": edits.current, "column": column, "row": row}
+    return session.preview.call(reopening.edit_at, **arguments)
 
 
 def resize(desk: Desk, body: bodies.Resized) -> State:

@@ -69,6 +69,7 @@ def guarded(studio: Studio, answer: Answerer) -> Answerer:
     """The endpoint, whose errors are answers: {"error": a sentence}, and the status that fits."""
 
     async def careful(request: Request) -> Response:
+        # 422 for what is no such request, 400 for what the user can mend, 500 for our faults.
         try:
             return await answer(request)
         except ValidationError as error:

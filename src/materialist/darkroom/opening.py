@@ -32,6 +32,7 @@ async def receive_upload(desks: Desks, request: Request) -> Response:
     person = desk.person
     size = promised_size(request)
     sender = studio.sender(person)
+    # --- Room for it is claimed before, and settled by what came ---
     with studio.quota.uploading(sender):
         claim = studio.quota.claim(sender, size)
         folder = studio.work.cache / secrets.token_hex(16)

@@ -20,6 +20,7 @@ def take_away(desk: Desk, options: dict[str, Any]) -> None:
     Raises InputError where nothing is selected, and for values that are not valid.
     """
     session = desk.session
+    # --- The edit as it will be, and the active ones before it ---
     with session.lock:
         planned = session.planned(REMOVE.name)
         index = planned.current or 0

@@ -124,6 +124,7 @@ def outline(mask: Array | None) -> str:
     smooth = cv2.GaussianBlur(large, (0, 0), scale * 0.6, borderType=cv2.BORDER_REPLICATE)
     inside = (smooth > 0.5).astype(np.uint8)
     borders, _ = cv2.findContours(inside, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    # Each border as a path, its points where straight lines miss it by < 0.7 / 3 pixels.
     parts = []
     for border in borders:
         points = cv2.approxPolyDP(border, 0.7, True)[:, 0]
@@ -155,8 +156,8 @@ def about(studio: Studio, person: str) -> dict[str, Any]:
 
 def _examples(studio: Studio) -> list[list[str]]:
     """[name, title, credit] of the photos that are offered: that of the command line first."""
-    given = studio.start
-    first = [["start", given.name, ""]] if isinstance(given, Path) else []
+    start = studio.start
+    first = [["start", start.name, ""]] if isinstance(start, Path) else []
     return first + [[name, name.capitalize(), credit] for name, (_, credit) in EXAMPLES.items()]
 
 

@@ -33,6 +33,7 @@ def take(desk: Desk, body: bodies.Take) -> dict[str, Any]:
     session = desk.session
     if body.kind not in kinds_here():
         raise InputError(f"There is no '{body.kind}' to take away; choose one of the list.")
+    # --- The list of edits and path-traced pictures need no job of their own ---
     project = session.opened
     file = session.workspace / f"take-{body.kind}{KINDS[body.kind][1]}"
     if body.kind == "edits":
@@ -47,6 +48,7 @@ def take(desk: Desk, body: bodies.Take) -> dict[str, Any]:
         _active_steps(desk)
         _traced(desk, body.kind)
         return {}
+    # --- Everything else is made by a job, and handed over when it is done ---
     job = desk.studio.submit(
         session,
         tasks.take,
@@ -91,6 +93,7 @@ def _traced(desk: Desk, kind: str | None) -> None:
     studio = desk.studio
     project = session.opened
     workspace = session.workspace
+    # --- The job, into a file named by these edits ---
     picture = new_final(workspace, session.edits.active)
     job = studio.submit(
         session,
@@ -150,8 +153,8 @@ def _from_final(desk: Desk, project: Project, picture: FinalPicture, kind: str) 
 
 def _handed(desk: Desk, project: Project, kind: str, file: Path) -> dict[str, Any]:
     """A copy of a file for the person of a page, under a name that says what it is."""
-    what = "edited" if kind in PICTURES else kind
-    name = f"{project.stem}-{what}{file.suffix}"
+    label = "edited" if kind in PICTURES else kind
+    name = f"{project.stem}-{label}{file.suffix}"
     person = desk.person
     copy = Path(desk.studio.public_copy(person, file, name))
     handle = desk.studio.files.hand_out(person, copy, f"result-{secrets.token_hex(16)}")

@@ -40,6 +40,7 @@ def save_layers(
 
     Returns notes. Raises InputError for another suffix, or a picture of another shape; OutputError as `save_image`.
     """
+    # --- The picture that the layers are of ---
     check_image_output(path, force=force)
     if Path(path).suffix.lower() != ".exr":
         raise InputError(f"{path} cannot have layers; give a name that ends in .exr.")
@@ -90,6 +91,7 @@ def _lobes(scene: Scene, picture: Array, device: str) -> tuple[Array, Array]:
         scene.geometry, scene.camera, passed_on, seed=0, cache=CacheSettings(*RAYS)
     )
     tables = engine.tables(scene.envmap)
+    # --- The maps of the surface pixels ---
     pixels = engine.cache.pixels
     maps = (
         materials.albedo.reshape(-1, 3),

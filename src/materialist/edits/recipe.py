@@ -148,6 +148,7 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
     """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
     import yaml
 
+    # All values are texts on reading, so that none of them needs quotes.
     class Unquoted(yaml.SafeDumper):
         """Texts stay without quotes, also those that spell numbers: `read_recipe` takes all for texts."""
 

@@ -43,6 +43,7 @@ def export_blend(
 
     Raises SetupError when a Blender that was named, or was found, does not build the file.
     """
+    # --- With Blender: the file itself, from assets that are thrown away ---
     wants_file = path.suffix.lower() == ".blend"
     program = None
     if wants_file:
@@ -52,6 +53,7 @@ def export_blend(
             write_blender_assets(Path(scratch), scene, parts)
             run_script(program, Path(scratch) / "build.py", result, options)
         return Exported(path)
+    # --- Without: its script and assets, and the command that makes the file ---
     folder = path.with_suffix("") if wants_file else path
     with export_folder(folder, force, "blend") as whole:
         write_blender_assets(whole, scene, parts)
@@ -67,6 +69,7 @@ def export_blend(
 
 def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     """Fill an empty folder with `build.py` and what it reads: meshes, float32 maps, light, photo, camera."""
+    # --- Meshes as arrays, maps and light as floats, the photo as it looks ---
     arrays = {}
     for part in parts:
         mesh = part.mesh
@@ -77,6 +80,7 @@ def write_blender_assets(folder: Path, scene: Scene, parts: list[Part]) -> None:
     np.savez_compressed(folder / "meshes.npz", **arrays)  # type: ignore[arg-type]
     write_exr(folder / "envmap.exr", scene.envmap)
     write_png(folder / "photo.png", scene.photo.original)
+    # --- What `build.py` reads beside them ---
     reach = farthest(parts)
     camera = scene.camera
     native = scene.photo.original.shape

@@ -30,6 +30,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=128)
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])
     facts = json.loads((HERE / "scene.json").read_text("utf-8"))
+    # --- An empty file, filled with the scene ---
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     add_meshes(scene, facts, options.fitted_material)
@@ -40,6 +41,7 @@ def main() -> None:
     set_rendering(scene, options.samples, facts["bounces"])
     if options.shadow_catcher:
         catch_shadows(scene, facts)
+    # --- Saved with all pictures in it, and rendered where that is asked for ---
     bpy.ops.file.pack_all()
     bpy.ops.wm.save_as_mainfile(filepath=str(Path(options.output).resolve()), compress=True)
     if options.render:
@@ -81,6 +83,7 @@ def material(name, look, additive):
     nodes.clear()
     output = nodes.new("ShaderNodeOutputMaterial")
     output.location = (600, 0)
+    # --- Shaders: the BRDF, glass in the place of a share of it, and glow added ---
     result, slots = (add_lobes if additive else add_principled)(nodes, links)
     if "glass" in look:
         result = add_glass(nodes, links, look["glass"], result)
@@ -90,6 +93,7 @@ def material(name, look, additive):
         glow.inputs["Strength"].default_value = 1
         result = added(nodes, links, result, glow.outputs["Emission"])
     links.new(result, output.inputs["Surface"])
+    # --- A texture for each map, into all inputs that it feeds ---
     for row, (key, sockets) in enumerate(slots.items()):
         source = add_texture(nodes, look, key, (-700, 300 - 300 * row))
         for socket in sockets:
@@ -149,6 +153,7 @@ def add_lobes(nodes, links):
             next(socket for socket in mix.outputs if socket.type == "RGBA"), lobe.inputs[slot]
         )
         mix.location = (-300, 200 - 300 * len(shares))
+    # f_d and f_s are added, as in the paper: nothing is taken from one for the other.
     both = added(nodes, links, diffuse.outputs["BSDF"], specular.outputs["BSDF"])
     return both, {
         "albedo": colours,
@@ -174,6 +179,7 @@ def add_glass(nodes, links, glass, opaque):
     interface.location = (0, -300)
     if glass["share"] >= 1:
         return interface.outputs[0]
+    # Inside, on backfacing sides, all is glass; outside, its share: max(backfacing, T).
     side, share, mixed = (
         nodes.new(f"ShaderNode{kind}") for kind in ("NewGeometry", "Math", "MixShader")
     )
@@ -217,6 +223,7 @@ def add_camera(scene, facts) -> None:
     camera.clip_start = facts["near"]
     camera.clip_end = facts["far"]
     camera.show_background_images = True
+    # The photo lies behind the scene, as wide as the picture.
     background = camera.background_images.new()
     background.image = image("photo.png", "sRGB")
     background.alpha = 1.0
@@ -245,6 +252,7 @@ def add_light(scene) -> None:
     texture.image = image("envmap.exr", "Linear Rec.709")
     light = nodes.new("ShaderNodeBackground")
     output = nodes.new("ShaderNodeOutputWorld")
+    # Direction, turned by a quarter about the vertical, to texel, to radiance.
     links.new(where.outputs["Generated"], turn.inputs["Vector"])
     links.new(turn.outputs["Vector"], texture.inputs["Vector"])
     links.new(texture.outputs["Color"], light.inputs["Color"])

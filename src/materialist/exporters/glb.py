@@ -82,6 +82,7 @@ def _material(part: Part) -> Any:
 
 def _complete(tree: dict[str, Any], scene: Scene, parts: list[Part]) -> None:
     """Add to the document what trimesh does not write: samplers, extensions, lamps, the photo's camera."""
+    # --- Samplers: 0 for the photo's surfaces, 1 for bodies, whose textures repeat ---
     tree["asset"]["generator"] = f"materialist {__version__}"
     tree["samplers"] = list(_SAMPLERS[: 1 + any(part.surface is not None for part in parts)])
     for part, material in zip(parts, tree["materials"], strict=True):
@@ -90,6 +91,7 @@ def _complete(tree: dict[str, Any], scene: Scene, parts: list[Part]) -> None:
         if extensions := _extensions(part):
             material["extensions"] = extensions
     used = {name for material in tree["materials"] for name in material.get("extensions", ())}
+    # --- The camera and lamps as nodes of their own ---
     tree["cameras"], nodes = [_camera(scene.camera, parts)], [{"name": "camera", "camera": 0}]
     for k, lamp in enumerate(scene.lamps):
         place = [float(c) for c in lamp.position]
@@ -97,6 +99,7 @@ def _complete(tree: dict[str, Any], scene: Scene, parts: list[Part]) -> None:
         nodes.append({"name": f"lamp{k}", "translation": place, "extensions": which})
     tree["scenes"][0]["nodes"] += range(len(tree["nodes"]), len(tree["nodes"]) + len(nodes))
     tree["nodes"] += nodes
+    # --- Names of all extensions, and what no field of glTF holds ---
     if scene.lamps:
         tree["extensions"] = {_LAMPS: {"lights": [_light(lamp) for lamp in scene.lamps]}}
         used.add(_LAMPS)

@@ -67,6 +67,7 @@ def _xml(mi, description: dict, depth: int) -> str:
 
 def _description(mi, scene: Scene, parts: list[Part], uses_plugin: bool) -> dict:
     """The scene as `mi.load_dict` takes it."""
+    # --- Camera, light and integrator as in `render.scene` ---
     eye = sensor(scene.camera, look_along(mi))
     description: dict = {
         "type": "scene",
@@ -75,6 +76,7 @@ def _description(mi, scene: Scene, parts: list[Part], uses_plugin: bool) -> dict
         "sensor": {**eye, "sampler": {"type": "multijitter", "sample_count": SPP}},
         "light": {"type": "envmap", "filename": "envmap_mitsuba.exr", "to_world": half_turn(mi)},
     }
+    # --- Each part by its mesh file, with the material of one of the two scenes ---
     for part in parts:
         description[part.name] = {
             "type": "ply",
@@ -88,6 +90,7 @@ def _description(mi, scene: Scene, parts: list[Part], uses_plugin: bool) -> dict
 
 def _bsdf(part: Part, uses_plugin: bool) -> dict:
     """The renderer's material, as `mi.load_dict` takes it."""
+    # The depth surface has unmixed pixels, bodies have textures that repeat.
     sampling = ("nearest", "clamp") if part.surface is None else ("bilinear", "repeat")
     opaque: dict = {"type": PLUGIN}
     for name, key in MAPS.items():
@@ -109,6 +112,7 @@ def _bsdf(part: Part, uses_plugin: bool) -> dict:
 
 
 def _standard(bsdf: dict) -> dict:
+    # Mitsuba's own materials in the place of ours: the weight is one number there.
     if bsdf["type"] == "blendbsdf":
         sides = {name: _standard(bsdf[name]) for name in ("opaque", "glass")}
         return {"type": "blendbsdf", "weight": bsdf["weight"]["value"], **sides}

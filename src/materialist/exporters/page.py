@@ -111,6 +111,7 @@ def _image(pixels: Array, quality: int = 90) -> str:
 
 def _packed(camera: Camera, depth: Array, parts: list[Part]) -> dict[str, Any]:
     """What page.js needs: the meshes one after the other, deflated, and the camera. Continued planes come last."""
+    # The page may leave the planes out: their triangles come last.
     shown = [parts[0], *(part for part in parts if part.surface is not None)]
     parts = [*shown, *(part for part in parts[1:] if part.surface is None)]
     vertices = np.concatenate([_vertices(part) for part in parts])
@@ -136,6 +137,7 @@ def _vertices(part: Part) -> Array:
     vertices["position"] = mesh.vertices
     vertices["normal"][:, :3] = np.round(np.clip(mesh.normals, -1, 1) * 127)
     vertices["uv"] = np.round(np.clip(mesh.uv, 0, 1) * 65535)
+    # The page has textures for the photo's surface alone: others are colours at the vertices.
     if part.constant or part.surface is not None:
         vertices["colour"][:, :3] = srgb_levels(texels(part.materials.albedo, mesh.uv))
         vertices["colour"][:, 3] = 255

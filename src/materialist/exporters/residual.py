@@ -78,6 +78,7 @@ def with_residual(scene: Scene) -> Materials:
         diffuse = np.einsum("pk,pkc->pc", powers, coefficients)
         return _Lit(diffuse, specular[:, :3], specular[:, 3:])
 
+    # --- What each pixel should send: its rendering, times the residual ---
     rerender = np.nan_to_num(scene.rerender, posinf=0, neginf=0)
     factor = shading_residual(scene.photo.linear, scene.rerender)
     colour = maps.albedo.reshape(-1, 3)[pixels]
@@ -85,6 +86,7 @@ def with_residual(scene: Scene) -> Materials:
     # By a factor on the rendering, not by the photo: what inserted bodies shade stays out of the maps.
     goal = lit(rerender).radiance(colour, metallic) * factor.reshape(-1, 3)[pixels]
     colour, metallic = _carried(goal, lit(rerender * factor), metallic)
+    # --- Base colour and metallic that do, in the places of their pixels ---
     albedo = maps.albedo.reshape(-1, 3).copy()
     metal = maps.metallic.reshape(-1).copy()
     albedo[pixels] = colour
@@ -98,12 +100,14 @@ def _carried(goal: Array, lit: _Lit, metallic: Array) -> tuple[Array, Array]:
     """Base colour [P, 3] and metallic [P, 1] that come nearest to radiance [P, 3]; metallic never falls."""
     colour = lit.colour(goal, metallic)
     excess = lit.radiance(colour, metallic) - goal
+    # Only pixels where even the best base colour is too bright move their metallic.
     dark = np.flatnonzero((excess > _TOLERANCE).any(1))
     some = lit.rows(dark)
     goal_srgb = linear_to_srgb(goal[dark])
     first = metallic[dark]
     least = np.full((len(dark), 1), np.inf, np.float32)
     metallic = metallic.copy()
+    # All levels from the pixel's own metallic up; the cheapest one wins.
     for level in np.linspace(0, 1, _LEVELS, dtype=np.float32):
         tried = np.maximum(first, level)
         fits = some.colour(goal[dark], tried)

@@ -56,6 +56,7 @@ def export(
         InputError: an unknown format, a suffix of another format. OutputError: PATH exists or cannot be written.
         SetupError: the extra for the format is missing, or `blender` does not work.
     """
+    # --- Options that do not go together are refused ---
     settings = ExportOptions.merged(options, **values)
     path = Path(path)
     to = check_format(path, settings.to)
@@ -77,6 +78,7 @@ def export(
 
         find_blender(settings.blender)
     ensure_writable(path, force, EXPORT if path.suffix.lower() not in SUFFIX.values() else None)
+    # --- What is exported: maps with the residual in them, surfaces and bodies ---
     carries = settings.residual and to != "html"
     if carries:
         scene = replace(scene, materials=with_residual(scene))
@@ -94,6 +96,7 @@ def export(
             "html": _html,
         }
         files = writers[to](path, scene, parts, force)
+    # --- What the format says of it, and what it does not show ---
     words = advice(scene)
     notes = [words[key] for key in ADVICE.get(to, ())]
     if carries:

@@ -21,6 +21,7 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, "/Scene").GetPrim())
+    # --- Materials and meshes, camera, light and lamps ---
     UsdGeom.Scope.Define(stage, "/Scene/Materials")
     for part in parts:
         _mesh(stage, part, _material(stage, folder, part))
@@ -28,6 +29,7 @@ def write_usd(folder: Path, scene: Scene, parts: list[Part]) -> None:
     _light(stage, folder, scene)
     for number, lamp in enumerate(scene.lamps):
         _lamp(stage, f"/Scene/lamp{number}", lamp)
+    # --- What the user should know of scale and colour ---
     layer = stage.GetRootLayer()
     words = advice(scene)
     layer.documentation = f"{words['scale']} {words['colour']}"
@@ -44,6 +46,7 @@ def _mesh(stage: Any, part: Part, material: Any) -> None:
     """A mesh with normals and texture coordinates; USD's v runs up."""
     source = part.mesh
     mesh = UsdGeom.Mesh.Define(stage, f"/Scene/{part.name}")
+    # --- Triangles as they are: no subdivision, both sides seen ---
     points = np.ascontiguousarray(source.vertices, np.float32)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(source.faces), 3, np.int32)))
@@ -58,6 +61,7 @@ def _mesh(stage: Any, part: Part, material: Any) -> None:
     mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
     mesh.CreateDoubleSidedAttr(True)
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([points.min(0), points.max(0)])))
+    # --- Texture coordinates, which USD calls st ---
     uv = np.stack([source.uv[:, 0], 1 - source.uv[:, 1]], 1).astype(np.float32)  # [V, 2]
     primvars = UsdGeom.PrimvarsAPI(mesh)
     st = primvars.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
@@ -79,6 +83,7 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
             shader.CreateInput(socket, type_).Set(value)
         return shader
 
+    # --- The surface; of glass it has the opacity and the index of refraction alone ---
     body = part.surface
     m = one_roughness(part)
     look: dict[str, tuple] = {"ior": (kinds.Float, 1.5)}
@@ -91,6 +96,7 @@ def _material(stage: Any, folder: Path, part: Part) -> Any:
         }
     surface = shader("surface", "UsdPreviewSurface", **look)
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
+    # --- A texture a map: sRGB for colour, raw for numbers ---
     reader = shader("st", "UsdPrimvarReader_float2", varname=(kinds.String, "st"))
     wrap = (kinds.Token, "clamp" if body is None else "repeat")
     for socket, type_, name, pixels, space, output in (

@@ -6,7 +6,7 @@ from functools import partial
 import torch
 
 from materialist.fit.engine import MaterialProblem
-from materialist.fit.losses import decode, encode, residual
+from materialist.fit.losses import decode, encode, encoded_error
 from materialist.fit.optimise import StageResult, Stop, never
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Progress
@@ -63,6 +63,7 @@ def solve_albedo(
             rises = error.detach() * gain + weight * (middle.detach() - before) > 0
             low = torch.where(rises, low, middle.detach())
             high = torch.where(rises, middle.detach(), high)
+        # --- The solution, and the mean cost before and after ---
         solution = (low + high) / 2
         maps[rows, :3] = decode(solution, settings.encoding)
         for k, encoded in enumerate((before, solution)):
@@ -84,4 +85,4 @@ def _error(
 ) -> torch.Tensor:
     """[P, 3] encoded rendering minus `seen`, the encoded photo [P, 3], for an encoded albedo [P, 3]."""
     radiance = offset + slope * decode(encoded, settings.encoding)
-    return residual(radiance, photo, settings.encoding, white=settings.white, encoded=seen)
+    return encoded_error(radiance, photo, settings.encoding, white=settings.white, encoded=seen)

@@ -71,20 +71,24 @@ class TransportEngine:
         self.light_height = light_height
         self.radiance = radiance
         self.pixels = torch.from_numpy(self.cache.pixels.astype(np.int64))
+        # Pixels without a surface show the map itself: the light is fitted to them, too.
         seen = np.zeros(camera.width * camera.height, bool)
         seen[self.cache.pixels] = True
         self.sky = np.flatnonzero(~seen)
         self.guide = surface_guide(self.cache)
 
     def light_problem(self, materials: Materials, sent: Array | None = None) -> LightProblem:
+        # --- Q pixels of surfaces and sky, by their share of the picture ---
         rng = np.random.default_rng(self.seed + 17)
         share = LIGHT_PIXELS / (self.camera.width * self.camera.height)
         count = len(self.cache.pixels)
         rows = _subset(rng, count, min(1.0, max(share, LEAST_PIXELS / max(count, 1))))
         sky = self.sky[_subset(rng, len(self.sky), min(1.0, share))]
+        # --- Surfaces: radiance is T E + b, b the light that other surfaces send ---
         matrix = light_matrix(self.cache, materials, rows, self.light_height)
         sent = self.radiance if sent is None else sent
         indirect = matrix.indirect(placed(self.cache.slot_radiance(sent)))
+        # --- Sky: the four texels around each ray, and their weights ---
         direction = pixel_rays(self.camera).reshape(-1, 3)[sky]
         direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
         index, weight = (placed(v) for v in texels_around(direction, matrix.shape))
@@ -149,6 +153,7 @@ class PathEngine:
         self._step = 0
 
     def _render(self, *maps_and_envmap: torch.Tensor) -> torch.Tensor:
+        # Two seeds a step: `seed` of the picture, and `seed` + 1 of its gradient.
         self._step += 1
         return self.scene.render_torch(
             *maps_and_envmap,

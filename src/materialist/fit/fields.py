@@ -47,6 +47,7 @@ class EnvmapMLP(nn.Module):
 
     def forward(self, height: int, jitter: torch.Generator | None = None) -> torch.Tensor:
         """Radiance [h, 2h, 3] at texel centres, or at random points of the texels when a generator is given."""
+        # Texel centres, all moved by one random offset, or by none.
         offset = torch.rand(2, generator=jitter) - 0.5 if jitter is not None else torch.zeros(2)
         v = (torch.arange(height) + 0.5 + offset[0])[:, None] / height
         u = (torch.arange(2 * height) + 0.5 + offset[1])[None, :] / (2 * height)
@@ -54,6 +55,7 @@ class EnvmapMLP(nn.Module):
         if self.coordinates == "uv":
             x = torch.stack([u, v], -1)
         else:
+            # d(u, v): theta from +Y, phi = 0 along -Z in the middle of the map.
             theta = math.pi * v
             phi = 2 * math.pi * (u - 0.5)
             x = torch.stack([theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()], -1)
@@ -93,9 +95,11 @@ def resize_envmap(envmap: torch.Tensor, height: int) -> torch.Tensor:
     h = envmap.shape[0]
     if h == height:
         return envmap
+    # Smaller: each new texel is the mean over its area, rows and columns apart.
     if height < h:
         rows, columns = (_coverage(n, m).to(envmap) for n, m in ((height, h), (2 * height, 2 * h)))
         return torch.einsum("ij,jkc,lk->ilc", rows, envmap, columns)
+    # Larger: with a rim of one texel, wrapped in azimuth, repeated at the poles.
     image = envmap.permute(2, 0, 1)[None]
     image = functional.pad(
         functional.pad(image, (1, 1, 0, 0), mode="circular"), (0, 0, 1, 1), mode="replicate"
@@ -137,10 +141,12 @@ class MaterialMLP(nn.Module):
         place = torch.stack([pixels // width, pixels % width], 1) * (512 / max(height, width))
         place = place.to(prior)
         waves = [wave(2.0**k * place) for k in range(self.BANDS) for wave in (torch.sin, torch.cos)]
+        # code [P, 15]: the place, its sines and cosines in 2 bands, m_p.
         self.register_buffer("prior", prior)
         self.register_buffer("code", torch.cat([place, *waves, prior], 1))
         inputs = self.code.shape[1]
         units = self.UNITS
+        # Layers 0 and 2 are narrower by the input, which joins their output.
         joined = nn.Linear(inputs, units - inputs), nn.Linear(units, units - inputs)
         plain = nn.Linear(units, units), nn.Linear(units, units)
         self.hidden = nn.ModuleList([joined[0], plain[0], joined[1], plain[1]])
@@ -189,6 +195,7 @@ class MaterialUNet(nn.Module):
         channels: int = 32,
     ):
         super().__init__()
+        # --- The prior as a picture whose sides can be halved twice ---
         grid = prior.new_zeros(height * width, 5)
         grid[pixels] = prior
         pad_h = -height % 4
@@ -198,6 +205,7 @@ class MaterialUNet(nn.Module):
         self.pixels = pixels
         self.register_buffer("image", functional.pad(image, (0, pad_w, 0, pad_h), mode="replicate"))
         self.register_buffer("prior", prior)
+        # --- Two blocks down, one between, two up; both halves are joined ---
         c = channels
         self.down1 = _double_conv(5, c)
         self.down2 = _double_conv(c, 2 * c)
@@ -214,6 +222,7 @@ class MaterialUNet(nn.Module):
         m = self.middle(functional.max_pool2d(b, 2))
         u = self.up2(torch.cat([functional.interpolate(m, scale_factor=2.0), b], 1))
         u = self.up1(torch.cat([functional.interpolate(u, scale_factor=2.0), a], 1))
+        # The residual of the surface pixels [P, 5], without the padding.
         delta = self.head(u)[0, :, : self.size[0], : self.size[1]].reshape(5, -1).T[self.pixels]
         return (self.prior + self.zeta * torch.tanh(delta)).clamp(0, 1)[rows]
 

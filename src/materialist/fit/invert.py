@@ -98,6 +98,7 @@ class Fit:
         if setup.mask is not None:  # what the mask makes one value moves, too
             last = replace(settings.stages[-1], targets=tuple(COLUMNS))
             settings = replace(settings, stages=(*settings.stages[:-1], last))
+        # Light by the prior's materials first, then materials under that light (paper).
         self.fit_light(state, setup.prior.materials)
         self._fit_materials(state, settings)
         return state
@@ -108,14 +109,17 @@ class Fit:
         setup = self.setup
         photo = self._photo()
         settings = setup.settings.light
+        # --- What surfaces send each other follows the fitted maps from the second fit on ---
         known = state.light is not None
         problem = self.engine.light_problem(materials, self._sent(state) if known else None)
+        # --- The first fit starts a fresh field, a later one moves that field on ---
         if state.light is None:
             begin = start_light(photo, settings, setup.prior.light, problem)
             state.light = envmap_field(settings, begin.radiance, seed=setup.seed), begin
         elif settings.again is not None:
             settings = replace(settings, schedule=settings.again)
         light, begin = state.light
+        # --- E* = argmin L_E over the field's parameters ---
         before = sum(stage["name"].startswith("light") for stage in state.stages)
         result = fit_light(
             problem,
@@ -128,6 +132,7 @@ class Fit:
             progress=self.progress,
             stop=self.stop,
         )
+        # --- The map at the scene's size, and what the fit took ---
         state.envmap = self.prepared_light(light(max(settings.height, 16)))
         state.stages.append({**result.summary(), "seconds": round(time.perf_counter() - start, 3)})
 
@@ -139,6 +144,7 @@ class Fit:
             envmap = with_mirrored_photo(envmap, setup.photo.linear, setup.photo.camera)
         if not setup.settings.light.sky:
             return envmap
+        # Pixels without a surface show the light itself: the photo's sky is pasted in.
         surface = np.zeros(setup.photo.linear.shape[:2], bool)
         surface.reshape(-1)[self.engine.pixels.numpy()] = True
         white = setup.settings.light.white
@@ -166,6 +172,7 @@ class Fit:
         photo = self._photo()[pixels]
         if isinstance(self.engine, PathEngine):  # it renders all pixels anyway
             settings = replace(settings, step_pixels=0)
+        # --- The maps that L_cons holds on to, and the field that moves ---
         held = remapped(state.maps) if settings.remap else state.maps
         inside = None if setup.mask is None else placed(setup.mask.reshape(-1)[pixels.numpy()])
         model = material_field(
@@ -175,6 +182,7 @@ class Fit:
         separable = not isinstance(self.engine, PathEngine) and isinstance(model, MaterialMaps)
         separable &= settings.loss == "l2"
         separable &= [stage.targets for stage in settings.stages] == [("albedo",)]
+        # --- Stage by stage, under the light of the state ---
         for stage in settings.stages:
             if self.stop():
                 break
@@ -198,12 +206,14 @@ class Fit:
                 state.maps = model().detach()
             seconds = round(time.perf_counter() - start, 3)  # with those of the tables
             state.stages.append({**result.summary(), "seconds": seconds})
+            # As in the published code: the light once more under the new materials.
             again = setup.settings.light.again is not None and state.light is not None
             if again and not self.stop():
                 self.fit_light(state, self.materials(state))
 
     def _white_light_first(self, state: FitState) -> FitState:
         """Roughness and metallic start at 0.5, and nothing is remapped on the way."""
+        # R and M under the white map, then the light, then A.
         settings = replace(self.setup.settings.materials, remap=False)
         schedule = settings.stages[0].schedule
         state.maps[:, 3:] = 0.5
@@ -272,6 +282,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None, stop: Stop = neve
     stages = list[dict]()
     photo = setup.photo
     prior = setup.prior
+    # --- The mesh of the predicted depth and normals ---
     tick("geometry", 0, 1)
     geometry = timed(
         stages,
@@ -285,6 +296,7 @@ def prepare(setup: FitSetup, progress: Progress | None = None, stop: Stop = neve
             seed=setup.seed,
         ),
     )
+    # --- What renders it: a path tracer for results, an engine for the steps of the fit ---
     renderer = timed(
         stages, "scene", lambda: RenderScene(geometry, photo.camera, device=setup.device)
     )
@@ -306,6 +318,7 @@ def invert(
     fit = prepare(setup, progress, stop)
     stages = list(fit.stages)
     seed = setup.seed
+    # --- The fit; tracing counts as a stage of its own, not as the light's ---
     if isinstance(fit.engine, TransportEngine):
         timed(stages, "trace", fit.engine.cache.trace)
     state = fit.run()
@@ -314,6 +327,7 @@ def invert(
     materials = fit.materials(state)
     on_stage("light", state.envmap)
     on_stage("materials", materials)
+    # --- The re-rendering, in halves of two seeds: where they differ is noise ---
     if progress is not None:
         progress("rerender", 0, 1)
     settings = setup.settings
@@ -334,10 +348,12 @@ def _engine(
 ) -> Engine:
     camera = setup.photo.camera
     seed = setup.seed
+    # The paper's engine: PRB, on the pixels that some face of the depth surface has.
     if setup.engine == "path":
         surface = np.unique(geometry.mesh.face_pixel[geometry.mesh.face_plane < 0])
         return PathEngine(renderer, camera, surface, envmap_height=setup.envmap_height, seed=seed)
     settings = setup.settings.materials
+    # A roughness that no stage moves needs one specular level in place of eight.
     stays = setup.mask is None and setup.strategy == "default" and not settings.remap
     stays &= all("roughness" not in stage.targets for stage in settings.stages)
     return TransportEngine(

@@ -12,7 +12,7 @@ from materialist.envmap import row_solid_angle
 from materialist.errors import InputError
 from materialist.fit.engine import LightProblem
 from materialist.fit.fields import EnvmapMLP, EnvmapSH, EnvmapTexels, resize_envmap
-from materialist.fit.losses import log_chroma, log_total_variation, rendering_loss, residual
+from materialist.fit.losses import encoded_error, log_chroma, log_total_variation, rendering_loss
 from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import LightSettings
 from materialist.types import Array, Progress
@@ -37,15 +37,18 @@ def start_light(
     hardly reach anything stay near it. The prior is that of `Prediction.light`; it gets the exposure that renders the
     photo best.
     """
+    # --- Without a predicted light: grey ---
     if prior is None or settings.field != "texels":
         grey = float(min(max(float(photo.mean()) / settings.start_albedo, 1e-3), settings.start))
         return LightStart(photo.new_full((settings.height, 2 * settings.height, 3), grey), None)
+    # --- With one: radiance in three channels, the scale of its error in the fourth ---
     light = placed(np.ascontiguousarray(prior[..., :3]))
     scale = placed(prior[..., 3:].copy())
     radiance = resize_envmap(light, settings.height).clamp_min(1e-3)
     target = photo[problem.pixels]
     with torch.no_grad():
         rendered = problem.render(resize_envmap(radiance, problem.height))
+    # Exposure k with least (k rendered - photo)^2, where the photo is not clipped.
     known = target < settings.white
     exposure = (target * rendered)[known].sum() / rendered[known].square().sum().clamp_min(1e-9)
     return LightStart(radiance * exposure, resize_envmap(scale, settings.height))
@@ -81,18 +84,24 @@ def fit_light(
 
     Beyond the paper, what the light differs from `start` by is kept smooth, white and small. photo: [H * W, 3] linear.
     """
+    # --- What stays the same in every step ---
     target = photo[problem.pixels]
     before = resize_envmap(start.radiance, problem.height).clamp_min(1e-6).log()
     trust = None
     angle = placed(row_solid_angle(problem.height)).float().view(-1, 1, 1)
+    # A texel's weight in the prior term: its solid angle over its scale of error.
     if start.scale is not None:
         trust = angle / angle.mean() / resize_envmap(start.scale, problem.height)
     jitter = torch.Generator().manual_seed(seed)
 
     def loss(_: int) -> torch.Tensor:
         envmap = _at_height(field, settings, problem.height, jitter)
-        error = residual(problem.render(envmap), target, settings.encoding, white=settings.white)
+        # L_E = L_1 + L_2 of encoded values (paper).
+        error = encoded_error(
+            problem.render(envmap), target, settings.encoding, white=settings.white
+        )
         value = rendering_loss(error)
+        # Beyond the paper: priors on the change of log radiance since the start.
         if settings.smooth or settings.chroma or settings.prior:
             change = envmap.clamp_min(1e-6).log() - before
             value = value + settings.smooth * log_total_variation(change)

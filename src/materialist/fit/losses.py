@@ -30,7 +30,7 @@ def decode(encoded: torch.Tensor, encoding: Encoding) -> torch.Tensor:
     )
 
 
-def residual(
+def encoded_error(
     radiance: torch.Tensor,
     photo: torch.Tensor,
     encoding: Encoding,
@@ -75,6 +75,7 @@ def consistency(
     encoded: [P, 3] the prior's albedo encoded, where it is at hand.
     """
     albedo, roughness, metallic = settings.weights
+    # The three channels of the albedo share its weight.
     weights = torch.tensor([albedo / 3] * 3 + [roughness, metallic]).to(maps)
     if settings.loss == "l2":
         before = encode(prior[:, :3], settings.encoding) if encoded is None else encoded
@@ -92,6 +93,7 @@ def log_total_variation(log_map: torch.Tensor) -> torch.Tensor:
 
 def log_chroma(log_map: torch.Tensor, share: torch.Tensor) -> torch.Tensor:
     """Mean colourfulness of log radiance [..., 3]: most lights are white. share: [...] what each counts, mean 1."""
+    # 1e-8 gives the root a gradient at grey.
     return (
         share * ((log_map - log_map.mean(-1, keepdim=True)).square().sum(-1) + 1e-8).sqrt()
     ).mean()

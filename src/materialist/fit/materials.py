@@ -17,7 +17,7 @@ from materialist.fit.fields import (
     Rows,
     Unified,
 )
-from materialist.fit.losses import consistency, encode, rendering_loss, residual
+from materialist.fit.losses import consistency, encode, encoded_error, rendering_loss
 from materialist.fit.optimise import StageResult, Stop, never, optimise
 from materialist.fit.settings import MaterialSettings
 from materialist.types import Camera, Progress
@@ -73,6 +73,7 @@ def fit_materials(
     encoded_photo = encode(photo, settings.encoding)
     encoded_albedo = encode(prior[:, :3], settings.encoding)
     for stage in settings.stages:
+        # Maps that the stage does not move stay as the field has them now.
         held = {
             name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets
         }
@@ -84,8 +85,9 @@ def fit_materials(
                 [held[name][rows] if name in held else moved[:, c] for name, c in COLUMNS.items()],
                 1,
             )
+            # L_re on the pixels of this step, plus delta L_cons on the same.
             radiance = problem(values, rows)
-            error = residual(
+            error = encoded_error(
                 radiance,
                 photo[rows],
                 settings.encoding,
@@ -96,6 +98,7 @@ def fit_materials(
             return rendering_loss(error, settings.loss) + change
 
         def into_range() -> None:
+            # Only maps that are parameters themselves can leave [0, 1] in a step.
             base = field.field if isinstance(field, Unified) else field
             if isinstance(base, MaterialMaps):
                 base.maps.clamp_(0, 1)

@@ -70,13 +70,10 @@ def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6
             f"The grazing angle tau is {tau} degrees; choose one between 0 and 90 (the paper uses 6)."
         )
     cuts = without_strays(find_cuts(depth, camera, tau, normal), depth)
-    inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(
-        np.float64
-    )  # [H, W] 1 / scene unit
-    vertex = corner_vertices(
-        depth > 0, cuts
-    )  # [H, W, 4] vertex of each pixel's corners, -1 without surface
-    reach = corner_inverse_depth(inverse, cuts)  # [H, W, 4] 1 / scene unit
+    # Inverse depth, 1 / scene unit: [H, W] of the pixels, and [H, W, 4] at their corners.
+    inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)
+    reach = corner_inverse_depth(inverse, cuts)
+    vertex = corner_vertices(depth > 0, cuts)
     return _assemble(inverse, normal, camera, cuts, vertex, reach)
 
 
@@ -130,16 +127,17 @@ def corner_vertices(surface: Array, cuts: Cuts) -> Array:
         (TOP_LEFT, BOTTOM_LEFT, np.pad(cuts.link_y, (both, before))),
         (TOP_RIGHT, BOTTOM_RIGHT, np.pad(cuts.link_y, (both, after))),
     ]
-    component = np.broadcast_to(
-        np.arange(4), pixels.shape
-    ).copy()  # smallest slot of each slot's component
+    # --- Connected components: each of the four slots takes the smallest one it is linked to ---
+    component = np.broadcast_to(np.arange(4), pixels.shape).copy()
     for _ in range(3):  # the longest chain has three links
         for a, b, link in linked:
             pair = component[..., [a, b]]
             component[..., [a, b]] = np.where(link[..., None], pair.min(-1, keepdims=True), pair)
+    # --- One vertex a component, numbered by its smallest slot ---
     leads = pixels & (component == np.arange(4))
     number = (np.cumsum(leads) - 1).reshape(leads.shape)
     index = np.where(pixels, np.take_along_axis(number, component, -1), -1)
+    # --- From the slots around grid corners to the corners of pixels ---
     upper = index[:-1, :-1, BOTTOM_RIGHT], index[:-1, 1:, BOTTOM_LEFT]
     return np.stack([*upper, index[1:, :-1, TOP_RIGHT], index[1:, 1:, TOP_LEFT]], -1)
 
@@ -172,6 +170,7 @@ def _half_step(inverse: Array, link: Array) -> Array:
     step = np.where(link, np.diff(inverse, axis=1), 0)
     left, right = (np.pad(step, ((0, 0), side)) for side in ((1, 0), (0, 1)))
     count = np.pad(link, ((0, 0), (1, 0))).astype(int) + np.pad(link, ((0, 0), (0, 1)))
+    # Only steps that go the same way limit the slope.
     least = np.where(left * right > 0, np.minimum(np.abs(left), np.abs(right)), np.inf)
     mean = (left + right) / np.maximum(count, 1)
     return 0.5 * np.where(count == 2, np.clip(mean, -2 * least, 2 * least), mean)
@@ -183,6 +182,7 @@ def _assemble(
     """Front faces and tucks as one Mesh; arrays as in `depth_to_mesh`."""
     height, width = inverse.shape
     surface = inverse > 0
+    # --- Front vertices: depth and normal are means over the pixels that meet there ---
     ids = vertex[surface]  # [P, 4] for the P pixels with a surface
     count = int(ids.max()) + 1
     weight = np.bincount(ids.ravel(), minlength=count)  # [V] pixels that meet in each vertex
@@ -196,12 +196,12 @@ def _assemble(
     normals = np.stack(
         [np.bincount(ids.ravel(), np.repeat(normal[surface][:, k], 4), count) for k in range(3)], -1
     )
+    # --- Front faces: two triangles a pixel ---
     faces = ids[:, QUAD].reshape(-1, 3)  # [2P, 3]
     pixel = np.repeat(rows * width + columns, 2)
 
-    tuck_screen, tuck_inverse, back = _tucks(
-        surface, cuts, vertex, reach, mean_inverse
-    )  # [T, 4, 2], [T, 4], [T]
+    # --- Tucks: quads of their own vertices, which look like the background pixel ---
+    tuck_screen, tuck_inverse, back = _tucks(surface, cuts, vertex, reach, mean_inverse)
     tuck_points = (rays_through(tuck_screen, camera) / tuck_inverse[..., None]).reshape(-1, 3)
     tuck_normals = np.repeat(normal.reshape(-1, 3)[back], 4, axis=0)
     tuck_uv = np.repeat(
@@ -228,6 +228,7 @@ def _tucks(
     On the shared edge a tuck takes the background's own vertices, so that the two join without a seam.
     """
     width = surface.shape[1]
+    # --- Which corners of the nearer pixel are corners of the farther one, too ---
     front, back, offset = _parted_pairs(surface, cuts, reach.mean(-1))
     flat_vertex = vertex.reshape(-1, 4)
     flat_reach = reach.reshape(-1, 4)
@@ -237,9 +238,9 @@ def _tucks(
     row = corner // 2 + offset[:, 1:]
     shared = (column >= 0) & (column <= 1) & (row >= 0) & (row <= 1)  # [T, 4]
     slot = np.where(shared, 2 * np.clip(row, 0, 1) + np.clip(column, 0, 1), 0)
-    joint = np.take_along_axis(
-        flat_vertex[back], slot, 1
-    )  # [T, 4] background vertex at shared corners
+    # [T, 4] the background's vertex at shared corners.
+    joint = np.take_along_axis(flat_vertex[back], slot, 1)
+    # --- Depth of the background over the whole of the nearer pixel ---
     # Beyond the back pixel its corner values go on linearly: in x the far side is 2 * near - opposite, and so in y.
     grid = flat_reach[back].reshape(-1, 2, 2)
     slope_x = (grid[:, :, 1] - grid[:, :, 0]).mean(1, keepdims=True)  # [T, 1] per pixel
@@ -248,24 +249,22 @@ def _tucks(
     beyond = centre + slope_x * (column - 0.5) + slope_y * (row - 0.5)
     beyond = np.clip(beyond, centre / SETTINGS.extrapolation, centre * SETTINGS.extrapolation)
     inverse = np.where(shared, mean_inverse[joint], beyond)
+    # --- Where that would come in front, the tuck passes under the nearer surface ---
     front_vertex = flat_vertex[front]  # [T, 4]
-    tip = shared & (joint == front_vertex)  # the cut ends here: both surfaces share this vertex
+    # At the tip of a cut both surfaces have this vertex in common.
+    tip = shared & (joint == front_vertex)
     limit = mean_inverse[front_vertex] * np.where(tip, 1, 1 - SETTINGS.behind)
-    loose = shared & (
-        inverse > limit
-    )  # the background comes in front at this corner: pass under it
+    loose = shared & (inverse > limit)
     # So moved, such a corner must stay behind the front face carried on to there, whose slope is at most this.
     slope = np.ptp(mean_inverse[front_vertex], axis=1, keepdims=True)
     inverse = np.minimum(inverse, limit - 2 * SETTINGS.overlap * slope * loose)
-    torn = (shared & ~tip).any(
-        1
-    )  # a cut whose both ends are tips has not opened, so there is no gap to close
+    # A cut whose both ends are tips has not opened: there is no gap to close.
+    torn = (shared & ~tip).any(1)
     screen = np.stack(
         [front[:, None] % width + corner % 2, front[:, None] // width + corner // 2], -1
     )
-    straight = (offset == 0).any(
-        1
-    )  # diagonally, such a corner would come out beside the front pixel
+    # Diagonally, a moved corner would come out beside the nearer pixel.
+    straight = (offset == 0).any(1)
     screen = screen - SETTINGS.overlap * (loose & straight[:, None])[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
@@ -281,6 +280,7 @@ def _parted_pairs(surface: Array, cuts: Cuts, inverse: Array) -> tuple[Array, Ar
     cut |= cuts.cut_x[:-1] | cuts.cut_x[1:] | cuts.cut_y[:, :-1] | cuts.cut_y[:, 1:]
     falling = cut & surface[:-1, :-1] & surface[1:, 1:]
     rising = cut & surface[:-1, 1:] & surface[1:, :-1]
+    # First pixel, second pixel, and the step (x, y) from one to the other.
     pairs = [
         (index[:, :-1][cuts.cut_x], index[:, 1:][cuts.cut_x], (1, 0)),
         (index[:-1][cuts.cut_y], index[1:][cuts.cut_y], (0, 1)),
@@ -289,6 +289,7 @@ def _parted_pairs(surface: Array, cuts: Cuts, inverse: Array) -> tuple[Array, Ar
     ]
     first, second = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
     step = np.concatenate([np.tile(pair[2], (len(pair[0]), 1)) for pair in pairs])
+    # The nearer one has the larger inverse depth.
     nearer = inverse.ravel()[second] > inverse.ravel()[first]
     front = np.where(nearer, second, first)
     back = np.where(nearer, first, second)
@@ -304,6 +305,7 @@ def face_camera(normals: Array, points: Array) -> Array:
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     unit = np.where(length > 1e-6, normals / np.maximum(length, 1e-6), view)
     facing = (unit * view).sum(-1, keepdims=True)
+    # The turn is in the plane of normal and view, to n . v = `least_facing`.
     aside = unit - facing * view
     aside_length = np.linalg.norm(aside, axis=-1, keepdims=True)
     turned = SETTINGS.least_facing * view + np.sqrt(

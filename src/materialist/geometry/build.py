@@ -74,6 +74,7 @@ def continued_as(geometry: Geometry, other: Geometry) -> Geometry:
     def both(a, b):
         return np.concatenate([a, b])
 
+    # Vertices of the planes come after those of the surface: their faces count from there.
     mesh = Mesh(
         vertices=both(near.vertices, far.vertices),
         normals=both(near.normals, far.normals),
@@ -92,6 +93,7 @@ def with_normals(geometry: Geometry, normal: Array, region: Array) -> Geometry:
     """
     mesh = geometry.mesh
     inside = (mesh.face_plane < 0) & region.ravel()[mesh.face_pixel]
+    # --- At vertices that faces inside alone have: the mean of the map's normals ---
     total = np.zeros((len(mesh.vertices), 3))
     np.add.at(total, mesh.faces[inside], normal.reshape(-1, 3)[mesh.face_pixel[inside], None])
     changed = np.zeros(len(mesh.vertices), bool)
@@ -112,6 +114,7 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
     mesh: whose first faces are two for each pixel with a surface, as of `depth_to_mesh`. depth: [H, W], 0 = none.
     normal: [H, W, 3] unit, camera frame.
     """
+    # --- Which pixels meet in each vertex: up to four ---
     pixel_normal = np.ascontiguousarray(normal[depth > 0], np.float32)  # [P, 3]
     corners = pixel_corners(mesh, depth > 0)[depth > 0]  # [P, 4]
     vertex = corners.ravel()
@@ -125,8 +128,8 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
         around[at, met[at]] = np.arange(len(corners))
         met[at] += 1
     place = place.ravel()
+    # --- Vertices on a crease: two of their pixels differ by more than CREASE ---
     cosine = np.cos(np.radians(CREASE))
-    # Most vertices lie on no crease and stay as they are.
     flat = np.ones(len(around), bool)
     for i, j in combinations(range(4), 2):
         both = around[:, j] >= 0  # places are filled from the first
@@ -134,13 +137,15 @@ def split_creases(mesh: Mesh, depth: Array, normal: Array) -> Mesh:
             np.einsum("nk,nk->n", pixel_normal[around[both, i]], pixel_normal[around[both, j]])
             > cosine
         )
+    # --- Corners there: the pixels of like normals that each is shaded with ---
     corner = np.flatnonzero(~flat[vertex])  # [C] of pixels, at creases
     at, near = vertex[corner], around[vertex[corner]]  # [C], [C, 4]
     alike = (near >= 0) & (
         np.einsum("njk,nk->nj", pixel_normal[near], pixel_normal[corner // 4]) > cosine
     )
     alike[np.arange(len(corner)), place[corner]] = True
-    # Pixels with the same company share a vertex.
+    # --- One new vertex for each old one and company of pixels ---
+    # The company is a number of four bits.
     key, first, number = np.unique(
         at * 16 + alike @ [1, 2, 4, 8], return_index=True, return_inverse=True
     )

@@ -79,9 +79,7 @@ def complete(
     depth = np.asarray(depth, np.float64)
     sheets = _sheets(planes, depth, camera)
     parts = [mesh]
-    farthest = _farthest_shown(
-        mesh, depth
-    )  # [H, W] smallest inverse depth of each pixel's front faces
+    farthest = _farthest_shown(mesh, depth)
     for sheet in sheets:
         stops = _stops(sheet, sheets)  # [S, 4] half-spaces that hold the continuation
         patches = [_inside_frame(sheet, stops, farthest, camera)]  # [Q, 4, 3]
@@ -102,6 +100,7 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
     radius = float(np.median(np.linalg.norm(points[surface], axis=-1)))
     patches = []
     for index, plane in enumerate(planes):
+        # Floors and walls have the others in front of them, up to 2 % of the scene's radius.
         others = points[surface & ~plane.mask]
         bounding = (
             not len(others)
@@ -112,10 +111,12 @@ def _sheets(planes: list[Plane], depth: Array, camera: Camera) -> list[_Sheet]:
         # A plane through the camera would cut the view open.
         if -plane.offset < 0.02 * radius or not (bounding or any(touches)):
             continue
+        # --- Some of its points, dropped onto the plane ---
         pixels = np.flatnonzero(plane.mask)
         pixels = pixels[:: max(1, len(pixels) // 20_000)]
         flat = points.reshape(-1, 3)[pixels]
         flat = flat - (flat @ plane.normal - plane.offset)[:, None] * plane.normal
+        # --- How far it goes on: ground under open sky farthest, walls by their own size ---
         outdoors = np.mean(~surface) > SETTINGS.sky_share and plane.normal[1] > SETTINGS.upward
         half = behind = (SETTINGS.ground_extent if outdoors else SETTINGS.extent) * radius
         if plane.normal[1] < SETTINGS.upward:
@@ -159,31 +160,29 @@ def _stops(sheet: _Sheet, sheets: list[_Sheet]) -> Array:
 
 def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) -> Array:
     """[Q, 4, 3] corners of the quads that continue the plane behind what the picture shows, scene units."""
+    # --- The plane at the corners of screen cells ---
     height, width = farthest.shape
     cell = max(1, max(height, width) // SETTINGS.cells)
     xs, ys = (np.unique(np.append(np.arange(0, n, cell), n)) for n in (width, height))
-    rays = rays_through(
-        np.stack(np.meshgrid(xs, ys), -1), camera
-    )  # [h+1, w+1, 3] through the cell corners
-    reach = rays @ (
-        sheet.plane.normal / sheet.plane.offset
-    )  # [h+1, w+1] inverse depth of the plane; <= 0: never
+    rays = rays_through(np.stack(np.meshgrid(xs, ys), -1), camera)  # [h+1, w+1, 3]
+    # [h+1, w+1] inverse depth of the plane; <= 0 where a ray never meets it.
+    reach = rays @ (sheet.plane.normal / sheet.plane.offset)
     points = rays / np.maximum(reach, 1e-9)[..., None]
     allowed = (reach > 0) & ((points @ walls[:, :3].T + walls[:, 3]) >= 0).all(-1)
     close = (reach > 0) & (np.linalg.norm(points - sheet.points.mean(0), axis=-1) < sheet.behind)
+    # --- Cells that lie behind all that their pixels show ---
     reach4, allowed4, close4, points4 = (  # [h, w, 4, ...] counter-clockwise seen from the camera
         np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], 2)
         for g in (reach, allowed, close, points)
     )
-    hidden = np.where(
-        sheet.plane.mask, 0, farthest
-    )  # on the plane's own pixels there is nothing to add
-    hidden = np.minimum.reduceat(
-        np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1
-    )  # [h, w] farthest in the cell
+    # On the plane's own pixels there is nothing to add: no inverse depth is below 0.
+    hidden = np.where(sheet.plane.mask, 0, farthest)
+    # [h, w] the farthest in each cell.
+    hidden = np.minimum.reduceat(np.minimum.reduceat(hidden, ys[:-1], 0), xs[:-1], 1)
     # A cell half beyond a stop stays: the planes then overlap by a cell instead of leaving a slit.
     keep = close4.all(-1) & allowed4.any(-1) & (reach4.max(-1) < (1 - SETTINGS.behind) * hidden)
     if not sheet.bounding:
+        # A table top is continued between its own pixels only.
         hull = convex_hull_image(sheet.plane.mask)
         keep &= hull[np.ix_((ys[:-1] + ys[1:]) // 2, (xs[:-1] + xs[1:]) // 2)]
     return points4[keep]
@@ -191,6 +190,7 @@ def _inside_frame(sheet: _Sheet, walls: Array, farthest: Array, camera: Camera) 
 
 def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     """[T, 3, 3] triangles of the plane outside the view frustum, scene units."""
+    # --- A grid on the plane, about the middle of what is seen of it ---
     origin = sheet.points.mean(0)
     spread = float(np.linalg.norm(sheet.points - origin, axis=-1).mean())
     reach = np.arcsinh(sheet.half / spread)
@@ -200,8 +200,10 @@ def _beyond_frame(sheet: _Sheet, walls: Array, camera: Camera) -> Array:
     )
     places = np.stack(np.meshgrid(along, -along), -1).reshape(-1, 2)
     rest = origin + places @ axes(sheet.plane.normal), grid_faces(len(along), len(along))
+    # --- Without what lies beyond other planes ---
     for wall in walls:
         rest = _cut(rest, wall)
+    # --- Its part outside of the view, one side of the frame after the other ---
     side_x = (camera.width / 2 + SETTINGS.rim) / camera.focal
     side_y = (camera.height / 2 + SETTINGS.rim) / camera.focal
     # a . p >= 0 inside the frustum: bottom, left, right, top
@@ -230,6 +232,7 @@ def _patch(sheet: _Sheet, corners: Array, camera: Camera) -> Mesh:
     count, sides = corners.shape[:2]
     triangles = np.array([[0, 1, 2], [0, 2, 3]][: sides - 2])
     nearest = sheet.pixels[cKDTree(sheet.points).query(corners.mean(1))[1]]  # [N]
+    # The centre of that pixel: the face looks like it.
     uv = np.stack(
         [
             (nearest % camera.width + 0.5) / camera.width,

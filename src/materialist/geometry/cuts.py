@@ -53,16 +53,17 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     surface = depth > 0  # [H, W]
     points = unproject(depth, camera).astype(np.float64)  # [H, W, 3] scene units
     inverse = np.where(surface, 1.0 / np.where(surface, depth, 1.0), 0.0)  # [H, W] 1 / scene unit
+    # --- Conditions 1 and 2: grazing pairs (paper) ---
     grazing_x, grazing_y = _grazing_pairs(points, surface, np.radians(tau))
-    slanted = np.ones(
-        depth.shape, bool
-    )  # [H, W] whether the normals are near enough to grazing for a slope
+    # --- Condition 3: steeper than the surface beside, or than the normals admit ---
+    slanted = np.ones(depth.shape, bool)
     if normal is not None:
         slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(
             np.radians(SETTINGS.slanted)
         )
     steep_x = _exceeds_slope(inverse, surface) | ~(slanted[:, :-1] | slanted[:, 1:])
     steep_y = _exceeds_slope(inverse.T, surface.T).T | ~(slanted[:-1] | slanted[1:])
+    # --- Cut where all three hold, linked elsewhere ---
     pair_x = surface[:, :-1] & surface[:, 1:]
     pair_y = surface[:-1] & surface[1:]
     cut_x = pair_x & grazing_x & steep_x
@@ -78,6 +79,7 @@ def without_strays(cuts: Cuts, depth: Array) -> Cuts:
     """
     height, width = depth.shape
     surface = depth > 0
+    # --- Neighbours as a graph: both pixels, whether linked, step in log depth ---
     index = np.arange(depth.size).reshape(depth.shape)
     across = cuts.link_x | cuts.cut_x
     down = cuts.link_y | cuts.cut_y
@@ -86,6 +88,7 @@ def without_strays(cuts: Cuts, depth: Array) -> Cuts:
     linked = np.concatenate([cuts.link_x[across], cuts.link_y[down]])
     values = np.log(np.where(surface, depth, 1)).ravel()
     step = np.abs(values[second] - values[first])
+    # --- Strays join a neighbour; back onto the grid ---
     least = SETTINGS.least * float(surface.sum())
     _, linked = regions_without_strays((first, second), linked, step, least, depth.size)
     link_x = np.zeros((height, width - 1), bool)
@@ -157,11 +160,10 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
     pair = surface[:, :-1] & surface[:, 1:]  # [H, W-1]
     step = np.where(pair, inverse[:, 1:] - inverse[:, :-1], 0.0)  # [H, W-1] 1 / (scene unit pixel)
     allowed = np.zeros_like(step)
+    # --- On either side: the least slope within `support` pixels, as far as it is known ---
     for side in (-1, 1):
-        least, first = (
-            np.full_like(step, np.inf),
-            np.zeros_like(step),
-        )  # smallest slope, and the one next to the pair
+        least = np.full_like(step, np.inf)
+        first = np.zeros_like(step)  # the slope next to the pair
         held = np.ones(step.shape, bool)  # no hole and no picture rim met so far
         for reach in range(1, min(SETTINGS.support, width - 2) + 1):
             here, there = (slice(reach, None), slice(None, -reach))[::side]
@@ -172,6 +174,7 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
             beside[:, here] = np.sign(step[:, here]) * step[:, there]
             least = np.where(held, np.minimum(least, beside), least)
             first = np.where(held & (reach == 1), beside, first)
+        # --- What it allows: more where it grows towards the pair, as at a round rim ---
         steady = np.isfinite(least) & (least > 0)
         least = np.where(steady, least, 1)
         bending = first * (SETTINGS.steady + SETTINGS.bending * (first / least - 1))

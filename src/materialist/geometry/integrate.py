@@ -55,10 +55,12 @@ def integrated(depth: Array, normal: Array, rays: Array) -> Array:
     surface = depth > 0
     if surface.sum() < 9:
         return depth.astype(np.float32)
+    # --- The sum: log depth d, pull 1 / length^2 in pixels, scale of rho ---
     grid = _Grid.of(surface, normal, rays)
     data = np.log(depth[surface].astype(np.float64))
     pull = np.full(len(data), (SETTINGS.length * max(depth.shape)) ** -2)
     scale = SETTINGS.steep * spacing(rays)
+    # --- Reweighted least squares: the weights are rho's at the solution before ---
     log_depth = data
     for _ in range(SETTINGS.rounds):
         log_depth = grid.solved(grid.weights(log_depth, scale), pull, data, log_depth)
@@ -75,6 +77,7 @@ def _without_strays(
 
     log_depth: [N] from the solves before. pull, data: [N] as in `_Grid.solved`. angle: of a pixel, radians.
     """
+    # --- Regions between steps that the normals do not explain; which are strays ---
     gap = np.abs(grid.step @ log_depth - grid.demanded)
     least = SETTINGS.least * len(data)
     linked = gap < SETTINGS.parted * angle
@@ -82,6 +85,7 @@ def _without_strays(
     region, joined = regions_without_strays(pairs, linked, gap, least, len(data))
     alone = connected_regions(pairs, linked, len(data))
     stray = (np.bincount(alone)[alone] < least) & (np.bincount(region)[region] >= least)
+    # --- Strays let go of their depth, and hold on to the neighbour they joined ---
     pull = np.where(stray, SETTINGS.stray_pull * pull, pull)
     within = region[grid.first] == region[grid.second]
     for _ in range(SETTINGS.last_rounds):
@@ -108,10 +112,12 @@ class _Grid:
     @staticmethod
     def of(surface: Array, normal: Array, rays: Array) -> "_Grid":
         """Of a picture; arrays as in `integrated`."""
+        # Numbers of the unknowns, and rays at z = -1.
         index = np.cumsum(surface.ravel()).reshape(surface.shape) - 1
         ray = np.stack([rays[..., 0], rays[..., 1], -np.ones(surface.shape)], -1).astype(np.float64)
         parts = []
         for near, far in (np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:]):
+            # What a pair demands is the mean of what the normals of both pixels demand.
             both = surface[near] & surface[far]
             ends = [normal[side][both].astype(np.float64) for side in (near, far)]
             views = [ray[side][both] for side in (near, far)]
@@ -120,6 +126,7 @@ class _Grid:
             parts.append((index[near][both], index[far][both], change, cosine[0] * cosine[1]))
         first, second, demanded, facing = (np.concatenate(column) for column in zip(*parts))
         count = len(first)
+        # The matrix of differences: -1 at the first pixel of a pair, +1 at the second.
         rows = np.tile(np.arange(count), 2)
         signs = np.repeat([-1.0, 1.0], count)
         shape = (count, int(surface.sum()))

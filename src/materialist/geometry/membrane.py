@@ -33,6 +33,7 @@ def _filled(values: Array, known: Array) -> Array:
         return values
     if min(height, width) < 2 or height * width <= 16:
         return np.where(known[..., None], values, values[known].mean(0))
+    # Sums of four over what is known of them: means at half the size.
     padded = np.pad(known, ((0, height % 2), (0, width % 2)))
     weight = padded.astype(np.float32)[..., None]
     total = _halved(np.pad(values, ((0, height % 2), (0, width % 2), (0, 0))) * weight)

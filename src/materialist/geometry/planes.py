@@ -70,6 +70,7 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
     """
     depth, normal = check_maps(depth, normal, camera)
     rays = pixel_rays(camera).astype(np.float64)  # [H, W, 3], z = -1
+    # --- The search looks at about `samples` pixels, evenly spaced ---
     stride = max(1, int(np.sqrt(depth.size / SETTINGS.samples)))
     thin = np.s_[stride // 2 :: stride, stride // 2 :: stride]
     small = _Maps(rays[thin], normal[thin].astype(np.float64), depth[thin])
@@ -77,9 +78,8 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
     fits: list[_Fit] = []
     free = small.depth > 0  # [h, w]
     least = SETTINGS.least * free.sum()
-    for _ in range(
-        2 * SETTINGS.most
-    ):  # some of the candidates are unsound and only use up their pixels
+    # --- The largest plane of what is left, again and again; unsound ones use up their pixels ---
+    for _ in range(2 * SETTINGS.most):
         if len(fits) == SETTINGS.most or free.sum() < max(3.0, least):
             break
         fit = _best_fit(small, free, rng)
@@ -88,6 +88,7 @@ def find_planes(depth: Array, normal: Array, camera: Camera, *, seed: int = 0) -
         fit, grown = _grow(small, free, fit)
         if grown.sum() < least:
             break
+        # Sound: its normals agree with each other, and their mean with the plane's.
         flat = np.median(small.normal[grown] @ fit.facing) > SETTINGS.flat
         if flat and unit(-fit.coefficients) @ fit.facing > SETTINGS.like_geometry:
             fits.append(fit)
@@ -152,12 +153,11 @@ class _Fit:
 
 def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None:
     """The plane that most of the free pixels [H, W] agree with, or None if there is no such thing."""
-    rays, facing, depth = (
-        maps.rays[free],
-        maps.normal[free],
-        maps.depth[free],
-    )  # [N, 3], [N, 3], [N]
+    rays = maps.rays[free]  # [N, 3]
+    facing = maps.normal[free]  # [N, 3]
+    depth = maps.depth[free]  # [N]
     count = len(depth)
+    # --- RANSAC: a plane through three pixels of like normals; most followers win ---
     best = None
     best_score = 2
     for _ in range(SETTINGS.hypotheses):
@@ -172,6 +172,7 @@ def _best_fit(maps: _Maps, free: Array, rng: np.random.Generator) -> _Fit | None
         if score > best_score:
             best = _Fit(coefficients, seed)
             best_score = score
+    # --- Least squares over its followers, anew each time ---
     for _ in range(5):
         if best is None:
             return None
@@ -215,6 +216,7 @@ def _region(maps: _Maps, free: Array, fit: _Fit) -> Array:
     core = alike & (np.abs(error) < SETTINGS.tolerance)
     wide = alike & (np.abs(error) < SETTINGS.bent)
     step = SETTINGS.step * max(1.0, SETTINGS.small_picture / max(error.shape))
+    # Growth stops where the error jumps: there another surface begins.
     jump_x = np.abs(np.diff(error, axis=1)) > step
     jump_y = np.abs(np.diff(error, axis=0)) > step
     calm = wide.copy()
@@ -232,6 +234,7 @@ def _label(maps: _Maps, fits: list[_Fit]) -> list[Plane]:
         error = np.where(_region(maps, surface, fit), np.abs(maps.error(fit)), np.inf)
         label = np.where(error < nearest, k, label)
         nearest = np.minimum(nearest, error)
+    # --- Planes that are large enough still; 1 / |c| is their distance, -c / |c| their normal ---
     planes = []
     # pixels of the largest patch that is chance
     speck = int(np.ceil(SETTINGS.speck * surface.size)) - 1

@@ -24,6 +24,7 @@ def regions_without_strays(
     apart = np.flatnonzero(region[first] != region[second])
     first, second, step = first[apart], second[apart], step[apart]
     while True:
+        # A round: every stray joins a larger neighbour. It ends when none is left to join.
         ends = region[first], region[second]
         size = np.bincount(region)
         target, limit = _targets(ends, step, size, least)
@@ -51,11 +52,13 @@ def _targets(
 
     A small one goes to one larger than itself, never in circles.
     """
+    # Each border twice, once from either side.
     owners = np.concatenate(ends)
     other = np.concatenate(ends[::-1])
     step = np.tile(step, 2)
     larger = (size[other] > size[owners]) | ((size[other] == size[owners]) & (other > owners))
     border = (owners != other) & (size[owners] < least) & larger
+    # The mean step along the border of each stray with each neighbour.
     key, place = np.unique(owners[border] * len(size) + other[border], return_inverse=True)
     mean = np.bincount(place, step[border], len(key)) / np.bincount(place, minlength=len(key))
     order = np.argsort(-mean, kind="stable")  # the last one written is the nearest

@@ -18,6 +18,7 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     Least squares over a window with Gaussian weights of `sigma` pixels, of known [H, W] bool pixels alone: next to
     the end of the map the window is one-sided.
     """
+    # --- The window, two standard deviations wide, and the plane 1, x, y to fit in it ---
     reach = int(np.ceil(2 * max(sigma, SHARP)))
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float64)
     weight = np.exp(-(x**2 + y**2) / (2 * max(sigma, SHARP) ** 2))
@@ -31,6 +32,7 @@ def depth_slopes(values: Array, known: Array, sigma: float = SHARP) -> tuple[Arr
     spread = max(float(values[known].std()), 1e-30)
     scaled = np.where(known, (values - mean) / spread, 0)
     inside = known.astype(np.float64)
+    # --- The normal equations of all windows at once ---
     moments = np.stack(
         [np.stack([total(inside, a * b) for b in basis], -1) for a in basis], -2
     )  # [H, W, 3, 3]

@@ -107,6 +107,7 @@ def square_pixels(decoded: Decoded, shape: float, path: Path) -> Decoded:
         return decoded
     if abs(shape - 1) < 1e-3:
         return decoded
+    # Only stretched: no pixel of the file is lost.
     height, width = decoded.linear.shape[:2]
     size = (round(width * max(shape, 1)), round(height * max(1 / shape, 1)))
     check_size(*size, path)

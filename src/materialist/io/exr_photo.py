@@ -151,6 +151,7 @@ def _choice(layers: Sequence[_Layer], chosen: _Layer) -> str:
 def _light(layer: _Layer, header: dict[str, Any], path: Path, notes: list[str]) -> Decoded:
     """The light and alpha of a layer in linear Rec.709, at the display window."""
     primaries = _primaries(header, notes)
+    # --- Channels to RGB: grey, RGB, CIE XYZ, or luminance and chroma ---
     if layer.grey:
         grey = np.asarray(layer.channels[layer.grey], np.float32)
         pixels = np.repeat(grey[..., None], 3, -1)
@@ -164,6 +165,7 @@ def _light(layer: _Layer, header: dict[str, Any], path: Path, notes: list[str]) 
         notes.append("The channels X, Y and Z are taken as CIE XYZ.")
     else:
         pixels = _from_luminance(layer.channels, primaries, exr_window(header, "dataWindow")[2:])
+    # --- On the display window, with alpha laid on, in linear Rec.709 ---
     pixels = displayed(pixels, header, path)
     alpha = pixels[..., 3:] if pixels.shape[-1] == 4 else None
     if alpha is None:
@@ -189,6 +191,7 @@ def _primaries(header: dict[str, Any], notes: list[str]) -> Primaries:
         return ACES_AP0
     if stated is None:
         return REC709
+    # Usable only where their matrix has an inverse: `rgb_to_xyz` raises otherwise.
     try:
         primaries = tuple(float(value) for value in stated)
         rgb_to_xyz(primaries)

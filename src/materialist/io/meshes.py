@@ -131,6 +131,7 @@ def read_bodies(folder: Path, entries: Sequence[dict[str, Any]]) -> tuple[Body, 
             raise SceneError(
                 f"The maps of body {k} have other channels than they need; the package is damaged."
             )
+        # A key may be missing, or null: then the surface has its default.
         values: dict[str, Any] = {
             key: _number_or_colour(entry[key])
             for key in _SURFACE_KEYS

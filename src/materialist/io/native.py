@@ -53,6 +53,7 @@ def unprinted() -> Iterator[None]:
     """
     with _lock, _silent_opencv(), _silent_tifffile(), _silent_python():
         _flush()
+        # C libraries write to the descriptors 1 and 2: these lead nowhere for a while.
         kept = {number: _duplicate(number) for number in _STANDARD_STREAMS}
         try:
             nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -129,6 +129,7 @@ def _footer(scene: Scene) -> list[tuple[str, tuple[int, int, int]]]:
         "peak_rss_mb": "peak {:.0f} MB",
     }
     parts += [text.format(metrics[key]) for key, text in figures.items() if key in metrics]
+    # At most two lines a note, and at most `_MAX_WARNINGS` notes.
     lines = [("   ·   ".join(parts), _INK)]
     for warning in scene.warnings[:_MAX_WARNINGS]:
         lines += [(line, _AMBER) for line in textwrap.wrap(f"Note: {warning}", 190, max_lines=2)]

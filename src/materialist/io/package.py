@@ -92,12 +92,14 @@ def load_scene(path: str | Path, *, most: float = MAX_BYTES) -> Scene:
 
 
 def _read(folder: Path, most: float) -> Scene:
+    # --- What scene.json says, checked before anything is decoded ---
     meta = _read_meta(folder)
     camera = Camera(**meta["camera"])
     photo = meta["photo"]
     prior = meta["prior"]
-    # Sizes first: nothing is decoded that would not fit into memory.
+    # By headers alone: nothing is decoded that would not fit into memory.
     check_files(folder, Path(photo["original"]).name, len(meta.get("bodies", ())), most)
+    # --- Maps, those of the prior and those of the fit ---
     shape = (camera.height, camera.width)
     prior_maps = _read_maps(folder / "prior", shape)
     fitted_maps = _read_maps(folder / "maps", shape)
@@ -287,6 +289,7 @@ def _read_meta(folder: Path) -> dict[str, Any]:
         raise SceneError(
             f"An interrupted save left {folder} without its scene; get it back: mv {aside} {folder}"
         )
+    # --- Is it a package, of this program and version? ---
     if not folder.is_dir():
         raise SceneError(
             f"There is no scene package at {folder}; make one with: materialist invert PHOTO -o {folder}"

@@ -110,6 +110,7 @@ def read_tiff(path: Path) -> Decoded:
     Raises InputError for layouts that would be read wrong.
     """
     with unprinted(), TiffFile(path) as file:
+        # --- Which reader: CIELAB, up to 8 bits, or deep pixels ---
         page: Any = file.pages[0]
         layout = _Layout.of(page, len(file.pages))
         if layout.bits > 8 and layout.meaning in (_CIELAB, _ICCLAB):

@@ -123,6 +123,7 @@ class Worker:
 
 def exit_report(code: int, errors: IO[bytes] | None = None) -> dict[str, Any]:
     """Why a process ended, from its exit code and its last line of stderr; keys as of `worker.failure_facts`."""
+    # A negative code is the number of the signal that ended it.
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
         hint = " (as the system does when memory runs out)" if -code == signal.SIGKILL else ""

@@ -113,6 +113,7 @@ class Marigold(HubPredictor):
         """The wanted maps at the photo's size. The model sees sRGB values; equal seeds start from equal noise."""
         import torch
 
+        # --- The answer of the pipeline ---
         folder = self.folder
         source = f"marigold ({folder.name.replace('--', '/')}){checksum_note(folder)}"
         kind = _pipeline_class(folder)
@@ -140,6 +141,7 @@ class Marigold(HubPredictor):
             )
             maps = {"depth": depth}
             source = source + note
+        # --- A model may give other maps than those that are asked for ---
         lacking = [name for name in names if name not in maps]
         if lacking:
             raise WeightsError(
@@ -249,6 +251,7 @@ def load_model(cls: Any, folder: Path, subfolder: str = "", **options: Any) -> A
             f"{folder / subfolder} does not hold a {cls.__name__} that can be read ({reason(error)}); fetch it again "
             f"with: materialist models download NAME --force, or {INSTEAD}."
         ) from error
+    # Weights that lack tensors would give noise: the libraries fill them at random.
     absent = [*(info.get("missing_keys") or ()), *(info.get("mismatched_keys") or ())]
     if absent:
         raise WeightsError(
@@ -267,6 +270,7 @@ def pipeline(name: str, folder: Path, gpu: bool, label: str = "", **options: Any
 
     diffusers = import_library("diffusers")
     transformers = import_library("transformers")
+    # --- Each network on its own, so that one that is not whole is refused ---
     kinds = {
         "unet": diffusers.UNet2DConditionModel,
         "vae": diffusers.AutoencoderKL,
@@ -279,6 +283,7 @@ def pipeline(name: str, folder: Path, gpu: bool, label: str = "", **options: Any
         components[part] = load_model(cls, folder, part, **variant).to(
             torch.float16 if gpu else torch.float32
         )
+    # --- The pipeline around them: its configuration, scheduler and tokenizer ---
     try:
         loaded = getattr(diffusers, name).from_pretrained(
             folder, local_files_only=True, **components, **options

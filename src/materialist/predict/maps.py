@@ -266,6 +266,7 @@ def _depth_range(values: Array, path: Path, warnings: list[str]) -> Array:
 def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
     """Normals: unit vectors facing the viewer; a zero vector means unknown."""
     _check_finite(values, path)
+    # --- Unit vectors, and not those of an 8-bit picture, (n + 1) / 2 ---
     length = np.linalg.norm(values, axis=-1)
     known = length > SETTINGS.min_normal_length
     wrong = (np.abs(length[known] - 1) > SETTINGS.max_excess).mean() > 0.05 if known.any() else True
@@ -282,6 +283,7 @@ def _unit_normals(values: Array, path: Path, warnings: list[str]) -> Array:
         raise InputError(
             f"{path} does not hold unit vectors (median length {np.median(length):.3g})."
         )
+    # --- In our frame: surfaces that are seen face +Z, but for grazing ones ---
     if (values[known][:, 2] < 0).mean() > 0.5:
         raise InputError(
             f"{path} points away from the viewer; normals are in the camera frame with +Z to the viewer."

@@ -63,6 +63,7 @@ class StoredNetwork(nn.Module):
             raise WeightsError(
                 f"There are no weights of {cls.__name__} at {path}; make some with: {cls.COMMAND}."
             )
+        # --- Is it a file of this network, and of which layers ---
         tensors = read_state(path)
         header = metadata(path)
         if header.get("format") != cls.FORMAT:

@@ -74,5 +74,6 @@ def _average(q: Array, a: Array, b: Array, radius: int) -> tuple[Array, Array]:
             sum_a += weight * np.nan_to_num(a_n)
             sum_b += weight * np.nan_to_num(b_n)
             total += weight
+    # A window of holes has no weight: its gradient is 0.
     total = np.maximum(total, 1e-12)
     return sum_a / total, sum_b / total

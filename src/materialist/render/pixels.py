@@ -67,6 +67,7 @@ def first_hits(
         return _surfaces(scene, camera, bodies, size, strip)
 
     values = _by_strips(surfaces, 8, scene, camera, bodies, size, box)
+    # Of the 8 channels of `_surfaces`: share, depth, albedo, normal.
     channels = (values[..., 0], values[..., 7], values[..., 1:4], values[..., 4:7])
     return FirstHits(*(np.ascontiguousarray(channel) for channel in channels))
 
@@ -114,6 +115,7 @@ def _around(scene, camera: Camera, names: Collection[str], size: tuple[int, ...]
     at, depth = project(corners, camera)
     if (depth <= 0).any():
         return box
+    # --- Their bounds in rows and columns, from working pixels to those of `size` ---
     sides = []
     for side, n, working, places in zip(box, size, (camera.height, camera.width), at.T[::-1]):
         places = places * n / working
@@ -141,6 +143,7 @@ def _hits(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], 
     way = directions(
         camera, size, dr.gather(mi.UInt32, integers(mi, pixel.ravel()), slot // rays), x, y
     )
+    # --- Rays that meet one of the shapes first, and their planar depth -z t ---
     met = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(0), way))
     known = mi.Bool(False)
     for shape in scene.shapes():
@@ -149,6 +152,7 @@ def _hits(scene, camera: Camera, names: Collection[str], size: tuple[int, ...], 
     known &= met.is_valid()
     values = [dr.select(known, value, 0) for value in (mi.Float(1), -way.z * met.t)]
     dr.eval(values)
+    # --- By pixel: the share of its rays, and the mean depth of those that hit ---
     count, depth = (np.array(dr.block_sum(value, rays)) for value in values)
     means = np.stack([count / rays, depth / np.maximum(count, 1)], -1)
     return means.reshape(*pixel.shape, 2)
@@ -220,6 +224,7 @@ def _albedo(body: Body, uv: Array) -> Array:
     """[n, 3] albedo at texture coordinates [n, 2], repeated; white where light goes on in one direction."""
     surface = body.surface
     h, w = surface.albedo.shape[:2]
+    # The nearest texel; where uv is not a number, the first one.
     x = np.floor(np.nan_to_num(uv[:, 0]) * w).astype(np.int64) % w
     y = np.floor(np.nan_to_num(uv[:, 1]) * h).astype(np.int64) % h
     # A denoiser is guided by what is seen in a mirror, not by the colour of the mirror.

@@ -89,6 +89,7 @@ class RenderScene:
                 raise InputError(
                     f"The {name} map is {getattr(materials, name).shape}, the camera needs {shape}."
                 )
+        # Mitsuba's textures have a channel axis, also of one channel.
         maps = (materials.albedo, materials.roughness[..., None], materials.metallic[..., None])
         self._assign(*(tensor(self.mi, values) for values in maps))
         self.params.update()
@@ -166,6 +167,7 @@ class RenderScene:
         )
 
     def _assign(self, albedo, roughness, metallic) -> None:
+        # The depth surface has the maps, a continued plane their mean over its own pixels.
         for name, maps in (
             ("base_color", albedo),
             ("roughness", roughness),
@@ -223,6 +225,7 @@ def sensor(camera: Camera, transform) -> dict:
 
 
 def _maps_bsdf(mi, height: int, width: int) -> dict:
+    # Values come by `set_materials`. Nearest texel: a pixel has one material, unmixed.
     def texture(channels: int, value: float) -> dict:
         data = tensor(mi, np.full((height, width, channels), value, np.float32))
         return {

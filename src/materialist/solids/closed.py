@@ -122,6 +122,7 @@ def _window(depth, normal, inside, thickness, behind, back, camera: Camera) -> _
     # Beyond the frame everything goes on as at its edge, for some pixels.
     i = np.clip(y, 0, camera.height - 1)[:, None]
     j = np.clip(x, 0, camera.width - 1)[None]
+    # Within the margin the object goes on; beyond it the view is empty.
     near = ((y >= -margin) & (y < camera.height + margin))[:, None] & (
         (x >= -margin) & (x < camera.width + margin)
     )
@@ -151,6 +152,7 @@ def _cavity(view: _View, wall: float, camera: Camera) -> Shell | None:
     """The surface `wall` below that of the object; None where the object has no room for it."""
     facing = np.abs((view.normal * view.rays).sum(-1)) / view.length
     through = wall / np.clip(facing, SETTINGS.min_cosine, 1)  # [h, w] along the ray, of one wall
+    # Room inside: two walls along the ray, and one from the silhouette.
     left = view.thickness - 2 * through
     room = view.inside & (left > SETTINGS.min_thickness * view.size * view.pixel)
     room &= border_distance(view.inside) * view.pixel > wall

@@ -78,12 +78,13 @@ def inflated(depth: Array, normal: Array, mask: Array, camera: Camera) -> Inflat
 
 def _membrane(inside: Array) -> Array:
     """[H, W] u >= 0, pixels squared: Laplacian -1 inside [H, W] bool, 0 outside; level where the frame cuts it."""
+    # --- The unknowns, and their distance to the outline ---
     count = int(inside.sum())
     index = np.cumsum(inside.ravel()).reshape(inside.shape) - 1
     margin = np.s_[_MARGIN:-_MARGIN, _MARGIN:-_MARGIN]
     distance = silhouette_field(np.pad(inside, _MARGIN, mode="edge"))[margin]
     # --- The five-point Laplacian; beyond the frame the membrane goes on as at its edge ---
-    own = np.zeros(inside.shape)
+    diagonal = np.zeros(inside.shape)
     starts: list[Array] = []
     ends: list[Array] = []
     for near, far in (np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:]):
@@ -94,12 +95,12 @@ def _membrane(inside: Array) -> Array:
             # Next to the outline the slope is that to the outline, which is nearer than the neighbour.
             part = distance[one] / np.maximum(distance[one] - distance[other], 1e-6)
             to_outline = 1 / np.clip(part, _NEAREST, 1)
-            own[one] += np.where(inside[other], 1, to_outline) * inside[one]
+            diagonal[one] += np.where(inside[other], 1, to_outline) * inside[one]
     places = np.concatenate(starts), np.concatenate(ends)
     links = coo_matrix((-np.ones(len(places[0])), places), (count, count))
     # --- Solved ---
     # A mask without any outline has no largest thickness: the pull back bounds it.
-    system = csr_matrix(links + diags(own[inside] + 1e-3 / count))
+    system = csr_matrix(links + diags(diagonal[inside] + 1e-3 / count))
     multigrid = pyamg.ruge_stuben_solver(system, max_coarse=_COARSEST, coarse_solver="splu")
     values = np.zeros(inside.shape)
     values[inside] = np.maximum(multigrid.solve(np.ones(count), tol=_TOLERANCE), 0)

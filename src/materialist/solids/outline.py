@@ -68,6 +68,7 @@ def surface_of_revolution(
     behind: [H, W] planar depth of what stands behind the object, 0 = nothing: the object ends above it.
     Raises InputError for maps of different sizes, or a mask without any surface.
     """
+    # --- What can be judged: whole, without a hole, and large enough ---
     inside = surface_in(mask, depth, camera)
     is_cut = inside[[0, -1]].any() or inside[:, [0, -1]].any()
     has_hole = binary_fill_holes(inside).sum() > SETTINGS.max_filled_ratio * inside.sum()
@@ -185,6 +186,7 @@ def has_mirror_image(inside: Array, rays: Array, across: Array, camera: Camera) 
     """[H, W] bool: pixels of a mask whose mirror image at the plane with normal `across` [3] is in the mask."""
     object_rays = rays[inside]
     mirrored = object_rays - 2 * (object_rays @ across)[:, None] * across
+    # The pixel that each mirrored ray meets; none where it leaves the picture.
     place, ahead = project(mirrored, camera)
     x, y = np.floor(place).astype(int).T
     in_frame = (ahead > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
@@ -273,6 +275,7 @@ def _hull(field: Array, axis: Axis, r: Array, h: Array, camera: Camera) -> Array
         # A place is in the hull where the smallest distance over all turns is still inside.
         least = np.full((len(h), len(r)), np.inf)
         for angle in half + np.linspace(-np.pi / 2, np.pi / 2, SETTINGS.hull_turns // 2):
+            # Every place of the half plane, turned by the angle, on the screen.
             out = np.cos(angle) * first + np.sin(angle) * np.cross(axis.up, first)
             points = axis.foot + r[None, :, None] * out + h[:, None, None] * axis.up
             x, y = np.moveaxis(project(points, camera)[0], -1, 0)
@@ -289,11 +292,13 @@ def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: boo
 
     line: [K, 2] (distance, height above the camera), `far` from the camera.
     """
+    # --- The line without the noise of its pixels, and its direction ---
     spline, along = splprep(
         line.T, s=len(line) * (SETTINGS.outline_noise * far / camera.focal) ** 2
     )
     smooth = np.stack(splev(along, spline), -1)
     step = unit(np.stack(splev(along, spline, der=1), -1))
+    # --- Its side: what is steeper than the camera looks down or up on it ---
     # The lower end is seen from above over its near rim, the upper one over its far rim.
     height = np.abs(smooth[:, 1])
     lower = height / np.maximum(far - smooth[:, 0], 0.1 * far)
@@ -305,6 +310,7 @@ def _capped(line: Array, far: float, camera: Camera, cell: float, round_top: boo
     if len(steep) < 4:
         return None
     side = smooth[steep[0] : steep[-1] + 1]
+    # --- The cap on its upper end ---
     # A round end has the side's slope where it begins, and is level at the axis.
     slope = float(upper[steep[-1]]) if round_top else 0.0
     wide, top = side[-1]

@@ -33,11 +33,13 @@ class Profile:
     def of(cls, line: Array, cell: float, floor: float) -> Self:
         """The profile inside a line [K, 2] (distance from the axis, height) that runs from its foot up to the axis."""
         low = min(float(line[:, 1].min()), floor) - MARGIN * cell
+        # --- The polygon of the line, in cells, and which cells are in it ---
         corners = (line - [0, low]) / cell  # (column, row)
         shape = tuple(int(np.ceil(n)) + MARGIN for n in corners.max(0)[::-1])
         # The polygon reaches one cell beyond the axis, whose column is inside.
         closed = np.concatenate([corners, [[-1, corners[-1, 1]], [-1, corners[0, 1]]]])
         inside = grid_points_in_poly(shape, closed[:, ::-1])
+        # --- Signed distance to its border, smoothed by a cell ---
         along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
         # Distance to the border: to the nearest of points every tenth of a cell along it.
         fine = np.arange(0, along[-1], 0.1)
@@ -80,6 +82,7 @@ class Profile:
         cut[[0, -1]] = np.maximum(cut[[0, -1]], 1)
         cut[:, -1] = np.maximum(cut[:, -1], 1)
         lines = []
+        # --- Contours as places in scene units; bits of a contour are left out ---
         for line in find_contours(cut, 0.0):
             line = line[:, ::-1]  # (column, row)
             line = line[np.r_[True, np.abs(np.diff(line, axis=0)).max(1) > 1e-6]]
@@ -88,6 +91,7 @@ class Profile:
                 np.allclose(line[0], line[-1]) or max(line[0, 0], line[-1, 0]) < 1e-6
             ):
                 continue
+            # On the base the normal is straight down, else up the slope of the distance.
             normal = unit(
                 np.where((line[:, 1] <= bottom + 1e-3)[:, None], [0.0, -1], self._slope(line))
             )

@@ -114,6 +114,7 @@ class Revolution:
         left = np.arange(len(rays))
         last = here
         before = np.ones(len(rays))
+        # `value` is in cells: a step is never longer than the distance, nor below half a cell.
         while len(left):
             value = self.profile.at(self.axis.of(rays[left] * here[:, None]))
             # The ray has entered: the zero lies between the last two values, linearly.
@@ -141,6 +142,7 @@ def ground_height(axis: Axis, behind: Array | None, inside: Array, rays: Array) 
     """
     if behind is None or not (known := inside & (np.asarray(behind) > 0)).any():
         return -np.inf
+    # The lowest part of the object on the screen, by the height of its rays.
     level = rays @ axis.up
     low = level[inside].min()
     lowest = known & (level <= low + SETTINGS.foot_share * np.ptp(level[inside]))
@@ -179,6 +181,7 @@ def _swept(line: Array, leaning: Array, axis: Axis, camera: Camera) -> Shell:
     faces = faces[
         (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     ]
+    # Only vertices that some face has, numbered anew.
     used, faces = np.unique(faces, return_inverse=True)
     vertices = points.reshape(-1, 3)[used]
     normals = normals.reshape(-1, 3)[used]

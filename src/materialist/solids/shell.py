@@ -93,5 +93,6 @@ def closed_shell(
 def _across(points: Array, outward: Array) -> Array:
     """[R, 3] unit normals of a wall along the rays to points [R, 3], that ends the region towards `outward` [R, 2]."""
     ray = unit(points)
+    # The picture's y runs down, the camera's up.
     side = np.stack([outward[:, 0], -outward[:, 1], np.zeros(len(outward))], -1)
     return unit(side - (side * ray).sum(-1, keepdims=True) * ray)

@@ -46,12 +46,14 @@ def mirrored_thickness(depth: Array, normal: Array, inside: Array, rays: Array) 
     depth: [H, W] planar, scene units. normal: [H, W, 3] unit. inside: [H, W] bool, where both are known.
     rays: [H, W, 3] camera rays through the pixels at z = -1, evenly spaced.
     """
+    # --- The back: the front, mirrored at the plane of the silhouette ---
     length = np.linalg.norm(rays, axis=-1)  # [H, W] of the ray per unit of planar depth
     border = border_distance(inside)
     front = np.where(inside, depth, 1.0).astype(np.float64)
     plane = _silhouette_plane(front, normal, rays, border, inside)
     # 1/front + 1/back = 2/plane, kept away from where the back runs to infinity.
     back = 1 / np.maximum(2 * plane - 1 / front, 0.2 / front)
+    # --- Bounds: a share of a round body's chord, and a multiple of the object's size ---
     width = border * front * spacing(rays)  # [H, W] scene units to the silhouette
     widest = width[inside].max()
     # Chord of a circle with radius `widest` at distance `width` from its edge: a body with a round section.
@@ -67,11 +69,13 @@ def _silhouette_plane(
     front: Array, normal: Array, rays: Array, border: Array, inside: Array
 ) -> Array:
     """[H, W] inverse planar depth of the plane through the silhouette: linear over the picture, as for every plane."""
+    # --- A ring just inside the silhouette tells where its plane is ---
     widest = max(SETTINGS.ring_pixels, SETTINGS.ring_share * np.sqrt(inside.sum()))
     # The outermost pixels are known too badly: where in them the silhouette runs is open.
     ring = inside & (border <= widest) & (border > 0.6)
     if not ring.any():
         ring = inside
+    # --- The plane through the ring, moved back to the silhouette itself ---
     length = np.linalg.norm(rays, axis=-1)[ring]
     cosine = np.clip(-np.sum(normal[ring] * rays[ring], -1) / length, SETTINGS.min_cosine, 1)
     # The surface just inside lies before the silhouette. With a round section of radius r, a point at distance e from

@@ -101,6 +101,7 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
                 f"{shown} lacks the file {lacking[0]}, which its list of edits names; {advice}."
             )
         _extract(archive, {name: members[name] for name in options}, folder, shown)
+    # Each file is checked as if it had been uploaded alone.
     readable = {
         name: uploads.checked_upload(report, folder / name, option)
         for name, option in options.items()

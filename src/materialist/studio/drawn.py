@@ -49,13 +49,13 @@ class Drawing:
 
     panes: glass.Panes
     before: tuple[Step, ...]
-    own: Step
+    step: Step
     after: tuple[Step, ...]
     fixed: Step
-    """The own step without what the page draws."""
+    """The changed step without what the page draws."""
     region: Array | None = None
     metal: bool = False
-    """Whether the own step gives the region the normals of metal."""
+    """Whether the changed step gives the region the normals of metal."""
 
     @property
     def others(self) -> tuple[Step, ...]:
@@ -87,7 +87,7 @@ def content(session: Session, kind: str) -> bytes | None:
         return None
     live, drawing = pair
     key = drawing.key(live)
-    steps = (*drawing.before, drawing.own, *drawing.after)
+    steps = (*drawing.before, drawing.step, *drawing.after)
     content: bytes | None = live.call(block, kind=kind, drawing=drawing, key=key, steps=steps)
     return content
 
@@ -109,6 +109,7 @@ def block(
 
 def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
     """What a change of that kind would be about now; None for nothing."""
+    # --- The state of this moment; the rest works on copies ---
     with session.lock:
         live = session.live
         edits = session.edits
@@ -117,32 +118,34 @@ def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
     if live is None or not live.ready or client is None:
         return None
     active = edits.active
-    own = edits.current_step
+    # --- Which step the page would change ---
+    step = edits.current_step
     if kind == "lamps" and edits.light is not None:
-        own = edits.steps[edits.light]
-    if kind == "material" and own is None and mask is not None:
+        step = edits.steps[edits.light]
+    if kind == "material" and step is None and mask is not None:
         # A new edit goes to the end of the list: with the first move of a slider nothing changes here.
-        own = Step(EDIT.name, {}, session.workspace)
-        active = (*active, own)
-    if own not in active:
+        step = Step(EDIT.name, {}, session.workspace)
+        active = (*active, step)
+    if step not in active:
         return None
-    place = active.index(own)
-    around = (active[:place], own, active[place + 1 :])
+    # --- The list around it, without what the page draws itself ---
+    place = active.index(step)
+    around = (active[:place], step, active[place + 1 :])
     panes = client.panes(active)
-    if kind == "material" and own.kind == EDIT.name and mask is not None:
-        fixed = with_options(own, **dict.fromkeys((*MOVED, *REGION)))
-        metal = has_outline_normals(live.scene, own, mask)
+    if kind == "material" and step.kind == EDIT.name and mask is not None:
+        fixed = with_options(step, **dict.fromkeys((*MOVED, *REGION)))
+        metal = has_outline_normals(live.scene, step, mask)
         return live, Drawing(panes, *around, fixed, mask, metal)
-    if kind == "thing" and own.kind == INSERT.name:
-        return live, Drawing(panes, *around, own)
-    if kind == "lamps" and "lamps" in own.options:
-        return live, Drawing(panes, *around, with_options(own, lamps=None))
+    if kind == "thing" and step.kind == INSERT.name:
+        return live, Drawing(panes, *around, step)
+    if kind == "lamps" and "lamps" in step.options:
+        return live, Drawing(panes, *around, with_options(step, lamps=None))
     return None
 
 
-def has_outline_normals(scene: Scene, own: Step, region: Array) -> bool:
+def has_outline_normals(scene: Scene, step: Step, region: Array) -> bool:
     """Whether a material step gives a region [H, W] bool the normals of metal, as far as the fitted scene tells."""
-    options = options_of(own)
+    options = options_of(step)
     return is_metal(changed(scene.materials.metallic, options.metallic), region, options)
 
 
@@ -153,6 +156,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     """Tables of the pixels of a region, row by row of the picture."""
     from materialist.transport.cache import ROUGHNESS_LEVELS
 
+    # --- The region, where shading says all that is seen of it ---
     steps = drawing.others
     before = live.edited(drawing.before)
     rest = live.edited(steps)
@@ -195,6 +199,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     rows |= {
         name: values.reshape(inside.size, -1)[pixels] for name, values in (maps | over).items()
     }
+    # --- Constants of the shading and of the composite ---
     header = {
         "box": [left, top, width, height],
         "count": len(pixels),
@@ -226,8 +231,9 @@ def _over(live: LivePreview, drawing: Drawing, rest: Scene) -> dict[str, Array]:
 
 def _thing(live: LivePreview, drawing: Drawing) -> Made:
     """An object as it is sketched: what it leaves of the picture, what it adds; and the picture without it."""
+    # --- The object alone: what it hides of a white picture, what it adds to a black one ---
     before = live.edited(drawing.before)
-    alone = live.edited((*drawing.before, drawing.own)).bodies[len(before.bodies) :]
+    alone = live.edited((*drawing.before, drawing.step)).bodies[len(before.bodies) :]
     scene = replace(live.edited(drawing.others), bodies=alone)
     shape = (*scene.depth.shape, 3)
     added = draw_bodies(np.zeros(shape, np.float32), scene)
@@ -237,14 +243,15 @@ def _thing(live: LivePreview, drawing: Drawing) -> Made:
     reached = (gain[..., 0] < 1) | (added > 0).any(-1)
     if not reached.any():
         return None
+    # --- Its part of the picture, and depth, by which it grows as it is dragged ---
     box = window(reached)
     scale = DEPTH_SIDE / max(scene.depth.shape)
     depth = cv2.resize(scene.depth, None, fx=scale, fy=scale, interpolation=cv2.INTER_NEAREST)
     height, width = reached[box].shape
-    options = options_of(drawing.own)
+    options = options_of(drawing.step)
     header = {
         "box": [box[1].start, box[0].start, width, height],
-        "at": [float(value) for value in drawing.own.options["at"]],
+        "at": [float(value) for value in drawing.step.options["at"]],
         "scale": options.scale,
         "size": [scene.camera.width, scene.camera.height],
     }
@@ -255,13 +262,14 @@ def _thing(live: LivePreview, drawing: Drawing) -> Made:
 
 def _lamps(live: LivePreview, drawing: Drawing) -> Made:
     """Surfaces as lamps light them, and the picture without the light of lamps."""
-    steps = (*drawing.before, drawing.own, *drawing.after)
+    steps = (*drawing.before, drawing.step, *drawing.after)
     edited = live.edited(steps)
     shape = edited.depth.shape
 
     def laid(picture: Array) -> Array:
         return live.laid_over(picture, edited, steps, drawing.panes, lamps=False)
 
+    # What lies over surfaces is linear: its factor is the white picture less the black.
     ones = np.ones((*shape, 3), np.float32)
     gain = np.clip(laid(ones) - laid(0 * ones), 0, 1)
     matt = edited.materials.albedo * (1 - edited.materials.metallic[..., None]) * gain
@@ -288,6 +296,7 @@ KINDS: dict[str, Callable[[LivePreview, Drawing], Made]] = {
 
 
 def _halves(values: Array) -> Array:
+    # float16 ends at 65504.
     return np.clip(values, -6e4, 6e4).astype("<f2")
 
 

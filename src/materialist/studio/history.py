@@ -51,6 +51,7 @@ def write_history(workspace: Path, history: History) -> None:
         action, edits, selection = one
         return [action, [place(step) for step in edits.steps], edits.current, region(selection)]
 
+    # Lists by numbers of steps, selections by names of mask files.
     content = {
         "past": [entry(one) for one in history.past],
         "future": [entry(one) for one in history.future],
@@ -65,8 +66,8 @@ def read_history(workspace: Path, shape: tuple[int, ...]) -> History:
     """What was written of a photo of a shape (H, W); empty where none can be read: undo then begins anew."""
     with suppress(OSError, ValueError, KeyError, TypeError, IndexError, InputError):
         content = json.loads((workspace / FILE).read_text("utf-8"))
-        given = [Step(kind, dict(options), workspace) for kind, options in content["steps"]]
-        steps = located(workspace, given)
+        stored = [Step(kind, dict(options), workspace) for kind, options in content["steps"]]
+        steps = located(workspace, stored)
         masks: dict[str, Array] = {}
 
         def region(names: list[str]) -> Selection:

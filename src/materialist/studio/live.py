@@ -119,9 +119,9 @@ class Live:
                 self._start(None)
             assert self._worker is not None
             self._asked = time.monotonic()
-            given = {"function": function, "arguments": arguments}
+            task = {"function": function, "arguments": arguments}
             future: Future[Any] = Future()
-            self._calls[self._worker.begin(answer, given)] = future
+            self._calls[self._worker.begin(answer, task)] = future
             return future
 
     @contextmanager
@@ -169,8 +169,8 @@ class Live:
             self._worker = worker = worker or _new_worker()
         except OSError as error:
             raise InputError(f"The live preview cannot be started: {error}; try again.") from error
-        given = {"package": self._package, "file": self._file, "device": self._device}
-        self._opening = worker.begin(open_preview, given)
+        task = {"package": self._package, "file": self._file, "device": self._device}
+        self._opening = worker.begin(open_preview, task)
         self._listener = threading.Thread(
             target=self._listen, args=(worker,), name="live", daemon=True
         )

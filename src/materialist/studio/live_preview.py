@@ -73,6 +73,7 @@ class LivePreview:
         if self._asked == float("-inf"):
             # First comes what a pointer needs (`views.look_ahead`).
             self._asked = time.monotonic()
+        # Later, while somebody moves a slider; else the next part now.
         quiet = SETTINGS.quiet_seconds - (time.monotonic() - self._asked)
         if quiet > 0:
             later = threading.Timer(quiet, _THREAD.submit, (self._prepare, built))

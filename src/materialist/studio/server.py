@@ -101,6 +101,7 @@ def serve(
 
     from materialist.studio.access.connections import Connection, ProxiedConnection
 
+    # --- The server, which says nothing of itself and believes no proxy's headers ---
     config = uvicorn.Config(
         page,
         host,

@@ -287,6 +287,7 @@ class Session:
         new = with_options(step, **options)
         # A light without options would be a step that does nothing.
         empty = new.operation.target is Target.LIGHT and not {*new.options} - {"skip"}
+        # --- One entry of the history while the same values slide on ---
         after = edits.without(index) if empty else edits.put(index, new)
         if after.steps != self.edits.steps:
             changed = [name for name in options if new.options.get(name) != step.options.get(name)]

@@ -286,6 +286,7 @@ class Studio:
         self, session: Session, source: Path, predictor: str, size: int, fov: str
     ) -> tuple[Project, Job]:
         """A project with a copy of an uploaded photo in it, and its inversion in the queue. Raises InputError."""
+        # --- What was uploaded can be read ---
         if predictor not in {value for _, value in PREDICTORS}:
             raise InputError("Choose one of the listed ways to make the first guess.")
         uploads.opened_upload(

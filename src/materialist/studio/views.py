@@ -83,6 +83,7 @@ def mesh(live: LivePreview, steps: Steps) -> bytes:
     [V, 3] (camera frame); colours, uint8 [V, 4] sRGB, with alpha 0 where the picture is laid on; faces, uint32 [F, 3].
     """
     scene = live.edited(steps)
+    # --- The surface with the picture laid on (alpha 0), then bodies in their colours ---
     positions, faces = _surface(scene)
     colours = np.zeros((len(positions), 4), np.uint8)
     parts = [(positions, faces, colours), *(_of_body(body) for body in scene.bodies)]
@@ -98,6 +99,7 @@ def mesh(live: LivePreview, steps: Steps) -> bytes:
         "aspect": scene.camera.width / scene.camera.height,
         "middle": float(np.median(seen)) if seen.size else 1.0,
     }
+    # --- One block; the header is filled up, so that arrays begin at whole words ---
     text = json.dumps(header).encode()
     text += b" " * (-len(text) % 4)
     blocks = [text, positions.tobytes(), colours.tobytes(), faces.astype("<u4").tobytes()]

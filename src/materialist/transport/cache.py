@@ -135,6 +135,7 @@ class TransportCache:
         # Wider lobes take more rays; at its own roughness a pixel needs one level.
         specular = (max(1, round(share * s.specular_samples)) for share in counts)
         alphas = (floats(mi, alpha_of(r)) for r in self.roughness)
+        # Lobe 0 is the diffuse one; alpha 1 makes `gather` read the map over a wide solid angle.
         self.lobes = [
             (s.diffuse_samples, dr.opaque(mi.Float, 1.0)),
             *zip(specular, alphas, strict=True),
@@ -190,6 +191,7 @@ class TransportCache:
         """[count * P] radiance slots that a lobe's rays meet, sample-major."""
         width = len(self.pixels)
         hits = dr.empty(mi.UInt32, count * width)
+        # `count` is data, so that one kernel serves lobes of any number of rays.
         _trace_loop(
             self.scene,
             self.slots,
@@ -236,6 +238,7 @@ class TransportCache:
         radiance: [H, W, 3] linear radiance that leaves the surface seen by each pixel (for indirect light), or None
             for direct light alone.
         """
+        # --- Light: a pyramid of the map for rays that miss, slots for those that hit ---
         pyramid = EnvmapPyramid(envmap)
         slots = floats(mi, self.slot_radiance(radiance))
         width = len(self.pixels)
@@ -276,6 +279,7 @@ class TransportCache:
         if radiance is None:
             return np.zeros((size + len(planes), 3), np.float32)
         flat = np.asarray(radiance, np.float32).reshape(size, 3)
+        # A face of a continued plane sends what the nearest pixel of its plane sends.
         return np.concatenate([flat, flat[planes]])
 
     def image(self, values) -> Array:
@@ -295,6 +299,7 @@ def _towards(normal, view):
 
 def spawn(position, geometric_normal, direction):
     """Ray that leaves a surface, offset as the path tracer offsets it."""
+    # The offset grows with the coordinates, as the round-off of float32 does.
     magnitude = (1 + dr.max(dr.abs(position))) * mi.math.RayEpsilon
     sign = dr.mulsign(mi.Float(1), dr.dot(geometric_normal, direction))
     return mi.Ray3f(dr.fma(magnitude * sign, geometric_normal, position), direction)
@@ -368,6 +373,7 @@ def _gather_loop(
     i = dr.zeros(mi.UInt32, dr.width(lane))
     sums = [mi.Color3f(0)] * (3 if diffuse else 2)
     while i < count:
+        # The directions of `_trace_loop`, from the same indices: nothing is traced here.
         wi, h = _drawn(diffuse, wo, alpha, point(i, count, shift))
         light = _incoming(
             hits, slots, env, level, i * width + lane, lifted(frame.to_world(wi), face), wi.z > 0
@@ -381,6 +387,7 @@ def levels_around(roughness: Array) -> range:
     """Those of ROUGHNESS_LEVELS, one after another and at least two, between which all of a roughness [P] lies."""
     last = len(ROUGHNESS_LEVELS) - 1
     low, high = (float(roughness.min()), float(roughness.max())) if roughness.size else (0.0, 0.0)
+    # The level below the least roughness, and the one above the largest.
     first = int(np.clip(np.searchsorted(ROUGHNESS_LEVELS, low) - 1, 0, last - 1))
     return range(first, int(np.clip(np.searchsorted(ROUGHNESS_LEVELS, high), first + 1, last)) + 1)
 
@@ -398,6 +405,7 @@ def pixel_shift(height: int, width: int, seed: int) -> Array:
 def point(index, count, shift):
     """Point `index` of `count` in [0, 1)^2: a rank-1 lattice (Fibonacci) in the unit square, rotated by `shift`."""
     i = mi.Float(index)
+    # Even steps in u, the golden ratio in v; the fractional part wraps both.
     u = (i + 0.5) / mi.Float(count) + shift.x
     v = i * 0.6180339887498949 + shift.y
     return mi.Point2f(u - dr.floor(u), v - dr.floor(v))

@@ -56,6 +56,7 @@ class EnvmapPyramid:
         def texel(yy, xx):
             return dr.gather(mi.Color3f, self.data, start + yy * width + xx, active)
 
+        # --- Bilinear: along azimuth, then between the two rows ---
         top = dr.lerp(texel(y0, x0), texel(y0, x1), fx)
         bottom = dr.lerp(texel(y1, x0), texel(y1, x1), fx)
         return dr.lerp(top, bottom, fy)
@@ -65,5 +66,6 @@ def halve(envmap: Array) -> Array:
     """[h/2, w/2, 3] average of an even-sized map, rows weighted by their solid angle."""
     h, w = envmap.shape[:2]
     weight = row_solid_angle(h).reshape(h // 2, 2, 1, 1, 1)
+    # [h/2, 2, w/2, 2, 3]: the four texels of a block lie along axes 1 and 3.
     blocks = envmap.reshape(h // 2, 2, w // 2, 2, -1)
     return ((blocks * weight).sum((1, 3)) / (2 * weight.sum((1, 3)))).astype(np.float32)

@@ -73,10 +73,12 @@ class Guide:
     def mean(self) -> csr_array:
         """[H W, H W]: times values of all pixels, their means over the 5 x 5 neighbours on the same surface."""
         h, w = self.scale.shape
+        # --- The 25 taps: step in rows and columns, and weight of the box ---
         taps = [
             (dy, dx, wy * wx) for dy, wy in enumerate(_TAPS, -2) for dx, wx in enumerate(_TAPS, -2)
         ]
         steps = np.array([dy * w + dx for dy, dx, _ in taps], np.int32)
+        # --- Weights, some rows at a time: the box, times how alike both surfaces are ---
         parts = []
         for first in range(0, h, _STRIP_ROWS):
             rows = slice(first, min(first + _STRIP_ROWS, h))
@@ -88,6 +90,7 @@ class Guide:
             column = np.arange(first * w, rows.stop * w, dtype=np.int32)[:, None] + steps
             kept = weight > _MIN_WEIGHT
             parts.append((weight[kept], column[kept], kept.sum(-1, dtype=np.int32)))
+        # --- One sparse matrix by rows: weights, columns, and where each row ends ---
         weight, column, count = (np.concatenate(part) for part in zip(*parts, strict=True))
         ends = np.concatenate([[0], count.cumsum()]).astype(np.int32)
         return csr_array((weight, column, ends), shape=(h * w, h * w))
@@ -96,6 +99,7 @@ class Guide:
 def surface_guide(cache: TransportCache) -> Guide:
     """Of the surfaces that the cache's camera sees."""
     position = np.array(cache.position).T
+    # At depth z a pixel is z / f wide, f the focal length in pixels.
     scale = cache.image(-position[:, 2:] / cache.camera.focal)[..., 0]
     normal = np.array(cache.normal).T
     return Guide(cache.image(position), cache.image(normal), np.maximum(scale, 1e-9))

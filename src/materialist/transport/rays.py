@@ -109,12 +109,14 @@ class LobeRays:
         """`specular` rays of every row, mirrored at its visible normals."""
         lane = dr.arange(mi.UInt32, count * self.specular)
         row = first + lane % count
+        # --- Directions: the view mirrored at visible normals of the row's own alpha ---
         wo = self._take(self.cache.wo, row)
         shift = self._take(self.cache.shift, row)
         sample = point(lane // count, dr.opaque(mi.UInt32, self.specular), shift)
         wi = mi.reflect(
             wo, visible_normal_vector(wo, dr.gather(mi.Float, self._alpha, row), sample)
         )
+        # --- Weights: of the specular lobe alone, 0 below the surface ---
         world = mi.Frame3f(self._take(self.cache.normal, row)).to_world(wi)
         base, grazing = (dr.select(wi.z > 0, w, 0) for w in self._reflected(world, wi, wo, row))
         return self._rays(world, row, 0, (base, grazing))

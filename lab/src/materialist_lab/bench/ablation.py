@@ -26,7 +26,7 @@ from materialist.edits.core.renderer import rendered
 from materialist.errors import InputError
 from materialist.fit.fields import ALL, Rows
 from materialist.fit.invert import FitSetup, FitState, prepare, replaced
-from materialist.fit.losses import rendering_loss, residual
+from materialist.fit.losses import encoded_error, rendering_loss
 from materialist.fit.materials import fit_materials, material_field, remapped
 from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
 from materialist.io.photo import read_photo
@@ -149,7 +149,9 @@ class _Photo:
         def render(maps: torch.Tensor, rows: Rows = ALL) -> torch.Tensor:
             radiance = problem(maps, rows)
             with torch.no_grad():
-                error = residual(radiance, photo[rows], settings.encoding, white=settings.white)
+                error = encoded_error(
+                    radiance, photo[rows], settings.encoding, white=settings.white
+                )
                 seen.append(float(rendering_loss(error)))
             return radiance
 

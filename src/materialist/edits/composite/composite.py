@@ -1,4 +1,8 @@
-"""The edit brought back into the photograph: everything that it does not reach stays as it was taken."""
+"""The edit brought back into the photograph: everything that it does not reach stays as it was taken.
+
+It is photo + (edited - base), of two renderings: `layers.render_layers` has the difference, and `into_photo` lays it on
+the photo.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -91,6 +95,7 @@ def pictures(
     An edit that is the same object as the one before it, as of a thing at rest, gives the same picture again.
     count: how many there are, for `progress`, where `edits` is no list. One is held at a time.
     """
+    # One compositor for all: the base is rendered once.
     options = RenderOptions(spp, seed, denoise, device)
     compositor = _Compositor(scene, options, full_render, upscale)
     tick = progress or (lambda *_: None)

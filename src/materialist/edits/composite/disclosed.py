@@ -30,6 +30,7 @@ def base_scene(scene: Scene, edited: Scene) -> Scene:
     base = base_of(scene, edited)
     if edited.photo is scene.photo:
         return base
+    # --- Inside the hole: the maps that the removal filled in ---
     hole = _disclosed(scene, edited)
     old = scene.materials
     new = edited.materials
@@ -38,6 +39,7 @@ def base_scene(scene: Scene, edited: Scene) -> Scene:
         np.where(hole, new.roughness, old.roughness),
         np.where(hole, new.metallic, old.metallic),
     )
+    # --- Outside the hole new normals belong to the edit, not to what it is compared with ---
     normal = np.where(hole[..., None], edited.normal, scene.normal)
     geometry = edited.geometry
     others = (normal != edited.normal).any(-1)

@@ -55,6 +55,7 @@ def into_photo(
     lights: of in-photo emitters that are dimmed: where they are seen, and what is known of them; see `in_photo`.
     once: nobody needs the photo's native pixels any more: without `lights` the result takes their place.
     """
+    # --- The photo with the difference, and with the dimmed lights that it shows ---
     tick = progress or (lambda *_: None)
     picture = photo.original if once and lights is None else photo.original.copy()
     if layers.reached.any():
@@ -106,6 +107,7 @@ def _change(out: Array, photo: Photo, layers: Layers, tick: Progress) -> None:
     def laid(block: Box) -> None:
         rows, columns = block
         inner = within(block, held)
+        # Its share of the first side, and the colours of both, as the photo has them.
         share = alpha[inner]
         colours = _side_colours(alpha, original, inner, scale)
         moved = original[inner].copy()
@@ -167,6 +169,7 @@ def _side_colours(alpha: Array, photo: Array, box: Box, scale: float) -> tuple[A
     margin = int(np.ceil(4 * scale))
     part = (rows, slice(columns.start + int(mixed[0]), columns.start + int(mixed[-1]) + 1))
     around = (_wider(rows, margin, len(photo)), _wider(part[1], margin, photo.shape[1]))
+    # --- Both sides unmixed there; the photo itself elsewhere ---
     pictures = unmixed(alpha[around], photo[around], scale)
     sides = []
     for picture in pictures:
@@ -185,9 +188,11 @@ def _difference(colour: Array, large: Array, share: Array, free: bool) -> Array:
     change = large[..., :3]
     excess = large[..., 3:6]
     reference = large[..., 6:]
+    # Where a channel is clipped, the rendering may say how bright it really is.
     held = colour if free else _unclipped(colour, reference)
     moved = np.maximum(held + change + excess * (held - reference), 0)
     if not free:
+        # A mixed pixel is not made brighter than white, lest the outline be ragged.
         moved = np.where(share < 1, np.minimum(moved, np.maximum(held, 1)), moved)
     return np.where((change != 0).any(-1, keepdims=True), moved - colour, 0)
 
@@ -236,6 +241,7 @@ def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     base = np.maximum(layers.base, 0)
     edited = np.maximum(layers.edited, 0)
     floor = SETTINGS.floor
+    # The change of the light, pixel by pixel and as a whole.
     factor = (edited + floor) / (base + floor)
     overall = overall_factor(base, edited)
     held = photo.linear if photo.hdr else _unclipped(photo.linear, base)
@@ -268,6 +274,7 @@ def in_photo(picture: Array, photo: Photo, seen: Array, emitters: dict) -> Array
     dim = float(emitters["dim"])
     if dim == 1 or not seen.any():
         return picture
+    # --- Only the part of the photo where lights are seen ---
     share = light_share(seen, photo)
     box = window(share > 0)
     share = share[box][..., None]

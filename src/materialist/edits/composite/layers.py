@@ -77,6 +77,7 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
     Both pictures come in two halves with different seeds: what the halves disagree on is
     noise. See `difference`.
     """
+    # --- Both renderings, and the pixels whose surface the edit replaces ---
     scene = renderer.scene
     base, other = renderer.pair(edited)
     relit = is_relit(scene, edited)
@@ -86,8 +87,7 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
         return Layers(nothing, nothing, changed, changed)
     guides = [(shown.materials.albedo, shown.normal) for shown in (scene, edited)]
 
-    # Bodies and lamps that only one of the scenes has: at native size, with an outline of
-    # their own.
+    # --- Bodies and lamps that only one scene has: at native size, with their own outline ---
     alone = None
     covered = None
     hidden = None

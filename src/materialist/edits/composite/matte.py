@@ -54,6 +54,7 @@ def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
     sides is its share; where both look alike, or the pixel is no mixture of them, the border decides. Exactly 0 and 1
     further away. box: the native rows and columns to make, None for all.
     """
+    # --- Away from the border: the mask itself, enlarged ---
     height, width = large.shape[:2]
     region = box or (slice(0, height), slice(0, width))
     scale = max(height / mask.shape[0], width / mask.shape[1])
@@ -113,6 +114,7 @@ def _shares(distance: Array, large: Array, scale: float) -> Array:
     soft = np.clip(away + 0.5, 0, 1)
     sure_in = away > SETTINGS.width
     sure_out = away < -SETTINGS.width
+    # A hard border, softened by a pixel; the colours decide where they can.
     place, trust = _place(encoded, sure_in, sure_out, SETTINGS.near * scale)
     alpha = soft + trust * (np.clip(place, 0, 1) - soft)
     return np.where(sure_in, 1, np.where(sure_out, 0, alpha)).astype(np.float32)
@@ -123,6 +125,7 @@ def _place(encoded: Array, sure_in: Array, sure_out: Array, sigma: float) -> tup
 
     And how far each is to be trusted, [h, w] in [0, 1]: the sides differ, and the colour is a mixture of them.
     """
+    # --- The line between the mean colours of what is surely of either side ---
     front, front_variance, known_front = _mean_of(encoded, sure_in, sigma)
     back, back_variance, known_back = _mean_of(encoded, sure_out, sigma)
     line = front - back
@@ -215,6 +218,7 @@ def _mean_of(picture: Array, members: Array, sigma: float) -> tuple[Array, Array
             return small
         return cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
 
+    # Sums over the members, divided by how many there are.
     weight = members.astype(np.float32)
     norm = np.maximum(blurred(weight), 1e-12)
     mean = blurred(picture * weight[..., None]) / norm[..., None]

@@ -63,6 +63,7 @@ def native_layer(
     """
     from materialist.render.pixels import coverage, first_hits, only, radiance
 
+    # --- Which bodies and lamps are new ---
     scene = renderer.scene
     lamps = [f"lamp{k}" for k in range(len(edited.lamps)) if is_relit(scene, edited)]
     bodies = {f"body{k}": body for k, body in enumerate(edited.bodies)}
@@ -76,7 +77,7 @@ def native_layer(
     native = scene.photo.original.shape[:2]
     working = scene.depth.shape
     chosen = {name: bodies.get(name) for name in names}
-    # Where they are seen: at working size, then at native size, in the scene and by themselves
+    # --- Where they are seen: at working size, then at native size, in the scene and alone ---
     small = coverage(target.mi_scene, camera, chosen, working).share
     if not small.any():
         return None
@@ -132,6 +133,7 @@ def native_layer(
 
 def _traced_size(native: tuple[int, ...], box: Box, largest: float) -> tuple[tuple[int, int], Box]:
     """Size of the picture that is traced, at most `largest` times the native one, and the native box in it."""
+    # A layer has at most `max_pixels`, and glass no more than the maps tell apart.
     factor = min(1.0, largest, np.sqrt(SETTINGS.max_pixels / area(box)))
     size = tuple(max(2, round(n * factor)) for n in native)
     sides = []
@@ -158,6 +160,7 @@ def _behind_things(
 
     native = scene.photo.original.shape[:2]
     working = scene.depth.shape
+    # --- Where something of the photo hides a part of the bodies ---
     share = alone.share if stands else sight.share
     photo = scene.photo.original[there]
     hidden = alone.share > sight.share + 0.05
@@ -166,6 +169,7 @@ def _behind_things(
         hidden &= (ground.share > 0) & (alone.depth - ground.depth > gap)
     if not hidden.any():
         return share, photo
+    # --- The outline of that thing in the photo, and the colours it leaves uncovered ---
     near = grown(hidden, int(np.ceil(2 * max(native[0] / working[0], 1.0))))
     whole = np.zeros(native, np.float32)
     whole[there] = spread_known(alone.depth)
@@ -183,6 +187,7 @@ def _extent(alone: Any) -> float:
     """How deep bodies seen alone are, scene units; a flat one that faces the camera has some depth, too."""
     if not (alone.depth > 0).any():
         return 1e-9
+    # At least some 5 % of their distance, less where they fill little of the box.
     size = float(alone.depth.max() - alone.depth[alone.depth > 0].min()) + 1e-9
     return max(size, float(alone.depth.max()) * float(np.sqrt((alone.share > 0).mean())) * 0.05)
 

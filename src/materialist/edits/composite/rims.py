@@ -34,6 +34,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
 
     depth: [H, W] planar, 0 for none. photo: [H, W, 3] linear.
     """
+    # --- How far each pixel is from an occlusion, and so how far it is trusted ---
     side = max(depth.shape)
     beside = _occlusions(depth)
     if not beside.any():
@@ -44,10 +45,11 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     rows, columns = np.nonzero(trust < 1)
     if not trust.any():
         return pictures
+    # --- Log radiance of all pictures side by side, and colours as the eye sees them ---
     logs = np.concatenate([np.log(np.maximum(p, 0) + SETTINGS.floor) for p in pictures], -1)
     logs = logs.astype(np.float32)
     seen = linear_to_srgb(np.clip(photo, 0, 1)).astype(np.float32)
-    own = seen[rows, columns]
+    colours = seen[rows, columns]
     # --- The mean over a disc around each pixel ---
     total = np.zeros((len(rows), logs.shape[-1]), np.float32)
     norm = np.zeros(len(rows), np.float32)
@@ -61,7 +63,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
                 continue
             y = np.clip(rows + down, 0, height - 1)
             x = np.clip(columns + right, 0, width - 1)
-            other = seen[y, x] - own
+            other = seen[y, x] - colours
             like = np.exp(-0.5 / SETTINGS.colour**2 * np.einsum("nc,nc->n", other, other))
             # Standard deviation of half the reach; the constant is for colours that nothing there has.
             weight = trust[y, x] * (like + 1e-4) * np.float32(np.exp(-2 * square))
@@ -75,6 +77,7 @@ def settled(pictures: list[Array], depth: Array, photo: Array) -> list[Array]:
     mean = total[known] / norm[known, None]
     logs[rows, columns] = share * logs[rows, columns] + (1 - share) * mean
     rims = np.exp(logs[rows, columns]) - SETTINGS.floor
+    # --- Back to pictures: only rims are other than before ---
     results = []
     for k, picture in enumerate(pictures):
         result = picture.astype(np.float32)

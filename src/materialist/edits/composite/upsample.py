@@ -44,6 +44,7 @@ class GuidedUpsample:
         working = self.layer.shape[:2]
         if working == self.native:
             return self.layer[rows, columns].astype(np.float32)
+        # --- The four working rows and columns around each native pixel, and their weights ---
         here = linear_to_srgb(colours)
         y0, ys = _taps(
             np.arange(rows.start, rows.stop), self.native[0], working[0], UPSAMPLE.radius
@@ -51,6 +52,7 @@ class GuidedUpsample:
         x0, xs = _taps(
             np.arange(self.native[1])[columns], self.native[1], working[1], UPSAMPLE.radius
         )
+        # --- The mean over these 16, weighted by distance and likeness ---
         total = np.zeros((*here.shape[:2], self.layer.shape[2]), np.float32)
         norm = np.zeros(here.shape[:2], np.float32)
         for i in range(4):
@@ -70,6 +72,7 @@ class GuidedUpsample:
 
 def _taps(index: Array, native: int, working: int, radius: float) -> tuple[Array, Array]:
     """The four working positions [4, n] around native positions [n] of one axis, and their spatial weights [4, n]."""
+    # Pixel centres lie at half numbers.
     place = (index + 0.5) * working / native - 0.5
     base = np.floor(place).astype(np.int64)
     taps = base[None] + np.arange(-1, 3)[:, None]

@@ -58,6 +58,7 @@ def reshaped(weight: Array, grow: float, feather: float) -> Array:
     Raises InputError when nothing is left of it.
     """
     longer = max(weight.shape)
+    # Both lengths are shares of the longer side.
     if radius := round(abs(grow) * longer):
         weight = (cv2.dilate if grow > 0 else cv2.erode)(weight, disc(radius))
     if feather:

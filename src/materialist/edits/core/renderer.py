@@ -88,6 +88,7 @@ class EditRenderer:
 
     def pair(self, edited: Scene) -> tuple[Render, Render]:
         """The renderings of the base and of `edited`, with paths of equal length."""
+        # --- The photo's sky in both or in neither, and paths of equal length: noise cancels ---
         scene = self.lit(self.scene, edited)
         edited = self.lit(edited, edited)
         depth = max(path_depth(s) for s in (scene, edited))
@@ -112,6 +113,7 @@ class EditRenderer:
     def covered(self, edited: Scene) -> Array:
         """[H, W] bool: where a body or lamp is seen, at least in part, that the other of the two scenes lacks."""
         seen = np.zeros(self.scene.depth.shape, bool)
+        # In either direction: what was added, and what was taken away.
         for scene, other in ((self.scene, edited), (edited, self.scene)):
             names = [f"body{k}" for k, body in enumerate(scene.bodies) if body not in other.bodies]
             names += [f"lamp{k}" for k, lamp in enumerate(scene.lamps) if lamp not in other.lamps]

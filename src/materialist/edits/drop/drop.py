@@ -76,6 +76,7 @@ def drop(
     if not 1 <= fps <= 240:
         raise InputError(f"The frame rate is {fps:g}; it must lie in [1, 240].")
     falling = _prepared(scene, meshes, at, options)
+    # --- A scene a frame; one that hardly moves is the frame before ---
     film = []
     last = scene
     poses: list[Pose] | None = None
@@ -107,6 +108,7 @@ def settle(
         InputError: a place or mesh that cannot be used, a number out of its range, or nothing comes to rest in sight.
         SetupError: mujoco or coacd is missing.
     """
+    # --- The fall, until everything is at rest or gone ---
     falling = _prepared(scene, meshes, at, Drop.merged(options, **values))
     poses, gone, rests = _rested(falling)
     names = falling.facts["meshes"]
@@ -115,6 +117,7 @@ def settle(
             f"{', '.join(names)} falls beside everything that the photo shows; choose a place further from the edge of "
             "the surface, a smaller height, or another seed."
         )
+    # --- What the user is to know of it ---
     notes = [
         f"{names[k]} falls beside everything that the photo shows, and was left out."
         for k in sorted(gone)
@@ -169,6 +172,7 @@ class Falling:
 
 
 def _prepared(scene: Scene, meshes: Mesh | Sequence[Mesh], at: Places, options: Drop) -> Falling:
+    # --- Models, and a place for each ---
     load_library("mujoco")
     meshes = [meshes] if isinstance(meshes, str | Path | MeshModel) else meshes
     models = [
@@ -254,6 +258,7 @@ def _lifts(points: list[Array], height: float) -> list[float]:
     for corners in points:
         low = corners.min(0)
         high = corners.max(0)
+        # A quarter of its height above each thing that stands below it.
         over = [
             top[2] - low[2] + 0.25 * (high[2] - low[2])
             for bottom, top in boxes
@@ -276,6 +281,7 @@ def _things(
     for bodies, shift in starts:
         vertices, faces = joined_faces(bodies)
         points = vertices.astype(np.float64) @ to_up.T * factor + shift
+        # The middle of its box; the turn is in radians a second.
         centre = (points.min(0) + points.max(0)) / 2
         axis = rng.normal(size=3)
         turning = 2 * np.pi * options.spin * axis / np.linalg.norm(axis)
@@ -297,6 +303,7 @@ def _rested(falling: Falling) -> tuple[list[Pose], frozenset[int], bool]:
     bottom = min((float(block[:, 2].min()) for block in falling.ground), default=-np.inf)
     recent: deque[list[Pose]] = deque(maxlen=SETTINGS.looks_at_rest + 1)
     gone: frozenset[int] = frozenset()
+    # Looked at now and then: at rest when no look of the last half second differs.
     for poses in fall(
         falling.things,
         falling.ground,

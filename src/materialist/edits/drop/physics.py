@@ -132,6 +132,7 @@ def _world(mujoco, things: list[RigidBody], ground: list[Array]):
     if hasattr(mujoco.mjtEnableBit, "mjENBL_MULTICCD"):
         spec.option.enableflags |= mujoco.mjtEnableBit.mjENBL_MULTICCD
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    # --- The ground does not move; each thing is one body of convex pieces ---
     for number, corners in enumerate(ground):
         _piece(mujoco, spec, spec.worldbody, f"ground{number}", corners)
     for k, thing in enumerate(things):
@@ -177,6 +178,7 @@ def convex_pieces(vertices: Array, faces: Array, *, seed: int = 0) -> list[Array
 
     Raises SetupError where coacd is not installed and the mesh is not nearly convex.
     """
+    # --- One hull is enough where it has hardly more volume than the mesh ---
     vertices = np.asarray(vertices, np.float64)
     outer = hull(vertices)
     mesh = Trimesh(vertices, faces, validate=True)

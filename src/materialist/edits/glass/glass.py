@@ -1,4 +1,8 @@
-"""An object of the photo turned to glass (paper, Material Transparency Editing)."""
+"""An object of the photo turned to glass (paper, Material Transparency Editing).
+
+Two models: a closed body that is path-traced (`solids.closed`, `solids.revolution`), and the paper's two interfaces
+(`edits.glass.two_interface`).
+"""
 
 from dataclasses import replace
 from itertools import chain
@@ -49,8 +53,10 @@ def glass(
     """
     options = Glass.merged(options, **values)
     region = checked_region(scene, mask) > 0.5
+    # --- What stands behind the object, and how thick it is ---
     removed = remove(scene, mask, options, fitted=fitted)
     parts = thick_parts(scene, region, options.thickness, behind=removed.depth)
+    # --- The paper's model, or a closed body for the path tracer ---
     if options.model == "two-interface":
         edited = _two_interface(scene, removed, parts, options, (fitted or scene).envmap)
         edited = warned(edited, SOLID) if options.hollow else edited
@@ -69,6 +75,7 @@ def glass(
             PHOTO_GLASS,
         )
         edited = warned(replace(removed, bodies=(*removed.bodies, body)), *chain(*notes))
+    # --- What the provenance keeps ---
     facts = {
         "ior": options.ior,
         "transmission": options.transmission,
@@ -88,6 +95,7 @@ def _shell(
 ) -> tuple[Shell, list[str]]:
     """(the body of one part, notes on a wall or an opening that could not be made)."""
     camera = scene.camera
+    # --- From the maps, or as its profile is swept; a wall where it is hollow ---
     thick = part.thickness
     revolution = thick.revolution
     # Handles are solid, also those of a hollow jug.
@@ -118,6 +126,7 @@ def _shell(
 
 def glass_surface(scene: Scene, options: Glass) -> Surface:
     """The material: glass, and (1 - T) of what the object was."""
+    # Clear glass has no surface of its own: white, without metal.
     clear = options.transmission >= 1
     albedo = np.ones((1, 1, 3), np.float32) if clear else scene.materials.albedo
     metallic = np.zeros((1, 1), np.float32) if clear else scene.materials.metallic
@@ -139,6 +148,7 @@ def _two_interface(
     """The removed scene with the paper's picture of the glass in its photo, in the light of the photo."""
     from materialist.edits.glass.two_interface import Backdrop, two_interface
 
+    # --- Its picture at working size, part by part ---
     glass_seen: Array = np.zeros(scene.depth.shape, bool)
     photo = removed.photo
     picture: Array = np.zeros(scene.photo.linear.shape, np.float32)
@@ -154,6 +164,7 @@ def _two_interface(
         glass_seen |= seen
     # The photo has the reflections of its own surface: that share of it takes the place of all of the glass.
     picture = clear * picture + (1 - clear) * scene.photo.linear * glass_seen[..., None]
+    # --- Into the photo at both of its sizes ---
     linear = np.where(glass_seen[..., None], picture, photo.linear).astype(np.float32)
     native = photo.original.shape[:2]
     share = np.clip(resample.values(glass_seen.astype(np.float32), native), 0, 1)[..., None]

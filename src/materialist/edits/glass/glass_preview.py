@@ -41,13 +41,13 @@ class GlassPreview:
             )
         setup(options.device)
         self.scene = scene
-        # The glass itself is exchanged for every picture.
+        # --- The scene with the body; its glass is exchanged for every picture ---
         edited = glass(scene, mask, options, ior=1.5, transmission=1.0)
         self._edited = replace(edited, envmap=photo_sky(edited))
         self._renderer = EditRenderer(self._edited, device=options.device)
         self._name = f"body{len(self._edited.bodies) - 1}"
         self._size = scene.depth.shape
-        # Where the glass is seen, and the denoiser's guides: they stay the same for every picture
+        # --- Where it is seen, and the denoiser's guides: the same for every picture ---
         traced = self._target(self._edited.bodies[-1].surface).mi_scene
         body = {self._name: self._edited.bodies[-1]}
         sight = first_hits(traced, scene.camera, body, self._size)
@@ -67,6 +67,7 @@ class GlassPreview:
         from materialist.render.pixels import radiance
         from materialist.render.scene import GLASS_DEPTH
 
+        # --- The pixels of the object alone, by few paths ---
         surface = glass_surface(self.scene, Glass.merged(self._options, **values))
         target = self._target(surface)
         box = self._box
@@ -75,6 +76,7 @@ class GlassPreview:
             target, self._size, box, spp=paths, seed=seed, max_depth=GLASS_DEPTH, names=[self._name]
         )
         traced = denoised(without_fireflies(spread_known(seen)), *self._guides)
+        # --- Laid on the photo by the share of each pixel ---
         out = self._edited.photo.linear.copy()
         share = self.share[box][..., None]
         out[box] = share * traced + (1 - share) * out[box]

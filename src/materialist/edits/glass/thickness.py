@@ -74,6 +74,7 @@ def _jug(scene: Scene, mask: Array, behind: Array | None) -> list[ThickPart] | N
     round_body = object_thickness(scene, body, behind=behind)
     if round_body.revolution is None:
         return None
+    # What is left beside the round body are its handles and spouts.
     handles = [
         ThickPart(one, object_thickness(scene, one, "outline", behind=behind), is_handle=True)
         for one in objects_in(mask & ~body)
@@ -123,6 +124,7 @@ def wall_of(scene: Scene, mask: Array, thick: Thickness) -> float:
     facing = np.abs((scene.normal * rays).sum(-1)) / np.linalg.norm(rays, axis=-1)
     # A ray through a hollow thing crosses two walls; where it runs along one it says nothing.
     across = inside & (thick.hollow > 0) & (thick.hollow < 0.8 * thick.solid)
+    # Slanting rays are longer in a wall: times the cosine; half of it, for there are two walls.
     wall = (
         float(np.median((thick.hollow * facing / 2)[across]))
         if across.any()
@@ -138,6 +140,7 @@ def _thickness_map(method: str | Array | Path, inside: Array) -> Array:
                 f"The thickness is {str(method)!r}; give a file, or one of {', '.join(METHODS)}."
             )
         method = read_map(method)
+    # --- One channel, at working size, in scene units >= 0 ---
     values = np.asarray(method, np.float32)
     values = values[..., 0] if values.ndim == 3 else values
     if values.shape != inside.shape:

@@ -104,6 +104,7 @@ def two_interface(
         crossing = cross(
             front, d1, ior=options.ior, alpha=options.roughness**2, sample=(k, side**2)
         )
+        # What both surfaces let pass, what stays inside, and what the front reflects.
         through = look(crossing.exit, crossing.direction, behind, camera)
         trapped = np.maximum(1 - crossing.reflectance - crossing.share, 0)[:, None]
         mirror = crossing.reflectance[:, None] * look(
@@ -179,7 +180,8 @@ def cross(
     k, n = sample
     points = [((k + 0.5) * g) % 1 for g in (0.7320508076, 1 / n, 0.6180339887, 0.4142135623)]
     facet = visible_facet(front.direction, front.normal, alpha, points[0], points[1])
-    # At the front: omega_t1 inside (Snell), the reflection, and what share goes which way (Fresnel)
+    # --- At the front: the facet bends and reflects the ray ---
+    # omega_t1 inside (Snell), the reflection, and what share goes which way (Fresnel).
     inner, _ = refract(front.direction, facet, ior)
     mirrored = reflect(front.direction, facet)
     fresnel = fresnel_dielectric(-np.sum(front.direction * facet, -1), ior)
@@ -210,12 +212,14 @@ def look(origin: Array, direction: Array, behind: Backdrop, camera: Camera) -> A
 
     A ray that meets no surface, but ends in the picture's sky, reads the picture.
     """
+    # --- Where the ray ends: on the background, or in the distance ---
     distance = background_distance(origin, direction, behind.depth, camera)
     met = np.isfinite(distance)
     end = np.where(
         met[:, None], origin + np.where(met, distance, 0)[:, None] * direction, direction
     )
     place, depth = project(end, camera)
+    # --- Sky in the picture is read from it, too ---
     size = np.array([camera.width, camera.height])
     sky = ~met & (depth > 0) & ((place >= 0) & (place < size)).all(-1)
     sky[sky] = bilinear(behind.depth[..., None], place[sky])[:, 0] == 0
@@ -227,7 +231,7 @@ def background_distance(origin: Array, direction: Array, depth: Array, camera: C
     """[N] the distance d2 to the surface that a depth map [H, W] describes; inf for rays that meet none.
 
     Beyond the picture the surface goes on as at its nearest edge. A ray that starts behind the surface meets it at
-    once. Rays are followed to twice the largest depth, in steps that are even in the picture's inverse depth.
+    once. Rays are followed to twice the largest depth, in steps that grow with the distance.
     """
     if not (depth > 0).any():
         return np.full(len(origin), np.inf)
@@ -248,6 +252,7 @@ def background_distance(origin: Array, direction: Array, depth: Array, camera: C
         open_ &= ~hit
         if not open_.any():
             break
+    # --- Bisection inside that step: to 1/4096 of it ---
     met = np.isfinite(high)
     for _ in range(12):
         middle = (low[met] + high[met]) / 2

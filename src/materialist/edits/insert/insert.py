@@ -71,6 +71,7 @@ def insert(
     Raises InputError for a place outside the photo, on the sky, or so near that the mesh would reach behind the
     camera; a mesh that cannot be used; a number out of its range.
     """
+    # --- The model in its material, where it is to stand ---
     options = Insertion.merged(options, **values)
     model = repainted(
         mesh if isinstance(mesh, MeshModel) else read_model(mesh, up=options.up), options.material
@@ -108,7 +109,7 @@ def put(
     low = model.vertices.min(0).astype(np.float64)
     high = model.vertices.max(0).astype(np.float64)
     longest = float((high - low).max())
-    # Size: the plane under the place tells the scale, then the plane under the whole footprint
+    # --- Size, by the depth at the place; then the plane under the whole footprint ---
     first = support_at(scene, at)
     factor = (
         scale
@@ -149,6 +150,7 @@ def support_at(scene: Scene, at: tuple[float, float], radius: float | None = Non
         raise InputError(
             f"The place {at[0]:g},{at[1]:g} is sky, where nothing can stand; choose a surface."
         )
+    # --- The point on the surface, and how far around it counts ---
     camera = scene.camera
     ray = rays_through(np.array(at), camera)
     point = ray * depth

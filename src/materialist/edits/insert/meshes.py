@@ -149,6 +149,7 @@ def _bodies(source: MeshSource, content: MeshContent) -> list[Body]:
 
 def _without_empty(source: MeshSource, part: MeshPart) -> MeshPart:
     """The part without triangles of no area, and without vertices of no triangle; they would count in its size."""
+    # --- Vertices that some triangle has must be numbers ---
     faces = part.faces
     used = np.zeros(len(part.vertices), bool)
     used[faces.ravel()] = True
@@ -160,6 +161,7 @@ def _without_empty(source: MeshSource, part: MeshPart) -> MeshPart:
     kept = area_vectors(part.vertices, faces).any(1)
     if kept.all() and used.all():
         return replace(part, vertices=part.vertices.astype(np.float64, copy=False))
+    # --- Numbered anew, without those of no triangle ---
     used[:] = False
     used[faces[kept].ravel()] = True
     number = np.cumsum(used, dtype=np.int32) - 1
@@ -182,6 +184,7 @@ def _with_normals(part: MeshPart, crease: float) -> MeshPart:
     """The part with unit normals; where it has none, its vertices are divided at creases."""
     if part.normals is not None:
         return replace(part, normals=_unit(part.normals).astype(np.float32))
+    # A vertex for each place and each side of a crease.
     number, normals = creased_normals(part.vertices, part.faces, crease, part.pieces)
     key = number.ravel().astype(np.int64)
     if part.uv is not None:  # vertices at one place that differ in texture stay apart
@@ -203,12 +206,14 @@ def _body(source: MeshSource, content: MeshContent, part: MeshPart, paint: Paint
     faces = part.faces.astype(np.int32)
     normals = part.normals
     assert normals is not None
+    # Colours of faces: each face has a texel, and so three vertices, of its own.
     if part.face_colours is not None:
         surface, of_face = coloured(paint.surface, part.face_colours)
         corners = faces.ravel()
         faces = np.arange(faces.size, dtype=np.int32).reshape(-1, 3)
         uv = np.repeat(of_face, 3, 0)
         return Body(vertices[corners], faces, normals[corners], uv, surface, part.name)
+    # A texture of the file: finite coordinates, and the repeating kind of texture.
     uv = np.zeros((len(vertices), 2)) if part.uv is None else part.uv
     uv = np.clip(np.nan_to_num(uv), -MAX_UV, MAX_UV)
     surface, uv, exact = wrapped(

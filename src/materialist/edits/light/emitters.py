@@ -55,6 +55,7 @@ def visible_lights(scene: Scene) -> list[Array]:
 
     They are connected regions of clipped pixels with the bright ones beside them, and do not face up.
     """
+    # --- Clipped pixels on surfaces; in an HDR photo those far above its median ---
     photo = scene.photo
     surface = scene.depth > 0
     threshold = SETTINGS.clipped
@@ -74,6 +75,7 @@ def visible_lights(scene: Scene) -> list[Array]:
     gap = disc(round(SETTINGS.gap * longer))
     closed = cv2.morphologyEx(grown.astype(np.uint8), cv2.MORPH_CLOSE, gap) > 0
     closed = ndimage.binary_fill_holes(closed) & surface
+    # --- Connected regions, large enough, that do not face up ---
     masks = [
         mask
         for mask in _parts(closed, SETTINGS.min_area * closed.size)
@@ -150,6 +152,7 @@ def dimmed(
         "share": share,
         "emission": emission,
     }
+    # --- The scene with them, and where they are, in words ---
     bodies = [emitting(body, [dim * c for c in colour]) for body, colour in zip(patches, emission)]
     edited = with_emitters(scene, bodies, facts)
     places = ", ".join("{1:.0f},{0:.0f}".format(*np.argwhere(mask).mean(0)) for mask in masks)
@@ -174,6 +177,7 @@ def _looks(
     """
     inside = [photo.linear[mask] for mask in masks]
     means = [pixels.mean(0) for pixels in inside]
+    # The photo tells the radiance where hardly anything of the lights is clipped.
     if (
         photo.hdr
         or np.concatenate([pixels.max(-1) >= SETTINGS.clipped for pixels in inside]).mean()

@@ -61,6 +61,7 @@ def relight(
     fitted: the scene before its edits, in which `dim` finds the photo's lights; needed where there are edits.
     Raises InputError for a map that is not 2:1, not finite or negative, or a number out of its range.
     """
+    # --- Values of the options; lights of the photo as surfaces, if they are dimmed ---
     notes: list[str] = []
     changes = resolved(scene, Relight.merged(options, **values), notes)
     if isinstance(changes.rotate, tuple):
@@ -190,6 +191,7 @@ def read_envmap(path: str | Path, notes: list[str] | None = None) -> Array:
         notes += [f"The environment map {Path(path).name}: {note}" for note in decoded.warnings]
     envmap = checked_envmap(decoded.linear)
     if len(envmap) > (rows := SETTINGS.max_map_rows):
+        # Means over areas keep the light of a small lamp.
         envmap = np.asarray(cv2.resize(envmap, (2 * rows, rows), interpolation=cv2.INTER_AREA))
     return envmap
 
@@ -245,6 +247,7 @@ def _sunny(
     scene: Scene, light: Array, sun: tuple[float, float], power: float
 ) -> tuple[Array, Array]:
     """(what is left of a light [h, 2h, 3] under a sun, the sun alone), by what surfaces of the photo get of them."""
+    # --- The old light without its brightest spot, and irradiances by both ---
     level = level_frame(scene.normal, scene.geometry.plane_label)
     calm, disc = with_sun(light, *sun, level=level)
     normals = scene.normal[scene.depth > 0]
@@ -252,6 +255,7 @@ def _sunny(
     old = _irradiance(light, normals)
     # The brightest spot may have been most of the light; what is left takes its place.
     kept = old / max(_irradiance(calm, normals), 1e-9) / (1 + SETTINGS.sky_loss * power)
+    # --- The sun, as bright as its irradiance on a surface that faces it asks ---
     facing = luminance(disc * row_solid_angle(len(disc))[:, None, None]).sum()
     strength = SETTINGS.sun_irradiance * power * old / max(float(facing), 1e-12)
     return calm * np.float32(kept), disc * np.float32(strength)
@@ -261,6 +265,7 @@ def _irradiance(envmap: Array, normals: Array) -> float:
     """Mean luminance that surfaces with normals [N, 3] get from a map [h, 2h, 3] with nothing in its way."""
     rows = min(len(envmap), 32)
     small = cv2.resize(luminance(envmap), (2 * rows, rows), interpolation=cv2.INTER_AREA)
+    # The integral of L max(n.w, 0) over the sphere, texel by texel.
     power = (small * row_solid_angle(rows)[:, None]).reshape(-1)
     cosine = normals @ texel_directions(rows, 2 * rows).reshape(-1, 3).T
     return float((np.maximum(cosine, 0) @ power).mean())
@@ -312,6 +317,7 @@ def moving_light(
     """
     if not 2 <= count <= MAX_FRAMES:
         raise InputError(f"The number of frames is {count}; it must lie in 2 to {MAX_FRAMES}.")
+    # --- What moves: the turn, the sun or one lamp ---
     film = [scene] * count if isinstance(scene, Scene) else scene
     notes: list[str] = []
     changes = resolved(film[0], Relight.merged(options, **values), notes)
@@ -326,6 +332,7 @@ def moving_light(
         changes = replace(changes, dim=None, lights=None)
     # After a full turn the last frame would be the first again: the film then stops one step before.
     closed = turn != 0 and turn % 360 == 0 and len(suns) < 2 and len(lamps) < 2
+    # --- A scene a frame, at even steps t in [0, 1] ---
     for k in range(count):
         t = k / (count if closed else count - 1)
         sun = tuple(_between(suns, t)) if suns else None

@@ -47,6 +47,7 @@ def edit(
     """
     changes = MaterialEdit.merged(options, **values)
     weight = weight_of(scene, mask, changes)
+    # --- The new albedo: hue, saturation and value act on it last, then the old shading ---
     materials = scene.materials
     colour, texture = base_colour(scene, weight, changes)
     if changes.hue or changes.saturation or changes.value:
@@ -60,10 +61,12 @@ def edit(
         _mix(materials.roughness, changed(materials.roughness, changes.roughness), weight),
         _mix(materials.metallic, changed(materials.metallic, changes.metallic), weight),
     )
+    # --- Metal mirrors each bump of predicted normals: round bodies get smooth ones ---
     region = weight > 0.5
     edited = replace(scene, materials=new)
     if is_metal(new.metallic, region, changes):
         edited = with_outline_normals(edited, region)
+    # --- What the provenance keeps: only what was asked for ---
     names = ("hue", "saturation", "value", "grow", "feather")
     facts: dict[str, Any] = {name: getattr(changes, name) or None for name in names}
     facts |= {

@@ -81,6 +81,7 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
         raise InputError(
             f"The inpainter is '{text}'; give sd:FOLDER or sd:owner/name (MI-GAN needs no option)."
         )
+    # The library first, then weights: each error names what is missing.
     gpu = on_gpu(device)
     with hub.advice('leave `inpaint="sd"` out'):
         hub.import_library("diffusers")  # before gigabytes of weights are asked for

@@ -99,6 +99,7 @@ class _Surroundings:
 
     def labels(self) -> Array:
         """[h, w] int: the labels around, carried into the hole."""
+        # --- Which surfaces have enough of the ring to go on ---
         kinds, count = np.unique(self.known[~self.hole], return_counts=True)
         shares = np.array([(self.ring & (self.known == k)).sum() for k in kinds]) / max(
             self.ring.sum(), 1
@@ -143,9 +144,11 @@ class _Surroundings:
         """Depth [P] and normals [P, 3] of one surface at `pixels` [h, w] bool of the hole."""
         if label == SKY:
             return np.zeros(pixels.sum()), self.normal[pixels]
+        # Inverse depth: linear on a plane, spanned by a membrane elsewhere.
         members = ~self.hole & (self.known == label) & (self.inverse > 0)
         spanned = self._on_plane(members) if label >= 0 else membrane(self.inverse, members)
         spanned = np.where(spanned > 0, spanned, self.spanned)[pixels]
+        # Never before what was taken away.
         limit = np.where(
             front[pixels] > 0, (1 - SETTINGS.min_gap) / np.maximum(front[pixels], 1e-12), np.inf
         )

@@ -53,6 +53,7 @@ def filled(photo: Array, hole: Array, usable: Array) -> Array:
 
     usable [H, W] bool: what the filling may be guessed from. Raises SetupError, WeightsError: see `onnx.run`.
     """
+    # --- The photo and the hole, at most `max_side` pixels long ---
     native = photo.shape[:2]
     scale = min(1.0, SETTINGS.max_side / max(native))
     shape = tuple(max(1, round(n * scale)) for n in native)
@@ -144,6 +145,7 @@ def _inpainted(levels: Array, unknown: Array) -> Array:
     picture = cv2.resize(smooth.astype(np.uint8), large, interpolation=cv2.INTER_CUBIC)
     small = np.where(unknown, 0, 255).astype(np.uint8)
     known = np.asarray(cv2.resize(small, large, interpolation=cv2.INTER_NEAREST))
+    # --- MI-GAN: 0 in the mask is what it fills ---
     channels_first = np.ascontiguousarray(np.moveaxis(picture, -1, 0))
     painted = run(NETWORK, {"image": channels_first[None], "mask": known[None, None]})[0]
     result = np.ascontiguousarray(np.moveaxis(painted[0], 0, -1))

@@ -48,13 +48,14 @@ def make_hole(
     `bodies` [H, W] bool: where the photo shows bodies of earlier edits, which stay.
     Raises InputError for a mask that is empty, of another size, all sky, or (nearly) all of the photo.
     """
+    # --- The object, and a rim of pixels that mix it with what is behind ---
     region = checked_region(scene, mask) > 0.5
     if not region.any():
         raise InputError("The mask is nowhere above one half on a surface; mark the object itself.")
     gone = grown(region, round(grow * max(region.shape)))
     surface = scene.depth > 0
     plane = scene.geometry.plane_label
-    # Shadow and reflection lie on the ground: planes that face up.
+    # --- Its shadow and reflection lie on the ground: planes that face up ---
     ground = (plane >= 0) & (scene.normal[..., 1] > 0.5)
     share = SETTINGS.shadow if shadow is None else shadow
     painted = gone | (ground & grown(gone, round(share * float(np.sqrt(region.sum())))))
@@ -76,6 +77,7 @@ def evidence_notes(hole: Hole) -> list[str]:
     """What to say of a hole whose surroundings tell little of what was hidden."""
     painted = hole.painted
     frame = np.pad(np.zeros(tuple(n - 2 for n in painted.shape), bool), 1, constant_values=True)
+    # Both as shares: of the photo, and of the hole's outline.
     outline = painted & ~binary_erosion(painted)
     share = float(painted.mean())
     cut = float((painted & frame).sum() / max(int(outline.sum()), 1))

@@ -46,6 +46,7 @@ def remove(
     Raises InputError for an option out of its range; a mask that is empty, of another size, all sky, or (nearly) all
     of the photo; a background of another aspect. SetupError, WeightsError: a library or model that is not there.
     """
+    # --- The hole, the surfaces behind it, and a picture of them ---
     options = Removal.merged(options, **values)
     fitted = fitted or scene
     hole, hidden, (picture, method, warnings) = disclosed(scene, mask, options, fitted)
@@ -56,6 +57,7 @@ def remove(
     around = window(hole.painted, margin=MARGIN)
     shown = scene.rerender.copy()
     shown[around] = denoised(scene.rerender[around], old.albedo[around], scene.normal[around])
+    # Roughness and metallic have no picture: spanned over the hole from its border.
     roughness = membrane(np.clip(old.roughness, 0, 1), ~hole.painted)
     metallic = membrane(np.clip(old.metallic, 0, 1), ~hole.painted)
     removed = replace(
@@ -113,6 +115,7 @@ def carried(values: Array, photo: Array, hole: Array) -> Array:
 
 def with_hole(photo: Photo, picture: Array, hole: Array) -> Photo:
     """The photo with a picture [h, w, 3] linear of any size in the hole [H, W] bool; elsewhere bit for bit itself."""
+    # --- At native size: a soft border, inwards only ---
     native = photo.original.shape[:2]
     box = window(hole, native)
     over = _outline(hole, native)[box][..., None].copy()
@@ -132,6 +135,7 @@ def _outline(mask: Array, native: tuple[int, ...]) -> Array:
         return hard.astype(np.float32)
     smooth = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), 1.0)
     share: Array = np.asarray(cv2.resize(smooth, native[::-1], interpolation=cv2.INTER_CUBIC))
+    # From 0 at one half of the smoothed mask to 1 at three quarters.
     share *= 4  # in place, for the memory
     share -= 2
     np.clip(share, 0, 1, out=share)

@@ -128,6 +128,7 @@ def _at(scene: Scene, points: Sequence[tuple[int, int]], extent: str = "auto") -
         by_size = sorted(logits[holding] > 0, key=np.sum)
         place = {"small": 0, "medium": len(by_size) // 2, "large": -1}
         return np.asarray(by_size[place[extent]])
+    # Each mask by its expected IoU, and by how well it agrees with ClickNet.
     likely = segment.object_likelihood(photo, scene.normal, scene.depth, points)
     marks = [
         score + SETTINGS.clicknet_weight * _soft_overlap(likely, mask > 0)
@@ -172,6 +173,7 @@ def tidy(mask: Array, points: Sequence[tuple[int, int]]) -> Array:
     groups, count = ndimage.label(cv2.dilate(opened.astype(np.uint8), wide))
     if count == 0:
         return mask
+    # Of several parts those that were clicked, else those of a tenth of the largest.
     parts = groups * opened
     sizes = np.bincount(parts.ravel())[1:]
     keep = {int(parts[y, x]) for x, y in points if parts[y, x]}

@@ -57,6 +57,7 @@ def select(
     Raises InputError for none or several of click, box and mask; a click or box outside the photo or on the sky; an
     empty mask or one of another shape. SetupError, WeightsError: a method without its library or weights.
     """
+    # --- Exactly one way to say what is meant; a mask is taken as it is ---
     check_process()
     if sum(v is not None for v in (click, box, mask)) != 1:
         raise InputError("Give exactly one of a click, a box or a mask.")
@@ -80,6 +81,7 @@ def select(
         region = object_in(scene, frame, network=method == "network")
     else:
         region = object_at_points(scene, points, network=method == "network", extent=extent)
+    # --- Refused where it is empty, or does not fit the box ---
     region = region & (scene.depth > 0)
     if not region.any():
         other = (

@@ -78,6 +78,7 @@ def save_image(
     Returns notes on what the file lacks. Raises InputError for another suffix, shape or number; OutputError where the
     file exists without `force`, or cannot be written; SetupError for AVIF without its encoder.
     """
+    # --- A picture of three channels that the format can hold ---
     check_image_output(path, quality=quality, bits=bits, force=force)
     kind = KINDS[Path(path).suffix.lower()]
     photo = photo.photo if isinstance(photo, Scene) else photo
@@ -118,6 +119,7 @@ def check_image_output(
             f"The output {path} must end in .png, .jpg, .tif, .webp or .avif (for looking), or .exr (linear, for "
             "further work)."
         )
+    # --- Quality for lossy formats, bits for PNG and TIFF ---
     if quality is not None and (
         kind not in QUALITY or not 1 <= quality <= 100 or quality != int(quality)
     ):

@@ -18,6 +18,7 @@ _ROWS = 64
 
 def tiff_bytes(levels: Array, exif: Image.Exif, profile: bytes) -> bytes:
     """A TIFF of [H, W, 3] uint8 or uint16: a directory, and deflated strips of horizontal differences."""
+    # --- The strips, and where each lies after the directory ---
     height, width = levels.shape[:2]
     strips = [_strip(levels[start : start + _ROWS]) for start in range(0, height, _ROWS)]
     offsets = [0]  # of the directory's end: Pillow adds where that lies
@@ -50,6 +51,7 @@ def tiff_bytes(levels: Array, exif: Image.Exif, profile: bytes) -> bytes:
     for number in (ExifTags.IFD.Exif, ExifTags.IFD.GPSInfo):
         if kept := exif.get_ifd(number):
             directory[number] = dict(kept)
+    # Little-endian, 42, and the directory right after these 8 bytes.
     head = b"II" + struct.pack("<HI", 42, 8)
     return b"".join([head, directory.tobytes(8), *strips])
 

@@ -58,6 +58,7 @@ class BundledPredictor(Predictor):
             device=self.device,
             on_materials=self.on_materials,
         )
+        # --- Its maps, which must be finite ---
         maps = {
             **vars(prediction.materials),
             "normal": prediction.normal,
@@ -73,6 +74,7 @@ class BundledPredictor(Predictor):
                 np.float32
             )
             warnings = ()
+        # --- Only what is asked for; the light goes with the albedo it was predicted with ---
         light = prediction.light if "albedo" in names else None
         spread = {name: values for name, values in prediction.spread.items() if name in names}
         chosen = {name: maps[name] for name in names}

@@ -60,6 +60,7 @@ def thickness(
     from materialist.predict.network import loaded
     from materialist.predict.refraction.network import RefractionNet
 
+    # --- Maps of one size, and the network ---
     inside = surface_in(mask, depth, camera)
     for name, value in (("photo", photo_linear), ("normals", normal)):
         if value.shape != (*inside.shape, 3):
@@ -76,6 +77,7 @@ def thickness(
         raise WeightsError(
             f"RefractionNet gave values that are not finite; check its weights ({weights or WEIGHTS})."
         )
+    # --- Its answer: two lengths, and the normals of the back ---
     solid = mean[..., 0]
     hollow = mean[..., 1]
     back = unit(mean[..., BACK_X:])
@@ -116,6 +118,7 @@ def of_outline(
     hollow: [H, W] through the walls alone, scene units, as far as it is known.
     """
     body = inflated(depth, normal, mask, camera)
+    # A wall is never thicker than the body.
     return Thickness(
         body.thickness,
         np.minimum(hollow, body.thickness),
@@ -137,6 +140,7 @@ def _answer(
     """[H, W, 5] float32 of one window, 0 outside the mask: both thicknesses in scene units, and the back's normal."""
     import torch
 
+    # --- The object in a square of its own, lengths in its own size ---
     view = window.cut(photo, inside, normal, depth, rays)
     with torch.inference_mode():  # [5, S, S], lengths in units of the object's size
         answer = network(torch.from_numpy(refraction_features(view))[None])[0].numpy()

@@ -99,12 +99,14 @@ class Gate:
             if self._admits_socket(scope):
                 return await self.app(scope, receive, send)
             return await send({"type": "websocket.close", "code": 1008})
+        # --- Headers that count, and as many bytes as the place may take ---
         address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
         max_bytes = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
         if scope["path"] == UPLOAD:
             max_bytes = largest_upload()
         request = Request(scope, _limited(receive, max_bytes))
+        # --- Who answers: the page, the form for passwords, or a refusal ---
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies, address)
 
@@ -205,6 +207,7 @@ class Gate:
         login = cookies.get(self._cookie, "")
         if self.password and login not in self._logins:
             return False
+        # Only a person who has a cookie already: none is set on a websocket.
         try:
             token = self._logins[login] if self.password else cookies.get(PERSON)
             person = self.studio.person(token)

@@ -62,7 +62,7 @@ def read_gltf(source: MeshSource) -> MeshContent:
     try:
         file = GltfFile(source)
         reader = _Reader(file, GltfNodes(file), MeshContent())
-        # Counts first, then pictures, then vertices: each step is checked before memory is taken
+        # --- Counts first, then pictures, then vertices: checked before memory is taken ---
         instances = reader.instances()
         used = sorted(
             {
@@ -176,6 +176,7 @@ class _Reader:
         """(faces [F, 3] as positions in the rows, rows [V] of the accessors that they use)."""
         mode = instance.primitive.get("mode", TRIANGLES)
         position = instance.attributes["POSITION"]
+        # --- Corners by their numbers, or all vertices in their order ---
         if "indices" in instance.primitive:
             corners = self.file.accessor(instance.primitive["indices"], 1)[:, 0]
             if corners.dtype.kind == "f":
@@ -189,6 +190,7 @@ class _Reader:
             corners = np.arange(self.file.count(position), dtype=np.int32)
         if len(corners) < 3:
             return np.zeros((0, 3), np.int32), np.zeros(0, np.int64)
+        # --- Triangles, and only the rows that they use ---
         if mode == TRIANGLES:
             faces = corners[: len(corners) // 3 * 3].reshape(-1, 3)
         else:

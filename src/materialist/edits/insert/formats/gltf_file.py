@@ -49,6 +49,7 @@ class GltfFile:
 
     def __init__(self, source: MeshSource):
         self.source = source
+        # --- The document, no larger than it may be ---
         text, self.chunk = _chunks(source)
         source.check("json_items", sum(text.count(mark) for mark in (b"{", b"[", b",")))
         tree = json.loads(text)
@@ -59,6 +60,7 @@ class GltfFile:
             raise source.damaged(
                 f"version {str(tree['asset']['version'])[:20]} of glTF; 2.0 is read"
             )
+        # --- Its lists, and what they promise ---
         for name, limit in LISTS.items():
             entries = tree.setdefault(name, [])
             if not isinstance(entries, list):
@@ -119,6 +121,7 @@ class GltfFile:
         values = (
             self._sparse_values(number, entry) if "sparse" in entry else self._values(number, entry)
         )
+        # Rows first: what is not used is not turned into floats.
         if rows is not None:
             if len(rows) and int(rows.max()) >= len(values):
                 raise self.source.damaged(
@@ -156,6 +159,7 @@ class GltfFile:
     def _sparse_values(self, number: Any, entry: dict[str, Any]) -> Array:
         """The values of an accessor, some of which are replaced."""
         if number not in self._sparse:
+            # Rows of a dense array, or of zeros, that other values replace (glTF 2.0, 3.6.2.3).
             sparse = entry["sparse"]
             columns = COLUMNS[entry["type"]]
             count = _whole(sparse["count"])
@@ -233,6 +237,7 @@ def _chunks(source: MeshSource) -> tuple[bytes, bytes | None]:
         return data, None
     if len(data) < 20:
         raise source.damaged(f"truncated after {len(data)} bytes")
+    # --- The header of 12 bytes, and the JSON chunk, which comes first ---
     version, total, length, kind = struct.unpack_from("<IIII", data, 4)
     if version != 2 or kind != 0x4E4F534A:
         raise source.damaged(f"version {version} of GLB; 2 is read")
@@ -240,6 +245,7 @@ def _chunks(source: MeshSource) -> tuple[bytes, bytes | None]:
         raise source.damaged(
             f"truncated: it should have {max(20 + length, total)} bytes, and has {len(data)}"
         )
+    # --- The binary chunk, if there is one ---
     after = 20 + length
     if after + 8 > len(data):
         return data[20:after], None

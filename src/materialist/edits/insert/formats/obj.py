@@ -129,6 +129,7 @@ def _use_material(source: MeshSource, obj: _Obj, name: list[bytes], polygon: int
 
 def _add(source: MeshSource, obj: _Obj, block: _Lines) -> None:
     """Add the numbers of a block, after a look at how many there are."""
+    # --- Vertices, texture coordinates and normals as tables ---
     before = dict(obj.sizes)
     for kind, columns in COLUMNS.items():
         rows = block.values[kind]
@@ -138,6 +139,7 @@ def _add(source: MeshSource, obj: _Obj, block: _Lines) -> None:
             obj.values[kind].append(_table(source, rows, columns))
     if not block.counts:
         return
+    # --- Polygons: the corners of each, counted from 1, or back from the line they stand on ---
     counts = np.array(block.counts, np.int32)
     obj.polygons += len(counts)
     obj.triangles += int(np.maximum(counts - 2, 0).sum())
@@ -191,6 +193,7 @@ def _whole(source: MeshSource, numbers: Array) -> Array:
 
 def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
     """Make the parts of all that was read; empties the lists on the way."""
+    # --- All blocks as one; every corner must have what it names ---
     tables = {kind: _joined_blocks(blocks, COLUMNS[kind]) for kind, blocks in obj.values.items()}
     corners = np.concatenate(obj.corners)
     obj.corners.clear()
@@ -203,11 +206,13 @@ def _fill(source: MeshSource, obj: _Obj, content: MeshContent) -> None:
     colours = tables[b"v"][:, 3:] if tables[b"v"].shape[1] == 6 else None
     faces, polygon = triangulated(source, positions, np.concatenate(obj.counts), corners[:, 0])
 
+    # --- The material of each triangle: that of the last `usemtl` before its polygon ---
     first, number = np.array(obj.changes, np.int64).T
     material = number[np.searchsorted(first, polygon, "right") - 1]
     used = np.unique(material)
     names = {int(k): obj.materials[k].decode("utf-8", "replace") for k in used}
     MtlLibrary(source, obj.libraries).paints(names.values(), content)
+    # --- A part for each of them ---
     for k, name in names.items():
         paint = content.paints.get(name)
         chosen = corners[faces[material == k].ravel()]
@@ -246,6 +251,7 @@ def _part(
     corners: Array, positions: Array, tables: dict[bytes, Array], colours: Array | None
 ) -> MeshPart:
     """The part of corners [3 F, 3]; corners that agree in everything become one vertex."""
+    # Texture coordinates and normals count where all corners have them.
     has_uv = bool((corners[:, 1] != NONE).all())
     has_normals = bool((corners[:, 2] != NONE).all())
     if has_uv or has_normals:
@@ -257,6 +263,7 @@ def _part(
     faces = faces.reshape(-1, 3)
     face_colours = None
     if colours is not None and np.isfinite(colours[vertex]).all():
+        # Vertex colours have no standard: above 1 they are taken as levels of 255.
         scale = 255 if colours[vertex].max() > 1 else 1
         linear = srgb_to_linear(np.clip(colours[vertex] / scale, 0, 1))
         face_colours = mean_of_corners(linear, faces)

@@ -37,6 +37,7 @@ def read_ply_mesh(source: MeshSource) -> MeshContent:
     to 255. The first texture that a comment names is laid on. Raises InputError for damaged bytes, and beyond the
     limits.
     """
+    # --- Vertices, and faces as polygons or strips ---
     elements, textures = read_elements(source)
     vertex = elements.get("vertex")
     points = vertex.table(("x", "y", "z")) if vertex else None
@@ -47,10 +48,12 @@ def read_ply_mesh(source: MeshSource) -> MeshContent:
     faces = corners[places]
     if not len(faces):
         return content
+    # --- What lies on them: of vertices, or of the corners of faces ---
     colours = _face_colours(elements, faces, polygon)
     normals = vertex.table(("nx", "ny", "nz"))
     uv = _vertex_uv(vertex)
     wedge = _corner_uv(elements, len(corners))
+    # Coordinates of corners: each corner becomes a vertex of its own.
     if wedge is not None:
         points = points[faces.ravel()]
         normals = None if normals is None else normals[faces.ravel()]

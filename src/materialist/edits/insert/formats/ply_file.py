@@ -95,11 +95,13 @@ def read_elements(source: MeshSource) -> tuple[dict[str, PlyElement], list[str]]
 
 def _header(source: MeshSource) -> tuple[dict[str, PlyElement], list[str], str, int]:
     """(elements, texture files, byte order or nothing for text, where the header ends)."""
+    # --- The text up to the line `end_header`, whichever way lines end ---
     head, mark, rest = source.data[:HEADER_BYTES].partition(b"end_header")
     if not head.startswith(b"ply") or not mark:
         raise source.damaged("it has no PLY header")
     end = len(head) + len(mark)
     end += 2 if rest[:2] == b"\r\n" else 1
+    # --- Elements and their properties, in the order in which their bytes come ---
     elements: dict[str, PlyElement] = {}
     textures: list[str] = []
     order = None
@@ -201,6 +203,7 @@ def _uniform(data: Array, start: int, element: PlyElement) -> Array | None:
             (_length(declared), declared.stored_count),
             (declared.name, declared.stored, (length,)),
         ]
+    # --- All rows at once, if the file has room for them ---
     try:
         rows = np.dtype(fields)
     except ValueError:  # a name twice
