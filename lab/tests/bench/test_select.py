@@ -9,15 +9,21 @@ from materialist_lab.bench.select import clickable, drawn, outlines
 @pytest.mark.slow
 def test_both_maps_are_scored(measured):
     rows = measured("select", scenes=1, size=96, seed=3).rows
-    assert {row["method"] for row in rows} == {
-        f"{method}, {prompt}{maps} maps"
-        for method in ("network", "grabcut")
-        for prompt in ("", "exact box, ", "loose box, ")
-        for maps in ("bundled", "true")
-    } and len(rows) >= 4
+    names = [
+        *("network", "network, exact box", "network, loose box", "one key"),
+        *("grabcut", "grabcut, exact box", "grabcut, loose box"),
+    ]
+    expected = {f"{name}, {maps} maps" for name in names for maps in ("bundled", "true")}
+    assert {row["method"] for row in rows} == expected and len(rows) >= 4
     assert all(0 <= row["iou"] <= 1 and row["good"] == (row["iou"] > 0.8) for row in rows)
     boxed = [row["iou"] for row in rows if row["method"] == "network, exact box, true maps"]
     assert np.mean(boxed) > 0.7
+    for maps in ("bundled", "true"):
+        once, keyed = (
+            [row["iou"] for row in rows if row["method"] == f"{name}, {maps} maps"]
+            for name in ("network", "one key")
+        )
+        assert len(once) == len(keyed) and (np.array(keyed) >= np.array(once)).all()
 
 
 def test_outlined_objects_are_drawn_where_they_are():

@@ -4,8 +4,9 @@ Synthetic pictures whose objects are known (those of `bench light`); two clicks 
 one in its middle and one anywhere, and two boxes around it, exact and a tenth too large. `bundled` maps are the bundled
 network's, `true` ones the truth. Where DATA has photos of `assets/outlines.yaml`, the same on their objects, which were
 outlined by eye; clicks on a whole keep off its parts that are listed. `network` is what `select` does by itself,
-`grabcut` goes by colours. IoU is intersection over union with the object's mask; `good` and `lost` are the shares above
-0.8 and below 0.3.
+`one key` the best of that and of the next smaller and the next larger object at the click (the keys [ and ] of the
+studio), `grabcut` goes by colours. IoU is intersection over union with the object's mask; `good` and `lost` are the
+shares above 0.8 and below 0.3.
 
 Borders are judged at the photo's own size, by the matte that every edit is laid on the photo with. `border F`: the F
 measure of its border against the outline, within 2 native pixels (outlines by eye are hardly better). `border` rows:
@@ -16,7 +17,9 @@ when the mesh is painted anew.
 """
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib.resources import files
 from itertools import product
 from pathlib import Path
@@ -35,6 +38,7 @@ from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import Box
+from materialist.studio.selection import Selection
 from materialist.types import Array, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row
 from materialist_lab.bench.edits import scene_of, true_scene
@@ -145,6 +149,9 @@ class SelectBench(Benchmark):
             ):
                 scores = _scores(scene, mask, click=click, method=method)
                 yield {"method": method, "sample": f"object {j} click {k}", **scores}
+                if method == "network":
+                    after = _resized(scene, mask, click)
+                    yield {"method": "one key", "sample": f"object {j} click {k}", **after}
             for fit, box in boxes(mask, self.loose).items():
                 scores = _scores(scene, mask, box=box, method=method)
                 yield {"method": f"{method}, {fit}", "sample": f"object {j}", **scores}
@@ -202,8 +209,22 @@ def _found(scene: Scene, mask: Array, **prompt: Any) -> Array:
         return np.zeros_like(mask)
 
 
+def _resized(scene: Scene, mask: Array, click: tuple[int, int]) -> dict[str, float]:
+    """The best of what a click finds, and of the next smaller and the next larger object there."""
+    regions = [_found(scene, mask, click=click)]
+    clicked = Selection((regions[0],), click)
+    for larger in (False, True):
+        if regions[0].any():
+            with suppress(InputError):  # there is none
+                regions.append(clicked.resized(larger, partial(select, scene)).parts[-1])
+    return max((_compared(region, mask) for region in regions), key=lambda row: row["iou"])
+
+
 def _scores(scene: Scene, mask: Array, **prompt: Any) -> dict[str, float]:
-    selected = _found(scene, mask, **prompt)
+    return _compared(_found(scene, mask, **prompt), mask)
+
+
+def _compared(selected: Array, mask: Array) -> dict[str, float]:
     iou = float((selected & mask).sum() / (selected | mask).sum())
     return {"iou": iou, "good": float(iou > 0.8), "lost": float(iou < 0.3)}
 
