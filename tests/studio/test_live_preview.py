@@ -46,7 +46,7 @@ def test_what_the_page_shades_of_metal_is_what_is_shaded_here(tmp_path):
 def asked_for(scene, ball, **options):
     """Whether the page draws an edit of a ball with the normals of metal."""
     own = Step("edit", {name: str(value) for name, value in options.items()}, Path())
-    return drawn.has_outline_normals(scene, own, ball)
+    return drawn.has_metal_normals(scene, own, ball)
 
 
 def test_the_page_asks_anew_where_an_edit_becomes_metal():

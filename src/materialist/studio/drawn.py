@@ -20,7 +20,8 @@ from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
 from materialist.edits.light.relight import kelvin_colour
-from materialist.edits.material.material import base_colour, changed, is_metal, weight_of
+from materialist.edits.material.material import base_colour, changed, weight_of
+from materialist.edits.material.normals import is_metal
 from materialist.edits.material.operation import EDIT
 from materialist.edits.recipe import Step, options_of
 from materialist.geometry.silhouette import window
@@ -134,7 +135,7 @@ def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
     panes = client.panes(active)
     if kind == "material" and step.kind == EDIT.name and mask is not None:
         fixed = with_options(step, **dict.fromkeys((*MOVED, *REGION)))
-        metal = has_outline_normals(live.scene, step, mask)
+        metal = has_metal_normals(live.scene, step, mask)
         return live, Drawing(panes, *around, fixed, mask, metal)
     if kind == "thing" and step.kind == INSERT.name:
         return live, Drawing(panes, *around, step)
@@ -143,7 +144,7 @@ def _drawing(session: Session, kind: str) -> tuple[Live, Drawing] | None:
     return None
 
 
-def has_outline_normals(scene: Scene, step: Step, region: Array) -> bool:
+def has_metal_normals(scene: Scene, step: Step, region: Array) -> bool:
     """Whether a material step gives a region [H, W] bool the normals of metal, as far as the fitted scene tells."""
     options = options_of(step)
     return is_metal(changed(scene.materials.metallic, options.metallic), region, options)

@@ -19,7 +19,7 @@ from materialist.edits.core.notes import warned
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import KEY
-from materialist.edits.material.material import with_outline_normals
+from materialist.edits.material.normals import with_metal_normals
 from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
@@ -212,7 +212,7 @@ class LivePreview:
         self._asked = time.monotonic()
         scene = self._surfaces(steps)
         if metal is not None:
-            scene = with_outline_normals(scene, metal)
+            scene = with_metal_normals(scene, metal)
         return _THREAD.submit(preview.rows, scene, region).result()
 
     def _surfaces(self, steps: tuple[Step, ...]) -> Scene:

@@ -237,7 +237,7 @@ def test_metal_has_the_normals_of_a_round_body():
     np.testing.assert_array_equal(
         mesh.normals[mesh.faces[~inside]], scene.geometry.mesh.normals[mesh.faces[~inside]]
     )
-    assert gold.provenance["edits"][-1]["normals"] == "outline"
+    assert gold.provenance["edits"][-1]["normals"] == "metal"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Edits of albedo, roughness and metallic inside a region (paper, Opaque Material Editing)."""
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Unpack
@@ -13,18 +12,13 @@ from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
 from materialist.edits.material.detail import shaded, shading_detail
+from materialist.edits.material.normals import is_metal, with_metal_normals
 from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
-from materialist.geometry.build import with_normals
-from materialist.geometry.planes import axes, upright
+from materialist.geometry.planes import axes
 from materialist.io.photo import decode_photo
 from materialist.option_kinds import documented
-from materialist.solids.parts import outline_normals
 from materialist.types import Array, Materials, Scene
-
-MAX_KEPT = 4
-"""Normal maps that are kept."""
-_KEPT: dict[str, Array] = {}
 
 
 @documented(MaterialEdit)
@@ -65,7 +59,7 @@ def edit(
     region = weight > 0.5
     edited = replace(scene, materials=new)
     if is_metal(new.metallic, region, changes):
-        edited = with_outline_normals(edited, region)
+        edited = with_metal_normals(edited, region)
     # --- What the provenance keeps: only what was asked for ---
     names = ("hue", "saturation", "value", "grow", "feather")
     facts: dict[str, Any] = {name: getattr(changes, name) or None for name in names}
@@ -75,42 +69,9 @@ def edit(
         "metallic": changes.metallic,
         "texture": texture,
         "detail": changes.detail if changes.detail != 1 else None,
-        "normals": "outline" if edited.normal is not scene.normal else None,
+        "normals": "metal" if edited.normal is not scene.normal else None,
     }
     return noted(edited, "material", {**facts, "pixels": int(region.sum())})
-
-
-def is_metal(metallic: Array, region: Array, changes: MaterialEdit) -> bool:
-    """Whether an edit to a new metallic [H, W] takes the normals of bodies inside a region [H, W] bool."""
-    if changes.metallic is None or changes.normals != "auto" or not region.any():
-        return False
-    return bool(metallic[region].mean() > 0.5)
-
-
-def with_outline_normals(scene: Scene, region: Array) -> Scene:
-    """The scene with the normals of bodies where the region [H, W] bool has surfaces of revolution."""
-    normal = _outline_normals(scene, region)
-    turned = (normal != scene.normal).any(-1)
-    if not turned.any():
-        return scene
-    return replace(scene, normal=normal, geometry=with_normals(scene.geometry, normal, turned))
-
-
-def _outline_normals(scene: Scene, region: Array) -> Array:
-    """`outline_normals` of a region; kept for the next value of a slider, since it takes a second."""
-    digest = hashlib.sha256(repr(scene.camera).encode())
-    for array in (scene.depth, scene.normal, scene.geometry.plane_label, region):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    key = digest.hexdigest()
-    normal = _KEPT.get(key)
-    if normal is None:
-        up = upright(scene.normal, np.where(region, -1, scene.geometry.plane_label))
-        normal = outline_normals(scene.depth, scene.normal, region, scene.camera, up)
-        # Other threads may do the same: what one of them took out is no error.
-        for old in list(_KEPT)[: 1 - MAX_KEPT]:
-            _KEPT.pop(old, None)
-        _KEPT[key] = normal
-    return normal.copy()
 
 
 def shifted_hsv(albedo: Array, hue: float, saturation: float, value: float) -> Array:
