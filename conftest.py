@@ -128,6 +128,18 @@ def refused(run):
     return call
 
 
+@pytest.fixture
+def filled_smoothly(monkeypatch):
+    """What hides holes in a photo is spanned from their border: the network takes seconds, and `edits/remove` tests it."""
+    from materialist.edits.remove import filling
+    from materialist.geometry.membrane import membrane
+
+    def spanned(levels, unknown):
+        return membrane(levels, ~unknown).round().astype(levels.dtype)
+
+    monkeypatch.setattr(filling, "_kept", spanned)
+
+
 @pytest.fixture(scope="module")
 def browser():
     """Chromium (skipped, with the reason, where it is not there), for one file: tests of a killed trainer end it."""
@@ -135,7 +147,7 @@ def browser():
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     if chromium is None:
         pytest.skip("needs chromium")
-    options = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader"]
+    options = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-rasterization"]
     with playwright.sync_playwright() as driver:
         opened = driver.chromium.launch(executable_path=chromium, args=options)
         yield opened
