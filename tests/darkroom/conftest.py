@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the studio extra")
 pytest.importorskip("pydantic", reason="needs the studio extra")
 import studio_server
-from live_here import live_here
+from live_here import live_here, live_nowhere
 from starlette.testclient import TestClient
 from studio_scenes import package
 
@@ -27,8 +27,9 @@ def shared(tmp_path):
     work = WorkFolder(tmp_path / "work")
     made = Studio(work, JobQueue(1), single_user=False)
     made.start = work.new("Room", "nobody", scene=package(tmp_path))
-    yield made
-    made.close()
+    with live_nowhere():
+        yield made
+        made.close()
 
 
 @pytest.fixture
