@@ -45,6 +45,8 @@ class LiveNowhere(Live):
 def _in_place(double):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("materialist.studio.session.Live", double)
+        # Nor does one get ready for the next photo.
+        patch.setattr("materialist.studio.studio.warmed", lambda device: None)
         yield
 
 
