@@ -141,6 +141,25 @@ def filled_smoothly(monkeypatch):
 
 
 @pytest.fixture(scope="module")
+def clicks_once():
+    """The same click on the same scene asks the networks once: they take most of a second."""
+    from materialist.edits.select import select
+
+    masks = {}
+    at_points = select.object_at_points
+
+    def known(scene, points, *, network):
+        key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr(points), network)
+        if key not in masks:
+            masks[key] = at_points(scene, points, network=network)
+        return masks[key].copy()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(select, "object_at_points", known)
+        yield
+
+
+@pytest.fixture(scope="module")
 def browser():
     """Chromium (skipped, with the reason, where it is not there), for one file: tests of a killed trainer end it."""
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")

@@ -50,7 +50,7 @@ def visit(shared):
 
 
 @pytest.fixture(scope="module")
-def local(tmp_path_factory):
+def local(tmp_path_factory, clicks_once):
     """The open small scene on a page of this machine's own studio, as a client."""
     folder = tmp_path_factory.mktemp("local")
     work = WorkFolder(folder / "work")
