@@ -55,7 +55,7 @@ from materialist.edits.composite.composite import composite
 from materialist.edits.recipe import Step, apply
 scene = flat_scene()
 edited = apply(scene, [Step("relight", {"rotate": "20"}), Step("relight", {"ambient": "0.5"})])
-composite(scene, edited, spp=1, denoise=True)
+composite(scene, edited, spp=2, denoise=True)
 assert "torch" not in sys.modules
 """
     subprocess.run([sys.executable, "-c", script], check=True)
