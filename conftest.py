@@ -140,19 +140,24 @@ def filled_smoothly(monkeypatch):
     monkeypatch.setattr(filling, "_kept", spanned)
 
 
+@pytest.fixture(scope="session")
+def clicked():
+    """The masks of `clicks_once`."""
+    return {}
+
+
 @pytest.fixture(scope="module")
-def clicks_once():
-    """The same click on the same scene asks the networks once: they take most of a second."""
+def clicks_once(clicked):
+    """The same click on the same scene asks the networks once: they take seconds for a photo that they do not know."""
     from materialist.edits.select import select
 
-    masks = {}
     at_points = select.object_at_points
 
     def known(scene, points, *, network):
         key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr(points), network)
-        if key not in masks:
-            masks[key] = at_points(scene, points, network=network)
-        return masks[key].copy()
+        if key not in clicked:
+            clicked[key] = at_points(scene, points, network=network)
+        return clicked[key].copy()
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(select, "object_at_points", known)
