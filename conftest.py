@@ -130,7 +130,7 @@ def refused(run):
 
 @pytest.fixture
 def filled_smoothly(monkeypatch):
-    """What hides holes in a photo is spanned from their border: the network takes seconds, and `edits/remove` tests it."""
+    """Holes of a photo are spanned from their border: the network takes seconds, and `edits/remove` tests it."""
     from materialist.edits.remove import filling
     from materialist.geometry.membrane import membrane
 
