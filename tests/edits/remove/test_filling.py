@@ -78,7 +78,9 @@ def test_blown_whites_of_a_large_photo_are_no_hdr(monkeypatch):
     assert seen[0][-1, -1, 0] == round(255 * float(linear_to_srgb(np.float32(0.2))))
 
 
-@pytest.mark.parametrize("place", [np.s_[:, 1:], np.s_[:1, :1]])
+@pytest.mark.parametrize(
+    "place", [np.s_[:, 1:], pytest.param(np.s_[:1, :1], marks=pytest.mark.slow)]
+)
 def test_holes_of_any_shape(place):
     picture, _ = two_walls(72, 96)
     hole = np.zeros((72, 96), bool)
