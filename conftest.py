@@ -153,10 +153,10 @@ def clicks_once(clicked):
 
     at_points = select.object_at_points
 
-    def known(scene, points, *, network):
-        key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr(points), network)
+    def known(scene, points, **options):
+        key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr((points, options)))
         if key not in clicked:
-            clicked[key] = at_points(scene, points, network=network)
+            clicked[key] = at_points(scene, points, **options)
         return clicked[key].copy()
 
     with pytest.MonkeyPatch.context() as patch:
