@@ -1,5 +1,6 @@
 """Fixtures for all tests, of the product and of the laboratory."""
 
+import gc
 import json
 import os
 import shutil
@@ -7,6 +8,17 @@ import sys
 from pathlib import Path
 
 import pytest
+
+
+def pytest_configure():
+    """While tests are collected nothing becomes garbage, and looking for it takes a quarter of the time."""
+    gc.disable()
+
+
+def pytest_collection_finish():
+    """What was imported stays: a search for garbage in a test looks at what tests made."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(autouse=True)
@@ -114,6 +126,42 @@ def refused(run):
         return err
 
     return call
+
+
+@pytest.fixture
+def filled_smoothly(monkeypatch):
+    """Holes of a photo are spanned from their border: the network takes seconds, and `edits/remove` tests it."""
+    from materialist.edits.remove import filling
+    from materialist.geometry.membrane import membrane
+
+    def spanned(levels, unknown):
+        return membrane(levels, ~unknown).round().astype(levels.dtype)
+
+    monkeypatch.setattr(filling, "_kept", spanned)
+
+
+@pytest.fixture(scope="session")
+def clicked():
+    """The masks of `clicks_once`."""
+    return {}
+
+
+@pytest.fixture(scope="module")
+def clicks_once(clicked):
+    """The same click on the same scene asks the networks once: they take seconds for a photo that they do not know."""
+    from materialist.edits.select import select
+
+    at_points = select.object_at_points
+
+    def known(scene, points, **options):
+        key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr((points, options)))
+        if key not in clicked:
+            clicked[key] = at_points(scene, points, **options)
+        return clicked[key].copy()
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(select, "object_at_points", known)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -95,7 +95,7 @@ def test_a_killed_worker_costs_its_photo_one_more_try(tmp_path, monkeypatch):
     )
 
 
-@pytest.mark.parametrize("whole_group", [True, False])
+@pytest.mark.parametrize("whole_group", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_ctrl_c_ends_the_workers_and_says_how_to_go_on(tmp_path, monkeypatch, whole_group):
     monkeypatch.setenv("MADE_SLOW", "30")
     source = photos(tmp_path / "in", *NAMES)

@@ -16,6 +16,8 @@ from materialist.io.package import load_scene, save_scene
 from materialist.io.photo import read_photo
 from materialist.render import variant
 
+pytestmark = pytest.mark.usefixtures("filled_smoothly")
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

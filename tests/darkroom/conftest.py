@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the studio extra")
 pytest.importorskip("pydantic", reason="needs the studio extra")
 import studio_server
-from live_here import live_here
+from live_here import live_here, live_nowhere
 from starlette.testclient import TestClient
 from studio_scenes import package
 
@@ -27,8 +27,9 @@ def shared(tmp_path):
     work = WorkFolder(tmp_path / "work")
     made = Studio(work, JobQueue(1), single_user=False)
     made.start = work.new("Room", "nobody", scene=package(tmp_path))
-    yield made
-    made.close()
+    with live_nowhere():
+        yield made
+        made.close()
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def visit(shared):
 
 
 @pytest.fixture(scope="module")
-def local(tmp_path_factory):
+def local(tmp_path_factory, clicks_once):
     """The open small scene on a page of this machine's own studio, as a client."""
     folder = tmp_path_factory.mktemp("local")
     work = WorkFolder(folder / "work")

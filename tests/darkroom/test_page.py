@@ -461,6 +461,7 @@ def test_the_page_draws_changes_as_the_server_does(page):
     assert not page.errors
 
 
+@pytest.mark.slow
 def test_final_picture_and_download(page, tmp_path):
     page.set_default_timeout(300_000)
     select_block(page)
@@ -479,6 +480,7 @@ def test_final_picture_and_download(page, tmp_path):
     assert green(picture[24, 25, :3])
 
 
+@pytest.mark.slow
 def test_a_dropped_scene_opens_and_photos_are_kept(page, tmp_path):
     file = zipped_package(tmp_path)
     page.get_by_role("button", name="Photos").click()

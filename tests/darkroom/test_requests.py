@@ -289,6 +289,7 @@ def working(news):
     return [job for job in news["jobs"] if job["state"] in ("queued", "running")]
 
 
+@pytest.mark.slow
 def test_a_page_without_a_server_shows_the_edited_picture(client, heard):
     select_block(client)
     change(client, hue=120)

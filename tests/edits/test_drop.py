@@ -51,7 +51,7 @@ def test_energy_is_only_lost():
     assert (np.diff(energy) < 0.01 * energy[0]).all() and energy[-1] < 0.5 * energy[0]
 
 
-@pytest.mark.parametrize("height", [1.0, 8.0])
+@pytest.mark.parametrize("height", [pytest.param(1.0, marks=pytest.mark.slow), 8.0])
 def test_nothing_tunnels(height):
     rough = np.random.default_rng(0).normal(0, 0.003, (65, 65))
     ground = blocks(Field(FLAT.corner, FLAT.cell, rough), metres=0.2)

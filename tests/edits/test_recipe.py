@@ -13,7 +13,7 @@ from materialist.edits.recipe import apply, read_recipe
 from materialist.errors import InputError
 from materialist.io.exr import write_exr
 
-pytestmark = pytest.mark.usefixtures("filled_once")
+pytestmark = pytest.mark.usefixtures("filled_smoothly")
 
 SCENE = flat_scene()
 

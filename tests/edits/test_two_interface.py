@@ -137,7 +137,10 @@ def test_no_light_is_made_or_lost(roughness):
     np.testing.assert_allclose(out[MAPS[2]], 1, atol=1e-6)
 
 
-@pytest.mark.parametrize(("roughness", "tilt"), [(0.3, 75.0), (0.6, 45.0), (1.0, 0.0)])
+@pytest.mark.parametrize(
+    ("roughness", "tilt"),
+    [(0.3, 75.0), pytest.param(0.6, 45.0, marks=pytest.mark.slow), (1.0, 0.0)],
+)
 def test_a_rough_front_reflects_what_its_lobe_integrates_to(roughness, tilt):
     """F D G / (4 cos_i cos_o) over the upper hemisphere, by quadrature: nothing is reflected below the surface."""
     alpha = roughness**2

@@ -72,7 +72,13 @@ def test_glass_of_a_glb_has_the_mean_way_through_it():
 
 @pytest.mark.parametrize(
     "surface",
-    [CHECKS, GLASS, GLOW, FROSTED, COATED],
+    [
+        CHECKS,
+        GLASS,
+        GLOW,
+        pytest.param(FROSTED, marks=pytest.mark.slow),
+        pytest.param(COATED, marks=pytest.mark.slow),
+    ],
     ids=["texture", "glass", "glow", "frosted", "coated"],
 )
 def test_mitsuba_renders_the_same_picture(tmp_path, surface):

@@ -1,4 +1,7 @@
-"""`studio.live.Live` within the tests' own process, which has loaded torch already."""
+"""`studio.live.Live` without a process of its own, which takes seconds to start.
+
+`live_here`: within the tests' process, which has loaded torch already. `live_nowhere`: the photo alone, without edits.
+"""
 
 from contextlib import contextmanager
 from pathlib import Path
@@ -30,8 +33,26 @@ class LiveHere(Live):
         return function(self.here, **arguments)
 
 
+class LiveNowhere(Live):
+    def _start(self, worker):
+        self._built.set_result(None)
+
+    def call(self, function, **arguments):
+        raise AssertionError(f"{function.__name__} needs a preview")
+
+
 @contextmanager
-def live_here():
+def _in_place(double):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("materialist.studio.session.Live", LiveHere)
+        patch.setattr("materialist.studio.session.Live", double)
+        # Nor does one get ready for the next photo.
+        patch.setattr("materialist.studio.studio.warmed", lambda device: None)
         yield
+
+
+def live_here():
+    return _in_place(LiveHere)
+
+
+def live_nowhere():
+    return _in_place(LiveNowhere)

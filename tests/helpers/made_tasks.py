@@ -70,3 +70,16 @@ def numbers(report, count):
     import numpy as np
 
     return np.arange(count)
+
+
+def open_without_pictures(report, package, file, device):
+    """In place of `studio.live.open_preview`: a preview that applies edits, and shades nothing."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    from materialist.io.package import load_scene
+    from materialist.studio import live, live_preview
+
+    live_preview._THREAD = ThreadPoolExecutor(1)
+    live_preview._build = lambda scene, file: None
+    live._OPENED.set_result(live_preview.LivePreview(load_scene(package), None, Path(package)))
+    report.intermediate(fine=True)

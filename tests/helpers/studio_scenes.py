@@ -1,5 +1,8 @@
 """Small scenes for the studio: `edit_scenes` again, with a field of view and a warning, as packages on disk."""
 
+import atexit
+import shutil
+import tempfile
 import zipfile
 from dataclasses import replace
 from functools import lru_cache
@@ -37,9 +40,16 @@ def room() -> Scene:
 
 def package(folder: Path) -> Path:
     """The room as a scene package."""
-    path = folder / "room.scene"
-    save_scene(room(), path)
-    return path
+    return Path(shutil.copytree(_saved(), folder / "room.scene"))
+
+
+@lru_cache(maxsize=1)
+def _saved() -> Path:
+    """The room's package, written once: its overview takes as long as all else of a small test."""
+    folder = Path(tempfile.mkdtemp())
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    save_scene(room(), folder / "room.scene")
+    return folder / "room.scene"
 
 
 def zipped(file: Path, members: dict[str, str | bytes]) -> Path:

@@ -36,7 +36,7 @@ def shared(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def opened(studio):
+def opened(studio, clicks_once):
     page = studio.page("page", "me")
     with live_here():
         studio.open(page, studio.start.name)

@@ -77,7 +77,7 @@ def report(stages, outdated=False):
     return Reporter(lambda kind, facts: stages.append(facts["stage"]), lambda: outdated)
 
 
-def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path):
+def test_the_task_answers_with_the_preview_of_the_edit_package(tmp_path, filled_smoothly):
     scene = str(package(tmp_path))
     others = (Step("relight", {"ambient": "0.5"}, tmp_path),)
     given = {

@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 
+import made_tasks
 import psutil
 import pytest
 from made_tasks import until
@@ -17,21 +18,47 @@ from materialist.studio.live import Live
 from materialist.studio.workspace import write_mask
 
 
-def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
-    """One story, as starting the process is what takes time."""
-    quota = Quota(tmp_path)
-    live = Live(package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
-    step = Step("edit", {"mask": write_mask(tmp_path, block()), "hue": "120"}, tmp_path)
+@pytest.fixture
+def quota(tmp_path):
+    return Quota(tmp_path)
+
+
+@pytest.fixture
+def live(tmp_path, quota):
+    """The open small scene, and its process."""
+    made = Live(package(tmp_path), tmp_path / "t.npz", Allowance(quota, lambda: "somebody"))
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def step(tmp_path):
+    return Step("edit", {"mask": write_mask(tmp_path, block()), "hue": "120"}, tmp_path)
+
+
+def test_the_process_answers_and_ends_with_the_photo(live, step, tmp_path):
     # Selecting does not wait for the tables.
     assert live.call(views.selected, where={"click": (25, 24)})[24, 25]
     live.wait()
     assert live.ready
     until(lambda: live.fine)
-    picture = live.call(views.picture, steps=(step,), panes={})
-    assert picture.startswith(b"\xff\xd8")
+    assert live.call(views.picture, steps=(step,), panes={}).startswith(b"\xff\xd8")
     # Errors come with their class and sentence.
     with pytest.raises(InputError, match="must lie in"):
         live.call(views.check, steps=(Step("edit", {**step.options, "roughness": "7"}, tmp_path),))
+    process = live.process
+    live.close()
+    until(lambda: not psutil.pid_exists(process))
+    with pytest.raises(InputError, match="was closed"):
+        live.call(views.check, steps=())
+
+
+def test_a_process_that_is_gone_is_replaced(monkeypatch, request, quota, tmp_path):
+    """Whatever it is asked: here it loads no torch, which takes longer than all else."""
+    monkeypatch.setattr("materialist.studio.live.open_preview", made_tasks.open_without_pictures)
+    live = request.getfixturevalue("live")
+    step = request.getfixturevalue("step")
+    live.wait()
     # Unused it ends, and the page does not see that: the next question starts another one.
     first = live.process
     live.rest(60)
@@ -39,7 +66,7 @@ def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     live.rest(0)
     until(lambda: not psutil.pid_exists(first))
     assert live.ready and live.process is None
-    assert live.call(views.picture, steps=(step,), panes={}) == picture
+    assert live.call(views.region, step=step).sum() == block().sum()
     # Ended by the system, it is told in words, once.
     os.kill(live.process, signal.SIGSTOP)
     second = live.process
@@ -55,17 +82,12 @@ def test_the_process_answers_is_replaced_and_ends_with_the_photo(tmp_path):
     assert live.call(views.region, step=step).any()
     os.kill(live.process, signal.SIGSTOP)
     threading.Timer(0.3, kill).start()
-    assert live.call(views.picture, steps=(step,), panes={}) == picture
+    assert live.call(views.check, steps=(step,)) == ("It is too dark.",)
     # A second fall of one person waits for the first.
     fall = Step("drop", {"mesh": "x.ply", "at": ["5", "5"]}, tmp_path)
     with quota.opening("somebody"), pytest.raises(InputError, match="being opened"):
         live.call(views.check, steps=(fall,))
     assert live.call(views.region, step=step).sum() == block().sum()
-    third = live.process
-    live.close()
-    until(lambda: not psutil.pid_exists(third))
-    with pytest.raises(InputError, match="was closed"):
-        live.call(views.check, steps=())
 
 
 def test_a_studio_that_ends_takes_its_previews_along(shared, tmp_path):

@@ -87,7 +87,9 @@ def either(request, comparison):
 
 
 @pytest.mark.parametrize(
-    ("bounces", "away", "everywhere"), [(1, 38, 32), (3, 34, 30)], ids=["direct", "indirect"]
+    ("bounces", "away", "everywhere"),
+    [pytest.param(1, 38, 32, marks=pytest.mark.slow), (3, 34, 30)],
+    ids=["direct", "indirect"],
 )
 def test_cached_shading_equals_path_tracing(either, bounces, away, everywhere):
     assert either.surface.mean() > 0.95

@@ -121,7 +121,10 @@ def test_a_small_sun_is_neither_missed_nor_met_twice():
     assert np.std(ratio) < 0.12, ratio
 
 
-@pytest.mark.parametrize("level", [2, 4, 6, 7])
+@pytest.mark.parametrize(
+    "level",
+    [2, pytest.param(4, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.slow), 7],
+)
 def test_open_plane_under_constant_light_has_the_analytic_specular_lobe(open_floor, level):
     tables = open_floor.gather(constant(1.0), None)
     d, weight = hemisphere(500)

@@ -117,7 +117,7 @@ def test_few_rays_are_near_many(scene, metallic):
     assert relative_error(lit(scene, metallic), many) < 0.015
 
 
-@pytest.mark.parametrize("roughness", [0.25, 0.4, 0.9])
+@pytest.mark.parametrize("roughness", [0.25, pytest.param(0.4, marks=pytest.mark.slow), 0.9])
 def test_either_kind_alone_estimates_metals(scene, roughness):
     """Balanced, the shares of the kinds do not matter to the mean."""
     texels = lit(scene, 1.0, roughness, sphere_samples=32768, specular_samples=1)

@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_catalog import make_archive
+from made_catalog import make_archive, make_photographs
 
 from materialist.errors import InputError
+from materialist_lab.procedural.catalog import packages
 from materialist_lab.procedural.dataset import identity, produce, sample_path
 from materialist_lab.procedural.objects import shapes
 from materialist_lab.procedural.options import HELD_OUT, DataSetOptions
@@ -35,10 +36,14 @@ CONTRACT = {
 
 @pytest.fixture(scope="module")
 def catalog(tmp_path_factory):
-    """Options that name a tiny catalogue."""
+    """Options that name a tiny catalogue; its photographs are the only ones."""
     folder = tmp_path_factory.mktemp("catalog")
     make_archive(folder / "made.sh3f")
-    return {"furniture": folder, "cache": folder / "cache"}
+    (folder / "photographs").mkdir()
+    make_photographs(folder / "photographs")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(packages, "PHOTOGRAPHS", (folder / "photographs",))
+        yield {"furniture": folder, "cache": folder / "cache"}
 
 
 @pytest.fixture(scope="module")

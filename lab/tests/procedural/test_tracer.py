@@ -32,8 +32,8 @@ def traced(world, spp=400):
     ("world", "tolerance"),
     [
         (still(), 0.01),
-        (room(window=True, lamp=False), 0.03),
-        (room(window=False, lamp=True, sky=0.0), 0.02),
+        pytest.param(room(window=True, lamp=False), 0.03, marks=pytest.mark.slow),
+        pytest.param(room(window=False, lamp=True, sky=0.0), 0.02, marks=pytest.mark.slow),
         (room(window=True, lamp=True), 0.02),
     ],
     ids=["sky", "window", "lamp", "window and lamp"],

@@ -39,7 +39,7 @@ def run(data, tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "run"
     notes: list[str] = []
     made_runs.trainer(
-        made_runs.bundled(data, samples=2, rate=5e-3), folder, steps=30, notes=notes, report_steps=6
+        made_runs.bundled(data, samples=2, rate=5e-3), folder, steps=15, notes=notes, report_steps=3
     ).fit()
     return folder, notes
 
@@ -71,7 +71,7 @@ def test_a_run_learns_and_tells(run):
         [json.loads(line) for line in (folder / name).read_text().splitlines()]
         for name in (checkpoint.CURVE, checkpoint.SCORES)
     )
-    assert [line["step"] for line in curve] == [6, 12, 18, 24, 30]
+    assert [line["step"] for line in curve] == [3, 6, 9, 12, 15]
     # It learns, and the rate falls.
     assert curve[-1]["loss"] < 0.8 * curve[0]["loss"]
     assert curve[-1]["rate"] < curve[0]["rate"] and curve[-1]["per_second"] > 0
@@ -92,7 +92,7 @@ def test_a_run_that_cannot_be_scored_says_why(tasks, tmp_path):
 def test_its_averaged_weights_predict_and_begin_another_run(run, data):
     folder, _ = run
     predictor = BundledPredictor(folder / checkpoint.WEIGHTS)
-    assert predictor.facts["step"] == 30 and predictor.facts["data"]["seed"] == [5]
+    assert predictor.facts["step"] == 15 and predictor.facts["data"]["seed"] == [5]
     # Weights are stored in half precision.
     state = checkpoint.load(folder, "matnet")
     begun = made_runs.bundled(data)

@@ -13,7 +13,6 @@ from materialist.errors import InputError
 from materialist.io.atomic import write_whole
 from materialist.io.text import read_text
 from materialist.option_kinds import OFF, ON, beside, declarations, parse_numbers, several
-from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
 
 
@@ -177,7 +176,6 @@ def check_libraries(steps: list[Step]) -> None:
             step.operation.check_libraries()
 
 
-@fixed_threads()
 def apply(
     scene: Scene,
     steps: list[Step],

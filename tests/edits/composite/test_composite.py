@@ -39,7 +39,7 @@ from materialist.io.out.icc import profile_of
 from materialist.io.package import load_scene, save_scene
 from materialist.types import Camera, Photo
 
-pytestmark = pytest.mark.usefixtures("filled_once")
+pytestmark = pytest.mark.usefixtures("filled_smoothly")
 
 FLAT = flat_scene()
 

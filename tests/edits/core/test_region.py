@@ -56,6 +56,10 @@ def test_several_clicks_cost_one_look_at_what_was_put_there(scenes, monkeypatch)
         "materialist.edits.select.select.body_coverage",
         lambda scene: looks.append(1) or np.zeros(scene.depth.shape),
     )
+    everything = np.ones((3, *scenes[1].depth.shape), np.float32)
+    monkeypatch.setattr(
+        "materialist.edits.select.objects.sam.masks", lambda *_, **__: (everything, np.ones(3))
+    )
     select(scenes[1], click=[(10, 60), (12, 62)])
     assert len(looks) == 1
 

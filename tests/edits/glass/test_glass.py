@@ -14,7 +14,7 @@ from materialist.errors import InputError
 from materialist.solids.parts import objects_in
 from materialist.solids.revolution import Revolution
 
-pytestmark = pytest.mark.usefixtures("filled_once")
+pytestmark = pytest.mark.usefixtures("filled_smoothly")
 
 PAPER = {"model": "two-interface", "thickness": "symmetry"}
 
@@ -191,7 +191,7 @@ def test_thin_masks_give_no_warnings_of_numpy(place, recwarn):
     assert not [w for w in recwarn if issubclass(w.category, RuntimeWarning)]
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def preview():
     return GlassPreview(rendered_scene(), MASK, thickness="symmetry")
 

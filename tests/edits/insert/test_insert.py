@@ -85,7 +85,7 @@ def whole(layer, values, size):
     return out
 
 
-@pytest.mark.parametrize("native", [1, 4])
+@pytest.mark.parametrize("native", [pytest.param(1, marks=pytest.mark.slow), 4])
 def test_the_photo_is_kept_where_no_path_meets_the_body(box, native):
     scene = floor_scene(native=native)
     edited = insert(scene, box, (24.0, 26.0), material="0.1,0.1,0.6")

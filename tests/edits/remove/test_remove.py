@@ -9,6 +9,7 @@ from edit_scenes import MASK, flat_scene, rendered_scene, tetrahedron
 
 from materialist.edits.composite.composite import composite
 from materialist.edits.core.region import body_coverage
+from materialist.edits.remove.filling import remembered
 from materialist.edits.remove.hole import make_hole
 from materialist.edits.remove.remove import remove
 from materialist.errors import InputError
@@ -16,6 +17,13 @@ from materialist.geometry.build import build_geometry
 from materialist.pipeline import render_scene
 
 pytestmark = pytest.mark.usefixtures("filled_once")
+
+
+@pytest.fixture(scope="module")
+def filled_once(tmp_path_factory):
+    """Equal holes are filled once: the network takes seconds."""
+    with remembered(tmp_path_factory.mktemp("filled")):
+        yield
 
 
 def far_from(mask, pixels):
@@ -97,7 +105,7 @@ def test_its_shadow_on_the_wall_goes_with_it():
     assert np.abs(picture - before)[still].mean() < 0.004
 
 
-def test_a_clipped_photo_stays_outside_the_hole():
+def test_a_clipped_photo_stays_outside_the_hole(filled_smoothly):
     """The hole is filled with what was there, too."""
     scene = rendered_scene(native=2)
     lit = np.maximum(scene.photo.linear, np.where(MASK, 0, 1)[..., None]).astype(np.float32)
@@ -110,7 +118,7 @@ def test_a_clipped_photo_stays_outside_the_hole():
     np.testing.assert_allclose(np.minimum(picture, 1)[far], scene.photo.original[far], atol=1 / 255)
 
 
-def test_a_hole_that_little_is_known_of_is_told():
+def test_a_hole_that_little_is_known_of_is_told(filled_smoothly):
     scene = flat_scene()
     assert not remove(scene, MASK).report.warnings
     large = np.zeros((36, 48), bool)
@@ -144,7 +152,7 @@ def test_what_was_put_before_it_stays_whole():
     assert not (red_there(gone) & ~here).any(), "nor is it copied"
 
 
-def test_masks_cut_by_the_frame_with_holes_parts_and_sky():
+def test_masks_cut_by_the_frame_with_holes_parts_and_sky(filled_smoothly):
     scene = flat_scene(sky=12)
     mask = np.zeros((36, 48), bool)
     mask[8:30, :14] = True

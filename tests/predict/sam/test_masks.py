@@ -38,15 +38,17 @@ def test_the_best_mask_is_the_disc(where):
     assert overlap(logits[expected.argmax()] > 0, disc) > 0.9
 
 
-@pytest.mark.parametrize("size", [(40, 300), (300, 40), (9, 9)])
-def test_photos_of_any_shape(size):
-    rgb = np.random.default_rng(0).random((*size, 3), np.float32)
-    logits, _ = sam.masks(rgb, [(size[1] - 1, size[0] - 1)])
-    assert logits.shape == (3, *size) and np.isfinite(logits).all()
-
-
 def test_a_photo_is_encoded_once(monkeypatch):
     rgb, _, _ = picture()
     first = sam.embedding(rgb)
     monkeypatch.setattr(sam, "run", lambda path, _: pytest.fail(f"{path.name} ran again"))
     assert sam.embedding(rgb) is first
+
+
+@pytest.mark.parametrize(
+    "size", [(40, 300), pytest.param((300, 40), marks=pytest.mark.slow), (9, 9)]
+)
+def test_photos_of_any_shape(size):
+    rgb = np.random.default_rng(0).random((*size, 3), np.float32)
+    logits, _ = sam.masks(rgb, [(size[1] - 1, size[0] - 1)])
+    assert logits.shape == (3, *size) and np.isfinite(logits).all()

@@ -17,6 +17,7 @@ from materialist.io.photo import decode_photo
 from materialist.predict import hub, resample
 from materialist.predict.models import locate
 from materialist.predict.protocol import on_gpu
+from materialist.threads import fixed_threads
 from materialist.types import Array, Scene
 
 Inpaint = Callable[[Array, Array], Array]
@@ -97,6 +98,7 @@ def inpainter(text: str, *, seed: int = 0, device: str = "auto", steps: int = 30
     return lambda photo, hole: _diffused(pipeline, photo, hole, seed=seed, steps=steps)
 
 
+@fixed_threads()
 def _diffused(pipeline: Any, photo: Array, hole: Array, *, seed: int, steps: int) -> Array:
     """[H, W, 3] linear: a photo [H, W, 3] with the hole [H, W] bool filled by an inpainting pipeline of diffusers."""
     import torch

@@ -13,6 +13,7 @@ from materialist.predict.refraction.crop import BACK_X, Window, refraction_featu
 from materialist.solids.inflated import inflated
 from materialist.solids.outline import surface_of_revolution
 from materialist.solids.revolution import Revolution
+from materialist.threads import fixed_threads
 from materialist.types import Array, Camera
 
 WEIGHTS = Path(__file__).parent / "weights.safetensors"
@@ -39,6 +40,7 @@ class Thickness:
     """Where it comes from."""
 
 
+@fixed_threads()
 def thickness(
     photo_linear: Array,
     mask: Array,
