@@ -10,7 +10,7 @@ from made_meshes import floor_scene
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.edits.composite.disclosed import base_scene
-from materialist.edits.material import material
+from materialist.edits.material import normals
 from materialist.edits.material.material import edit, projected, shifted_hsv
 from materialist.errors import InputError
 from materialist.geometry.build import rebuilt, with_normals
@@ -250,9 +250,18 @@ def test_other_edits_leave_its_normals(change):
     assert "normals" not in edited.provenance["edits"][-1]
 
 
-def test_metal_that_is_not_round_keeps_its_normals():
-    edited = edit(SCENE, MASK, metallic=1)
-    assert edited.normal is SCENE.normal and edited.geometry is SCENE.geometry
+def test_metal_that_is_not_round_is_smooth_where_the_photo_is():
+    """A block under uneven normals: its own are one direction."""
+    rows, columns = np.indices(MASK.shape)
+    waves = 0.2 * np.stack([np.sin(1.3 * rows), np.cos(1.1 * columns), 0 * rows], -1)
+    uneven = unit(SCENE.normal + np.where(MASK[..., None], waves, 0)).astype(np.float32)
+    geometry = with_normals(SCENE.geometry, uneven, MASK)
+    scene = replace(SCENE, normal=uneven, geometry=geometry)
+    edited = edit(scene, MASK, metallic=1)
+    off = [(n * SCENE.normal).sum(-1)[MASK].mean() for n in (uneven, edited.normal)]
+    assert off[1] > off[0] + 0.01
+    np.testing.assert_array_equal(edited.normal[~MASK], uneven[~MASK])
+    assert edited.geometry.mesh.vertices is scene.geometry.mesh.vertices
 
 
 def test_normals_of_metal_are_not_shared_with_the_next_edit():
@@ -269,7 +278,7 @@ def test_normals_of_metal_are_there_though_another_thread_throws_them_away(monke
             """As if others had kept many in the meantime."""
 
     scene, ball, _ = uneven_ball()
-    monkeypatch.setattr(material, "_KEPT", Emptied())
+    monkeypatch.setattr(normals, "_KEPT", Emptied())
     assert (edit(scene, ball, metallic=1).normal != scene.normal).any()
 
 

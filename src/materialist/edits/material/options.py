@@ -53,7 +53,7 @@ class MaterialEdit(OperationOptions):
     metallic: float | str | None = option(None, "The same for metallic.", **SHIFT)
     normals: str = option(
         "auto",
-        "Of metal; auto: of its outline where that is round and upright, as of a jug; maps: as they are.",
+        "Of metal; auto: of a round body by its outline, else smooth where the photo is; maps: as they are.",
         kind="word",
         choices=("auto", "maps"),
     )

@@ -1,0 +1,51 @@
+"""Normals of polished things that are not round: smooth where the photo is, creased where it is."""
+
+import numpy as np
+import pytest
+
+from materialist.camera import unit
+from materialist.edits.material.normals import guided_normals
+
+MASK = np.zeros((64, 96), bool)
+MASK[8:56, 8:88] = True
+
+
+def degrees(a, b):
+    return np.degrees(np.arccos(np.clip((a * b).sum(-1), -1, 1)))
+
+
+def bumpy(normal):
+    """The normals with waves of about ten degrees, as networks predict them."""
+    rows, columns = np.indices(normal.shape[:2])
+    waves = 0.17 * np.stack([np.sin(1.3 * rows), np.cos(1.1 * columns), 0 * rows], -1)
+    return unit(normal + waves).astype(np.float32)
+
+
+def test_an_even_thing_becomes_smooth_and_the_rest_stays():
+    truth = np.broadcast_to(np.float32([0, 0, 1]), (*MASK.shape, 3))
+    normal = bumpy(truth)
+    result = guided_normals(normal, np.full_like(normal, 0.3), MASK)
+    inner = np.s_[16:48, 16:80]
+    assert np.median(degrees(result, truth)[inner]) < np.median(degrees(normal, truth)[inner]) / 4
+    np.testing.assert_array_equal(result[~MASK], normal[~MASK])
+    np.testing.assert_allclose(np.linalg.norm(result, axis=-1), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize("shown", [True, False])
+def test_a_crease_stays_where_the_photo_shows_it(shown):
+    left = np.arange(96) < 48
+    halves = np.where(left[:, None], [-0.6, 0, 0.8], [0.6, 0, 0.8])
+    truth = np.broadcast_to(halves.astype(np.float32), (*MASK.shape, 3))
+    photo = np.broadcast_to(np.where(left, 0.1, 0.5 if shown else 0.1)[:, None], truth.shape)
+    result = guided_normals(bumpy(truth), photo.astype(np.float32), MASK)
+    beside = np.s_[16:48, 44:52]  # four pixels on either side
+    off = np.median(degrees(result, truth)[beside])
+    assert (off < 6) if shown else (off > 15)
+
+
+def test_a_pixel_alone_and_a_photo_brighter_than_white():
+    normal = bumpy(np.broadcast_to(np.float32([0, 0, 1]), (8, 8, 3)))
+    mask = np.zeros((8, 8), bool)
+    mask[4, 4] = True
+    result = guided_normals(normal, np.full_like(normal, 300.0), mask)
+    assert degrees(result, normal)[4, 4] < 0.1
