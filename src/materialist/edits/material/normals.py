@@ -11,6 +11,7 @@ from materialist.color import linear_to_srgb
 from materialist.edits.material.options import MaterialEdit
 from materialist.geometry.build import with_normals
 from materialist.geometry.planes import upright
+from materialist.geometry.silhouette import window
 from materialist.solids.parts import objects_in, outline_normals
 from materialist.types import Array, Scene
 
@@ -79,26 +80,32 @@ def guided_normals(normal: Array, photo: Array, mask: Array) -> Array:
     In each window they are a linear function of the photo's grey: where that is even, their mean; where it shows a
     crease or a curl, they turn with it. normal: [H, W, 3] unit. photo: [H, W, 3] linear.
     """
-    grey = np.clip(linear_to_srgb(photo), 0, 1).mean(-1, dtype=np.float32)[..., None]
+    # Nothing is read outside of the mask's window: of many small things each takes little.
+    box = window(mask)
+    grey = np.clip(linear_to_srgb(photo[box]), 0, 1).mean(-1, dtype=np.float32)[..., None]
+    inside = mask[box].astype(np.float32)[..., None]
     sigma = SETTINGS.window * float(np.sqrt(mask.sum()))
-    inside = mask.astype(np.float32)[..., None]
     norm = _blurred(inside, sigma) + 1e-6
 
     def mean(values: Array) -> Array:
         return _blurred(values * inside, sigma) / norm
 
     # --- n = slope * grey + offset, by least squares in each window ---
-    mean_grey, mean_normal = mean(grey), mean(normal)
+    mean_grey, mean_normal = mean(grey), mean(normal[box])
     variance = mean(grey * grey) - mean_grey**2
-    covariance = mean(grey * normal) - mean_grey * mean_normal
+    covariance = mean(grey * normal[box]) - mean_grey * mean_normal
     slope = covariance / (variance + SETTINGS.contrast**2)
     offset = mean_normal - slope * mean_grey
     # --- All windows that hold a pixel, in the mean ---
     turned = unit(mean(slope) * grey + mean(offset))
-    return np.where(mask[..., None], turned, normal).astype(np.float32)
+    result = np.array(normal, np.float32)
+    result[mask] = turned[mask[box]]
+    return result
 
 
 def _blurred(values: Array, sigma: float) -> Array:
-    """A Gaussian mean of [H, W, C], C of 1 kept."""
-    blurred = cv2.GaussianBlur(values.astype(np.float32), (0, 0), max(sigma, 0.5))
+    """A Gaussian mean of [H, W, C], 0 outside, C of 1 kept."""
+    outside = cv2.BORDER_CONSTANT
+    sigma = max(sigma, 0.5)
+    blurred = cv2.GaussianBlur(values.astype(np.float32), (0, 0), sigma, borderType=outside)
     return np.asarray(blurred).reshape(values.shape)
