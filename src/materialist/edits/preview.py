@@ -62,12 +62,14 @@ class Preview:
         self.scene = scene
         self._file = file
         self._key = _key(scene)
-        self._other: tuple[Array, Tables] | None = None
+        self._other: tuple[Array, Tables, Array] | None = None
+        """Another light, its tables, and what surfaces pass on under it."""
         self._turned: tuple[Array, Any] | None = None
         """Normals [H, W, 3] of an edit, and the rays of the pixels where they differ."""
         self._turned_tables: tuple[Tables, Tables] | None = None
         """Tables of the scene's own normals, and the same with those of `_turned`."""
         self._passed_on = scene.rerender
+        """What surfaces pass on in the last picture of another light."""
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
         if kept is None:
@@ -164,12 +166,13 @@ class Preview:
             cache = self._turned[1]
             fitted = tables is self._tables
             passed_on = self.scene.rerender if fitted else self._passed_on
-            rows = torch.from_numpy(np.searchsorted(self._pixels, cache.pixels))
+            places = np.searchsorted(self._pixels, cache.pixels)
             own = cache.gather(seen.envmap, passed_on)
             if len(tables.levels) == 1:  # coarse ones, of one roughness [P]
-                own = at_roughness(own, tables.levels[0][rows])
+                own = at_roughness(own, tables.levels[0][places])
             own = filter_tables(cache, own, surface_guide(cache), sharpest=SHARPEST)
             mixed = Tables(tables.diffuse.clone(), tables.specular.clone(), tables.levels)
+            rows = torch.from_numpy(places)
             mixed.diffuse[rows] = own.diffuse
             mixed.specular[:, rows] = own.specular
             self._turned_tables = (tables, mixed)
@@ -227,7 +230,8 @@ class Preview:
         Coarse ones are of the scene's own roughness alone.
         """
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
-            return self._other[1]
+            _, tables, self._passed_on = self._other
+            return tables
         # First what surfaces pass on under this light, by few rays, at the roughness that they have; then the picture,
         # by all of them.
         before = self._passed_on if coarse else None
@@ -238,7 +242,7 @@ class Preview:
         )
         if not coarse:
             tables = self._filtered(self._cache, edited.envmap, self._passed_on)
-            self._other = (edited.envmap, tables)
+            self._other = (edited.envmap, tables, self._passed_on)
         return tables
 
     def _filtered(
