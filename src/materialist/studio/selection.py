@@ -94,8 +94,11 @@ class Selection:
         regions.sort(key=np.sum, reverse=not larger)
         for region in regions:
             ratio = region.sum() / area
-            if (ratio if larger else 1 / ratio) >= LARGER:
-                return Selection((*self.parts[:-1], region), self.clicked)
+            after = Selection((*self.parts[:-1], region), self.clicked)
+            # What other parts hold anyway is no change.
+            differs = not np.array_equal(after.mask, self.mask)
+            if differs and (ratio if larger else 1 / ratio) >= LARGER:
+                return after
         size = "larger" if larger else "smaller"
         raise InputError(
             f"Nothing {size} is found at that click; add another click, or use the brush."
