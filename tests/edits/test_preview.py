@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from edit_scenes import MASK, rendered_scene
+from edit_scenes import MASK, balls, rendered_scene
 
 from materialist.camera import unit
 from materialist.edits.core.renderer import EditRenderer
@@ -76,6 +76,33 @@ def test_new_normals_agree_with_the_path_tracer(preview, coarse):
             assert psnr(preview.render(straight, coarse=coarse)[MASK], truth) < score - 6
     # Nothing of it stays behind.
     assert psnr(preview.render(preview.scene), traced(preview.scene)) > 30
+
+
+def test_new_normals_of_one_pixel_are_shaded_under_a_coarse_light(preview):
+    copper = turned(preview.scene)
+    one = np.zeros_like(MASK)
+    one[tuple(np.argwhere(MASK)[0])] = True
+    normal = np.where(one[..., None], copper.normal, preview.scene.normal)
+    geometry = with_normals(preview.scene.geometry, normal, one)
+    edited = relight(replace(copper, normal=normal, geometry=geometry), sun=(60.0, 40.0))
+    assert np.isfinite(preview.render(edited, coarse=True)).all()
+
+
+def test_new_normals_see_what_their_own_light_lets_surfaces_pass_on():
+    """After a glance at another light, too, as of a slider that is taken back."""
+    scene, number = balls(((-0.3, -0.2, -3), 0.4))
+    around = number < 0
+    normal = np.where(around[..., None], unit(scene.normal + np.array([0.8, 0, 0])), scene.normal)
+    geometry = with_normals(scene.geometry, normal, around)
+    copper = edit(scene, around, metallic=1, roughness=0.15, normals="maps")
+    copper = replace(copper, normal=normal.astype(np.float32), geometry=geometry)
+    preview = prepared(scene)
+    dim, bright = (
+        relight(copper, envmap=np.full((8, 16, 3), value, np.float32)) for value in (0.2, 9)
+    )
+    picture = preview.render(dim)
+    preview.render(bright, coarse=True)
+    np.testing.assert_array_equal(preview.render(dim), picture)
 
 
 def test_a_coarse_light_is_near_and_leaves_nothing_behind(preview):

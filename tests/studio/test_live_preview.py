@@ -6,6 +6,7 @@ import numpy as np
 from edit_scenes import balls
 from made_meshes import box_file
 
+from materialist.edits.material.material import edit
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.studio import drawn, live_preview
@@ -57,3 +58,11 @@ def test_the_page_asks_anew_where_an_edit_becomes_metal():
     assert asked == [False, False, True, True, True, False]
     assert not asked_for(scene, ball, roughness=0.1)
     assert not asked_for(scene, ball, metallic=1, normals="maps")
+
+
+def test_a_soft_border_does_not_decide_what_is_metal():
+    scene, number = balls(((-0.3, -0.2, -3), 0.4))
+    ball = number == 0
+    options = {"metallic": 0.6, "feather": 0.2}
+    edited = edit(scene, ball, **options)
+    assert asked_for(scene, ball, **options) and (edited.normal != scene.normal).any()

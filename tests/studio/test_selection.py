@@ -71,6 +71,10 @@ def test_a_click_takes_less_or_more():
         more.resized(True, choose)
     with pytest.raises(InputError, match="Nothing smaller"):
         less.resized(False, choose)
+    twice = one.click(scene, 25, 24, "add", choose)
+    with pytest.raises(InputError, match="Nothing smaller"):
+        twice.resized(False, choose)  # the first click keeps it
+    assert twice.resized(True, choose).mask.sum() == more.mask.sum()
     for other in (one.brush(scene, [[44, 40]], 4, "add", CHOOSE), Selection((first,))):
         with pytest.raises(InputError, match="Click an object first"):
             other.resized(True, choose)

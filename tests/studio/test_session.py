@@ -189,6 +189,20 @@ def test_a_history_that_cannot_be_read_begins_anew(session, damage):
         file.unlink()
 
 
+def test_a_selection_that_its_edit_follows_is_kept_for_the_next_start(session, monkeypatch):
+    click(session)
+    session.set("edit", hue="10")
+    before = session.selection.mask
+    grown = before.copy()
+    grown[:, :20] = True
+    monkeypatch.setattr(session.live, "select", lambda click, extent: grown.copy())
+    session.resize_selection(True)
+    history = read_history(session.workspace, session.scene.depth.shape)
+    np.testing.assert_array_equal(history.selection.mask, grown)
+    session.undo()
+    np.testing.assert_array_equal(session.selection.mask, before)
+
+
 def test_a_change_that_cannot_be_written_is_none(session, monkeypatch):
     """On a full disk the page shows what is kept, not what was refused."""
     click(session)

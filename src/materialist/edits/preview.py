@@ -62,12 +62,14 @@ class Preview:
         self.scene = scene
         self._file = file
         self._key = _key(scene)
-        self._other: tuple[Array, Tables] | None = None
-        self._turned: tuple[Array, Any] | None = None
-        """Normals [H, W, 3] of an edit, and the rays of the pixels where they differ."""
+        self._other: tuple[Array, Tables, Array] | None = None
+        """Another light, its tables, and what surfaces pass on under it."""
+        self._turned: tuple[Array, TransportCache, Guide] | None = None
+        """Normals [H, W, 3] of an edit, the rays of the pixels where they differ, and their surfaces."""
         self._turned_tables: tuple[Tables, Tables] | None = None
         """Tables of the scene's own normals, and the same with those of `_turned`."""
         self._passed_on = scene.rerender
+        """What surfaces pass on in the last picture of another light."""
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
         if kept is None:
@@ -152,24 +154,23 @@ class Preview:
         import torch
 
         from materialist.transport.cache import CacheSettings, Tables, TransportCache
-        from materialist.transport.filter import filter_tables, surface_guide
-        from materialist.transport.shading import at_roughness
+        from materialist.transport.filter import surface_guide
 
         if self._turned is None or not np.array_equal(self._turned[0], seen.normal):
             rays = CacheSettings(*RAYS)
             cache = TransportCache(seen.geometry, seen.camera, rays, region=turned)
-            self._turned = (seen.normal, cache)
+            self._turned = (seen.normal, cache, surface_guide(cache))
             self._turned_tables = None
         if self._turned_tables is None or self._turned_tables[0] is not tables:
-            cache = self._turned[1]
+            _, cache, guide = self._turned
             fitted = tables is self._tables
             passed_on = self.scene.rerender if fitted else self._passed_on
-            rows = torch.from_numpy(np.searchsorted(self._pixels, cache.pixels))
-            own = cache.gather(seen.envmap, passed_on)
-            if len(tables.levels) == 1:  # coarse ones, of one roughness [P]
-                own = at_roughness(own, tables.levels[0][rows])
-            own = filter_tables(cache, own, surface_guide(cache), sharpest=SHARPEST)
+            places = np.searchsorted(self._pixels, cache.pixels)
+            # Coarse ones are of one roughness [P].
+            roughness = tables.levels[0][places] if len(tables.levels) == 1 else None
+            own = self._filtered(cache, seen.envmap, passed_on, roughness, guide)
             mixed = Tables(tables.diffuse.clone(), tables.specular.clone(), tables.levels)
+            rows = torch.from_numpy(places)
             mixed.diffuse[rows] = own.diffuse
             mixed.specular[:, rows] = own.specular
             self._turned_tables = (tables, mixed)
@@ -227,7 +228,8 @@ class Preview:
         Coarse ones are of the scene's own roughness alone.
         """
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
-            return self._other[1]
+            _, tables, self._passed_on = self._other
+            return tables
         # First what surfaces pass on under this light, by few rays, at the roughness that they have; then the picture,
         # by all of them.
         before = self._passed_on if coarse else None
@@ -238,7 +240,7 @@ class Preview:
         )
         if not coarse:
             tables = self._filtered(self._cache, edited.envmap, self._passed_on)
-            self._other = (edited.envmap, tables)
+            self._other = (edited.envmap, tables, self._passed_on)
         return tables
 
     def _filtered(
@@ -247,8 +249,12 @@ class Preview:
         envmap: Array,
         passed_on: Array | None,
         roughness: Array | None = None,
+        guide: Guide | None = None,
     ) -> Tables:
-        """Tables of a light by the rays of one cache, without noise, of all levels or of one roughness [P] alone."""
+        """Tables of a light by the rays of one cache, without noise, of all levels or of one roughness [P] alone.
+
+        guide: its surfaces, where they are not the scene's.
+        """
         from materialist.transport.cache import levels_around
         from materialist.transport.filter import filter_tables
         from materialist.transport.shading import at_roughness
@@ -259,7 +265,7 @@ class Preview:
             tables = cache.gather(envmap, passed_on, levels_around(roughness))
             # One level to filter in place of all.
             tables = at_roughness(tables, roughness)
-        return filter_tables(cache, tables, self._guide, sharpest=SHARPEST)
+        return filter_tables(cache, tables, guide or self._guide, sharpest=SHARPEST)
 
     def _shaded(self, materials: Materials, tables: Tables):
         """[P, 3] torch radiance of the surface pixels."""

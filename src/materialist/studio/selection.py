@@ -90,11 +90,14 @@ class Selection:
         if self.clicked is None:
             raise InputError("Click an object first; then its selection can grow or shrink.")
         area = int(self.parts[-1].sum())
+        others = np.logical_or.reduce([np.zeros_like(self.parts[-1]), *self.parts[:-1]])
         regions = [choose(click=self.clicked, extent=extent) for extent in EXTENTS[1:]]
         regions.sort(key=np.sum, reverse=not larger)
         for region in regions:
             ratio = region.sum() / area
-            if (ratio if larger else 1 / ratio) >= LARGER:
+            # What other parts hold anyway is no change.
+            differs = ((region != self.parts[-1]) & ~others).any()
+            if differs and (ratio if larger else 1 / ratio) >= LARGER:
                 return Selection((*self.parts[:-1], region), self.clicked)
         size = "larger" if larger else "smaller"
         raise InputError(

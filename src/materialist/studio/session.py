@@ -229,6 +229,8 @@ class Session:
                 **{**dict.fromkeys(REGION), "mask": write_mask(self.workspace, after.mask)},
             )
         self.selection = after
+        # The edit was written beside the selection of before.
+        self._history_changed = True
         self._note_history()
         if after.mask is not None and self.glass is not None:
             self.glass.get_ready()

@@ -92,9 +92,11 @@ def test_an_extent_is_one_of_the_masks_by_size(table, monkeypatch):
         ({"click": (50, 50), "extent": "huge"}, "extent is 'huge'"),
         ({"box": (30, 30, 90, 90), "extent": "small"}, "of a click"),
         ({"click": (50, 50), "method": "grabcut", "extent": "small"}, "network answers"),
+        ({"click": (50, 50), "extent": ["small"]}, "choose one of auto, small"),
+        ({"click": (50, 50), "method": ["network"]}, "choose one of network, grabcut"),
     ],
 )
-def test_extents_that_are_refused(table, where, match):
+def test_extents_and_methods_that_are_refused(table, where, match):
     with pytest.raises(InputError, match=match):
         select(table[0], **where)
 

@@ -50,15 +50,16 @@ def edit(
         region = weight > 0.5 if (weight > 0.5).any() else weight > 0
         colour = shaded(colour, shading_detail(scene, region, changes.detail), region)
     # Mixed by the weight, so that a feathered border fades.
+    metallic = changed(materials.metallic, changes.metallic)
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
         _mix(materials.roughness, changed(materials.roughness, changes.roughness), weight),
-        _mix(materials.metallic, changed(materials.metallic, changes.metallic), weight),
+        _mix(materials.metallic, metallic, weight),
     )
     # --- Metal mirrors each bump of predicted normals: round bodies get smooth ones ---
     region = weight > 0.5
     edited = replace(scene, materials=new)
-    if is_metal(new.metallic, region, changes):
+    if is_metal(metallic, region, changes):
         edited = with_metal_normals(edited, region)
     # --- What the provenance keeps: only what was asked for ---
     names = ("hue", "saturation", "value", "grow", "feather")

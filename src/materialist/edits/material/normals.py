@@ -136,6 +136,8 @@ def _resized(values: Array, size: tuple[int, int]) -> Array:
 
 
 def _blurred(values: Array, sigma: float) -> Array:
-    """A Gaussian mean of [H, W, C], C of 1 kept."""
-    blurred = cv2.GaussianBlur(values.astype(np.float32), (0, 0), max(sigma, 0.5))
+    """A Gaussian mean of [H, W, C], 0 outside, C of 1 kept."""
+    outside = cv2.BORDER_CONSTANT
+    sigma = max(sigma, 0.5)
+    blurred = cv2.GaussianBlur(values.astype(np.float32), (0, 0), sigma, borderType=outside)
     return np.asarray(blurred).reshape(values.shape)

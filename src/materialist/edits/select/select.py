@@ -61,7 +61,7 @@ def select(
     check_process()
     if sum(v is not None for v in (click, box, mask)) != 1:
         raise InputError("Give exactly one of a click, a box or a mask.")
-    method = FORMER.get(method, method)
+    method = FORMER.get(str(method), method)
     if method not in METHODS:
         raise InputError(f"The method is '{method}'; choose one of {', '.join(METHODS)}.")
     if extent not in EXTENTS:
