@@ -39,6 +39,14 @@ class EditList:
     steps: tuple[Step, ...] = ()
     current: int | None = None
 
+    @property
+    def follows_selection(self) -> bool:
+        """Whether the current edit is one of a region that the preview shows soon enough."""
+        step = self.current_step
+        if step is None or step.operation.target is not Target.REGION:
+            return False
+        return step.operation.preview in (PreviewMode.SHADED, PreviewMode.TRACED)
+
     def add(self, step: Step) -> EditList:
         return EditList((*self.steps, step), len(self.steps))
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from materialist.color import linear_to_srgb
-from materialist.edits.select.objects import EXTENTS
+from materialist.edits.select.extents import next_region
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -18,8 +18,6 @@ ADD = "add"
 REMOVE = "remove"
 Choose = Callable[..., Array]
 """[H, W] bool of a `click`, a `box` or a `mask`, as `select` gives it."""
-LARGER = 1.05
-"""Least ratio of areas from which one region of a click is called larger than another (a definition)."""
 _PIECE_COLOUR = 14.0
 """How far colours of one piece may lie from that of its pixel, in each of L, a and b; tuned by eye."""
 
@@ -89,16 +87,11 @@ class Selection:
         """
         if self.clicked is None:
             raise InputError("Click an object first; then its selection can grow or shrink.")
-        area = int(self.parts[-1].sum())
-        others = np.logical_or.reduce([np.zeros_like(self.parts[-1]), *self.parts[:-1]])
-        regions = [choose(click=self.clicked, extent=extent) for extent in EXTENTS[1:]]
-        regions.sort(key=np.sum, reverse=not larger)
-        for region in regions:
-            ratio = region.sum() / area
-            # What other parts hold anyway is no change.
-            differs = ((region != self.parts[-1]) & ~others).any()
-            if differs and (ratio if larger else 1 / ratio) >= LARGER:
-                return Selection((*self.parts[:-1], region), self.clicked)
+        *rest, region = self.parts
+        others = np.logical_or.reduce([np.zeros_like(region), *rest])
+        after = next_region(choose, self.clicked, region, larger=larger, others=others)
+        if after is not None:
+            return Selection((*rest, after), self.clicked)
         size = "larger" if larger else "smaller"
         raise InputError(
             f"Nothing {size} is found at that click; add another click, or use the brush."

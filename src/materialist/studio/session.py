@@ -7,7 +7,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-from materialist.edits.core.operation import REGION, PreviewMode, Target
+from materialist.edits.core.operation import REGION, Target
 from materialist.edits.light.operation import RELIGHT
 from materialist.edits.recipe import Step, write_recipe
 from materialist.errors import InputError, OutputError
@@ -220,7 +220,7 @@ class Session:
 
     def _select(self, after: Selection, follows: bool) -> None:
         """Change the selection; the current edit `follows` it, or is put aside."""
-        if after.mask is None or not follows or not self._follows_selection():
+        if after.mask is None or not follows or not self.edits.follows_selection:
             self.remember("select")
             self.edits = self.edits.chosen(None)
         else:  # the current edit grows or shrinks with its region, whatever that was given as
@@ -234,13 +234,6 @@ class Session:
         self._note_history()
         if after.mask is not None and self.glass is not None:
             self.glass.get_ready()
-
-    def _follows_selection(self) -> bool:
-        """Whether the current edit is one of a region that the preview shows soon enough."""
-        step = self.edits.current_step
-        if step is None or step.operation.target is not Target.REGION:
-            return False
-        return step.operation.preview in (PreviewMode.SHADED, PreviewMode.TRACED)
 
     def deselect(self) -> None:
         with self.lock:
@@ -382,11 +375,8 @@ class Session:
             and step.operation.target is Target.PLACE
             and isinstance(step.options.get("mesh"), str)
         ):
-            self.next_object = {
-                k: step.options[k]
-                for k in ("mesh", "scale", "turn", "material")
-                if k in step.options
-            }
+            names = ("mesh", "scale", "turn", "material")
+            self.next_object = {k: step.options[k] for k in names if k in step.options}
 
     def remember(self, action: str, moving: bool = False) -> None:
         """Keep the state for undo; a slider (or colour) that moves on adds no further entry."""

@@ -17,7 +17,6 @@ when the mesh is painted anew.
 """
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
@@ -31,6 +30,7 @@ from scipy.ndimage import distance_transform_edt
 from skimage.draw import polygon
 
 from materialist.edits.composite.matte import matte
+from materialist.edits.select.extents import next_region
 from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.geometry.silhouette import window
@@ -38,7 +38,6 @@ from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict.bundled.predictor import BundledPredictor
 from materialist.predict.clicks.features import Box
-from materialist.studio.selection import Selection
 from materialist.types import Array, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row
 from materialist_lab.bench.edits import scene_of, true_scene
@@ -211,12 +210,12 @@ def _found(scene: Scene, mask: Array, **prompt: Any) -> Array:
 
 def _resized(scene: Scene, mask: Array, click: tuple[int, int]) -> dict[str, float]:
     """The best of what a click finds, and of the next smaller and the next larger object there."""
-    regions = [_found(scene, mask, click=click)]
-    clicked = Selection((regions[0],), click)
-    for larger in (False, True):
-        if regions[0].any():
-            with suppress(InputError):  # there is none
-                regions.append(clicked.resized(larger, partial(select, scene)).parts[-1])
+    region = _found(scene, mask, click=click)
+    others: list[Array | None] = []
+    if region.any():
+        choose = partial(select, scene)
+        others = [next_region(choose, click, region, larger=larger) for larger in (False, True)]
+    regions = [region, *(other for other in others if other is not None)]
     return max((_compared(region, mask) for region in regions), key=lambda row: row["iou"])
 
 

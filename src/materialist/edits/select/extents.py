@@ -1,0 +1,35 @@
+"""From the object that a click selects to the next smaller or larger one there."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from materialist.edits.select.objects import EXTENTS
+from materialist.types import Array
+
+LARGER = 1.05
+"""Least ratio of areas from which one region of a click is called larger than another (a definition)."""
+
+
+def next_region(
+    choose: Callable[..., Array],
+    click: tuple[float, float],
+    region: Array,
+    *,
+    larger: bool,
+    others: Array | None = None,
+) -> Array | None:
+    """[H, W] bool: the next larger, or smaller, object at a click than a region [H, W] bool; None where there is none.
+
+    choose: gives [H, W] bool of a `click` and an `extent`, as `select` does. others: [H, W] bool that is selected
+    besides; what it holds anyway is no change.
+    """
+    regions = [choose(click=click, extent=extent) for extent in EXTENTS[1:]]
+    regions.sort(key=np.sum, reverse=not larger)
+    area = int(region.sum())
+    for candidate in regions:
+        differs = candidate != region if others is None else (candidate != region) & ~others
+        ratio = candidate.sum() / area
+        if differs.any() and (ratio if larger else 1 / ratio) >= LARGER:
+            return candidate
+    return None
