@@ -12,6 +12,7 @@ from materialist.edits.material.options import MaterialEdit
 from materialist.geometry.build import with_normals
 from materialist.geometry.planes import upright
 from materialist.geometry.silhouette import window
+from materialist.predict import resample
 from materialist.solids.parts import objects_in, outline_normals
 from materialist.types import Array, Scene
 
@@ -23,9 +24,7 @@ class PolishedSettings:
     window: float = 0.05  # standard deviation, part of the root of an object's area
     contrast: float = 0.05  # sRGB-encoded: less in the photo is no sign of another normal
     bend: float = 0.2  # of normals in a window: less is an unevenness, more a crease
-    coarse: float = (
-        4.0  # standard deviation, pixels, of the windows where they are computed; derived: time
-    )
+    coarse: float = 4.0  # least standard deviation, pixels, on the grid of windows; derived: time
 
 
 SETTINGS = PolishedSettings()
@@ -93,7 +92,7 @@ def guided_normals(normal: Array, photo: Array, mask: Array) -> Array:
     sigma = SETTINGS.window * float(np.sqrt(mask.sum()))
     factor = max(1, int(sigma / SETTINGS.coarse))
     height, width = inside.shape[:2]
-    grid = (-(-width // factor), -(-height // factor))
+    grid = (-(-height // factor), -(-width // factor))
 
     def mean(values: Array) -> Array:
         return _blurred(_resized(values * inside, grid), sigma / factor) / norm
@@ -117,7 +116,7 @@ def guided_normals(normal: Array, photo: Array, mask: Array) -> Array:
     # --- All windows that hold a pixel, in the mean ---
     shares = _resized(inside, grid)
     line = np.concatenate([slope.reshape(*slope.shape[:2], -1), offset], -1)
-    line = _resized(_blurred(line * shares, sigma / factor) / norm, (width, height))
+    line = _resized(_blurred(line * shares, sigma / factor) / norm, (height, width))
     slope = line[..., :-3].reshape(height, width, count, 3)
     turned = unit(np.einsum("hwk,hwkc->hwc", features, slope) + line[..., -3:])
     result = np.array(normal, np.float32)
@@ -126,13 +125,10 @@ def guided_normals(normal: Array, photo: Array, mask: Array) -> Array:
 
 
 def _resized(values: Array, size: tuple[int, int]) -> Array:
-    """[h, w, C] at another size (columns, rows): means over areas, or between pixels."""
-    shrinks = size[0] <= values.shape[1]
-    method = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    """[h, w, C] at another size (rows, columns)."""
     # OpenCV resizes four channels at most.
     quads = np.split(values.astype(np.float32), range(4, values.shape[-1], 4), axis=-1)
-    resized = [cv2.resize(quad, size, interpolation=method) for quad in quads]
-    return np.concatenate([quad.reshape(size[1], size[0], -1) for quad in resized], -1)
+    return np.concatenate([resample.values(quad, size).reshape(*size, -1) for quad in quads], -1)
 
 
 def _blurred(values: Array, sigma: float) -> Array:
