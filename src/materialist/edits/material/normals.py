@@ -12,7 +12,6 @@ from materialist.edits.material.options import MaterialEdit
 from materialist.geometry.build import with_normals
 from materialist.geometry.planes import upright
 from materialist.geometry.silhouette import window
-from materialist.predict import resample
 from materialist.solids.parts import objects_in, outline_normals
 from materialist.types import Array, Scene
 
@@ -125,10 +124,12 @@ def guided_normals(normal: Array, photo: Array, mask: Array) -> Array:
 
 
 def _resized(values: Array, size: tuple[int, int]) -> Array:
-    """[h, w, C] at another size (rows, columns)."""
+    """[h, w, C] at another size (rows, columns): means over areas, or between pixels."""
+    method = cv2.INTER_AREA if size[0] < len(values) else cv2.INTER_LINEAR
     # OpenCV resizes four channels at most.
     quads = np.split(values.astype(np.float32), range(4, values.shape[-1], 4), axis=-1)
-    return np.concatenate([resample.values(quad, size).reshape(*size, -1) for quad in quads], -1)
+    resized = [cv2.resize(quad, size[::-1], interpolation=method) for quad in quads]
+    return np.concatenate([quad.reshape(*size, -1) for quad in resized], -1)
 
 
 def _blurred(values: Array, sigma: float) -> Array:
