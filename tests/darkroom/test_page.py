@@ -280,7 +280,8 @@ def test_box_brush_shift_and_alt(page):
         page.keyboard.press(key)
         said = f"document.body.innerText.includes('Nothing {name}')"
         until(page, f"(old) => ({outline})() !== old || {said}", before)
-        page.keyboard.press("Escape") if page.evaluate(f"() => {said}") else None
+        if page.evaluate(f"() => {said}"):
+            page.keyboard.press("Escape")
 
 
 def test_a_swipe_selects_nothing(browser, running):

@@ -109,8 +109,8 @@ def guided_normals(normal: Array, photo: Array, mask: Array) -> Array:
     squares = squares.reshape(*squares.shape[:2], count, count)
     products = products.reshape(*products.shape[:2], count, 3)
     covariance = squares - mean_features[..., :, None] * mean_features[..., None, :]
-    with_normal = products - mean_features[..., :, None] * mean_normal[..., None, :]
-    slope = np.linalg.solve(covariance + np.eye(count, dtype=np.float32), with_normal)
+    cross = products - mean_features[..., :, None] * mean_normal[..., None, :]
+    slope = np.linalg.solve(covariance + np.eye(count, dtype=np.float32), cross)
     offset = mean_normal - np.einsum("hwk,hwkc->hwc", mean_features, slope)
     # --- All windows that hold a pixel, in the mean ---
     shares = _resized(inside, grid)
