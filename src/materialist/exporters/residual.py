@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from materialist.bsdf.disney import combine_by_albedo
 from materialist.color import linear_to_srgb
 from materialist.render.variant import setup
 from materialist.residual import shading_residual
@@ -21,7 +22,6 @@ _METALLIC_COST = 3e-3
 """Of the square of its change, beside squared errors of sRGB values (by eye): 0.3 costs as three errors of 0.01."""
 _TOLERANCE = 2e-3
 """Radiance by which a pixel may be too bright before metallic moves: half a level of 8 bits."""
-_R0 = np.float32(0.04)
 
 
 @dataclass(frozen=True)
@@ -34,21 +34,19 @@ class _Lit:
     s1: Array
     """[P, 3] each: the specular radiance is C_0 s0 + s1."""
 
-    def black(self, metallic: Array) -> Array:
-        """[P, 3] radiance of base colour 0 with metallic [P, 1]."""
-        return _R0 * (1 - metallic) * self.s0 + self.s1
-
-    def slope(self, metallic: Array) -> Array:
-        """[P, 3] what base colour 1 adds to it."""
-        return (1 - metallic) * self.diffuse + metallic * self.s0
+    def by_colour(self, metallic: Array) -> tuple[Array, Array]:
+        """(slope, black), [P, 3] each: with metallic [P, 1] the radiance is base colour times slope + black."""
+        slope, black = combine_by_albedo(metallic, self.diffuse, self.s0, self.s1)
+        return slope, black
 
     def colour(self, radiance: Array, metallic: Array) -> Array:
         """[P, 3] base colour in [0, 1] that comes nearest to a radiance [P, 3]."""
-        slope = np.maximum(self.slope(metallic), 1e-6)
-        return np.clip((radiance - self.black(metallic)) / slope, 0, 1)
+        slope, black = self.by_colour(metallic)
+        return np.clip((radiance - black) / np.maximum(slope, 1e-6), 0, 1)
 
     def radiance(self, colour: Array, metallic: Array) -> Array:
-        return self.black(metallic) + colour * self.slope(metallic)
+        slope, black = self.by_colour(metallic)
+        return black + colour * slope
 
     def rows(self, which: Array) -> "_Lit":
         return _Lit(self.diffuse[which], self.s0[which], self.s1[which])

@@ -15,7 +15,8 @@ class CutSettings:
 
     # pixels beside a pair over which a slope must hold to count as the surface's own
     support: int = 3
-    slanted: float = 25.0  # degrees from grazing: where normals face the camera more, a steep slope is a smeared edge
+    # degrees from grazing; a steep slope whose normals face the camera more than this is a smeared edge
+    slanted: float = 25.0
     steady: float = 2.0  # factor by which a step may exceed a steady slope, as on a plane
     bending: float = 3.0  # what a slope that grows towards the pair adds to that factor, times the share it grows by
     least: float = 0.002  # share of the surface below which a region is a stray; by eye
@@ -47,6 +48,8 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
        is cut across its slope, not along the boundary.
     3. Its step in inverse depth, linear on the screen for a plane, exceeds what the slope on either side lets expect,
        or the predicted normals, if given, deny that the surface is slanted (`CutSettings`).
+
+    A pair that is below tau by itself needs no triangle: conditions 1 and 2 then hold, as in thin structures.
 
     depth: [H, W] planar scene units, 0 = no surface. tau: degrees. normal: [H, W, 3] predicted unit normals or None.
     """

@@ -105,7 +105,7 @@ class Revolution:
     def _met(self, rays: Array, start: Array, way: Array) -> Array:
         """[N] planar depth of the first point in the body from `start` [N] on, up to start + way; NaN where none is.
 
-        The function is a bound on the distance to the body: it tells the next step (sphere tracing, Hart 1996).
+        `profile.at` bounds the distance to the body: it tells the next step (sphere tracing, Hart 1996).
         """
         depth = np.full(len(rays), np.nan)
         here = start

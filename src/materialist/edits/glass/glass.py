@@ -41,7 +41,7 @@ def glass(
     fitted: Scene | None = None,
     **values: Unpack[GlassKeywords],
 ) -> Scene:
-    """The scene with the object under a mask of glass, before what it hid.
+    """The scene with the masked object made of glass, before what it hid.
 
     The model `closed` path-traces a closed body (`solids.closed`); `two-interface` is the paper's: every camera ray
     is bent twice and looks up the background, and there are no shadows.
