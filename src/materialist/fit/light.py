@@ -82,7 +82,8 @@ def fit_light(
 ) -> StageResult:
     """Move `field` so that the rendering matches the photo: argmin_E L_E, with the materials of the problem.
 
-    Beyond the paper, the difference of the light from `start` is kept smooth, white and small. photo: [H * W, 3] linear.
+    Beyond the paper, the difference of the light from `start` is kept smooth, white and small.
+    photo: [H * W, 3] linear.
     """
     # --- What stays the same in every step ---
     target = photo[problem.pixels]
