@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from solid_scenes import CAMERA, FOOT, GROUND, RAYS, UP, arc, lines, turned, view, volume
 
 from materialist.solids.outline import surface_of_revolution
@@ -58,6 +59,18 @@ def test_its_axis_and_front_are_those_of_the_object(pot):
     assert there.sum() > 0.97 * mask.sum() and error(thick, front, mask) < 0.06
     assert np.abs(depth - front.depth)[there].mean() < 0.02
     assert np.degrees(np.arccos(np.clip((normal * front.normal).sum(-1), -1, 1)))[there].mean() < 8
+
+
+@pytest.mark.parametrize("lean", [9, 13])
+def test_its_outline_corrects_an_axis_seen_too_much_from_above(lean):
+    front, mask = view(turned(lines((0.0, 0.0), (0.3, 0.0), (0.3, 0.7), (0.0, 0.7))))
+    way = FOOT / np.linalg.norm(FOOT)
+    toward = Rotation.from_rotvec(-np.radians(lean) * np.cross(UP, way)).apply(UP)
+    body, _ = surface_of_revolution(
+        front.depth, front.normal, mask, CAMERA, up=toward, behind=GROUND
+    )
+    assert toward @ way < UP @ way  # seen more from above
+    assert np.degrees(np.arccos(np.clip(body.axis.up @ UP, -1, 1))) < 0.6 * lean
 
 
 def test_a_cylinder_becomes_an_open_pot(pot, ball):

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import splev, splprep
-from scipy.ndimage import binary_fill_holes, map_coordinates
+from scipy.ndimage import binary_erosion, binary_fill_holes, map_coordinates
 from scipy.optimize import minimize_scalar
+from scipy.spatial.transform import Rotation
 from skimage.measure import find_contours
 
 from materialist.camera import pixel_rays, project, unit
@@ -35,6 +36,14 @@ class OutlineSettings:
     min_step_ratio: float = 0.9  # of `_step_ratio`, over the normals of the side
     max_side_tilt: float = 0.5  # normals that look up or down by less than this are of the side
     min_view_sine: float = 0.3  # sine of the angle between axis and view; from above less shows
+
+    # How far from above the object is seen, at most; from 40 made objects.
+    # pixels between hull and outline: its axis stays as given, and another one is sought
+    gaps: tuple[float, float] = (0.3, 2.5)
+    max_axis_error: float = 16.0  # degrees by which the given axis may be off
+    min_axis_error: float = 5.0  # degrees up to which an outline cannot tell
+    axis_step: float = 2.0  # degrees between the axes that are tried
+    gap_tolerance: float = 0.2  # pixels above the least gap: the first axis within it is taken
 
     # How the body is scaled until it stands on the ground.
     max_ground_gap: float = 0.15  # heights between base and ground up to which the base is moved
@@ -101,18 +110,14 @@ def _fitted_body(up: Array, seen: _ObjectMaps) -> tuple[Revolution, Array] | Non
     middle = seen.rays[seen.inside].mean(0)
     if np.linalg.norm(np.cross(up, middle)) < SETTINGS.min_view_sine * np.linalg.norm(middle):
         return None
-    # --- The axis: it lies in the upright plane at which the mask mirrors itself ---
-    across, overlap = mirror_plane(seen.inside, seen.rays, up, seen.camera)
-    if overlap < SETTINGS.min_mirror_overlap:
+    hull = _hull_by_outline(up, seen)
+    if hull is None:
         return None
-    ahead = np.cross(across, up)
-    first = Axis(up, ahead * np.sign(ahead @ middle))  # at distance 1
+    across = hull.across
+    up = hull.first.up
 
     # --- Two candidates from the visual hull: the upper end is round, or flat ---
-    border = _border(silhouette_field(seen.inside), first, seen.camera)
-    if border is None:
-        return None
-    bodies = [_placed(first, border, seen, round_top) for round_top in (True, False)]
+    bodies = [_placed(hull, seen, round_top) for round_top in (True, False)]
     candidates = [
         (body, *body.front(seen.inside, seen.rays)) for body in bodies if body is not None
     ]
@@ -132,6 +137,73 @@ def _fitted_body(up: Array, seen: _ObjectMaps) -> tuple[Revolution, Array] | Non
         return None
     is_covered = covered.sum() > SETTINGS.min_coverage * seen.inside.sum()
     return (body, front) if is_covered and body.profile.lines() else None
+
+
+class _VisualHull(NamedTuple):
+    """The largest body around an axis that stays inside the outline."""
+
+    first: Axis
+    """Its axis, at distance 1."""
+    across: Array
+    """[3] unit normal of the upright plane at which the mask mirrors itself."""
+    border: Array
+    """[K, 2] from its lower to its upper end: distance from the axis, height."""
+    cell: float
+    """Size of a cell of the grid in which the border was sought."""
+
+
+def _hull_by_outline(up: Array, seen: _ObjectMaps) -> _VisualHull | None:
+    """The visual hull around an axis along `up`, or one seen less from above where that fills the outline better.
+
+    The normal of a predicted ground is often 10 degrees off. Seen too much from above, circles become ellipses that are
+    higher than those of the outline: no body with such an axis fills the corners of a flat base.
+    """
+    view = unit(seen.rays[seen.inside].mean(0))
+    sideways = unit(np.cross(up, view))
+    elevation = np.degrees(np.arcsin(np.clip(-(up @ view), -1, 1)))
+    # --- As given, then less and less from above, down to level with the camera ---
+    hulls: list[tuple[float, _VisualHull]] = []
+    most = np.clip(elevation, SETTINGS.axis_step, SETTINGS.max_axis_error)
+    for lean in np.arange(0, most, SETTINGS.axis_step):
+        leaned = Rotation.from_rotvec(np.radians(lean) * sideways).apply(up)
+        across, overlap = mirror_plane(seen.inside, seen.rays, leaned, seen.camera)
+        # Leaning in the mirror plane changes little of the overlap.
+        if overlap < SETTINGS.min_mirror_overlap:
+            break
+        hull = _visual_hull(leaned, across, seen)
+        gap = np.inf if hull is None else _gap(hull, seen)
+        if hull is not None:
+            hulls.append((gap, hull))
+        # Where the first fills the outline, or hardly any of it, no other is sought.
+        if lean == 0 and not SETTINGS.gaps[0] < gap <= SETTINGS.gaps[1]:
+            break
+    if not hulls:
+        return None
+    # --- The first that fills the outline as well as any, unless the given one is nearly the same ---
+    enough = min(gap for gap, _ in hulls) + SETTINGS.gap_tolerance
+    chosen = next(hull for gap, hull in hulls if gap <= enough)
+    cosine = np.clip(chosen.first.up @ up, -1, 1)
+    return chosen if np.degrees(np.arccos(cosine)) > SETTINGS.min_axis_error else hulls[0][1]
+
+
+def _visual_hull(up: Array, across: Array, seen: _ObjectMaps) -> _VisualHull | None:
+    """The visual hull around the axis along `up` in the mirror plane with normal `across`; None where it is empty."""
+    ahead = np.cross(across, up)
+    first = Axis(up, ahead * np.sign(ahead @ seen.rays[seen.inside].mean(0)))
+    border = _border(silhouette_field(seen.inside), first, seen.camera)
+    return None if border is None else _VisualHull(first, across, *border)
+
+
+def _gap(hull: _VisualHull, seen: _ObjectMaps) -> float:
+    """Pixels by which the hull stays inside the outline, a mean along it; infinite where there is no hull."""
+    far = float(np.linalg.norm(hull.first.foot))
+    line = _capped(hull.border, far, seen.camera, hull.cell, round_top=True)
+    if line is None:
+        return np.inf
+    body = Revolution(hull.first, Profile.of(line, hull.cell, float(line[0, 1])))
+    missed = seen.inside & (body.front(seen.inside, seen.rays)[0] == 0)
+    outline = seen.inside & ~binary_erosion(seen.inside)
+    return float(missed.sum() / outline.sum())
 
 
 def _step_ratio(body_side: Array, map_side: Array) -> float:
@@ -195,15 +267,14 @@ def has_mirror_image(inside: Array, rays: Array, across: Array, camera: Camera) 
     return result
 
 
-def _placed(
-    first: Axis, border: tuple[Array, float], seen: _ObjectMaps, round_top: bool
-) -> Revolution | None:
+def _placed(hull: _VisualHull, seen: _ObjectMaps, round_top: bool) -> Revolution | None:
     """The body where the depth map has its front, or as far away as the ground that it stands on.
 
-    first: its axis at distance 1. border: as of `_border`. Its upper end is round, or flat.
+    Its upper end is round, or flat.
     """
-    whole, cell = border
-    line = _capped(whole, float(np.linalg.norm(first.foot)), seen.camera, cell, round_top)
+    first = hull.first
+    cell = hull.cell
+    line = _capped(hull.border, float(np.linalg.norm(first.foot)), seen.camera, cell, round_top)
     if line is None:
         return None
 

@@ -13,6 +13,7 @@ from skimage.morphology import remove_small_holes, remove_small_objects
 from materialist.camera import rays_at, unit
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.integrate import integrated
+from materialist.geometry.manhattan import drawn_to_frame, manhattan_frame
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
 from materialist.predict.bundled.edges import GuidedFilter, grabcut, weighted_median
@@ -126,7 +127,12 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     coarse = np.log(np.where(known, depth, 1)).astype(np.float32)
     seen = resample.values(np.ascontiguousarray(rays), middle)
     sharp = weighted_median(coarse, guide, known)
-    depth = integrated(np.where(known, np.exp(sharp), 0), normal, seen)
+    depth = np.where(known, np.exp(sharp), 0)
+    # Floors and walls follow the directions of the photo's straight edges, and depth follows the normals.
+    frame = manhattan_frame(photo, normal, depth, seen)
+    if frame is not None:
+        normal = drawn_to_frame(normal, depth, frame)
+    depth = integrated(depth, normal, seen)
     if middle != size:
         depth = resample.depth(depth, size)
         normal = resample.normals(normal, size)
