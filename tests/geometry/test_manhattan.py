@@ -61,6 +61,9 @@ def test_without_straight_edges_or_normals_along_them_there_is_none(room):
     noise = np.random.default_rng(0).random(picture.shape).astype(np.float32)
     assert manhattan_frame(noise, normal, depth, RAYS) is None
     assert manhattan_frame(np.full_like(picture, 0.5), normal, depth, RAYS) is None
+    assert manhattan_frame(picture, normal, np.zeros_like(depth), RAYS) is None  # all sky
+    for small in (np.s_[:1, :1], np.s_[:5, :40]):
+        assert manhattan_frame(picture[small], normal[small], depth[small], RAYS[small]) is None
     diagonal = np.broadcast_to(unit(AXES.sum(0)), normal.shape)
     assert manhattan_frame(picture, diagonal, depth, RAYS) is None
 

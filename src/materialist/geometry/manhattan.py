@@ -35,13 +35,10 @@ class ManhattanSettings:
     min_near: float = 0.4  # share of the normals that are near an axis; by chance 0.28
 
     # Normals near an axis.
-    ramp: tuple[float, float] = (
-        25.0,
-        40.0,
-    )  # degrees: on the axis up to the first, untouched from the second on
-    detail: float = (
-        0.006  # standard deviation below which normals are relief and stay, longer sides
-    )
+    # degrees: on the axis up to the first, untouched from the second on
+    ramp: tuple[float, float] = (25.0, 40.0)
+    # standard deviation below which normals are relief and stay, longer sides
+    detail: float = 0.006
     step: float = 0.04  # of log depth between neighbours, at which a surface ends
     min_area: float = 0.01  # share of the picture that a floor or wall has at least
     max_turn: float = 30.0  # degrees by which normals may turn across it: round things turn more
@@ -61,7 +58,8 @@ def manhattan_frame(
     normal, depth: [H, W, 3] unit, [H, W] planar, 0 = none. rays: [H, W, 2 or more] x and y of the rays at z = -1.
     """
     planes, length = _edges(picture, rays)
-    if len(planes) < SETTINGS.min_edges:
+    known = normal[depth > 0]
+    if len(planes) < SETTINGS.min_edges or not len(known):
         return None
     weight = np.minimum(length, SETTINGS.longest)
     weight /= weight.sum()
@@ -77,7 +75,6 @@ def manhattan_frame(
     frames = np.stack([first, second, np.cross(first, second)], 1)  # [D, 3, 3]
     away = np.abs(np.einsum("nc,dkc->dnk", planes, frames)).min(-1)  # sine of the angle, [D, N]
     score = np.clip(1 - (away / near) ** 2, 0, 1) @ weight
-    known = normal[depth > 0]
     some = known[:: max(1, len(known) // SETTINGS.most_normals)]
     shares = np.clip(1 - _angles(some, frames) / SETTINGS.ramp[1], 0, 1).mean(-1)
     score += SETTINGS.normals_weight * shares
@@ -119,10 +116,10 @@ def drawn_to_frame(normal: Array, depth: Array, frame: Array) -> Array:
         for piece in 1 + np.flatnonzero(area[1:] >= SETTINGS.min_area * depth.size):
             flat[_flat_part(smooth, pieces == piece)] = 1
     # Steps of depth inside of them leave lines.
-    flat = cv2.morphologyEx(flat, cv2.MORPH_CLOSE, disc(SETTINGS.lines))
+    closed = cv2.morphologyEx(flat, cv2.MORPH_CLOSE, disc(SETTINGS.lines))
     # --- Drawn to the axis, with their relief ---
     low, high = SETTINGS.ramp
-    share = (np.clip((high - angle) / (high - low), 0, 1) * flat)[..., None]
+    share = (np.clip((high - angle) / (high - low), 0, 1) * closed)[..., None]
     drawn = unit(smooth + share * (axes[nearest] - smooth))
     return unit(drawn + normal - smooth).astype(np.float32)
 
