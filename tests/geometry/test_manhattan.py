@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from materialist.camera import pixel_rays, project, unit
-from materialist.geometry.manhattan import drawn_to_frame, manhattan_frame
+from materialist.geometry.manhattan import drawn_to_axes, manhattan_axes
 from materialist.types import Camera
 
 CAMERA = Camera(320, 240, 60.0)
@@ -47,39 +47,69 @@ def off(normal, degrees):
     return turn.apply(normal.reshape(-1, 3)).reshape(normal.shape)
 
 
-def test_the_frame_of_a_room_is_known_by_its_edges(room):
+def test_the_directions_of_a_room_are_known_by_its_edges(room):
     picture, normal, depth = room
-    frame = manhattan_frame(picture, off(normal, 12), depth, RAYS)
-    assert np.allclose(frame @ frame.T, np.eye(3), atol=1e-6)
-    best = np.abs(frame @ AXES.T).max(0)
+    axes = manhattan_axes(picture, off(normal, 12), depth, RAYS)
+    assert axes.shape == (3, 3)
+    best = np.abs(axes @ AXES.T).max(0)
     assert np.degrees(np.arccos(best)).max() < 1.5
-    assert np.allclose(frame, manhattan_frame(picture, off(normal, 12), depth, RAYS))  # one seed
+    # The mirror image has the mirrored ones.
+    turn = np.array([-1, 1, 1])
+    mirrored = manhattan_axes(
+        np.ascontiguousarray(picture[:, ::-1]),
+        off(normal, 12)[:, ::-1] * turn,
+        depth[:, ::-1],
+        RAYS[:, ::-1] * turn,
+    )
+    assert np.allclose(np.abs((mirrored * turn) @ axes.T).max(0), 1, atol=1e-3)
 
 
-def test_without_straight_edges_or_normals_along_them_there_is_none(room):
+def test_without_straight_edges_or_normals_along_them_there_are_none(room):
     picture, normal, depth = room
     noise = np.random.default_rng(0).random(picture.shape).astype(np.float32)
-    assert manhattan_frame(noise, normal, depth, RAYS) is None
-    assert manhattan_frame(np.full_like(picture, 0.5), normal, depth, RAYS) is None
-    assert manhattan_frame(picture, normal, np.zeros_like(depth), RAYS) is None  # all sky
+    assert not len(manhattan_axes(noise, normal, depth, RAYS))
+    assert not len(manhattan_axes(np.full_like(picture, 0.5), normal, depth, RAYS))
+    assert not len(manhattan_axes(picture, normal, np.zeros_like(depth), RAYS))  # all sky
     for small in (np.s_[:1, :1], np.s_[:5, :40]):
-        assert manhattan_frame(picture[small], normal[small], depth[small], RAYS[small]) is None
+        cut = manhattan_axes(picture[small], normal[small], depth[small], RAYS[small])
+        assert not len(cut)
+        assert np.array_equal(drawn_to_axes(normal, depth, RAYS, cut), normal)
     diagonal = np.broadcast_to(unit(AXES.sum(0)), normal.shape)
-    assert manhattan_frame(picture, diagonal, depth, RAYS) is None
+    assert not len(manhattan_axes(picture, diagonal, depth, RAYS))
 
 
-@pytest.mark.parametrize("degrees", [8, 20])
+def test_stripes_alone_tell_no_frame(room):
+    _, normal, depth = room
+    stripes = np.where(np.indices(depth.shape)[1] % 8 < 4, 0.2, 0.7).astype(np.float32)
+    picture = np.repeat(stripes[..., None], 3, -1)
+    assert not len(manhattan_axes(picture, normal, depth, RAYS))
+
+
+def test_axes_that_turn_surfaces_away_are_wrong():
+    seen = np.broadcast_to(unit(np.array([1.0, 0.0, 0.62])), RAYS.shape)
+    assert ((seen * -RAYS).sum(-1) > 0).all()
+    depth = np.ones(RAYS.shape[:2])
+    for x, drawn in (
+        (0.8, True),
+        (0.35, False),
+    ):  # the second faces away from the rays at the right
+        axes = unit(np.array([[1.0, 0.0, x]]))
+        result = drawn_to_axes(seen, depth, RAYS, axes)
+        assert (between(result, seen).max() > 3) == drawn
+
+
+@pytest.mark.parametrize("degrees", [8, 13])
 def test_floors_and_walls_are_drawn_to_it(room, degrees):
     _, normal, depth = room
     predicted = off(normal, degrees)
-    drawn = drawn_to_frame(predicted, depth, AXES)
+    drawn = drawn_to_axes(predicted, depth, RAYS, AXES)
     known = depth > 0
     assert np.allclose(np.linalg.norm(drawn[known], axis=-1), 1, atol=1e-4)
     assert np.median(between(drawn, normal)[known]) < 1
     assert between(drawn, normal)[known].mean() < 0.2 * degrees
     # What is as far from one axis as from the others stays.
     slanted = np.broadcast_to(unit(AXES.sum(0)), normal.shape)
-    assert np.allclose(drawn_to_frame(slanted, depth, AXES), slanted, atol=1e-4)
+    assert np.allclose(drawn_to_axes(slanted, depth, RAYS, AXES), slanted, atol=1e-4)
 
 
 def test_relief_stays_and_so_does_a_ball(room):
@@ -87,7 +117,7 @@ def test_relief_stays_and_so_does_a_ball(room):
     rows, columns = np.indices(depth.shape)
     # --- Relief finer than a floor's bend ---
     relief = unit(off(normal, 8) + 0.2 * np.sin(2.5 * columns)[..., None] * AXES[2])
-    drawn = drawn_to_frame(relief, depth, AXES)
+    drawn = drawn_to_axes(relief, depth, RAYS, AXES)
     floor = normal @ AXES[1] > 0.9
     waves = (drawn @ AXES[2])[floor]
     assert waves.std() > 0.7 * (relief @ AXES[2])[floor].std()
@@ -100,6 +130,6 @@ def test_relief_stays_and_so_does_a_ball(room):
     front = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], -1)
     with_ball = np.where(ball[..., None], front, off(normal, 8))
     nearer = np.where(ball, 2 - 0.3 * front[..., 2], depth)
-    drawn = drawn_to_frame(with_ball, nearer, AXES)
+    drawn = drawn_to_axes(with_ball, nearer, RAYS, AXES)
     inside = cv2.erode(ball.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0
     assert np.quantile(between(drawn, with_ball)[inside], 0.9) < 3

@@ -1,8 +1,8 @@
 """Three directions at right angles, as rooms and streets have them, and normals that are drawn to them.
 
 Straight edges of a building run along three directions. In the picture, those of one direction meet in a vanishing
-point, which tells the direction to a degree or two; predicted normals of the same floors and walls are 5 to 30 degrees
-off. An edge and the camera span a plane: its normal is at right angles to the direction of the edge.
+point, which tells the direction; predicted normals of the same floors and walls are 5 to 30 degrees off. An edge and
+the camera span a plane: its normal is at right angles to the direction of the edge.
 """
 
 from dataclasses import dataclass
@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from scipy.ndimage import label
+from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.camera import unit
-from materialist.geometry.silhouette import disc
 from materialist.types import Array
 
 
@@ -25,101 +25,156 @@ class ManhattanSettings:
     longest: float = 0.2  # from which on edges weigh alike, longer sides
     most_edges: int = 400  # the longest are used; derived: time
     tolerance: float = 2.0  # degrees between an edge and its direction
-    min_apart: float = 0.05  # sine of the angle between two edges' planes that tell a direction
+    min_sine: float = 0.05  # sine of the angle between two edges' planes that tell a direction
     most_normals: int = 300  # are looked at; derived: time
     normals_weight: float = 0.5  # of the normals beside the edges
     draws: int = 2000  # frames that are tried; derived: time
     rounds: int = 10  # of least squares, at most
+    refined: int = 20  # of the best drawn frames; derived: time
     min_edges: int = 100  # with fewer a picture has no frame
-    min_support: float = 0.42  # share of the edges' length that the frame explains; else it is none
-    min_near: float = 0.4  # share of the normals that are near an axis; by chance 0.28
+    # shares of the edges' length that a frame explains: in all, along its second and along its third direction
+    min_support: tuple[float, float, float] = (0.42, 0.1, 0.02)
+    near: float = 25.0  # degrees from an axis up to which a normal is near it
+    min_near: float = 0.4  # share of the normals that are
+    max_apart: float = 3.0  # degrees between directions of the picture and of its mirror image
 
     # Normals near an axis.
     # degrees: on the axis up to the first, untouched from the second on
-    ramp: tuple[float, float] = (25.0, 40.0)
+    ramp: tuple[float, float] = (15.0, 30.0)
     # standard deviation below which normals are relief and stay, longer sides
     detail: float = 0.006
     step: float = 0.04  # of log depth between neighbours, at which a surface ends
     min_area: float = 0.01  # share of the picture that a floor or wall has at least
     max_turn: float = 30.0  # degrees by which normals may turn across it: round things turn more
     max_off: float = 20.0  # degrees from that turn: what is farther off stands out
-    lines: int = 2  # pixels: half the width of gaps that are closed
+    min_piece: float = 0.001  # share of the picture below which holes and islands are filled
+    blur: float = (
+        2.0  # standard deviation, pixels, of the border between what is drawn and what is not
+    )
+    max_away: float = (
+        0.005  # share of the picture that an axis may turn away from the camera; else it is wrong
+    )
 
 
 SETTINGS = ManhattanSettings()
 
 
-def manhattan_frame(
-    picture: Array, normal: Array, depth: Array, rays: Array, seed: int = 0
-) -> Array | None:
-    """[3, 3] three unit directions at right angles, as rows, along which most straight edges run; None without such.
+def manhattan_axes(picture: Array, normal: Array, depth: Array, rays: Array) -> Array:
+    """[K, 3] unit directions at right angles, at most three, along which most straight edges run; none without such.
 
     Of frames that explain the edges alike, the one that more normals are near. picture: [H, W, 3] sRGB-encoded.
     normal, depth: [H, W, 3] unit, [H, W] planar, 0 = none. rays: [H, W, 2 or more] x and y of the rays at z = -1.
     """
-    planes, length = _edges(picture, rays)
     known = normal[depth > 0]
-    if len(planes) < SETTINGS.min_edges or not len(known):
-        return None
+    none = np.zeros((0, 3))
+    if not len(known):
+        return none
+    some = known[:: max(1, len(known) // SETTINGS.most_normals)]
+    # --- A frame of the edges of the picture, and one of those of its mirror image: other edges are found there ---
+    frames = []
+    mirrored = np.ascontiguousarray(picture[:, ::-1])
+    for seen, seen_rays in ((picture, rays), (mirrored, rays[:, ::-1])):
+        edges = _edges(seen, seen_rays)
+        frame = _frame_of(*edges, some) if len(edges[0]) >= SETTINGS.min_edges else None
+        if frame is None:
+            return none
+        frames.append(frame)
+    # --- Only directions that both have ---
+    cosine = frames[0] @ frames[1].T
+    partner = np.abs(cosine).argmax(1)
+    sign = np.sign(cosine[np.arange(3), partner])[:, None]
+    mean = unit(frames[0] + sign * frames[1][partner])
+    return mean[np.abs(cosine).max(1) >= np.cos(np.radians(SETTINGS.max_apart))]
+
+
+def _frame_of(planes: Array, length: Array, normals: Array) -> Array | None:
+    """The frame [3, 3] of edges (`_edges`) and some normals [N, 3]; None where it does not explain both."""
     weight = np.minimum(length, SETTINGS.longest)
     weight /= weight.sum()
     near = np.sin(np.radians(SETTINGS.tolerance))
     # --- Frames of three edges: two that share a direction, and one of another (RANSAC) ---
-    drawn = np.random.default_rng(seed).choice(len(planes), (SETTINGS.draws, 3), p=weight)
+    drawn = np.random.default_rng(0).choice(len(planes), (SETTINGS.draws, 3), p=weight)
     one, other, third = np.moveaxis(planes[drawn], 1, 0)
     first = np.cross(one, other)
     second = np.cross(unit(first), third)
     # Edges on one line leave their direction open, and so does a third edge of the same one.
-    apart = np.minimum(np.linalg.norm(first, axis=-1), np.linalg.norm(second, axis=-1))
+    sine = np.minimum(np.linalg.norm(first, axis=-1), np.linalg.norm(second, axis=-1))
     first, second = unit(first), unit(second)
-    frames = np.stack([first, second, np.cross(first, second)], 1)  # [D, 3, 3]
-    away = np.abs(np.einsum("nc,dkc->dnk", planes, frames)).min(-1)  # sine of the angle, [D, N]
-    score = np.clip(1 - (away / near) ** 2, 0, 1) @ weight
-    some = known[:: max(1, len(known) // SETTINGS.most_normals)]
-    shares = np.clip(1 - _angles(some, frames) / SETTINGS.ramp[1], 0, 1).mean(-1)
-    score += SETTINGS.normals_weight * shares
-    frame = frames[np.argmax(np.where(apart > SETTINGS.min_apart, score, -1))]
-    # --- Each direction by least squares over its edges, then at right angles again ---
+    frames = np.stack([first, second, np.cross(first, second)], 1)[sine > SETTINGS.min_sine]
+
+    def score(frames: Array) -> Array:
+        """[D] by edges and normals, of frames [D, 3, 3]."""
+        away = np.abs(np.einsum("nc,dkc->dnk", planes, frames)).min(-1)  # sine of the angle
+        close = np.clip(1 - _angles(normals, frames) / SETTINGS.ramp[1], 0, 1).mean(-1)
+        return np.clip(1 - (away / near) ** 2, 0, 1) @ weight + SETTINGS.normals_weight * close
+
+    # --- The best of them, each direction by least squares over its edges, then at right angles again ---
+    best = frames[np.argsort(-score(frames))[: SETTINGS.refined]]
+    if not len(best):
+        return None
+    refined = np.stack([_refined(frame, planes, weight) for frame in best])
+    frame = refined[np.argmax(score(refined))]
+    # --- Whether it explains edges and normals ---
+    away = np.abs(planes @ frame.T)
+    whose = np.where(away.min(1) < near, away.argmin(1), 3)
+    support = np.sort(np.bincount(whose, weight, 4)[:3])[::-1]
+    explained = np.array([support.sum(), *support[1:]]) >= SETTINGS.min_support
+    close = (_angles(normals, frame) < SETTINGS.near).mean() >= SETTINGS.min_near
+    return frame if explained.all() and close else None
+
+
+def _refined(frame: Array, planes: Array, weight: Array) -> Array:
+    """[3, 3] the frame by least squares over the edges along it."""
+    near = np.sin(np.radians(SETTINGS.tolerance))
     for _ in range(SETTINGS.rounds):
         away = np.abs(planes @ frame.T)
         whose = np.where(away.min(1) < near, away.argmin(1), -1)
         moved = frame.copy()
         for k in range(3):
-            own = whose == k
-            if own.sum() > 1:
-                direction = np.linalg.svd(planes[own] * weight[own, None])[2][-1]
+            own = planes[whose == k] * weight[whose == k, None]
+            if len(own) > 1:
+                direction = np.linalg.eigh(own.T @ own)[1][:, 0]
                 moved[k] = direction * np.sign(direction @ frame[k])
         left, _, right = np.linalg.svd(moved)
+        if np.abs(left @ right - frame).max() < 1e-4:
+            break
         frame = left @ right
-    # --- Whether it explains edges and normals ---
-    support = weight[np.abs(planes @ frame.T).min(1) < near].sum()
-    close = (_angles(some, frame) < SETTINGS.ramp[0]).mean()
-    return frame if support >= SETTINGS.min_support and close >= SETTINGS.min_near else None
+    return frame
 
 
-def drawn_to_frame(normal: Array, depth: Array, frame: Array) -> Array:
-    """[H, W, 3] unit normals: those of floors and walls near an axis of the frame [3, 3] are drawn to it.
+def drawn_to_axes(normal: Array, depth: Array, rays: Array, axes: Array) -> Array:
+    """[H, W, 3] unit normals: those of floors and walls near one of the axes [K, 3] are drawn to it.
 
-    Relief stays on them, and so do round things. normal: [H, W, 3] unit. depth: [H, W] planar, 0 = no surface.
+    Fine relief stays on them, and so do most round things; slopes up to 15 degrees are lost. Axes that would turn
+    more than a few of them away from the camera are wrong, and nothing is drawn. normal: [H, W, 3] unit.
+    depth: [H, W] planar, 0 = no surface. rays: [H, W, 2 or more] x and y of the rays at z = -1.
     """
-    axes = np.concatenate([frame, -frame])
+    if not len(axes):
+        return normal
+    axes = np.concatenate([axes, -axes])
     smooth = unit(cv2.GaussianBlur(normal, (0, 0), SETTINGS.detail * max(depth.shape)))
     cosine = smooth @ axes.T
     nearest = cosine.argmax(-1)
     angle = np.degrees(np.arccos(np.clip(cosine.max(-1), -1, 1)))
     # --- Floors and walls: large pieces near one axis, whose normals hardly turn across them ---
     candidates = (angle < SETTINGS.ramp[1]) & _within(depth)
-    flat = np.zeros(depth.shape, np.uint8)
+    flat = np.zeros(depth.shape, bool)
     for k in range(len(axes)):
         pieces, count = label(candidates & (nearest == k))
         area = np.bincount(pieces.ravel(), minlength=count + 1)
         for piece in 1 + np.flatnonzero(area[1:] >= SETTINGS.min_area * depth.size):
-            flat[_flat_part(smooth, pieces == piece)] = 1
-    # Steps of depth inside of them leave lines.
-    closed = cv2.morphologyEx(flat, cv2.MORPH_CLOSE, disc(SETTINGS.lines))
-    # --- Drawn to the axis, with their relief ---
+            flat |= _flat_part(smooth, pieces == piece)
+    # Steps of depth inside of them leave lines, and what stands out leaves specks.
+    small = int(SETTINGS.min_piece * depth.size)
+    flat = remove_small_objects(remove_small_holes(flat, max_size=small), max_size=small)
+    # --- How far each is drawn; none away from the camera ---
     low, high = SETTINGS.ramp
-    share = (np.clip((high - angle) / (high - low), 0, 1) * closed)[..., None]
+    share = np.clip((high - angle) / (high - low), 0, 1) * flat
+    away = (axes[nearest][..., :2] * rays[..., :2]).sum(-1) - axes[nearest][..., 2] > 0
+    if (away & (share > 0)).mean() > SETTINGS.max_away:
+        return normal
+    share = cv2.GaussianBlur(share * ~away, (0, 0), SETTINGS.blur)[..., None]
+    # --- Drawn to the axis, with their relief ---
     drawn = unit(smooth + share * (axes[nearest] - smooth))
     return unit(drawn + normal - smooth).astype(np.float32)
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import splev, splprep
-from scipy.ndimage import binary_erosion, binary_fill_holes, map_coordinates
+from scipy.ndimage import binary_dilation, binary_erosion, binary_fill_holes, map_coordinates
 from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 from skimage.measure import find_contours
@@ -43,6 +43,9 @@ class OutlineSettings:
     max_axis_error: float = 16.0  # degrees by which the given axis may be off
     min_axis_error: float = 5.0  # degrees up to which an outline cannot tell
     axis_step: float = 2.0  # degrees between the axes that are tried
+    beside: int = 3  # pixels beside what a hull leaves out, where nearer things are sought
+    nearer: float = 0.97  # of its depth, from which a thing lies before it
+    min_hidden: float = 0.3  # share of those pixels from which it may be hidden
     gap_tolerance: float = 0.2  # pixels above the least gap: the first axis within it is taken
 
     # How the body is scaled until it stands on the ground.
@@ -158,32 +161,32 @@ def _hull_by_outline(up: Array, seen: _ObjectMaps) -> _VisualHull | None:
     The normal of a predicted ground is often 10 degrees off. Seen too much from above, circles become ellipses that are
     higher than those of the outline: no body with such an axis fills the corners of a flat base.
     """
-    view = unit(seen.rays[seen.inside].mean(0))
-    sideways = unit(np.cross(up, view))
-    elevation = np.degrees(np.arcsin(np.clip(-(up @ view), -1, 1)))
-    # --- As given, then less and less from above, down to level with the camera ---
-    hulls: list[tuple[float, _VisualHull]] = []
-    most = np.clip(elevation, SETTINGS.axis_step, SETTINGS.max_axis_error)
-    for lean in np.arange(0, most, SETTINGS.axis_step):
-        leaned = Rotation.from_rotvec(np.radians(lean) * sideways).apply(up)
-        across, overlap = mirror_plane(seen.inside, seen.rays, leaned, seen.camera)
-        # Leaning in the mirror plane changes little of the overlap.
-        if overlap < SETTINGS.min_mirror_overlap:
-            break
-        hull = _visual_hull(leaned, across, seen)
-        gap = np.inf if hull is None else _gap(hull, seen)
-        if hull is not None:
-            hulls.append((gap, hull))
-        # Where the first fills the outline, or hardly any of it, no other is sought.
-        if lean == 0 and not SETTINGS.gaps[0] < gap <= SETTINGS.gaps[1]:
-            break
-    if not hulls:
+    across, overlap = mirror_plane(seen.inside, seen.rays, up, seen.camera)
+    if overlap < SETTINGS.min_mirror_overlap:
         return None
+    # --- The given axis, where it fills the outline, or hardly any of it, or something hides the rest ---
+    given = _visual_hull(up, across, seen)
+    if given is None:
+        return None
+    least = _missed(given, seen)
+    if not SETTINGS.gaps[0] < _gap(least, seen) <= SETTINGS.gaps[1] or _is_hidden(least, seen):
+        return given
+    # --- Less and less from above, in the mirror plane, down to level with the camera ---
+    hulls = [(_gap(least, seen), given)]
+    view = unit(seen.rays[seen.inside].mean(0))
+    sideways = across * np.sign(across @ np.cross(up, view))
+    elevation = np.degrees(np.arcsin(np.clip(-(up @ view), -1, 1)))
+    most = min(elevation, SETTINGS.max_axis_error)
+    for lean in np.arange(SETTINGS.axis_step, most + 1e-6, SETTINGS.axis_step):
+        leaned = Rotation.from_rotvec(np.radians(lean) * sideways).apply(up)
+        hull = _visual_hull(leaned, across, seen)
+        if hull is not None:
+            hulls.append((_gap(_missed(hull, seen), seen), hull))
     # --- The first that fills the outline as well as any, unless the given one is nearly the same ---
     enough = min(gap for gap, _ in hulls) + SETTINGS.gap_tolerance
     chosen = next(hull for gap, hull in hulls if gap <= enough)
     cosine = np.clip(chosen.first.up @ up, -1, 1)
-    return chosen if np.degrees(np.arccos(cosine)) > SETTINGS.min_axis_error else hulls[0][1]
+    return chosen if np.degrees(np.arccos(cosine)) > SETTINGS.min_axis_error else given
 
 
 def _visual_hull(up: Array, across: Array, seen: _ObjectMaps) -> _VisualHull | None:
@@ -194,16 +197,30 @@ def _visual_hull(up: Array, across: Array, seen: _ObjectMaps) -> _VisualHull | N
     return None if border is None else _VisualHull(first, across, *border)
 
 
-def _gap(hull: _VisualHull, seen: _ObjectMaps) -> float:
-    """Pixels by which the hull stays inside the outline, a mean along it; infinite where there is no hull."""
+def _missed(hull: _VisualHull, seen: _ObjectMaps) -> Array:
+    """[H, W] bool: pixels of the mask that the hull leaves out; all where it has no body."""
     far = float(np.linalg.norm(hull.first.foot))
     line = _capped(hull.border, far, seen.camera, hull.cell, round_top=True)
     if line is None:
-        return np.inf
+        return seen.inside
     body = Revolution(hull.first, Profile.of(line, hull.cell, float(line[0, 1])))
-    missed = seen.inside & (body.front(seen.inside, seen.rays)[0] == 0)
+    return seen.inside & (body.front(seen.inside, seen.rays)[0] == 0)
+
+
+def _gap(missed: Array, seen: _ObjectMaps) -> float:
+    """Pixels by which a hull stays inside the outline, a mean along it, from the pixels that it leaves out."""
     outline = seen.inside & ~binary_erosion(seen.inside)
     return float(missed.sum() / outline.sum())
+
+
+def _is_hidden(missed: Array, seen: _ObjectMaps) -> bool:
+    """Whether a nearer thing lies beside what a hull leaves out: it may hide the foot, and its edge tells nothing."""
+    beside = binary_dilation(missed, np.ones((3, 3)), SETTINGS.beside) & ~seen.inside
+    known = beside & (seen.depth > 0)
+    if not missed.any() or not known.any():
+        return False
+    nearer = seen.depth[known] < SETTINGS.nearer * np.median(seen.depth[missed])
+    return bool(nearer.mean() > SETTINGS.min_hidden)
 
 
 def _step_ratio(body_side: Array, map_side: Array) -> float:

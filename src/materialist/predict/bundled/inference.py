@@ -13,7 +13,7 @@ from skimage.morphology import remove_small_holes, remove_small_objects
 from materialist.camera import rays_at, unit
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.geometry.integrate import integrated
-from materialist.geometry.manhattan import drawn_to_frame, manhattan_frame
+from materialist.geometry.manhattan import drawn_to_axes, manhattan_axes
 from materialist.geometry.membrane import nearest
 from materialist.predict import resample
 from materialist.predict.bundled.edges import GuidedFilter, grabcut, weighted_median
@@ -129,9 +129,8 @@ def with_edges(depth: Array, normal: Array, linear: Array, rays: Array) -> tuple
     sharp = weighted_median(coarse, guide, known)
     depth = np.where(known, np.exp(sharp), 0)
     # Floors and walls follow the directions of the photo's straight edges, and depth follows the normals.
-    frame = manhattan_frame(photo, normal, depth, seen)
-    if frame is not None:
-        normal = drawn_to_frame(normal, depth, frame)
+    axes = manhattan_axes(photo, normal, depth, seen)
+    normal = drawn_to_axes(normal, depth, seen, axes)
     depth = integrated(depth, normal, seen)
     if middle != size:
         depth = resample.depth(depth, size)
