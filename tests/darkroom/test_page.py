@@ -403,6 +403,7 @@ class Held:
         self.page.wait_for_timeout(300)  # until it is decoded
 
 
+@pytest.mark.slow
 def test_the_page_draws_changes_as_the_server_does(page):
     # --- A material: by the same formula, so but for the JPEG the same picture ---
     select_block(page)

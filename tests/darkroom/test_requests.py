@@ -252,6 +252,7 @@ def test_pictures_maps_and_what_there_is_to_choose_from(client):
         assert client.get(f"/api/{place}").status_code == 400, place
 
 
+@pytest.mark.slow
 def test_a_final_picture_is_kept_and_taken_away_in_every_format(client, heard):
     select_block(client)
     change(client, hue=90)

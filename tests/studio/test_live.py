@@ -53,6 +53,7 @@ def test_the_process_answers_and_ends_with_the_photo(live, step, tmp_path):
         live.call(views.check, steps=())
 
 
+@pytest.mark.slow
 def test_a_process_that_is_gone_is_replaced(monkeypatch, request, quota, tmp_path):
     """Whatever it is asked: here it loads no torch, which takes longer than all else."""
     monkeypatch.setattr("materialist.studio.live.open_preview", made_tasks.open_without_pictures)

@@ -314,6 +314,7 @@ def test_ticking_and_moving_leave_the_current_one():
     )
 
 
+@pytest.mark.slow
 def test_an_object_falls_and_lies_there(session, monkeypatch, tmp_path):
     pytest.importorskip("mujoco", reason="needs the physics extra")
     save_scene(floor_scene(64, 48), tmp_path / "floor.scene")
