@@ -48,12 +48,10 @@ class ManhattanSettings:
     max_turn: float = 30.0  # degrees by which normals may turn across it: round things turn more
     max_off: float = 20.0  # degrees from that turn: what is farther off stands out
     min_piece: float = 0.001  # share of the picture below which holes and islands are filled
-    blur: float = (
-        2.0  # standard deviation, pixels, of the border between what is drawn and what is not
-    )
-    max_away: float = (
-        0.005  # share of the picture that an axis may turn away from the camera; else it is wrong
-    )
+    # standard deviation, pixels, of the border between what is drawn and what is not
+    blur: float = 2.0
+    # share of the picture that axes may turn away from the camera; else they are wrong
+    max_away: float = 0.005
 
 
 SETTINGS = ManhattanSettings()
@@ -189,8 +187,10 @@ def _edges(picture: Array, rays: Array) -> tuple[Array, Array]:
     """Normals [N, 3] of the planes through the camera and straight edges, and the edges' lengths [N], longer sides."""
     height, width = picture.shape[:2]
     grey = cv2.cvtColor(np.round(255 * picture).astype(np.uint8), cv2.COLOR_RGB2GRAY)
-    found = cv2.createLineSegmentDetector().detect(grey)[0]
-    ends = np.zeros((0, 2, 2)) if found is None else np.asarray(found, float).reshape(-1, 2, 2)
+    segments = cv2.createLineSegmentDetector().detect(grey)[0]
+    ends = np.zeros((0, 2, 2))
+    if segments is not None:
+        ends = np.asarray(segments, float).reshape(-1, 2, 2)
     length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1) / max(height, width)
     longest = np.argsort(-length)[: SETTINGS.most_edges]
     longest = longest[length[longest] > SETTINGS.min_edge]
