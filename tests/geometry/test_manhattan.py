@@ -80,7 +80,7 @@ def test_without_straight_edges_or_normals_along_them_there_are_none(room):
 
 def test_stripes_alone_tell_no_frame(room):
     _, normal, depth = room
-    stripes = np.where(np.indices(depth.shape)[1] % 8 < 4, 0.2, 0.7).astype(np.float32)
+    stripes = np.where(np.indices(depth.shape)[1] % 4 < 2, 0.2, 0.7).astype(np.float32)
     picture = np.repeat(stripes[..., None], 3, -1)
     assert not len(manhattan_axes(picture, normal, depth, RAYS))
 
@@ -89,10 +89,8 @@ def test_axes_that_turn_surfaces_away_are_wrong():
     seen = np.broadcast_to(unit(np.array([1.0, 0.0, 0.62])), RAYS.shape)
     assert ((seen * -RAYS).sum(-1) > 0).all()
     depth = np.ones(RAYS.shape[:2])
-    for x, drawn in (
-        (0.8, True),
-        (0.35, False),
-    ):  # the second faces away from the rays at the right
+    # The second axis faces away from the rays at the right.
+    for x, drawn in ((0.8, True), (0.35, False)):
         axes = unit(np.array([[1.0, 0.0, x]]))
         result = drawn_to_axes(seen, depth, RAYS, axes)
         assert (between(result, seen).max() > 3) == drawn

@@ -76,12 +76,11 @@ def test_its_outline_corrects_an_axis_seen_too_much_from_above(lean):
 
 def test_a_hidden_foot_leans_no_axis():
     front, mask = view(turned(arc((0, 0.4), 0.4)))
-    rows = np.flatnonzero(mask.any(1))
     seen = mask.copy()
-    seen[int(np.quantile(rows, 0.8)) :] = False
+    seen[int(np.quantile(np.flatnonzero(mask.any(1)), 0.75)) :] = False
+    # Something nearer hides the foot.
     depth = np.where(seen, front.depth, 0.8 * front.depth[mask].min())
-    body, _ = surface_of_revolution(depth, front.normal, seen, CAMERA, up=UP)
-    assert np.degrees(np.arccos(np.clip(body.axis.up @ UP, -1, 1))) < 0.5
+    assert surface_of_revolution(depth, front.normal, seen, CAMERA, up=UP) is None
 
 
 def test_a_cylinder_becomes_an_open_pot(pot, ball):

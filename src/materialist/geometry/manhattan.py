@@ -129,9 +129,9 @@ def _refined(frame: Array, planes: Array, weight: Array) -> Array:
         whose = np.where(away.min(1) < near, away.argmin(1), -1)
         moved = frame.copy()
         for k in range(3):
-            own = planes[whose == k] * weight[whose == k, None]
-            if len(own) > 1:
-                direction = np.linalg.eigh(own.T @ own)[1][:, 0]
+            along = planes[whose == k] * weight[whose == k, None]
+            if len(along) > 1:
+                direction = np.linalg.eigh(along.T @ along)[1][:, 0]
                 moved[k] = direction * np.sign(direction @ frame[k])
         left, _, right = np.linalg.svd(moved)
         if np.abs(left @ right - frame).max() < 1e-4:

@@ -43,10 +43,10 @@ class OutlineSettings:
     max_axis_error: float = 16.0  # degrees by which the given axis may be off
     min_axis_error: float = 5.0  # degrees up to which an outline cannot tell
     axis_step: float = 2.0  # degrees between the axes that are tried
+    gap_tolerance: float = 0.2  # pixels above the least gap: the first axis within it is taken
     beside: int = 3  # pixels beside what a hull leaves out, where nearer things are sought
     nearer: float = 0.97  # of its depth, from which a thing lies before it
     min_hidden: float = 0.3  # share of those pixels from which it may be hidden
-    gap_tolerance: float = 0.2  # pixels above the least gap: the first axis within it is taken
 
     # How the body is scaled until it stands on the ground.
     max_ground_gap: float = 0.15  # heights between base and ground up to which the base is moved
@@ -165,7 +165,8 @@ def _hull_by_outline(up: Array, seen: _ObjectMaps) -> _VisualHull | None:
     if overlap < SETTINGS.min_mirror_overlap:
         return None
     # --- The given axis, where it fills the outline, or hardly any of it, or something hides the rest ---
-    given = _visual_hull(up, across, seen)
+    field = silhouette_field(seen.inside)
+    given = _visual_hull(up, across, field, seen)
     if given is None:
         return None
     least = _missed(given, seen)
@@ -179,7 +180,7 @@ def _hull_by_outline(up: Array, seen: _ObjectMaps) -> _VisualHull | None:
     most = min(elevation, SETTINGS.max_axis_error)
     for lean in np.arange(SETTINGS.axis_step, most + 1e-6, SETTINGS.axis_step):
         leaned = Rotation.from_rotvec(np.radians(lean) * sideways).apply(up)
-        hull = _visual_hull(leaned, across, seen)
+        hull = _visual_hull(leaned, across, field, seen)
         if hull is not None:
             hulls.append((_gap(_missed(hull, seen), seen), hull))
     # --- The first that fills the outline as well as any, unless the given one is nearly the same ---
@@ -189,11 +190,14 @@ def _hull_by_outline(up: Array, seen: _ObjectMaps) -> _VisualHull | None:
     return chosen if np.degrees(np.arccos(cosine)) > SETTINGS.min_axis_error else given
 
 
-def _visual_hull(up: Array, across: Array, seen: _ObjectMaps) -> _VisualHull | None:
-    """The visual hull around the axis along `up` in the mirror plane with normal `across`; None where it is empty."""
+def _visual_hull(up: Array, across: Array, field: Array, seen: _ObjectMaps) -> _VisualHull | None:
+    """The visual hull around the axis along `up` in the mirror plane with normal `across`; None where it is empty.
+
+    field: [H, W] pixels to the outline, as of `silhouette_field`.
+    """
     ahead = np.cross(across, up)
     first = Axis(up, ahead * np.sign(ahead @ seen.rays[seen.inside].mean(0)))
-    border = _border(silhouette_field(seen.inside), first, seen.camera)
+    border = _border(field, first, seen.camera)
     return None if border is None else _VisualHull(first, across, *border)
 
 

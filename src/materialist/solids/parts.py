@@ -20,7 +20,7 @@ class PartSettings:
 
     min_depth_pixels: float = 0.02  # inside its outline that a part must reach; derived
     min_part: float = 0.01  # share of the mask's largest part from which a part is an object
-    max_round: int = 16  # objects among which round ones are looked for, a second each
+    max_round: int = 16  # objects among which round ones are looked for, up to some seconds each
 
 
 SETTINGS = PartSettings()
