@@ -111,6 +111,25 @@ def test_report_and_provenance_tell_what_happened(scene):
     assert told["completion_asked"] in ("auto", told["completion"]) and told["mask"] is None
 
 
+def test_the_fitted_scene_comes_before_its_rerendering(folder, scene):
+    stages = {}
+    done = invert(**options(folder), on_stage=stages.setdefault)
+    early = stages["scene"]
+    assert list(stages)[-1] == "scene" and early.report.metrics == {}
+    assert early.provenance == {**done.provenance, "spp": 0}
+    for name in ("albedo", "roughness", "metallic"):
+        np.testing.assert_array_equal(getattr(early.materials, name), getattr(done.materials, name))
+    np.testing.assert_array_equal(early.envmap, done.envmap)
+    assert early.geometry is done.geometry
+    # Without noise, and with what the photo shows as indirect light: near to the traced paths.
+    assert psnr(early.rerender, done.rerender) > 25
+    assert not np.array_equal(early.rerender, done.rerender)
+    stages.clear()
+    short = options(folder, settings="paper", steps=1)
+    invert(**{**short, "engine": "path", "spp": 1}, on_stage=stages.setdefault)
+    assert "scene" not in stages
+
+
 def test_equal_seeds_give_equal_scenes(folder, scene):
     again = invert(**options(folder))
     np.testing.assert_array_equal(again.materials.albedo, scene.materials.albedo)

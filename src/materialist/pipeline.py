@@ -61,7 +61,9 @@ def invert(
         options, values: see `options.InvertOptions`; `values` are fields of it, as in `invert(photo, size=256)`.
         progress: called as progress(stage, done, total).
         on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
-            soon as each is there; "materials" also before "prior", where the predictor has them before the depth.
+            soon as each is there; "materials" also before "prior", where the predictor has them before the depth. Last,
+            before the path-traced re-rendering: "scene" (a Scene whose `rerender` is the fit's own picture, and whose
+            report has no figures), unless the engine is `path`.
         stop: asked after each step of the fit; True ends it there, and the scene has what was found until then.
 
     Raises:
@@ -134,42 +136,53 @@ def invert(
         spp=choices.spp,
     )
     lap("setup")
-    best = fitting.invert(fit_setup, progress=progress, on_stage=tell, stop=stop or never)
 
     # --- The scene, with where everything came from ---
-    report = _report(picture, prior, best, (*stages, *best.stages), start)
-    return Scene(
-        camera=picture.camera,
-        photo=picture,
-        prior=prior,
-        materials=best.materials,
-        normal=prior.normal,
-        depth=prior.depth,
-        geometry=best.geometry,
-        envmap=best.envmap,
-        rerender=best.rerender,
-        report=report,
-        provenance={
-            "tool_version": __version__,
-            "predictor": prior.predictor,
-            "sources": prior.sources,
-            "engine": choices.engine,
-            "preset": preset,
-            "steps": choices.steps,
-            "completion": fit_setup.completion,
-            "completion_asked": choices.completion,
-            "tau": choices.tau,
-            "strategy": choices.strategy,
-            "mask": _named(mask),
-            "settings": asdict(settings) if choices.settings else None,
-            "seed": choices.seed,
-            "spp": best.spp,
-            "size": choices.size,
-            "envmap_size": list(choices.envmap_size),
-            "fov": picture.camera.fov,
-            "fov_source": picture.fov_source,
-        },
-    )
+    provenance = {
+        "tool_version": __version__,
+        "predictor": prior.predictor,
+        "sources": prior.sources,
+        "engine": choices.engine,
+        "preset": preset,
+        "steps": choices.steps,
+        "completion": fit_setup.completion,
+        "completion_asked": choices.completion,
+        "tau": choices.tau,
+        "strategy": choices.strategy,
+        "mask": _named(mask),
+        "settings": asdict(settings) if choices.settings else None,
+        "seed": choices.seed,
+        "size": choices.size,
+        "envmap_size": list(choices.envmap_size),
+        "fov": picture.camera.fov,
+        "fov_source": picture.fov_source,
+    }
+
+    def scene_of(result: FitResult) -> Scene:
+        report = _report(picture, prior, result, (*stages, *result.stages), start)
+        return Scene(
+            camera=picture.camera,
+            photo=picture,
+            prior=prior,
+            materials=result.materials,
+            normal=prior.normal,
+            depth=prior.depth,
+            geometry=result.geometry,
+            envmap=result.envmap,
+            rerender=result.rerender,
+            # Figures are those of traced paths.
+            report=report if result.spp else replace(report, metrics={}),
+            provenance={**provenance, "spp": result.spp},
+        )
+
+    def on_fit_stage(name: str, value: Any) -> None:
+        if name == "fitted":
+            tell("scene", scene_of(value))
+        else:
+            tell(name, value)
+
+    best = fitting.invert(fit_setup, progress=progress, on_stage=on_fit_stage, stop=stop or never)
+    return scene_of(best)
 
 
 def _prior(

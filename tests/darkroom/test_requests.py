@@ -9,15 +9,17 @@ import re
 import signal
 import time
 import weakref
+from functools import partial
 
 import made_tasks
 import numpy as np
 import pytest
 from PIL import Image
-from studio_scenes import HEIGHT, WIDTH, block, zipped_package
+from studio_scenes import HEIGHT, WIDTH, block, package, zipped_package
 
 from materialist.darkroom.state import outline
 from materialist.io.image import write_png
+from materialist.io.package import load_scene
 
 
 def select_block(client):
@@ -424,6 +426,38 @@ def test_other_photos_are_safe_while_one_is_taken_apart(client, heard, monkeypat
     assert state["expected"] is None and state["project"] is None
     assert client.post("/api/open", json={"project": "photo-001"}).json()["project"]
     client.studio.page("b" * 32, "me").session.live.wait()
+
+
+def test_a_photo_opens_before_its_rerendering_and_takes_it_later(
+    client, heard, monkeypatch, tmp_path
+):
+    whole = package(tmp_path)
+    fitted = partial(made_tasks.invert_from, package=str(whole))
+    monkeypatch.setattr(fitted, "__name__", "invert", raising=False)
+    monkeypatch.setattr("materialist.studio.tasks.invert", fitted)
+    begun = client.post("/api/start", json={"example": "cat"}).json()
+    heard(lambda news: news["jobs"] and not working(news))
+    state = client.get("/api/state").json()
+    assert state["project"]["name"] == begun["expected"]["name"]
+    (job,) = client.studio.jobs.unfinished("me", "invert")
+    assert job.stage == "rerender"
+    # It can be edited, and another page opens it, too.
+    live = client.studio.page("b" * 32, "me").session.live
+    live.wait()
+    select_block(client)
+    assert change(client, hue=60).json()["steps"]
+    assert live.call(rerender_of).max() == 0.5
+    # When the job ends, the preview has the path-traced picture, and the edit is still there.
+    (job.folder / "go").touch()
+    made_tasks.until(lambda: job.over)
+    assert job.state == "done"
+    expected = load_scene(whole).rerender
+    made_tasks.until(lambda: np.array_equal(live.call(rerender_of), expected))
+    assert client.get("/api/state").json()["steps"][0]["options"]["hue"] == "60"
+
+
+def rerender_of(preview):
+    return preview.edited(()).rerender
 
 
 def test_photos_are_opened_renamed_and_deleted(client, tmp_path):

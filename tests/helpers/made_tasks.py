@@ -54,6 +54,20 @@ def invert(report, **arguments):
     time.sleep(60)
 
 
+def invert_from(report, package, scene, **arguments):
+    """In place of an inversion: the scene of a package, grey at first; re-rendered when `go` lies beside it."""
+    from dataclasses import replace
+
+    import materialist as mt
+    from materialist.io.package import replace_rerender
+
+    whole = mt.load_scene(package)
+    mt.save_scene(replace(whole, rerender=0 * whole.rerender + 0.5), scene)
+    report("rerender", 0, 1)
+    until(Path(scene).with_name("go").exists, seconds=60)
+    replace_rerender(whole, scene)
+
+
 def surroundings(report):
     """What a task sees of the process that started it."""
     return {"pid": os.getpid(), "password": os.environ.get("MATERIALIST_PASSWORD")}

@@ -20,7 +20,7 @@ from materialist.io import atomic
 from materialist.io.atomic import ensure_writable, whole_folder
 from materialist.io.exr import write_exr
 from materialist.io.meshes import read_ply, write_ply
-from materialist.io.package import check_room, load_scene, save_scene
+from materialist.io.package import check_room, load_scene, replace_rerender, save_scene
 
 
 @pytest.fixture
@@ -68,6 +68,33 @@ def test_round_trip_with_bodies_is_exact(scene, tmp_path, from_memory):
     with pytest.raises(SceneError, match=r"1\.albedo\.exr"):
         load_scene(tmp_path / "a.scene")
     save_scene(scene, tmp_path / "a.scene", force=True)  # the light is a file of the package, too
+
+
+def test_a_rerendering_replaces_that_of_a_package_and_nothing_else(scene, tmp_path):
+    path = tmp_path / "a.scene"
+    report = replace(scene.report, metrics={}, warnings=("early",))
+    early = replace(scene, rerender=0.5 * scene.rerender, report=report)
+    early = replace(early, provenance={**scene.provenance, "spp": 0})
+    save_scene(early, path)
+    before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
+    replace_rerender(scene, path)
+    assert_same(load_scene(path), scene)
+    names = {
+        file.relative_to(path).as_posix() for file in before if file.read_bytes() != before[file]
+    }
+    assert names == {
+        "rerender.exr",
+        "rerender.png",
+        "maps/shading_residual.exr",
+        "overview.png",
+        "report.json",
+        "scene.json",
+    }
+    save_scene(early, tmp_path / "b.scene")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.scene", "b.scene"]
+    with pytest.raises(SceneError, match="no scene package"):
+        replace_rerender(scene, tmp_path / "missing.scene")
+    assert not (tmp_path / "missing.scene").exists()
 
 
 def test_the_files_of_the_contract(scene, tmp_path):

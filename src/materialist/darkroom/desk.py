@@ -38,10 +38,22 @@ class Followed:
     notes: list[str] = field(default_factory=list)
     result: dict[str, Any] | None = None
     """What it made, for the page; a file by the id under which it is handed over."""
+    outcome: str = DONE
+    """How the page's wait for the job ended."""
+    seconds: float = 0.0
+    """How long the page waited."""
     finished: bool = False
     """Whether what follows the job was done, too."""
     failed: bool = False
     """Whether that failed; the notes say why."""
+
+    @property
+    def state(self) -> str:
+        if self.failed:
+            return FAILED
+        if self.finished:
+            return self.outcome
+        return RUNNING if self.job.over else self.job.state
 
 
 class Desk:
@@ -84,20 +96,32 @@ class Desk:
 
     # Jobs
 
-    def follow(self, job: Job, then: Callable[[Followed], None]) -> Followed:
-        """Show a job on the page, and call then(it) in another thread when it is done."""
+    def follow(
+        self,
+        job: Job,
+        then: Callable[[Followed], None],
+        is_done: Callable[[], bool] = lambda: False,
+    ) -> Followed:
+        """Show a job on the page, and call then(it) in another thread when it is over.
+
+        is_done: whether the page has what it waits for, although the job goes on.
+        """
         with self._lock:
             self._numbers += 1
             entry = Followed(job, self._numbers)
             # Those that are over were shown.
             self.followed = [*(one for one in self.followed if not one.finished), entry]
-        threading.Thread(target=self._wait, args=(entry, then), daemon=True).start()
+        threading.Thread(target=self._wait, args=(entry, then, is_done), daemon=True).start()
         return entry
 
-    def _wait(self, entry: Followed, then: Callable[[Followed], None]) -> None:
+    def _wait(
+        self, entry: Followed, then: Callable[[Followed], None], is_done: Callable[[], bool]
+    ) -> None:
         job = entry.job
-        while not job.over:
+        while not (job.over or is_done()):
             time.sleep(POLL)
+        entry.outcome = job.state if job.over else DONE
+        entry.seconds = job.seconds
         try:
             then(entry)
         except MaterialistError as error:
@@ -123,17 +147,15 @@ class Desk:
 
     def _shown(self, entry: Followed) -> dict[str, Any]:
         job = entry.job
-        state = job.state if entry.finished or not job.over else RUNNING
-        state = FAILED if entry.failed else state
         part = min(1.0, job.done / job.total) if job.total and not job.over else None
         map_names = [facts["name"] for facts in job.intermediate]
         return {
             "number": entry.number,
             "kind": job.kind,
-            "state": state,
+            "state": entry.state,
             "text": self._words(entry),
             "part": part,
-            "seconds": int(job.seconds),
+            "seconds": int(entry.seconds if entry.finished else job.seconds),
             "found": list(dict.fromkeys(map_names)),
             "project": job.folder.name if job.kind == "invert" else None,
             "result": entry.result,
@@ -141,15 +163,15 @@ class Desk:
 
     def _words(self, entry: Followed) -> str:
         job = entry.job
-        if job.state == QUEUED:
+        if entry.state == QUEUED:
             return f"Waiting: {self.studio.jobs.ahead(job)} before yours"
-        if job.state == STOPPED:
+        if entry.state == STOPPED:
             return "Stopped; nothing was changed."
-        if job.state == FAILED:
+        if entry.outcome == FAILED:
             return self.session.without_folders(failure_message(job))
-        if job.state == DONE and entry.finished:
+        if entry.finished:
             notes = noise_notes() if job.kind == "final" else []
-            return " ".join([*entry.notes, *notes]) or f"Done in {job.seconds:.0f} s."
+            return " ".join([*entry.notes, *notes]) or f"Done in {entry.seconds:.0f} s."
         return words(job.stage or "start")
 
     # The pointer

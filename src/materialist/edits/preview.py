@@ -32,7 +32,7 @@ RAYS = (48, 12)
 SHARPEST = 0.1
 """Least roughness at which reflections are filtered: unfiltered, the few rays of the level above it show as a grid of
 dots on metal, four times as strong as after the filter (4 x 4 pixels, relief 0.059 and 0.018 of log radiance)."""
-VERSION = 2
+VERSION = 3
 """Of the tables on disk; another one where the same scene gives other tables."""
 MIN_AMBIENT = 1e-3
 """Factor on the fitted map below which the map cannot be scaled back."""
@@ -49,9 +49,9 @@ def load() -> None:
 class Preview:
     """A fitted scene whose rays are traced once; then a change of materials is one shading call.
 
-    What surfaces send to each other stays that of the fitted scene (for another light: of one shading under it), so
-    that colour bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once (a
-    second or two), keep it; it has a seventh of the rays until `prepare` has traced the others.
+    What surfaces send to each other is what the photo shows (for another light: one shading under it), so that colour
+    bleeding of the edit itself is missing; lamps and what they light are not shown. Build it once (a second or two),
+    keep it; it has a seventh of the rays until `prepare` has traced the others.
 
     file: where the finer tables of the fitted light are kept (.npz). Where it has those of this scene, nothing is
         traced before there is another light; what cannot be read, or is of another scene, is made again.
@@ -68,12 +68,12 @@ class Preview:
         """Normals [H, W, 3] of an edit, the rays of the pixels where they differ, and their surfaces."""
         self._turned_tables: tuple[Tables, Tables] | None = None
         """Tables of the scene's own normals, and the same with those of `_turned`."""
-        self._passed_on = scene.rerender
+        self._passed_on = scene.photo.linear
         """What surfaces pass on in the last picture of another light."""
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
         if kept is None:
-            tables = self._filtered(self._quick, scene.envmap, scene.rerender)
+            tables = self._filtered(self._quick, scene.envmap, scene.photo.linear)
             self._use(self._quick.pixels, tables)
         else:
             self._use(kept["pixels"], _restored(kept))
@@ -120,7 +120,7 @@ class Preview:
         if self._quick.trace_next() or self._cache.trace_next():
             return True
         if self._coarse:
-            tables = self._filtered(self._cache, self.scene.envmap, self.scene.rerender)
+            tables = self._filtered(self._cache, self.scene.envmap, self.scene.photo.linear)
             kept = _stored(self._cache, tables)
             self._coarse = False
             self._use(kept["pixels"], _restored(kept))
@@ -164,7 +164,7 @@ class Preview:
         if self._turned_tables is None or self._turned_tables[0] is not tables:
             _, cache, guide = self._turned
             fitted = tables is self._tables
-            passed_on = self.scene.rerender if fitted else self._passed_on
+            passed_on = self.scene.photo.linear if fitted else self._passed_on
             places = np.searchsorted(self._pixels, cache.pixels)
             # Coarse ones are of one roughness [P].
             roughness = tables.levels[0][places] if len(tables.levels) == 1 else None
@@ -298,7 +298,7 @@ def _key(scene: Scene) -> str:
     """What the tables of a scene depend on, as a text."""
     mesh = scene.geometry.mesh
     total = 0
-    for values in (*vars(mesh).values(), scene.rerender, scene.envmap):
+    for values in (*vars(mesh).values(), scene.photo.linear, scene.envmap):
         total = zlib.crc32(values.tobytes(), total)
     return f"{VERSION} {RAYS} {scene.camera} {total:08x}"
 

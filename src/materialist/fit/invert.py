@@ -9,7 +9,8 @@ import numpy as np
 import torch
 
 from materialist.buffers import placed
-from materialist.envmap import paste_visible_sky, with_mirrored_photo
+from materialist.camera import pixel_rays, unit
+from materialist.envmap import environment, paste_visible_sky, with_mirrored_photo
 from materialist.fit.albedo import solve_albedo
 from materialist.fit.engine import (
     Engine,
@@ -18,7 +19,7 @@ from materialist.fit.engine import (
     TransportEngine,
     prepared_envmap,
 )
-from materialist.fit.fields import MaterialMaps
+from materialist.fit.fields import ALL, MaterialMaps
 from materialist.fit.light import LightStart, envmap_field, fit_light, start_light
 from materialist.fit.materials import COLUMNS, fit_materials, material_field, remapped
 from materialist.fit.optimise import Stop, never
@@ -67,6 +68,8 @@ class FitState:
     stages: list[dict] = field(default_factory=list)
     light: tuple[torch.nn.Module, LightStart] | None = None
     """The field behind `envmap`, which a later fit moves on, and what it began with."""
+    shaded: torch.Tensor | None = None
+    """[P, 3] radiance of the surface pixels as the last stage renders them; None before it, and with `PathEngine`."""
 
 
 @dataclass(frozen=True)
@@ -204,6 +207,9 @@ class Fit:
                     stop=self.stop,
                 )
                 state.maps = model().detach()
+            if isinstance(self.engine, TransportEngine):
+                with torch.no_grad():
+                    state.shaded = problem(state.maps, ALL)
             seconds = round(time.perf_counter() - start, 3)  # with those of the tables
             state.stages.append({**result.summary(), "seconds": seconds})
             # As in the published code: the light once more under the new materials.
@@ -225,6 +231,15 @@ class Fit:
             state, replace(settings, stages=(MaterialStage(("albedo",), schedule),))
         )
         return state
+
+    def picture(self, state: FitState) -> Array | None:
+        """[H, W, 3] linear: the picture as the last stage renders it, without noise; None where it is not known."""
+        if state.shaded is None:
+            return None
+        rays = unit(pixel_rays(self.setup.photo.camera).reshape(-1, 3))
+        picture = environment(rays, state.envmap).astype(np.float32)
+        picture[self.engine.pixels.numpy()] = state.shaded.cpu().numpy()
+        return picture.reshape(self.setup.photo.linear.shape)
 
     def materials(self, state: FitState) -> Materials:
         """Full-size maps of the state; the prior's values where there is no surface."""
@@ -265,7 +280,7 @@ class FitResult:
     halves: tuple[Array, Array]
     """Two independent path-traced re-renderings [H, W, 3] linear, of half the samples each."""
     spp: int
-    """Paths a pixel of both together."""
+    """Paths a pixel of both together; 0 where both are the same picture of the fit's own, without noise."""
     stages: tuple[dict, ...]
     stopped: bool = False
     """Whether the fit was ended before its end."""
@@ -313,7 +328,8 @@ def invert(
 ) -> FitResult:
     """Geometry, light, materials and the path-traced re-rendering of one photo.
 
-    on_stage: called as on_stage("light", [h, 2h, 3]) and on_stage("materials", Materials) as soon as each is there.
+    on_stage: called as on_stage("light", [h, 2h, 3]) and on_stage("materials", Materials) as soon as each is there;
+        then as on_stage("fitted", FitResult) with the fit's own picture, before paths are traced, where there is one.
     """
     fit = prepare(setup, progress, stop)
     stages = list(fit.stages)
@@ -327,6 +343,9 @@ def invert(
     materials = fit.materials(state)
     on_stage("light", state.envmap)
     on_stage("materials", materials)
+    if (picture := fit.picture(state)) is not None:
+        known = (picture, picture), 0, tuple(stages), stopped
+        on_stage("fitted", FitResult(fit.geometry, materials, state.envmap, *known))
     # --- The re-rendering, in halves of two seeds: where they differ is noise ---
     if progress is not None:
         progress("rerender", 0, 1)

@@ -14,7 +14,14 @@ import numpy as np
 
 from materialist import __version__
 from materialist.errors import OutputError, SceneError
-from materialist.io.atomic import MARKER, interrupted_replacement, whole_folder
+from materialist.io.atomic import (
+    MARKER,
+    files_below,
+    interrupted_replacement,
+    partial,
+    whole_folder,
+    writing,
+)
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.image import write_png
 from materialist.io.manifest import (
@@ -73,6 +80,25 @@ def save_scene(scene: Scene, path: str | Path, *, force: bool = False) -> None:
     """
     with whole_folder(path, force) as folder:
         _write(scene, folder)
+
+
+def replace_rerender(scene: Scene, path: str | Path) -> None:
+    """Put the scene's re-rendering, its report and its provenance in place of those of its package at PATH.
+
+    Each file is replaced whole, so that the package can be read meanwhile. Raises SceneError, OutputError.
+    """
+    folder = Path(path)
+    meta = _read_meta(folder)
+    temporary = partial(folder, "")
+    try:
+        with writing(path, temporary):
+            (temporary / "maps").mkdir(parents=True)
+            _write_rerender(scene, temporary)
+            _write_json(temporary / MARKER, {**meta, "provenance": scene.provenance})
+            for file in files_below(temporary):
+                os.replace(temporary / file, folder / file)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
 @spelled
@@ -163,7 +189,6 @@ def _write(scene: Scene, folder: Path) -> None:
         write_exr(folder / spread_file(key), array)
     if scene.prior.light is not None:
         write_exr(folder / LIGHT, scene.prior.light)
-    write_exr(folder / "maps/shading_residual.exr", shading_residual(photo.linear, scene.rerender))
     # --- Light and geometry ---
     write_exr(folder / "envmap.exr", scene.envmap)
     write_ply(folder / "mesh.ply", scene.geometry.mesh)
@@ -172,21 +197,27 @@ def _write(scene: Scene, folder: Path) -> None:
         folder / "plane_label.png",
         (scene.geometry.plane_label.astype(np.int16) + 1).astype(np.uint8),
     )
-    # --- What a person looks at ---
+    _write_rerender(scene, folder)
+    # --- scene.json last: a folder without it is no package ---
+    meta = _meta(scene, original)
+    if scene.bodies:
+        meta["bodies"] = write_bodies(folder, scene.bodies)
+    _write_json(folder / MARKER, meta)
+
+
+def _write_rerender(scene: Scene, folder: Path) -> None:
+    """The re-rendering and all that follows from it: the residual, what a person looks at, and the report."""
+    residual = shading_residual(scene.photo.linear, scene.rerender)
+    write_exr(folder / "maps/shading_residual.exr", residual)
     write_exr(folder / "rerender.exr", scene.rerender)
     write_png(folder / "rerender.png", scene.rerender)
     write_png(folder / "overview.png", overview(scene))
-    # --- The report, and scene.json last: a folder without it is no package ---
     report = scene.report  # its metrics lie flat beside `stages` and `warnings`
     warnings = list(dict.fromkeys(report.warnings))
     _write_json(
         folder / "report.json",
         {**report.metrics, "stages": list(report.stages), "warnings": warnings},
     )
-    meta = _meta(scene, original)
-    if scene.bodies:
-        meta["bodies"] = write_bodies(folder, scene.bodies)
-    _write_json(folder / MARKER, meta)
 
 
 def _meta(scene: Scene, original: str) -> dict[str, Any]:

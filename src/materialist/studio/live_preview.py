@@ -24,6 +24,7 @@ from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
+from materialist.io.package import load_scene
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
@@ -102,6 +103,14 @@ class LivePreview:
     def wait(self) -> None:
         """Wait for the preview. Raises the error of its building, if there was one."""
         self._preview.result()
+
+    def take_rerender(self) -> None:
+        """Take the re-rendering of the package, and its report, which an inversion has added since it was opened."""
+        assert self._package is not None
+        whole = load_scene(self._package)
+        parts = {name: getattr(whole, name) for name in ("rerender", "report", "provenance")}
+        self.scene = replace(self.scene, **parts)
+        self._kept.clear()
 
     def edited(self, steps: tuple[Step, ...]) -> Scene:
         """The scene after the steps without glass, whose body another process builds.

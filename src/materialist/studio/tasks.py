@@ -17,6 +17,7 @@ from materialist.edits.core.operation import PreviewMode, new_edits
 from materialist.edits.recipe import Step
 from materialist.io import display
 from materialist.io.atomic import partial, write_whole
+from materialist.io.package import replace_rerender
 from materialist.jobs.worker import Reporter
 from materialist.studio import SETTINGS
 from materialist.types import Array, Materials, Prediction, Scene
@@ -97,14 +98,21 @@ def invert(
     fov: float | str,
     seed: int,
 ) -> None:
-    """`materialist invert`; maps and light are sent as intermediate results as soon as they are there."""
+    """`materialist invert`; maps and light are sent as intermediate results as soon as they are there.
+
+    The scene is there as soon as it is fitted, so that it can be opened; its re-rendering follows.
+    """
     from dataclasses import replace
 
     picture = replace(mt.read_photo(photo, size=size, fov=fov), path=title)
     folder = Path(scene).parent
 
     def show(name, value):
-        return _show(report, folder, name, value)
+        if isinstance(value, Scene):
+            report("save", 0, 1)
+            mt.save_scene(value, scene)
+        else:
+            _show(report, folder, name, value)
 
     # The photo first: the page shows it while the rest is computed.
     show(PHOTO, picture.linear)
@@ -112,7 +120,10 @@ def invert(
         picture, predictor=predictor, fov=fov, size=size, seed=seed, progress=report, on_stage=show
     )
     report("save", 0, 1)
-    mt.save_scene(done, scene, force=True)
+    if Path(scene).exists():
+        replace_rerender(done, scene)
+    else:
+        mt.save_scene(done, scene)
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:

@@ -31,6 +31,11 @@ def check(live: LivePreview, steps: Steps) -> tuple[str, ...]:
     return live.edited(steps).report.warnings
 
 
+def take_rerender(live: LivePreview) -> None:
+    """Show the re-rendering that was added to the scene's package since it was opened."""
+    live.take_rerender()
+
+
 def unfilled(live: LivePreview, steps: Steps) -> bool:
     """Whether something that the edits take away hid what was not filled yet, which takes seconds."""
     try:
