@@ -137,6 +137,7 @@ def test_no_light_is_made_or_lost(roughness):
     np.testing.assert_allclose(out[MAPS[2]], 1, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("roughness", "tilt"),
     [(0.3, 75.0), pytest.param(0.6, 45.0, marks=pytest.mark.slow), (1.0, 0.0)],

@@ -22,7 +22,7 @@ from materialist.types import Scene
 
 resource = pytest.importorskip("resource", reason="needs POSIX limits")
 FEW = settings(
-    max_examples=60, deadline=5000, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=25, deadline=5000, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 

@@ -34,6 +34,7 @@ loaded(Path("a.xml"), 4)
 """
 
 
+@pytest.mark.slow
 def test_a_single_thread_loads_a_file(tmp_path):
     (tmp_path / "a.xml").write_text(LIGHT)
     write_exr(tmp_path / "a.exr", np.ones((8, 16, 3), np.float32))

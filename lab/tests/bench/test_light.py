@@ -52,6 +52,7 @@ def test_one_colour_of_light_and_the_predicted_one_are_not_fitted(sample):
     )
 
 
+@pytest.mark.slow
 def test_mirrors_are_photographed_under_the_same_light(sample):
     polished = light.with_mirrors(sample)
     changed = np.abs(polished.photo.linear - sample.photo.linear).max(-1) > 0.05

@@ -18,6 +18,7 @@ def test_the_mask_is_the_jug(real_data):
     )
 
 
+@pytest.mark.slow
 def test_the_plate_lies_over_the_photo_where_nothing_was_removed(measured, real_data, monkeypatch):
     monkeypatch.setattr(PlateBench, "_removed", lambda self, photo, predictor, mask: photo.original)
     # Two of twenty photos with holes: all take most of a minute.

@@ -10,6 +10,7 @@ from materialist.types import Camera
 from materialist_lab.bench.screen_space import shadowed, strongest
 
 
+@pytest.mark.slow
 def test_a_shadow_lies_where_the_line_through_the_body_and_the_light_meets_the_floor():
     camera = Camera(64, 64, 60.0)
     rays = unproject(np.ones((64, 64), np.float32), camera)

@@ -18,7 +18,7 @@ from materialist.errors import InputError
 
 resource = pytest.importorskip("resource", reason="needs POSIX limits")
 FEW = settings(
-    max_examples=100, deadline=20_000, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=40, deadline=20_000, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 
 
@@ -204,7 +204,7 @@ def places(tree):
             yield from places(value)
 
 
-@settings(FEW, max_examples=300)
+@settings(FEW, max_examples=100)
 @given(
     changes=st.lists(st.tuples(SPOTS, st.one_of(VALUES, st.just("remove"))), min_size=1, max_size=3)
 )

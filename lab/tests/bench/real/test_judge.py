@@ -118,6 +118,7 @@ def test_a_limit_and_few_sheets(folder, measured):
     assert len(list((report.folder / "pictures").iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_a_fitted_scene_is_relit(folder, measured, monkeypatch):
     """With the true shape and paint, the relit photo is nearer to the other one than the photo itself."""
 
