@@ -9,7 +9,9 @@ studio), `grabcut` goes by colours. IoU is intersection over union with the obje
 shares above 0.8 and below 0.3.
 
 Borders are judged at the photo's own size, by the matte that every edit is laid on the photo with. `border F`: the F
-measure of its border against the outline, within 2 native pixels (outlines by eye are hardly better). `border` rows:
+measure of its border against the outline, within 2 native pixels (outlines by eye are hardly better); an edit of the
+hue leaves so much of the old colour inside of the outline, and spills so much of the new one beyond it, within a 64th
+of the longer side, as shares of the colour inside. `border` rows:
 a rendered mesh that no network has learnt from, over photos of DATA, so that the share of each pixel is known, by the
 true mask at working size or by what a box finds; `SAD` (thousands of pixels) and `MSE` (in thousandths, over the
 pixels within 8 native ones of the border) are the matte's errors, `fringe` is the error of colours (of 255, RMS, there)
@@ -41,11 +43,13 @@ from materialist.predict.clicks.features import Box
 from materialist.types import Array, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row
 from materialist_lab.bench.edits import scene_of, true_scene
-from materialist_lab.bench.real.borders import boundary_f, known_composites
+from materialist_lab.bench.real.borders import boundary_f, colour_errors, known_composites
 from materialist_lab.bench.report import Column, Report
 from materialist_lab.procedural.arrangements import arrangement
 from materialist_lab.procedural.synthetic import make_sample
 
+RIM = 1 / 64
+"""Longer sides on both sides of a border within which colours are judged."""
 METHODS = ("network", "grabcut")
 """Ways to select that need nothing but the package."""
 
@@ -59,6 +63,8 @@ class SelectBench(Benchmark):
         Column("good", "good", "higher", 2),
         Column("lost", "lost", "lower", 2),
         Column("border", "border F", "higher"),
+        Column("left", "old colour left", "lower"),
+        Column("spilt", "new colour spilt", "lower"),
         Column("sad", "SAD", "lower", 2),
         Column("mse", "MSE", "lower", 1),
         Column("fringe", "fringe", "lower", 1),
@@ -233,10 +239,14 @@ def _outline_score(scene: Scene, thing: dict[str, Any]) -> Row:
     photo = scene.photo.original
     mask = drawn(thing, scene.depth.shape)
     selected = _found(scene, mask, box=boxes(mask, 0.1)["exact box"])
-    outlined = matte(selected, photo) > 0.5
+    share = matte(selected, photo)
+    true = drawn(thing, photo.shape[:2])
+    left, spilt = colour_errors(share, true, photo, RIM * max(photo.shape))
     return {
         "method": "border, photos, exact box",
-        "border": boundary_f(outlined, drawn(thing, photo.shape[:2])),
+        "border": boundary_f(share > 0.5, true),
+        "left": left,
+        "spilt": spilt,
     }
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from materialist.types import Camera, Photo
 from materialist_lab.bench.edit import stray
-from materialist_lab.bench.real.borders import KnownComposite, boundary_f
+from materialist_lab.bench.real.borders import KnownComposite, boundary_f, colour_errors
 
 
 def test_a_border_counts_within_two_pixels():
@@ -43,3 +43,19 @@ def test_dots_count_where_the_true_edit_changes_nothing(column, count):
     picture = after.copy()
     picture[22, column] = 0.9
     assert stray(picture, before, before, after, inside) == count
+
+
+def test_colour_that_an_edit_leaves_and_spills():
+    true = np.zeros((40, 40), bool)
+    true[10:30, 10:30] = True
+    photo = np.where(true[..., None], (1.0, 0, 0), (1.0, 1.0, 1.0))
+    small, large = np.zeros((40, 40)), np.zeros((40, 40))
+    small[12:28, 12:28] = 1
+    large[8:32, 8:32] = 1
+    # The inner 8 pixels from the border: of 400, less the 16 in the middle.
+    left, spilt = colour_errors(small, true, photo, 9)
+    assert (left, spilt) == (pytest.approx((400 - 256) / (400 - 16), abs=0.03), 0)
+    # White has no colour.
+    assert colour_errors(large, true, photo, 9) == (0, 0)
+    left, spilt = colour_errors(large, true, photo[..., ::-1] * 0 + (0, 1.0, 0), 9)
+    assert left == 0 and spilt == pytest.approx(176 / (400 - 16), abs=0.03)

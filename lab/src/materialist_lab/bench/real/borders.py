@@ -153,6 +153,21 @@ def boundary_f(predicted: Array, true: Array, tolerance: float = TOLERANCE) -> f
     return 2 * precision * recall / max(precision + recall, 1e-9)
 
 
+def colour_errors(share: Array, true: Array, photo: Array, reach: float) -> tuple[float, float]:
+    """(old colour left inside of a border, new colour spilt beyond it), shares of all colour inside and near it.
+
+    Of an edit of the hue by a matte [H0, W0] of an object [H0, W0] bool: colour is the difference of the channels,
+    sRGB-encoded, of the photo [H0, W0, 3] linear; near: within `reach` pixels of the border.
+    """
+    encoded = linear_to_srgb(photo)
+    colour = encoded.max(-1) - encoded.min(-1)
+    near = distance_transform_edt(true) + distance_transform_edt(~true) < reach
+    whole = max(float(colour[near & true].sum()), 1e-9)
+    left = ((1 - share) * colour)[near & true].sum()
+    spilt = (share * colour)[near & ~true].sum()
+    return float(left / whole), float(spilt / whole)
+
+
 def _border(mask: Array) -> Array:
     """[H, W] bool: pixels of a mask beside one outside of it; the picture's rim is no border."""
     padded = np.pad(mask.astype(np.uint8), 1, mode="edge")
