@@ -4,8 +4,6 @@ import asyncio
 import re
 import secrets
 import shutil
-import threading
-import time
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +11,15 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
 from materialist.darkroom import bodies
-from materialist.darkroom.desk import POLL, Desk, Desks, Followed, found_file
+from materialist.darkroom.desk import Desk, Desks, Followed, found_file
 from materialist.darkroom.endpoint import desk_of
 from materialist.darkroom.state import example_file, project_facts, state
 from materialist.darkroom.taking import follow_finals
 from materialist.errors import InputError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job
-from materialist.studio import SETTINGS, views
+from materialist.studio import SETTINGS
 from materialist.studio.access.gate import promised_size
-from materialist.studio.session import Session
 from materialist.studio.workspace import Project
 
 State = dict[str, Any]
@@ -224,19 +221,9 @@ def _expect(desk: Desk, project: Project, job: Job) -> None:
         expected = desk.expected == project
         if expected and project.ready and not desk.page.left:
             desk.studio.open(desk.page, project.name)
-            threading.Thread(target=_take_rerender, args=(desk.session, job), daemon=True).start()
         elif project.ready:
             entry.notes.append(f"{project.title} is ready; it is among your photos.")
         if desk.expected == project:
             desk.expected = None
 
     desk.follow(job, then, lambda: project.ready)
-
-
-def _take_rerender(session: Session, job: Job) -> None:
-    """Let an open photo have its path-traced re-rendering, once its inversion is over."""
-    while not job.over:
-        time.sleep(POLL)
-    if session.live is not None and session.opened.folder == job.folder:
-        session.live.call(views.take_rerender)
-        session.changed()

@@ -16,12 +16,12 @@ from typing import Any
 
 import psutil
 
-from materialist.errors import InputError, OutputError
+from materialist.errors import InputError, MaterialistError, OutputError
 from materialist.io.atomic import writing
 from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
 from materialist.memory import give_back
-from materialist.studio import SETTINGS, archives, tasks, uploads
+from materialist.studio import SETTINGS, archives, tasks, uploads, views
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
 from materialist.studio.live import warmed
@@ -37,6 +37,8 @@ PERSON_HEADER = "x-materialist-person"
 """The header in which the gate tells the page whose request it is; what a browser sends of that name is dropped."""
 PREDICTORS = (("Automatic", "auto"), ("MatNet", "matnet"), ("Marigold", "marigold"))
 """Ways to make the first guess that a page offers, and their names of `invert`."""
+POLL = 0.2
+"""Seconds between two looks at the inversion of an open photo."""
 _FOLDERS = re.compile(r"(?<![\w/:.<])/(?:[^/\s<>'\"]+/)*(?=[^/\s<>])")
 
 
@@ -197,6 +199,8 @@ class Studio:
             session = self.session_on(project, page.person) or page.session
             session.expected = project
             page.session = session
+        inversions = self.jobs.unfinished(kind=tasks.invert.__name__)
+        job = next((job for job in inversions if job.folder == project.folder), None)
         try:
             # Whoever comes second waits until it is open.
             with session.lock:
@@ -209,6 +213,8 @@ class Studio:
             self.put_away(page)
             raise
         self.note_last(page.person, name)
+        if job is not None:
+            threading.Thread(target=_complete, args=(session, job), daemon=True).start()
 
     def put_away(self, page: Page) -> None:
         """Give a page an empty session; the scene of the one before goes when no other page shows it."""
@@ -403,6 +409,18 @@ class Studio:
             # A copy: the original may be replaced while somebody downloads it.
             copy = Path(shutil.copyfile(file, folder / (name or file.name)))
         return self.files.hand_out(person, copy, str(copy))
+
+
+def _complete(session: Session, job: Job) -> None:
+    """Let an open photo have its path-traced re-rendering, once its inversion is over."""
+    while not job.over:
+        time.sleep(POLL)
+    live = session.live
+    # It may have been closed, or another one opened.
+    if live is not None and session.project is not None and session.project.folder == job.folder:
+        with suppress(MaterialistError):
+            live.call(views.take_rerender)
+            session.changed()
 
 
 def _check_memory(project: Project) -> None:

@@ -14,7 +14,7 @@ from materialist.types import Array
 
 
 @dataclass(frozen=True)
-class RimSettings:
+class MaskRimSettings:
     """What belongs to the object; tuned on 60 masks of half the photos of `bench select`; lengths in longer sides."""
 
     reach: float = 0.004  # from the mask; 0.006 to 0.012 takes more of what is not the object's
@@ -28,7 +28,7 @@ class RimSettings:
     blur: float = 0.7  # standard deviation, pixels, of the Gaussian that takes single pixels out
 
 
-SETTINGS = RimSettings()
+SETTINGS = MaskRimSettings()
 
 
 def with_rim(mask: Array, photo: Array) -> Array:
