@@ -63,7 +63,7 @@ def invert(
         on_stage: called as on_stage(name, value) with "prior" (a Prediction), "light" ([h, 2h, 3]) and "materials" as
             soon as each is there; "materials" also before "prior", where the predictor has them before the depth. Last,
             before the path-traced re-rendering: "scene" (a Scene whose `rerender` is the fit's own picture, and whose
-            report has no figures), unless the engine is `path`.
+            report has no figures), where the fit ended with materials by the engine `transport`.
         stop: asked after each step of the fit; True ends it there, and the scene has what was found until then.
 
     Raises:
@@ -170,16 +170,15 @@ def invert(
             geometry=result.geometry,
             envmap=result.envmap,
             rerender=result.rerender,
-            # Figures are those of traced paths.
-            report=report if result.spp else replace(report, metrics={}),
+            report=report,
             provenance={**provenance, "spp": result.spp},
         )
 
     def on_fit_stage(name: str, value: Any) -> None:
-        if name == "fitted":
-            tell("scene", scene_of(value))
-        else:
+        if name != "fitted":
             tell(name, value)
+        elif on_stage is not None:
+            on_stage("scene", scene_of(value))
 
     best = fitting.invert(fit_setup, progress=progress, on_stage=on_fit_stage, stop=stop or never)
     return scene_of(best)
@@ -247,23 +246,9 @@ def render_scene(
 def _report(
     picture: Photo, prior: Prediction, result: FitResult, stages: tuple[dict, ...], start: float
 ) -> FitReport:
-    """Figures and warnings of a fit."""
-    materials = result.materials
-    # Two halves with independent noise: their difference tells how much of the error is noise.
-    halves = [np.nan_to_num(half, posinf=0) for half in result.halves]
-    rerender = (halves[0] + halves[1]) / 2
-    surface = prior.depth > 0
-    # How far the fit moved from the prior: mean L1 over the surface.
-    distance = {
-        f"prior_l1_{name}": float(
-            np.abs(getattr(materials, name) - getattr(prior.materials, name))[surface].mean()
-        )
-        for name in ("albedo", "roughness", "metallic")
-    }
+    """Warnings of a fit, and figures of one whose paths were traced."""
     # --- Where the photo cannot be trusted, or the fit does not explain it ---
-    residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
-    white = HDR_CLIP if picture.hdr else CLIPPED
-    clipped = float((picture.linear >= white).any(-1).mean())
+    clipped = _clipped(picture)
     notes = [*picture.warnings, *prior.warnings]
     if lost := int((~np.isfinite(result.rerender).all(-1)).sum()):
         notes.append(
@@ -280,24 +265,47 @@ def _report(
         notes.append(
             f"The fit was stopped in its stage '{last['name']}', after {last['steps']} steps."
         )
-    # --- Figures; noise in the re-rendering is no error of the fit ---
-    poor = float((residual > 0.1).mean())
-    return FitReport(
-        stages=stages,
-        metrics={
-            "rerender_psnr_path": metrics.psnr_without_noise(halves[0], halves[1], picture.linear),
-            "rerender_ssim_path": metrics.ssim_without_noise(halves[0], halves[1], picture.linear),
-            "rerender_psnr_residual": metrics.psnr(
-                rerender * shading_residual(picture.linear, rerender), picture.linear
-            ),
-            **distance,
+    figures: dict[str, float] = {}
+    if result.spp:
+        figures = {
+            **_figures(picture, prior, result),
             "clipped_fraction": clipped,
-            "poor_fraction": poor,
             "total_seconds": time.perf_counter() - start,
             "peak_rss_mb": peak_rss_mb(),
-        },
-        warnings=tuple(notes),
-    )
+        }
+    return FitReport(stages=stages, metrics=figures, warnings=tuple(notes))
+
+
+def _clipped(picture: Photo) -> float:
+    """The share of a photo's pixels that are clipped."""
+    white = HDR_CLIP if picture.hdr else CLIPPED
+    return float((picture.linear >= white).any(-1).mean())
+
+
+def _figures(picture: Photo, prior: Prediction, result: FitResult) -> dict[str, float]:
+    """How near the re-rendering is to the photo, and how far the maps moved from the prior."""
+    # Two halves with independent noise: their difference tells how much of the error is noise.
+    halves = [np.nan_to_num(half, posinf=0) for half in result.halves]
+    rerender = (halves[0] + halves[1]) / 2
+    surface = prior.depth > 0
+    # How far the fit moved from the prior: mean L1 over the surface.
+    distance = {
+        f"prior_l1_{name}": float(
+            np.abs(getattr(result.materials, name) - getattr(prior.materials, name))[surface].mean()
+        )
+        for name in ("albedo", "roughness", "metallic")
+    }
+    residual = np.abs(linear_to_srgb(rerender) - linear_to_srgb(picture.linear)).max(-1)
+    return {
+        # Noise in the re-rendering is no error of the fit.
+        "rerender_psnr_path": metrics.psnr_without_noise(halves[0], halves[1], picture.linear),
+        "rerender_ssim_path": metrics.ssim_without_noise(halves[0], halves[1], picture.linear),
+        "rerender_psnr_residual": metrics.psnr(
+            rerender * shading_residual(picture.linear, rerender), picture.linear
+        ),
+        **distance,
+        "poor_fraction": float((residual > 0.1).mean()),
+    }
 
 
 def peak_rss_mb() -> float:

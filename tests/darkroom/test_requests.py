@@ -18,6 +18,7 @@ from PIL import Image
 from studio_scenes import HEIGHT, WIDTH, block, package, zipped_package
 
 from materialist.darkroom.state import outline
+from materialist.errors import InputError
 from materialist.io.image import write_png
 from materialist.io.package import load_scene
 
@@ -428,32 +429,70 @@ def test_other_photos_are_safe_while_one_is_taken_apart(client, heard, monkeypat
     client.studio.page("b" * 32, "me").session.live.wait()
 
 
-def test_a_photo_opens_before_its_rerendering_and_takes_it_later(
-    client, heard, monkeypatch, tmp_path
-):
-    whole = package(tmp_path)
-    fitted = partial(made_tasks.invert_from, package=str(whole))
+@pytest.fixture
+def whole(monkeypatch, tmp_path):
+    """The package whose scene an inversion gives, grey at first (`made_tasks.invert_from`)."""
+    path = package(tmp_path)
+    fitted = partial(made_tasks.invert_from, package=str(path))
     monkeypatch.setattr(fitted, "__name__", "invert", raising=False)
     monkeypatch.setattr("materialist.studio.tasks.invert", fitted)
+    return path
+
+
+def test_a_photo_opens_before_its_rerendering_and_takes_it_later(client, heard, whole):
     begun = client.post("/api/start", json={"example": "cat"}).json()
     heard(lambda news: news["jobs"] and not working(news))
     state = client.get("/api/state").json()
-    assert state["project"]["name"] == begun["expected"]["name"]
+    assert state["project"]["name"] == begun["expected"]["name"] and not state["traced"]
     (job,) = client.studio.jobs.unfinished("me", "invert")
     assert job.stage == "rerender"
-    # It can be edited, and another page opens it, too.
-    live = client.studio.page("b" * 32, "me").session.live
-    live.wait()
+    # It can be edited, closed, and opened again.
     select_block(client)
     assert change(client, hue=60).json()["steps"]
+    client.post("/api/close", json={})
+    client.post("/api/open", json={"project": begun["expected"]["name"]})
+    live = client.studio.page("b" * 32, "me").session.live
+    live.wait()
     assert live.call(rerender_of).max() == 0.5
+    names = client.get("/api/report").json()["maps"]
+    assert any("before its paths are traced" in name for name in names)
     # When the job ends, the preview has the path-traced picture, and the edit is still there.
     (job.folder / "go").touch()
     made_tasks.until(lambda: job.over)
     assert job.state == "done"
-    expected = load_scene(whole).rerender
-    made_tasks.until(lambda: np.array_equal(live.call(rerender_of), expected))
+    made_tasks.until(lambda: client.get("/api/state").json()["traced"])
+    np.testing.assert_array_equal(live.call(rerender_of), load_scene(whole).rerender)
     assert client.get("/api/state").json()["steps"][0]["options"]["hue"] == "60"
+
+
+def test_a_rerendering_that_is_lost_leaves_the_photo_open(client, heard, whole):
+    client.post("/api/start", json={"example": "cat"})
+    heard(lambda news: news["jobs"] and not working(news))
+    (job,) = client.studio.jobs.unfinished("me", "invert")
+    os.kill(job.worker.pid, signal.SIGKILL)
+    made_tasks.until(lambda: job.over)
+    state = client.get("/api/state").json()
+    assert state["project"]["name"] == job.folder.name and not state["traced"]
+
+
+def test_a_photo_opens_after_its_rerendering_where_memory_is_short(
+    client, heard, whole, monkeypatch
+):
+    studio = client.studio
+
+    def check(project):
+        if studio.jobs.unfinished("me", "invert"):
+            raise InputError("No memory.")
+
+    monkeypatch.setattr("materialist.studio.studio._check_memory", check)
+    client.post("/api/start", json={"example": "cat"})
+    made_tasks.until(lambda: studio.jobs.unfinished("me", "invert")[0].stage == "rerender")
+    (job,) = studio.jobs.unfinished("me", "invert")
+    assert client.get("/api/state").json()["project"] is None
+    (job.folder / "go").touch()
+    heard(lambda news: news["jobs"] and not working(news))
+    state = client.get("/api/state").json()
+    assert state["project"]["name"] == job.folder.name and state["traced"]
 
 
 def rerender_of(preview):

@@ -45,6 +45,15 @@ def test_the_first_picture_is_coarse_and_near(preview):
     assert psnr(first, fine) > 30 and (first != fine).any()
 
 
+def test_surfaces_pass_on_what_the_photo_shows(preview):
+    scene = preview.scene
+    first = Preview(scene).render(scene)
+    other = replace(scene, rerender=0 * scene.rerender)
+    np.testing.assert_array_equal(Preview(other).render(other), first)
+    brighter = replace(scene, photo=replace(scene.photo, linear=2 * scene.photo.linear))
+    assert (Preview(brighter).render(brighter) > first).any()
+
+
 def test_light_change_agrees_with_the_path_tracer(preview):
     light = np.full((8, 16, 3), 0.2, np.float32)
     light[:, 3:8] = [1.5, 1.0, 0.5]

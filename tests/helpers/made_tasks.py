@@ -62,7 +62,8 @@ def invert_from(report, package, scene, **arguments):
     from materialist.io.package import replace_rerender
 
     whole = mt.load_scene(package)
-    mt.save_scene(replace(whole, rerender=0 * whole.rerender + 0.5), scene)
+    early = replace(whole, provenance={**whole.provenance, "spp": 0})
+    mt.save_scene(replace(early, rerender=0 * whole.rerender + 0.5), scene)
     report("rerender", 0, 1)
     until(Path(scene).with_name("go").exists, seconds=60)
     replace_rerender(whole, scene)

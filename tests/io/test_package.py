@@ -20,7 +20,13 @@ from materialist.io import atomic
 from materialist.io.atomic import ensure_writable, whole_folder
 from materialist.io.exr import write_exr
 from materialist.io.meshes import read_ply, write_ply
-from materialist.io.package import check_room, load_scene, replace_rerender, save_scene
+from materialist.io.package import (
+    check_room,
+    load_scene,
+    replace_rerender,
+    save_scene,
+    with_rerender,
+)
 
 
 @pytest.fixture
@@ -90,11 +96,32 @@ def test_a_rerendering_replaces_that_of_a_package_and_nothing_else(scene, tmp_pa
         "report.json",
         "scene.json",
     }
+    assert_same(with_rerender(early, path), scene)
     save_scene(early, tmp_path / "b.scene")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.scene", "b.scene"]
     with pytest.raises(SceneError, match="no scene package"):
         replace_rerender(scene, tmp_path / "missing.scene")
     assert not (tmp_path / "missing.scene").exists()
+
+
+def test_a_rerendering_that_is_interrupted_leaves_the_old_report(scene, tmp_path, monkeypatch):
+    path = tmp_path / "a.scene"
+    early = replace(scene, report=replace(scene.report, metrics={}))
+    save_scene(early, path)
+    place = os.replace
+
+    def until_the_report(source, target):
+        if str(target).endswith(".json"):
+            raise OSError(28, "No space left on device")
+        place(source, target)
+
+    monkeypatch.setattr("os.replace", until_the_report)
+    with pytest.raises(OutputError, match="no space left"):
+        replace_rerender(replace(scene, rerender=0.5 * scene.rerender), path)
+    loaded = load_scene(path)
+    assert loaded.report.metrics == {}
+    np.testing.assert_array_equal(loaded.rerender, 0.5 * scene.rerender)
+    assert [file.name for file in tmp_path.iterdir()] == ["a.scene"]
 
 
 def test_the_files_of_the_contract(scene, tmp_path):

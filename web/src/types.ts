@@ -39,6 +39,8 @@ export interface Fitted {
 
 export interface State {
   revision: number;
+  /** Whether the re-rendering is path traced yet. */
+  traced: boolean;
   project: Project | null;
   expected: Project | null;
   ready: boolean;

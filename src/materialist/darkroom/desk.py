@@ -120,7 +120,7 @@ class Desk:
         job = entry.job
         while not (job.over or is_done()):
             time.sleep(POLL)
-        entry.outcome = job.state if job.over else DONE
+        entry.outcome = DONE if is_done() else job.state
         entry.seconds = job.seconds
         try:
             then(entry)

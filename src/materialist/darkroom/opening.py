@@ -4,6 +4,7 @@ import asyncio
 import re
 import secrets
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
 from materialist.darkroom import bodies
-from materialist.darkroom.desk import Desk, Desks, Followed, found_file
+from materialist.darkroom.desk import POLL, Desk, Desks, Followed, found_file
 from materialist.darkroom.endpoint import desk_of
 from materialist.darkroom.state import example_file, project_facts, state
 from materialist.darkroom.taking import follow_finals
@@ -219,11 +220,26 @@ def _expect(desk: Desk, project: Project, job: Job) -> None:
             # Nothing to go on with: the folder goes.
             desk.studio.work.drop(project)
         expected = desk.expected == project
-        if expected and project.ready and not desk.page.left:
-            desk.studio.open(desk.page, project.name)
-        elif project.ready:
-            entry.notes.append(f"{project.title} is ready; it is among your photos.")
-        if desk.expected == project:
-            desk.expected = None
+        try:
+            if expected and project.ready and not desk.page.left:
+                _open_first(desk, project, job)
+            elif project.ready:
+                entry.notes.append(f"{project.title} is ready; it is among your photos.")
+        finally:
+            if desk.expected == project:
+                desk.expected = None
 
     desk.follow(job, then, lambda: project.ready)
+
+
+def _open_first(desk: Desk, project: Project, job: Job) -> None:
+    """Open a project whose inversion may still run; where memory is short, when that has given its own back."""
+    try:
+        desk.studio.open(desk.page, project.name)
+    except InputError:
+        if job.over:
+            raise
+        while not job.over:
+            time.sleep(POLL)
+        if desk.expected == project and not desk.page.left:
+            desk.studio.open(desk.page, project.name)

@@ -20,6 +20,7 @@ from materialist.option_kinds import declarations
 from materialist.options import InvertOptions
 from materialist.studio import SETTINGS, drawn, objects, uploads
 from materialist.studio.edit_list import step_summary
+from materialist.studio.reporting import is_traced
 from materialist.studio.selection import Selection
 from materialist.studio.stage import commands, stage
 from materialist.studio.studio import PREDICTORS, Studio
@@ -53,6 +54,7 @@ def state(
             "project": project_facts(session.project),
             "expected": project_facts(desk.expected),
             "ready": session.live is not None and session.live.ready,
+            "traced": session.live is not None and is_traced(session.live.scene),
             "original": _original(desk),
             "stage": {**shown, "region": outlined, "clicked": selection.clicked is not None},
             "drawn": drawn.keys(session),

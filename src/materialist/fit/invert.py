@@ -69,7 +69,7 @@ class FitState:
     light: tuple[torch.nn.Module, LightStart] | None = None
     """The field behind `envmap`, which a later fit moves on, and what it began with."""
     shaded: torch.Tensor | None = None
-    """[P, 3] radiance of the surface pixels as the last stage renders them; None before it, and with `PathEngine`."""
+    """[P, 3] radiance of the surface pixels by the last materials and light; None where no stage rendered it."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +110,7 @@ class Fit:
         """Find the state's light, under which these materials look like the photo."""
         start = time.perf_counter()
         setup = self.setup
+        state.shaded = None
         photo = self._photo()
         settings = setup.settings.light
         # --- What surfaces send each other follows the fitted maps from the second fit on ---
@@ -233,7 +234,7 @@ class Fit:
         return state
 
     def picture(self, state: FitState) -> Array | None:
-        """[H, W, 3] linear: the picture as the last stage renders it, without noise; None where it is not known."""
+        """[H, W, 3] linear: the state as its last stage renders it, without noise; None where none did."""
         if state.shaded is None:
             return None
         rays = unit(pixel_rays(self.setup.photo.camera).reshape(-1, 3))

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -95,10 +95,22 @@ def replace_rerender(scene: Scene, path: str | Path) -> None:
             (temporary / "maps").mkdir(parents=True)
             _write_rerender(scene, temporary)
             _write_json(temporary / MARKER, {**meta, "provenance": scene.provenance})
-            for file in files_below(temporary):
+            # The report and scene.json last: where they are new, so is the picture.
+            for file in sorted(files_below(temporary), key=lambda name: name.endswith(".json")):
                 os.replace(temporary / file, folder / file)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def with_rerender(scene: Scene, path: str | Path) -> Scene:
+    """The scene with the re-rendering, report and provenance of its package at PATH. Raises SceneError."""
+    folder = Path(path)
+    return replace(
+        scene,
+        rerender=package_map(folder / "rerender.exr", scene.rerender.shape),
+        report=_read_report(folder),
+        provenance=_read_meta(folder)["provenance"],
+    )
 
 
 @spelled

@@ -17,7 +17,7 @@ from materialist import errors
 from materialist.edits.core.operation import PreviewMode
 from materialist.edits.recipe import Step
 from materialist.errors import InputError, MaterialistError
-from materialist.io.package import load_scene
+from materialist.io.package import load_scene, with_rerender
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, Reporter
 from materialist.memory import give_back
@@ -110,6 +110,11 @@ class Live:
     def select(self, **where: Any) -> Array:
         """[H, W] bool: what `edits.select.select.select` chooses by these keywords. Raises InputError."""
         return np.asarray(self.call(views.selected, where=where))
+
+    def take_rerender(self) -> None:
+        """Take the re-rendering that an inversion has added to the package since it was opened. Raises as `call`."""
+        self.call(views.take_rerender)
+        self.scene = with_rerender(self.scene, self._package)
 
     def _begin(self, function: Callable[..., Any], arguments: dict[str, Any]) -> Future[Any]:
         with self._lock:

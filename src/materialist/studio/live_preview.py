@@ -24,7 +24,7 @@ from materialist.edits.recipe import Step, apply, options_of, region_of
 from materialist.edits.remove.filling import remembered
 from materialist.errors import InputError
 from materialist.geometry.membrane import nearest
-from materialist.io.package import load_scene
+from materialist.io.package import with_rerender
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
 from materialist.studio import SETTINGS, glass, tasks
@@ -107,10 +107,9 @@ class LivePreview:
     def take_rerender(self) -> None:
         """Take the re-rendering of the package, and its report, which an inversion has added since it was opened."""
         assert self._package is not None
-        whole = load_scene(self._package)
-        parts = {name: getattr(whole, name) for name in ("rerender", "report", "provenance")}
-        self.scene = replace(self.scene, **parts)
-        self._kept.clear()
+        self.scene = with_rerender(self.scene, self._package)
+        # What a request in flight still makes goes into the old one.
+        self._kept = {}
 
     def edited(self, steps: tuple[Step, ...]) -> Scene:
         """The scene after the steps without glass, whose body another process builds.
@@ -125,14 +124,15 @@ class LivePreview:
     def _after(self, steps: tuple[Step, ...]) -> Scene:
         """The scene after the steps; the last scenes are kept, so moving the last step replays none before it."""
         # The longest list that starts alike and is kept; from there step by step.
+        store = self._kept
         counts = range(len(steps), 0, -1)
-        known = next((n for n in counts if key_of(steps[:n]) in self._kept), 1)
+        known = next((n for n in counts if key_of(steps[:n]) in store), 1)
         scene = self.scene
         for n in range(known, len(steps) + 1):
             make = partial(self._applied, scene, steps[:n])
-            scene = kept(self._kept, steps[:n], make, SETTINGS.scenes_kept)
-        while len(self._kept) > 1 and _bytes_of_bodies(self._kept.values()) > SETTINGS.kept_bytes:
-            del self._kept[next(iter(self._kept))]
+            scene = kept(store, steps[:n], make, SETTINGS.scenes_kept)
+        while len(store) > 1 and _bytes_of_bodies(store.values()) > SETTINGS.kept_bytes:
+            del store[next(iter(store))]
         return scene
 
     def _applied(self, before: Scene, steps: tuple[Step, ...]) -> Scene:

@@ -10,6 +10,9 @@ from materialist.types import Array, Scene
 def named_maps(scene: Scene) -> list[tuple[Array, str]]:
     """[H, W, 3] uint8 pictures of everything that was found, each with its name in plain words."""
     shown = display.maps(scene)
+    origin = (
+        "path traced" if is_traced(scene) else "as the fit sees it, before its paths are traced"
+    )
     return [
         (shown["albedo"], "Albedo: colour without light"),
         (shown["roughness"], "Roughness: black is a mirror, white is chalk"),
@@ -17,12 +20,17 @@ def named_maps(scene: Scene) -> list[tuple[Array, str]]:
         (shown["normal"], "Normals: which way surfaces face"),
         (shown["depth"], "Depth: near is bright"),
         (display.light(scene.envmap), "Light, all around; ahead is the middle"),
-        (srgb_levels(scene.rerender), "Re-rendering: the scene, path traced"),
+        (srgb_levels(scene.rerender), f"Re-rendering: the scene, {origin}"),
         (
             display.error(scene.photo.linear, scene.rerender),
             "Error: where it misses the photo (x 4)",
         ),
     ]
+
+
+def is_traced(scene: Scene) -> bool:
+    """Whether the re-rendering of a scene is path traced; else it is the fit's own, which an inversion replaces."""
+    return scene.provenance.get("spp") != 0
 
 
 def quality(scene: Scene) -> str:

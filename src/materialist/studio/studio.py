@@ -20,8 +20,9 @@ from materialist.errors import InputError, MaterialistError, OutputError
 from materialist.io.atomic import writing
 from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
+from materialist.jobs.worker import DONE
 from materialist.memory import give_back
-from materialist.studio import SETTINGS, archives, tasks, uploads, views
+from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
 from materialist.studio.live import warmed
@@ -411,15 +412,21 @@ class Studio:
         return self.files.hand_out(person, copy, str(copy))
 
 
+def _folder_of(session: Session) -> Path | None:
+    """The folder of the photo that a session shows."""
+    project = session.project
+    return None if project is None else project.folder
+
+
 def _complete(session: Session, job: Job) -> None:
     """Let an open photo have its path-traced re-rendering, once its inversion is over."""
     while not job.over:
         time.sleep(POLL)
     live = session.live
     # It may have been closed, or another one opened.
-    if live is not None and session.project is not None and session.project.folder == job.folder:
+    if live is not None and job.state == DONE and _folder_of(session) == job.folder:
         with suppress(MaterialistError):
-            live.call(views.take_rerender)
+            live.take_rerender()
             session.changed()
 
 

@@ -53,6 +53,14 @@ def test_what_is_not_joined_to_the_mask_stays_outside():
     assert (found & ~mask).sum() == 0
 
 
+def test_a_thin_thing_in_front_stays_outside():
+    whole = within(60)
+    line = np.zeros_like(whole)
+    line[:, 128] = True
+    found = with_rim(whole & ~line, painted(whole & ~line, RED, GREY))
+    assert (found & line & whole).sum() <= 0.1 * (line & whole).sum()
+
+
 @pytest.mark.parametrize("mask", [within(0), within(999), within(2), within(60, (0, 128))])
 def test_masks_of_any_kind(mask):
     found = with_rim(mask, painted(mask, RED, GREY))

@@ -16,7 +16,8 @@ export function Look() {
   const [facts, setFacts] = useState<Report | null>(null);
   const [large, setLarge] = useState<number | null>(null);
   const project = state?.project?.name;
-  const edits = JSON.stringify(state?.steps);
+  // The re-rendering of a new photo comes later, and is shown, too.
+  const edits = JSON.stringify([state?.steps, state?.traced]);
   useEffect(() => {
     if (!project) return;
     let wanted = true;

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from materialist.geometry.silhouette import disc, grown, window
+from materialist.geometry.silhouette import window
 from materialist.types import Array
 
 
@@ -21,10 +21,11 @@ class MaskRimSettings:
     window: float = 0.01  # standard deviation of the Gaussian that weighs colours near a pixel
     brightness: float = 0.35  # weight of brightness beside colour: rims are shaded
     grain: float = 0.03  # standard deviation of an even surface's colour, sRGB-encoded
-    margin: float = (
-        4.0  # squared standard deviations by which a pixel is nearer to the object's colours
-    )
+    # squared standard deviations by which a pixel is nearer to the object's colours
+    margin: float = 4.0
     most: float = 20.0  # of the same: more is as sure
+    # least standard deviation, pixels, where colours are weighed; derived: time
+    coarse: float = 5.0
     blur: float = 0.7  # standard deviation, pixels, of the Gaussian that takes single pixels out
 
 
@@ -44,13 +45,15 @@ def with_rim(mask: Array, photo: Array) -> Array:
     # --- Only the part of the picture around the mask ---
     box = window(mask, margin=int(np.ceil(3 * sigma)) + 2 * reach)
     inside = mask[box]
-    near = grown(inside, reach)
-    core = cv2.erode(inside.astype(np.uint8), disc(reach)) > 0
+    near = inside | (_away(~inside) <= reach)
+    core = _away(inside) > reach
     # --- How far each pixel's colour is from those of the object, and of what is beyond the rim ---
     colour = _features(photo[box])
-    to_object = _distance(colour, core, sigma)
-    to_other = _distance(colour, ~near, sigma)
-    nearer = np.clip(to_other - to_object, -SETTINGS.most, SETTINGS.most).astype(np.float32)
+    to_object, known = _distance(colour, core, sigma)
+    to_other, known_other = _distance(colour, ~near, sigma)
+    nearer = np.clip(to_other - to_object, -SETTINGS.most, SETTINGS.most)
+    # Where one side is not near, as in a gap that a thin thing fills, nothing is taken.
+    nearer = np.where(known & known_other, nearer, 0).astype(np.float32)
     alike = cv2.GaussianBlur(nearer, (0, 0), SETTINGS.blur) > SETTINGS.margin
     # --- What is joined to the mask ---
     result = mask.copy()
@@ -65,17 +68,35 @@ def _features(photo: Array) -> Array:
     return np.concatenate(parts, -1).astype(np.float32)
 
 
-def _distance(colour: Array, members: Array, sigma: float) -> Array:
+def _away(mask: Array) -> Array:
+    """[H, W] pixels from those of a mask [H, W] bool to the nearest outside of it; 0 there."""
+    return np.asarray(
+        cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    )
+
+
+def _distance(colour: Array, members: Array, sigma: float) -> tuple[Array, Array]:
     """[H, W] squared standard deviations of each colour [H, W, C] from those of the members [H, W] bool near it.
 
-    Where no member is near, it is the largest that counts.
+    And where there are any [H, W] bool.
     """
+    height, width = members.shape
+    # A wide Gaussian is as smooth on a coarser grid: its cost stays that of a small picture.
+    factor = max(1, int(sigma / SETTINGS.coarse))
+    coarse = (-(-width // factor), -(-height // factor))
+
+    def blurred(values: Array) -> Array:
+        small = cv2.resize(values, coarse, interpolation=cv2.INTER_AREA) if factor > 1 else values
+        small = cv2.GaussianBlur(small, (0, 0), sigma / factor)
+        if factor == 1:
+            return small
+        return cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
+
     weight = members.astype(np.float32)
-    norm = cv2.GaussianBlur(weight, (0, 0), sigma)
+    norm = blurred(weight)
     known = norm > 1e-3
     norm = np.maximum(norm, 1e-6)[..., None]
-    mean = cv2.GaussianBlur(colour * weight[..., None], (0, 0), sigma) / norm
-    square = cv2.GaussianBlur(colour**2 * weight[..., None], (0, 0), sigma) / norm
+    mean = blurred(colour * weight[..., None]) / norm
+    square = blurred(colour**2 * weight[..., None]) / norm
     variance = np.maximum(square - mean**2, 0) + SETTINGS.grain**2
-    distance = ((colour - mean) ** 2 / variance).sum(-1)
-    return np.where(known, distance, SETTINGS.most)
+    return ((colour - mean) ** 2 / variance).sum(-1), known
