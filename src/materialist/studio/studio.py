@@ -215,7 +215,7 @@ class Studio:
             raise
         self.note_last(page.person, name)
         if job is not None:
-            threading.Thread(target=_complete, args=(session, job), daemon=True).start()
+            threading.Thread(target=_complete, args=(session, project, job), daemon=True).start()
 
     def put_away(self, page: Page) -> None:
         """Give a page an empty session; the scene of the one before goes when no other page shows it."""
@@ -412,19 +412,13 @@ class Studio:
         return self.files.hand_out(person, copy, str(copy))
 
 
-def _folder_of(session: Session) -> Path | None:
-    """The folder of the photo that a session shows."""
-    project = session.project
-    return None if project is None else project.folder
-
-
-def _complete(session: Session, job: Job) -> None:
+def _complete(session: Session, project: Project, job: Job) -> None:
     """Let an open photo have its path-traced re-rendering, once its inversion is over."""
     while not job.over:
         time.sleep(POLL)
     live = session.live
     # It may have been closed, or another one opened.
-    if live is not None and job.state == DONE and _folder_of(session) == job.folder:
+    if live is not None and job.state == DONE and session.shows(project):
         with suppress(MaterialistError):
             live.take_rerender()
             session.changed()

@@ -25,17 +25,17 @@ def painted(inside, front, back, grain=0.02):
 @pytest.mark.parametrize("missing", [1, 0])
 def test_the_rest_of_a_disc_is_added_and_nothing_beside_it(missing):
     whole = within(60)
-    found = with_rim(within(60 - missing), painted(whole, RED, GREY))
-    assert (found & ~whole).sum() <= 0.02 * (whole & ~within(59)).sum()
-    assert (whole & ~found).sum() <= 0.15 * (whole & ~within(59)).sum()
+    result = with_rim(within(60 - missing), painted(whole, RED, GREY))
+    assert (result & ~whole).sum() <= 0.02 * (whole & ~within(59)).sum()
+    assert (whole & ~result).sum() <= 0.15 * (whole & ~within(59)).sum()
 
 
 def test_a_shaded_rim_is_the_objects_too():
     whole = within(60)
     picture = painted(whole, RED, GREY)
     picture[whole & ~within(59)] *= 0.7
-    found = with_rim(within(59), picture)
-    assert (whole & ~found).sum() <= 0.25 * (whole & ~within(59)).sum()
+    result = with_rim(within(59), picture)
+    assert (whole & ~result).sum() <= 0.25 * (whole & ~within(59)).sum()
 
 
 def test_what_looks_alike_on_both_sides_stays_outside():
@@ -49,27 +49,27 @@ def test_what_is_not_joined_to_the_mask_stays_outside():
     # A red ring, behind a grey one of a pixel.
     wide = within(59 + 2.5) & ~within(59 + 1.2)
     picture[wide] = RED
-    found = with_rim(mask, np.ascontiguousarray(picture))
-    assert (found & ~mask).sum() == 0
+    result = with_rim(mask, np.ascontiguousarray(picture))
+    assert (result & ~mask).sum() == 0
 
 
 def test_a_thin_thing_in_front_stays_outside():
     whole = within(60)
     line = np.zeros_like(whole)
     line[:, 128] = True
-    found = with_rim(whole & ~line, painted(whole & ~line, RED, GREY))
-    assert (found & line & whole).sum() <= 0.1 * (line & whole).sum()
+    result = with_rim(whole & ~line, painted(whole & ~line, RED, GREY))
+    assert (result & line & whole).sum() <= 0.1 * (line & whole).sum()
 
 
 @pytest.mark.parametrize("mask", [within(0), within(999), within(2), within(60, (0, 128))])
 def test_masks_of_any_kind(mask):
-    found = with_rim(mask, painted(mask, RED, GREY))
-    assert found.shape == mask.shape and found.dtype == bool
-    assert not (mask & ~found).any()
-    assert (found & ~mask).sum() <= 0.02 * mask.sum() + 2
+    result = with_rim(mask, painted(mask, RED, GREY))
+    assert result.shape == mask.shape and result.dtype == bool
+    assert not (mask & ~result).any()
+    assert (result & ~mask).sum() <= 0.02 * mask.sum() + 2
 
 
 def test_a_larger_picture_has_a_wider_rim():
     large, mask = (np.kron(within(radius), np.ones((4, 4))) > 0 for radius in (60, 59))
-    found = with_rim(mask, painted(large, RED, GREY))
-    assert (large & ~found).sum() <= 0.05 * (large & ~mask).sum()
+    result = with_rim(mask, painted(large, RED, GREY))
+    assert (large & ~result).sum() <= 0.05 * (large & ~mask).sum()
