@@ -196,6 +196,19 @@ def test_select_writes_a_mask_that_edit_reads(done, folder, tmp_path):
     done(*select, "--click", "17,17", "--native", "-o", tmp_path / "n.png")
 
 
+def test_a_region_takes_its_options_to_select(done, folder, tmp_path, monkeypatch):
+    seen = {}
+
+    def chosen(scene, **where):
+        seen.update(where)
+        return MASK
+
+    monkeypatch.setattr("materialist.select", chosen)
+    narrowed = ("--click", "17,17", "--same-material", "--exclude", "20,21", "--exclude", "22,23")
+    done("select", folder / "a.scene", *narrowed, "-o", tmp_path / "m.png")
+    assert seen["same_material"] is True and seen["exclude"] == ((20, 21), (22, 23))
+
+
 def test_glass_is_written_saved_and_loaded_again(done, folder, tmp_path):
     out = tmp_path / "g.exr"
     saved = tmp_path / "g.scene"

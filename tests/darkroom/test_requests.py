@@ -74,6 +74,18 @@ def test_the_selection_of_a_click_grows_and_its_edit_with_it(client, monkeypatch
     assert undone["steps"] == before["steps"]
 
 
+def test_the_selection_of_a_click_keeps_its_material_and_so_does_its_edit(client, monkeypatch):
+    session = client.studio.page("b" * 32, "me").session
+    wider = block() | (np.indices(block().shape)[1] > 58)
+    monkeypatch.setattr(session.live, "select", lambda click, extent="auto": wider.copy())
+    select_block(client)
+    change(client, hue=120)
+    before = client.get("/api/state").json()
+    after = client.post("/api/material", json={}).json()
+    assert after["stage"]["region"] != before["stage"]["region"] and len(after["steps"]) == 1
+    assert after["steps"][0]["options"]["mask"] != before["steps"][0]["options"]["mask"]
+
+
 def test_a_default_is_left_out_of_the_list_and_none_clears(client):
     select_block(client)
     change(client, hue=30, saturation=0.5)

@@ -80,7 +80,8 @@ def test_a_further_operation_is_a_step_of_lists_of_edits(folder):
     assert step_summary(steps[0]) == "Wet: depth 0.5"
     assert step_summary(Step("wet")) == "Wet: as it is"
     with pytest.raises(
-        InputError, match="says 'hue'; wet knows mask, click, box, with, extent, depth"
+        InputError,
+        match="says 'hue'; wet knows mask, click, box, with, extent, same_material, exclude, depth",
     ):
         steps_of(folder, "- wet: {mask: block.png, hue: 3}")
 

@@ -78,3 +78,18 @@ def test_a_click_takes_less_or_more():
     for other in (one.brush(scene, [[44, 40]], 4, "add", CHOOSE), Selection((first,))):
         with pytest.raises(InputError, match="Click an object first"):
             other.resized(True, choose)
+
+
+def test_only_what_has_the_material_of_the_click():
+    scene = room()
+    whole = block() | (np.indices((48, 64))[1] > 58)  # the block, and some wall
+    one = Selection((np.eye(48, 64, dtype=bool),)).click(
+        scene, 25, 24, "add", lambda click: whole.copy()
+    )
+    narrow = one.of_material(scene)
+    assert overlap(narrow.parts[-1], block()) > 0.9 and narrow.clicked == one.clicked
+    assert np.array_equal(narrow.parts[0], one.parts[0])
+    with pytest.raises(InputError, match="seems to be of one material"):
+        narrow.of_material(scene)
+    with pytest.raises(InputError, match="Click an object first"):
+        Selection((whole,)).of_material(scene)

@@ -23,6 +23,7 @@ const PATHS: Record<string, string> = {
   deselect: "M4 4l12 12M7 4h9v9M13 16H4V7",
   smaller: "M3 3h14v14H3zM7.500 7.500h5v5h-5zM5 10h2.500M12.500 10H15",
   larger: "M7 7h6v6H7zM3 7V3h4M13 3h4v4M17 13v4h-4M7 17H3v-4",
+  sameMaterial: "M3 3h14v14H3zM3 11l8-8M3 17L17 3M9 17l8-8",
   up: "M5 12l5-5 5 5",
   down: "M5 8l5 5 5-5",
   pen: "M4 16l.600-3L13 4.600l2.400 2.400L7 15.400z",

@@ -16,6 +16,10 @@ export function resize(larger: boolean): void {
   if (view.state?.stage.clicked) void change("resize", { larger }, "", t.selecting);
 }
 
+export function keepMaterial(): void {
+  if (view.state?.stage.clicked) void change("material", {}, "", t.selecting);
+}
+
 function typing(target: EventTarget | null): boolean {
   return target instanceof HTMLElement && target.matches("textarea, input:not([type=range], [type=checkbox], [type=color])");
 }
@@ -44,6 +48,7 @@ export function shortcuts(): () => void {
     if (event.shiftKey && panel) set({ panel });
     else if (tool) set({ tool, dropper: null });
     else if (key === "[" || key === "]") resize(key === "]");
+    else if (key === "s") keepMaterial();
     else if (key === "b") set({ before: true });
     else if (key === "c") set({ comparing: !view.comparing });
     else if (key === "f") void change("final");

@@ -62,6 +62,7 @@ export const t = {
   brushSize: "Brush size",
   smaller: "Select less: a part of it ([)",
   larger: "Select more: the whole of it (])",
+  sameMaterial: "Select only what has its material (S)",
   deselect: "Select nothing (Esc)",
   // Panels
   panels: "Panels",
@@ -202,6 +203,7 @@ export const t = {
     ["Shift, Alt", "Add to the selection, take away from it"],
     ["Shift 1 … 4", "Material, light, objects, look"],
     ["[ and ]", "Select less or more at the last click"],
+    ["S", "Select only what has the material of the last click"],
     ["Esc", "Select nothing; close what is open"],
     ["Ctrl Z, Ctrl Shift Z", "Undo, redo"],
     ["B (hold)", "The photo as it was"],

@@ -1,6 +1,6 @@
 // The tools of the pointer, over the picture's edge.
 import { Icon } from "./icons";
-import { resize } from "./keys";
+import { keepMaterial, resize } from "./keys";
 import { change, set, useView, type Mode, type Tool } from "./store";
 import { t } from "./strings";
 
@@ -64,6 +64,9 @@ export function Tools() {
           </button>
           <button class="icon-only" id="larger" aria-label={t.larger} title={t.larger} onClick={() => resize(true)}>
             <Icon name="larger" />
+          </button>
+          <button class="icon-only" id="same-material" aria-label={t.sameMaterial} title={t.sameMaterial} onClick={keepMaterial}>
+            <Icon name="sameMaterial" />
           </button>
         </>
       )}

@@ -103,6 +103,18 @@ class Region(Place):
         kind="word",
         choices=("auto", "small", "medium", "large"),
     )
+    same_material: bool = option(
+        False, "Of the object only what has the material of a click.", kind="switch"
+    )
+    exclude: tuple[tuple[float, float], ...] = option(
+        (),
+        "A pixel of what is taken away again.",
+        kind="numbers",
+        count=2,
+        many=True,
+        called="--exclude",
+        metavar="X,Y",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,8 @@ def chosen_region(scene: Any, region: Place, device: str) -> Any:
     click = list(region.click) or None
     chosen = {}
     if isinstance(region, Region):
-        chosen = {"method": region.method, "extent": region.extent}
+        names = ("method", "extent", "same_material", "exclude")
+        chosen = {name: getattr(region, name) for name in names}
     return mt.select(
         scene,
         click=click,

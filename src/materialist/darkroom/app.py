@@ -48,6 +48,7 @@ _POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
     "pick": (bodies.Pick, editing.pick),
     "point": (bodies.Pointed, editing.point),
     "resize": (bodies.Resized, editing.resize),
+    "material": (bodies.Nothing, editing.keep_material),
     "deselect": (bodies.Nothing, editing.deselect),
     "colour": (bodies.Pointed, seeing.colour_at),
     # Changing.

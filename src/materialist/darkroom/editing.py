@@ -65,7 +65,15 @@ def edit_at(session: Session, x: float, y: float) -> int | None:
 
 def resize(desk: Desk, body: bodies.Resized) -> State:
     """The selection with the next larger, or smaller, object at the last click."""
-    desk.session.resize_selection(body.larger)
+    session = desk.session
+    session.reselect(lambda selection: selection.resized(body.larger, session.preview.select))
+    return state(desk)
+
+
+def keep_material(desk: Desk, body: bodies.Nothing) -> State:
+    """Of what the last click selected only what has its material."""
+    session = desk.session
+    session.reselect(lambda selection: selection.of_material(session.scene))
     return state(desk)
 
 

@@ -243,7 +243,9 @@ def region_of(scene: Scene, step: Step) -> Array:
         where["box"] = parse_numbers(options["box"], 4, "box")
     if "mask" in options:
         where["mask"] = beside(step.folder, "mask", options["mask"])
-    names = {"method": "with", "extent": "extent"}
+    if "exclude" in options:
+        where["exclude"] = [parse_numbers(at, 2, "exclude") for at in several(options["exclude"])]
+    names = {"method": "with", "extent": "extent", "same_material": "same_material"}
     where |= {name: options[key] for name, key in names.items() if key in options}
     return select(scene, device=step.device, **where)
 

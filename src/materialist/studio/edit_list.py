@@ -12,7 +12,20 @@ from materialist.edits.core.operation import PreviewMode, Target
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 
-_SILENT = ("mask", "click", "box", "with", "extent", "skip", "thickness", "at", "seed", "gain")
+_SILENT = (
+    "mask",
+    "click",
+    "box",
+    "with",
+    "extent",
+    "same_material",
+    "exclude",
+    "skip",
+    "thickness",
+    "at",
+    "seed",
+    "gain",
+)
 """Options that a summary leaves out: the picture shows them."""
 _NAMES = {
     "mesh": "",

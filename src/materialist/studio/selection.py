@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import cv2
 import numpy as np
 
-from materialist.color import linear_to_srgb
-from materialist.edits.select.extents import next_region
+from materialist.edits.select.extents import LARGER, next_region
+from materialist.edits.select.parts import of_material
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -18,8 +18,6 @@ ADD = "add"
 REMOVE = "remove"
 Choose = Callable[..., Array]
 """[H, W] bool of a `click`, a `box` or a `mask`, as `select` gives it."""
-_PIECE_COLOUR = 14.0
-"""How far colours of one piece may lie from that of its pixel, in each of L, a and b; tuned by eye."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class Selection:
         column = min(int(x), width - 1)
         inside = any(part[row, column] for part in self.parts)
         if mode == REMOVE:
-            return self._without(piece_at(scene, self.mask, row, column)) if inside else self
+            return self._reduced(choose, row, column) if inside else self
         # A second click on a selected object takes it out.
         if inside and mode != ADD:
             return Selection(tuple(part for part in self.parts if not part[row, column]))
@@ -96,6 +94,21 @@ class Selection:
         raise InputError(
             f"Nothing {size} is found at that click; add another click, or use the brush."
         )
+
+    def of_material(self, scene: Scene) -> Selection:
+        """With only what has the material of the last click, of what that selected.
+
+        Raises InputError where that is all of it.
+        """
+        if self.clicked is None:
+            raise InputError("Click an object first; then its material can be selected.")
+        *rest, region = self.parts
+        part = of_material(scene.materials.albedo, region, [self.clicked])
+        if LARGER * part.sum() > region.sum():
+            raise InputError(
+                "All that is selected there seems to be of one material; take parts away with Alt, or use the brush."
+            )
+        return Selection((*rest, part), self.clicked)
 
     def box(self, scene: Scene, box: Sequence[float], mode: str, choose: Choose) -> Selection:
         if mode == REMOVE:
@@ -128,26 +141,18 @@ class Selection:
     def _with(self, region: Array, mode: str) -> Selection:
         return Selection((*self.parts, region) if mode == ADD else (region,))
 
+    def _reduced(self, choose: Choose, row: int, column: int) -> Selection:
+        """Without the object, or the piece of one colour, at a pixel; all of it where that is most of it."""
+        mask = self.mask
+        try:
+            kept = choose(mask=mask, exclude=[(column, row)])
+        except InputError:
+            return Selection()
+        return self._without(mask & ~kept)
+
     def _without(self, region: Array) -> Selection:
         left = tuple(p & ~region for p in self.parts)
         return Selection(tuple(p for p in left if p.any()))
-
-
-def piece_at(scene: Scene, mask: Array | None, row: int, column: int) -> Array:
-    """[H, W] bool: what is of one colour with a pixel of a selection [H, W] bool, and joined to it within that."""
-    if mask is None:
-        return np.zeros(scene.depth.shape, bool)
-    # By the colour without light: a shadow is no border. Differences are those that the eye sees (Lab).
-    lab = cv2.cvtColor(linear_to_srgb(scene.materials.albedo).astype(np.float32), cv2.COLOR_RGB2LAB)
-    lab = cv2.bilateralFilter(lab, 5, 10, 3)
-    barred = np.pad(np.where(mask, 0, 1).astype(np.uint8), 1, constant_values=1)
-    flags = 4 | cv2.FLOODFILL_FIXED_RANGE | cv2.FLOODFILL_MASK_ONLY | (2 << 8)
-    around = (_PIECE_COLOUR,) * 3
-    cv2.floodFill(lab, barred, (column, row), (0, 0, 0), around, around, flags)
-    piece = (barred[1:-1, 1:-1] == 2).astype(np.uint8)
-    # Specks that are left between belong to it.
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-    return (cv2.morphologyEx(piece, cv2.MORPH_CLOSE, kernel) > 0) & mask
 
 
 def data_url(data: bytes) -> str:

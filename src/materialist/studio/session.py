@@ -213,10 +213,10 @@ class Session:
                 after = before.brush(scene, points, radius, mode, choose)
             self._select(after, follows=mode in (ADD, REMOVE))
 
-    def resize_selection(self, larger: bool) -> None:
-        """Take the next larger, or smaller, object at the last click. Raises InputError where there is none."""
+    def reselect(self, change: Callable[[Selection], Selection]) -> None:
+        """Put what `change` makes of the selection in its place; the current edit follows it."""
         with self.lock:
-            self._select(self.selection.resized(larger, self.preview.select), follows=True)
+            self._select(change(self.selection), follows=True)
 
     def _select(self, after: Selection, follows: bool) -> None:
         """Change the selection; the current edit `follows` it, or is put aside."""

@@ -6,7 +6,8 @@ network's, `true` ones the truth. Where DATA has photos of `assets/outlines.yaml
 outlined by eye; clicks on a whole keep off its parts that are listed. `network` is what `select` does by itself,
 `one key` the best of that and of the next smaller and the next larger object at the click (the keys [ and ] of the
 studio), `grabcut` goes by colours. IoU is intersection over union with the object's mask; `good` and `lost` are the
-shares above 0.8 and below 0.3.
+shares above 0.8 and below 0.3. `material` rows judge a click at a material of things that have several
+(`assets/materials.yaml`): by itself, with `same_material`, and with `exclude` at the middle of the largest surplus.
 
 Borders are judged at the photo's own size, by the matte that every edit is laid on the photo with. `border F`: the F
 measure of its border against the outline, within 2 native pixels (outlines by eye are hardly better); an edit of the
@@ -89,6 +90,7 @@ class SelectBench(Benchmark):
         predictor = BundledPredictor()
         if data is not None:
             yield from self._outlined(data / "photos", predictor)
+            yield from self._materials(data / "photos", predictor)
             yield from self._composed(data, predictor)
         # --- Synthetic pictures, procedural and of captured meshes, with both kinds of maps ---
         for folder in (None,) if data is None else (None, data):
@@ -114,11 +116,8 @@ class SelectBench(Benchmark):
         for k, (name, objects) in enumerate(outlines().items()):
             if not (folder / name).is_file():
                 continue
-            photo = read_photo(str(folder / name), size=self.photo_size)
-            maps = predictor.predict(photo)
-            # Selection uses the maps alone: any light will do.
-            scene = scene_of(photo, maps, np.ones((16, 32, 3), np.float32))
-            things = clickable(objects, maps.depth.shape)
+            scene = self._scene(folder / name, predictor)
+            things = clickable(objects, scene.depth.shape)
             for thing in objects:
                 yield {"sample": f"{name} {thing['name']}", **_outline_score(scene, thing)}
             for row in self._selected(scene, things, k):
@@ -127,6 +126,26 @@ class SelectBench(Benchmark):
                     "method": f"{row['method']}, photos",
                     "sample": f"{name} {row['sample']}",
                 }
+
+    def _materials(self, folder: Path, predictor: BundledPredictor) -> Iterator[Row]:
+        """Rows of clicks at one of the materials of a thing."""
+        for name, parts in outlines("materials").items():
+            if not (folder / name).is_file():
+                continue
+            scene = self._scene(folder / name, predictor)
+            scale = max(scene.depth.shape) / 512
+            for part in parts:
+                mask = drawn(part, scene.depth.shape)
+                x, y = part["click"]
+                click = (int(x * scale), int(y * scale))
+                for method, region in _narrowed(scene, mask, click):
+                    row = {"method": f"material, {method}", "sample": f"{name} {part['name']}"}
+                    yield {**row, **_compared(region, mask)}
+
+    def _scene(self, file: Path, predictor: BundledPredictor) -> Scene:
+        photo = read_photo(str(file), size=self.photo_size)
+        # Selection uses the maps alone: any light will do.
+        return scene_of(photo, predictor.predict(photo), np.ones((16, 32, 3), np.float32))
 
     def _composed(self, data: Path, predictor: BundledPredictor) -> Iterator[Row]:
         """Rows of rendered meshes over photos: how well their mattes are found."""
@@ -162,9 +181,12 @@ class SelectBench(Benchmark):
                 yield {"method": f"{method}, {fit}", "sample": f"object {j}", **scores}
 
 
-def outlines() -> dict[str, list[dict[str, Any]]]:
-    """Photo -> its objects, each with an `outline` and perhaps `holes`: (x, y) where the longer side is 512 pixels."""
-    text = (files("materialist_lab.bench") / "assets" / "outlines.yaml").read_text("utf-8")
+def outlines(kind: str = "outlines") -> dict[str, list[dict[str, Any]]]:
+    """Photo -> its objects, each with `outlines` and perhaps `holes`: (x, y) where the longer side is 512 pixels.
+
+    kind: `outlines` of objects (of one `outline` each), or `materials`, of parts of objects.
+    """
+    text = (files("materialist_lab.bench") / "assets" / f"{kind}.yaml").read_text("utf-8")
     return dict(yaml.safe_load(text))
 
 
@@ -172,7 +194,8 @@ def drawn(thing: dict[str, Any], shape: tuple[int, ...]) -> Array:
     """[H, W] bool of an object of `outlines` in a photo of that shape."""
     mask = np.zeros(shape, bool)
     scale = max(shape) / 512
-    for inside, polygons in ((True, [thing["outline"]]), (False, thing.get("holes", []))):
+    whole = thing["outlines"] if "outlines" in thing else [thing["outline"]]
+    for inside, polygons in ((True, whole), (False, thing.get("holes", []))):
         for corners in polygons:
             # Outlines are in pixels of 512, whose centres are halves.
             columns, rows = np.array(corners, float).T * scale - 0.5
@@ -223,6 +246,24 @@ def _resized(scene: Scene, mask: Array, click: tuple[int, int]) -> dict[str, flo
         others = [next_region(choose, click, region, larger=larger) for larger in (False, True)]
     regions = [region, *(other for other in others if other is not None)]
     return max((_compared(region, mask) for region in regions), key=lambda row: row["iou"])
+
+
+def _narrowed(scene: Scene, mask: Array, click: tuple[int, int]) -> Iterator[tuple[str, Array]]:
+    """What a click at a material selects, and by further means: (what they are, [H, W] bool)."""
+    for same_material, name in ((False, "one click"), (True, "same material")):
+        region = _found(scene, mask, click=click, same_material=same_material)
+        yield name, region
+        excluded: list[tuple[int, int]] = []
+        for count in ("one", "two"):
+            surplus = distance_transform_edt(np.pad(region & ~mask, 1))[1:-1, 1:-1]
+            row, column = np.unravel_index(int(surplus.argmax()), surplus.shape)
+            more = [*excluded, (int(column), int(row))]
+            try:
+                region = select(scene, click=click, same_material=same_material, exclude=more)
+                excluded = more
+            except InputError:  # it cannot be told from the rest
+                pass
+            yield f"{name}, {count} excluded", region
 
 
 def _scores(scene: Scene, mask: Array, **prompt: Any) -> dict[str, float]:

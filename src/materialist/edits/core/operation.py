@@ -12,7 +12,7 @@ from materialist.option_kinds import OperationOptions, declarations
 if TYPE_CHECKING:
     from materialist.types import Scene
 
-REGION = ("mask", "click", "box", "with", "extent")
+REGION = ("mask", "click", "box", "with", "extent", "same_material", "exclude")
 PLACE = ("mesh", "at")
 
 

@@ -19,6 +19,7 @@ from materialist.edits.select.objects import (
     object_at_points,
     object_in,
 )
+from materialist.edits.select.parts import of_material, without
 from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.geometry.silhouette import window
@@ -42,6 +43,8 @@ def select(
     mask: Array | str | Path | None = None,
     method: str = "network",
     extent: str = "auto",
+    same_material: bool = False,
+    exclude: Sequence[float] | Sequence[Sequence[float]] = (),
     device: str = "auto",
 ) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or the given mask, checked.
@@ -51,6 +54,8 @@ def select(
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
         extent: of the object at a click: `auto`, or `small`, `medium` or `large`, the part, the thing or the group that
             the network sees there.
+        same_material: of the object at the clicks only what has the material of one of them: paint without windows.
+        exclude: (x, y), or several, of what is taken away again: the smallest object there, or what is of one colour.
         method: `network` (MobileSAM and ClickNet) or `grabcut` (by colours alone); `sam2` is `network`.
         device: of no effect; both run on the processor.
 
@@ -68,11 +73,16 @@ def select(
         raise InputError(f"The extent is '{extent}'; choose one of {', '.join(EXTENTS)}.")
     if extent != "auto" and (click is None or method != "network"):
         raise InputError("An extent is of a click that the network answers; leave it out.")
+    if not isinstance(same_material, bool):
+        raise InputError(f"same_material is {same_material!r}; give true or false.")
+    if same_material and click is None:
+        raise InputError("The same material is that of a click; give one, or leave it out.")
     if isinstance(mask, str | Path):
         mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
-    if mask is not None:
-        return checked_region(scene, mask) > 0.5
     # --- The object, by the chosen method ---
+    unwanted = [checked_pixel(scene, point, "exclude") for point in several(exclude)]
+    if mask is not None:
+        return _reduced(scene, checked_region(scene, mask) > 0.5, unwanted)
     points = [] if click is None else _points(scene, click)
     frame = None if box is None else _box(scene, box)
     if frame is not None:
@@ -97,6 +107,28 @@ def select(
             f"{columns.start},{rows.start},{columns.stop},{rows.stop}; give that box if it is meant, "
             "else one that fits the object, or click the object."
         )
+    # --- The part of it that is meant ---
+    if same_material:
+        region = of_material(scene.materials.albedo, region, points)
+    return _reduced(scene, region, unwanted, points)
+
+
+def _reduced(
+    scene: Scene,
+    region: Array,
+    unwanted: Sequence[tuple[int, int]],
+    points: Sequence[tuple[int, int]] = (),
+) -> Array:
+    """[H, W] bool: a region without what is at the unwanted (column, row) points; what is at `points` stays."""
+    for x, y in unwanted:
+        if not region[y, x]:
+            raise InputError(
+                f"{x},{y} is not selected, so nothing is taken away there; leave it out."
+            )
+    for x, y in unwanted:
+        # One of them may have taken another with it.
+        if region[y, x]:
+            region = without(scene, region, (x, y), points)
     return region
 
 
