@@ -16,14 +16,17 @@ from materialist.types import Array, Scene
 
 @dataclass(frozen=True)
 class SelectionPartSettings:
-    """What is of one material; tuned by eye on 14 clicks; colours in CIELAB of the albedo."""
+    """What is of one material; tuned by eye on 14 clicks; colours in CIELAB of the albedo.
+
+    `lightness` and `threshold` were chosen on half of the materials of `bench select`.
+    """
 
     seed_radius: float = 0.02  # of what is surely of the material, around a click; in longer sides
-    lightness: float = 0.2  # weight of L beside a and b: what light is left in the albedo is in L
+    lightness: float = 0.35  # weight of L beside a and b: what light is left in the albedo is in L
     spread: float = 4.0  # least standard deviation of a material's colour
     sure: float = 2.0  # standard deviations within which a pixel tells more of the material
     rounds: int = 3  # in which it does
-    threshold: float = 3.3  # standard deviations within which a pixel is of the material
+    threshold: float = 3.5  # standard deviations within which a pixel is of the material
     crumbs: float = 0.003  # shares of the selection below which holes and pieces are none
 
     piece: float = 14.0  # from the colour of a pixel, in each of L, a and b: still its piece
