@@ -78,7 +78,7 @@ def test_the_selection_of_a_click_keeps_its_material_and_so_does_its_edit(client
     session = client.studio.page("b" * 32, "me").session
     wider = block() | (np.indices(block().shape)[1] > 58)
     monkeypatch.setattr(session.live, "select", lambda click, extent="auto": wider.copy())
-    select_block(client)
+    client.post("/api/pick", json={"tool": "click", "at": [24, 25]})
     change(client, hue=120)
     before = client.get("/api/state").json()
     after = client.post("/api/material", json={}).json()

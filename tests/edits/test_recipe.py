@@ -121,12 +121,20 @@ def test_what_was_taken_away_is_in_no_later_region(folder, second):
     assert np.allclose(got.materials.albedo[wide & ~gone], [0, 0, 1])
 
 
-def test_a_region_says_its_material_and_what_is_not_of_it(monkeypatch):
-    seen = {}
-    monkeypatch.setattr(recipe, "select", lambda scene, **where: seen.update(where) or MASK)
-    options = {"click": "16,18", "same_material": True, "exclude": ["20,21", [22, 23]], "hue": 10}
-    apply(SCENE, [recipe.Step("edit", options)])
-    assert seen["same_material"] is True and seen["exclude"] == [(20, 21), (22, 23)]
+def test_a_region_says_its_material_and_what_is_not_of_it(folder, monkeypatch):
+    seen = []
+
+    def chosen(scene, **where):
+        seen.append((where["same_material"], where.get("exclude")))
+        return MASK
+
+    monkeypatch.setattr(recipe, "select", chosen)
+    region = 'click: "16,18", same_material: true, exclude: ["20,21", [22, 23]]'
+    replay(folder, f"- edit: {{{region}, hue: 10}}\n")
+    replay(folder, '- edit: {click: "16,18", exclude: "20,21", hue: 10}\n')
+    assert seen == [(True, [(20, 21), (22, 23)]), (False, [(20, 21)])]
+    with pytest.raises(InputError, match="same_material must be true or false, not 'cloth'"):
+        replay(folder, '- edit: {click: "16,18", same_material: cloth, hue: 10}\n')
 
 
 def test_a_region_is_chosen_on_the_steps_device(monkeypatch):

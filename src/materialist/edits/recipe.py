@@ -121,10 +121,11 @@ def _step(entry: Any, number: int, path: Path) -> Step:
         raise InputError(
             f"Step {number} of {path} says '{unknown[0]}'; {kind} knows {', '.join(keys)}."
         )
-    if str(options.get("skip", "false")).lower() not in (*ON, *OFF):
-        raise InputError(
-            f"Step {number} of {path}: The skip must be true or false, not {options['skip']!r}."
-        )
+    for name in ("skip", "same_material"):
+        if str(options.get(name, "false")).lower() not in (*ON, *OFF):
+            raise InputError(
+                f"Step {number} of {path}: The {name} must be true or false, not {options[name]!r}."
+            )
     return Step(kind, options, path.parent)
 
 
@@ -245,7 +246,8 @@ def region_of(scene: Scene, step: Step) -> Array:
         where["mask"] = beside(step.folder, "mask", options["mask"])
     if "exclude" in options:
         where["exclude"] = [parse_numbers(at, 2, "exclude") for at in several(options["exclude"])]
-    names = {"method": "with", "extent": "extent", "same_material": "same_material"}
+    where["same_material"] = str(options.get("same_material", "false")).lower() in ON
+    names = {"method": "with", "extent": "extent"}
     where |= {name: options[key] for name, key in names.items() if key in options}
     return select(scene, device=step.device, **where)
 

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from materialist.edits.select.extents import LARGER, next_region
-from materialist.edits.select.parts import of_material
+from materialist.edits.select.parts import of_material, without
 from materialist.errors import InputError
 from materialist.types import Array, Scene
 
@@ -70,7 +70,7 @@ class Selection:
         column = min(int(x), width - 1)
         inside = any(part[row, column] for part in self.parts)
         if mode == REMOVE:
-            return self._reduced(choose, row, column) if inside else self
+            return self._reduced(scene, choose, row, column) if inside else self
         # A second click on a selected object takes it out.
         if inside and mode != ADD:
             return Selection(tuple(part for part in self.parts if not part[row, column]))
@@ -141,14 +141,23 @@ class Selection:
     def _with(self, region: Array, mode: str) -> Selection:
         return Selection((*self.parts, region) if mode == ADD else (region,))
 
-    def _reduced(self, choose: Choose, row: int, column: int) -> Selection:
-        """Without the object, or the piece of one colour, at a pixel; all of it where that is most of it."""
-        mask = self.mask
+    def _reduced(self, scene: Scene, choose: Choose, row: int, column: int) -> Selection:
+        """Without the object, or the piece of one colour, at a pixel of it; without the parts of which that is most."""
         try:
-            kept = choose(mask=mask, exclude=[(column, row)])
-        except InputError:
-            return Selection()
-        return self._without(mask & ~kept)
+            thing = choose(click=(column, row), extent="small")
+        except InputError:  # the network sees none there
+            thing = None
+        parts = []
+        for part in self.parts:
+            rest: Array | None = part
+            if part[row, column]:
+                rest = without(scene.materials.albedo, part, (column, row), thing)
+            if rest is not None:
+                parts.append(rest)
+        # The last click still is that of the last part, where it lies on it.
+        last = self.clicked
+        held = last is not None and bool(parts) and bool(parts[-1][last[1], last[0]])
+        return Selection(tuple(parts), last if held else None)
 
     def _without(self, region: Array) -> Selection:
         left = tuple(p & ~region for p in self.parts)

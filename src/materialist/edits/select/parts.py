@@ -8,60 +8,71 @@ import numpy as np
 from skimage.morphology import remove_small_holes, remove_small_objects
 
 from materialist.color import linear_to_srgb
-from materialist.edits.select.objects import object_at_points
-from materialist.errors import InputError
-from materialist.geometry.silhouette import disc
-from materialist.types import Array, Scene
+from materialist.geometry.silhouette import disc, window
+from materialist.types import Array
+
+Point = tuple[int, int]
+"""(column, row)."""
 
 
 @dataclass(frozen=True)
 class SelectionPartSettings:
-    """What is of one material; tuned by eye on 14 clicks; colours in CIELAB of the albedo.
+    """What is of one material, by its CIELAB albedo; tuned by eye on 14 clicks.
 
-    `lightness` and `threshold` were chosen on half of the materials of `bench select`.
+    Lightness, threshold, gaps and crumbs were chosen on half of the materials of `bench select`. Lengths are in longer
+    sides.
     """
 
-    seed_radius: float = 0.02  # of what is surely of the material, around a click; in longer sides
+    seed_radius: float = 0.02  # of what is of the material, around a click
     lightness: float = 0.35  # weight of L beside a and b: what light is left in the albedo is in L
     spread: float = 4.0  # least standard deviation of a material's colour
     sure: float = 2.0  # standard deviations within which a pixel tells more of the material
     rounds: int = 3  # in which it does
     threshold: float = 3.5  # standard deviations within which a pixel is of the material
-    crumbs: float = 0.003  # shares of the selection below which holes and pieces are none
+    gap: float = 0.004  # half of the width of lines of another colour that stay: seams and folds
+    hole: float = 0.02  # share of the material, of holes that stay: highlights
+    crumb: float = 0.003  # the same, of pieces that go
+    kept: float = 0.004  # radius around a click of what stays in any case
 
     piece: float = 14.0  # from the colour of a pixel, in each of L, a and b: still its piece
-    most: float = 0.75  # of a selection, that a click can take away
+    most: float = 0.75  # share of a selection that a click can take away
 
 
 SETTINGS = SelectionPartSettings()
-_FILTER = (7, 8.0, 3.0)
-"""Diameter, standard deviation of colours and of places, pixels, of the bilateral filter of the albedo."""
 
 
-def of_material(albedo: Array, mask: Array, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool: what of a mask has the material that it has at one of the points (column, row).
+def of_material(albedo: Array, mask: Array, points: Sequence[Point]) -> Array:
+    """[H, W] bool: what of a mask has the material that it has at one of the points on it.
 
     albedo: [H, W, 3] linear. mask: [H, W] bool. Seen is the albedo, so that a shadow is no other material.
     """
-    colour = _lab(albedo) * np.array([SETTINGS.lightness, 1, 1], np.float32)
-    colour = cv2.bilateralFilter(colour, *_FILTER)
-    distance = np.min([_distance(colour, mask, point) for point in points], axis=0)
-    alike = mask & (distance < SETTINGS.threshold)
-    size = int(SETTINGS.crumbs * alike.sum())
-    alike = remove_small_objects(remove_small_holes(alike, max_size=size), max_size=size)
-    # Pixels of a border are mixed with what is beyond: lines of another colour stay.
-    other = cv2.morphologyEx((mask & ~alike).astype(np.uint8), cv2.MORPH_OPEN, disc(1)) > 0
-    return mask & ~other
+    # --- Only the part of the picture around the mask ---
+    box = window(mask)
+    inside = mask[box]
+    places = [(x - box[1].start, y - box[0].start) for x, y in points]
+    longer = max(mask.shape)
+    # --- What has the colour of one of the clicks ---
+    weights = np.array([SETTINGS.lightness, 1, 1], np.float32)
+    colour = cv2.bilateralFilter(_lab(albedo[box]) * weights, 7, 8, 3)
+    distance = np.min([_distance(colour, inside, place, longer) for place in places], axis=0)
+    alike = inside & (distance < SETTINGS.threshold)
+    # --- Without specks on either side ---
+    size = int(alike.sum())
+    alike = remove_small_holes(alike, max_size=int(SETTINGS.hole * size))
+    alike = remove_small_objects(alike, max_size=int(SETTINGS.crumb * size))
+    other = cv2.morphologyEx((inside & ~alike).astype(np.uint8), cv2.MORPH_OPEN, _disc(longer)) > 0
+    near = [_near(inside.shape, place, SETTINGS.kept * longer) for place in places]
+    result = np.zeros_like(mask)
+    result[box] = inside & (~other | np.logical_or.reduce(near))
+    return result
 
 
-def _distance(colour: Array, mask: Array, point: tuple[int, int]) -> Array:
-    """[H, W] standard deviations from the colours of the material at a point (column, row) of a mask [H, W] bool."""
-    rows, columns = np.indices(mask.shape)
-    near = np.hypot(columns - point[0], rows - point[1]) < SETTINGS.seed_radius * max(mask.shape)
-    members = mask & near
-    members[point[1], point[0]] = True
+def _distance(colour: Array, mask: Array, point: Point, longer: int) -> Array:
+    """[H, W] standard deviations of colours [H, W, 3] from those of the material at a point of a mask [H, W] bool."""
+    members = mask & _near(mask.shape, point, SETTINGS.seed_radius * longer)
     # The material is seen around the click first, then wherever it surely is.
     for _ in range(SETTINGS.rounds):
+        members[point[1], point[0]] = True
         middle = np.median(colour[members], axis=0)
         spread = np.sqrt(colour[members].var(0) + SETTINGS.spread**2)
         distance = np.sqrt((((colour - middle) / spread) ** 2).sum(-1))
@@ -70,44 +81,64 @@ def _distance(colour: Array, mask: Array, point: tuple[int, int]) -> Array:
 
 
 def without(
-    scene: Scene, mask: Array, point: tuple[int, int], keep: Sequence[tuple[int, int]] = ()
-) -> Array:
-    """[H, W] bool: a mask less the object at a point (column, row) of it.
+    albedo: Array,
+    mask: Array,
+    point: Point,
+    thing: Array | None,
+    keep: Sequence[Point] = (),
+) -> Array | None:
+    """[H, W] bool: a mask less what is at a point of it: the thing there, or what is of one colour with the point.
 
-    Where that is most of the mask, or holds a point of `keep`, what is of one colour there is taken away instead.
-    Raises InputError where that is, too.
+    thing: [H, W] bool, or None where no thing is known there. What is most of the mask, or holds a point of `keep`, is
+    not meant; None where nothing else is there.
     """
-    for region in (_object, _piece):
-        gone = region(scene, mask, point)
-        kept = any(gone[y, x] for x, y in keep)
-        if gone.any() and not kept and gone.sum() < SETTINGS.most * mask.sum():
-            return mask & ~gone
-    raise InputError(
-        f"What is at {point[0]},{point[1]} cannot be told from the rest of the selection; "
-        "click another place, or give a mask."
-    )
+    for gone in (thing, _piece(albedo, mask, point)):
+        if gone is None or not (mask & gone)[point[1], point[0]]:
+            continue
+        few = (mask & gone).sum() < SETTINGS.most * mask.sum()
+        if few and not any(gone[y, x] for x, y in keep):
+            return _without_slivers(mask & ~gone, keep)
+    return None
 
 
-def _object(scene: Scene, mask: Array, point: tuple[int, int]) -> Array:
-    """[H, W] bool: what of a mask is of the smallest object at a point (column, row)."""
-    try:
-        return mask & object_at_points(scene, [point], extent="small")
-    except InputError:  # the network sees none there
-        return np.zeros_like(mask)
+def _without_slivers(mask: Array, keep: Sequence[Point]) -> Array:
+    """[H, W] bool: a mask without what is thin or small in it; what is around a point of `keep` stays."""
+    longer = max(mask.shape)
+    size = int(SETTINGS.crumb * mask.sum())
+    opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, _disc(longer))
+    opened = remove_small_objects(opened > 0, max_size=size)
+    # The corners that opening rounds off come back.
+    whole = mask & (cv2.dilate(opened.astype(np.uint8), _disc(longer)) > 0)
+    for point in keep:
+        whole |= mask & _near(mask.shape, point, SETTINGS.kept * longer)
+    return whole if whole.any() else mask
 
 
-def _piece(scene: Scene, mask: Array, point: tuple[int, int]) -> Array:
-    """[H, W] bool: what is of one colour with a pixel (column, row) of a mask, and joined to it within that."""
-    # By the albedo: a shadow is no border.
-    colour = cv2.bilateralFilter(_lab(scene.materials.albedo), 5, 10, 3)
-    barred = np.pad(np.where(mask, 0, 1).astype(np.uint8), 1, constant_values=1)
+def _piece(albedo: Array, mask: Array, point: Point) -> Array:
+    """[H, W] bool: what is of one colour with a pixel of a mask [H, W] bool, and joined to it within that."""
+    box = window(mask)
+    colour = cv2.bilateralFilter(_lab(albedo[box]), 5, 10, 3)
+    start = (int(point[0] - box[1].start), int(point[1] - box[0].start))
+    # The flood is bounded by 1, and writes 2; its mask is a pixel larger on each side.
+    flood = np.pad((~mask[box]).astype(np.uint8), 1, constant_values=1)
     flags = 4 | cv2.FLOODFILL_FIXED_RANGE | cv2.FLOODFILL_MASK_ONLY | (2 << 8)
     around = (SETTINGS.piece,) * 3
-    cv2.floodFill(colour, barred, point, (0, 0, 0), around, around, flags)
-    piece = (barred[1:-1, 1:-1] == 2).astype(np.uint8)
+    cv2.floodFill(colour, flood, start, (0, 0, 0), around, around, flags)
+    piece = np.zeros_like(mask)
+    piece[box] = flood[1:-1, 1:-1] == 2
     # Specks that are left between belong to it.
-    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
-    return (cv2.morphologyEx(piece, cv2.MORPH_CLOSE, kernel) > 0) & mask
+    closed = cv2.morphologyEx(piece.astype(np.uint8), cv2.MORPH_CLOSE, _disc(max(mask.shape)))
+    return (closed > 0) & mask
+
+
+def _near(shape: tuple[int, ...], point: Point, radius: float) -> Array:
+    """[H, W] bool: within a radius, pixels, of a point."""
+    rows, columns = np.ogrid[: shape[0], : shape[1]]
+    return np.asarray((columns - point[0]) ** 2 + (rows - point[1]) ** 2 < max(radius, 1) ** 2)
+
+
+def _disc(longer: int) -> Array:
+    return disc(max(1, round(SETTINGS.gap * longer)))
 
 
 def _lab(albedo: Array) -> Array:

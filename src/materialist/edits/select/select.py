@@ -44,7 +44,7 @@ def select(
     method: str = "network",
     extent: str = "auto",
     same_material: bool = False,
-    exclude: Sequence[float] | Sequence[Sequence[float]] = (),
+    exclude: Sequence[float] | Sequence[Sequence[float]] | None = None,
     device: str = "auto",
 ) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or the given mask, checked.
@@ -54,7 +54,8 @@ def select(
         mask: [H, W] bool, or a file of the photo's shape; taken as it is.
         extent: of the object at a click: `auto`, or `small`, `medium` or `large`, the part, the thing or the group that
             the network sees there.
-        same_material: of the object at the clicks only what has the material of one of them: paint without windows.
+        same_material: of the object at the clicks only what has the material of one of them: cloth without legs. It
+            goes by colour: grey paint and grey glass are alike.
         exclude: (x, y), or several, of what is taken away again: the smallest object there, or what is of one colour.
         method: `network` (MobileSAM and ClickNet) or `grabcut` (by colours alone); `sam2` is `network`.
         device: of no effect; both run on the processor.
@@ -73,24 +74,24 @@ def select(
         raise InputError(f"The extent is '{extent}'; choose one of {', '.join(EXTENTS)}.")
     if extent != "auto" and (click is None or method != "network"):
         raise InputError("An extent is of a click that the network answers; leave it out.")
-    if not isinstance(same_material, bool):
-        raise InputError(f"same_material is {same_material!r}; give true or false.")
     if same_material and click is None:
         raise InputError("The same material is that of a click; give one, or leave it out.")
     if isinstance(mask, str | Path):
         mask = read_mask(mask, scene.depth.shape, scene.photo.original.shape[:2])
     # --- The object, by the chosen method ---
-    unwanted = [checked_pixel(scene, point, "exclude") for point in several(exclude)]
+    network = method == "network"
+    taken = () if exclude is None else several(exclude)
+    unwanted = [checked_pixel(scene, point, "excluded pixel") for point in taken]
     if mask is not None:
-        return _reduced(scene, checked_region(scene, mask) > 0.5, unwanted)
+        return _reduced(scene, checked_region(scene, mask) > 0.5, unwanted, network=network)
     points = [] if click is None else _points(scene, click)
     frame = None if box is None else _box(scene, box)
     if frame is not None:
         if method == "grabcut":
             _check_background(scene, frame)
-        region = object_in(scene, frame, network=method == "network")
+        region = object_in(scene, frame, network=network)
     else:
-        region = object_at_points(scene, points, network=method == "network", extent=extent)
+        region = object_at_points(scene, points, network=network, extent=extent)
     # --- Refused where it is empty, or does not fit the box ---
     region = region & (scene.depth > 0)
     if not region.any():
@@ -110,7 +111,7 @@ def select(
     # --- The part of it that is meant ---
     if same_material:
         region = of_material(scene.materials.albedo, region, points)
-    return _reduced(scene, region, unwanted, points)
+    return _reduced(scene, region, unwanted, points, network=network)
 
 
 def _reduced(
@@ -118,6 +119,8 @@ def _reduced(
     region: Array,
     unwanted: Sequence[tuple[int, int]],
     points: Sequence[tuple[int, int]] = (),
+    *,
+    network: bool,
 ) -> Array:
     """[H, W] bool: a region without what is at the unwanted (column, row) points; what is at `points` stays."""
     for x, y in unwanted:
@@ -127,9 +130,25 @@ def _reduced(
             )
     for x, y in unwanted:
         # One of them may have taken another with it.
-        if region[y, x]:
-            region = without(scene, region, (x, y), points)
+        if not region[y, x]:
+            continue
+        thing = _smallest(scene, (x, y)) if network else None
+        rest = without(scene.materials.albedo, region, (x, y), thing, points)
+        if rest is None:
+            raise InputError(
+                f"What is at {x},{y} is most of the selection, or holds one of its clicks; click another place of "
+                "what is not meant, or give a mask."
+            )
+        region = rest
     return region
+
+
+def _smallest(scene: Scene, point: tuple[int, int]) -> Array | None:
+    """[H, W] bool of the smallest object at a point; None where the network sees none."""
+    try:
+        return object_at_points(scene, [point], extent="small")
+    except InputError:
+        return None
 
 
 def _points(scene: Scene, click) -> list[tuple[int, int]]:
