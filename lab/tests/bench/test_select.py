@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from materialist.errors import InputError
+from materialist_lab.bench import select as bench
 from materialist_lab.bench.select import clickable, drawn, outlines
 
 
@@ -44,3 +46,38 @@ def test_all_outlines_can_be_drawn():
             corners = np.concatenate([thing["outline"], *thing.get("holes", [])])
             assert corners.min() >= -1 and corners.max() <= 513, (name, thing["name"])
             assert drawn(thing, (512, 512)).sum() >= 400, (name, thing["name"])
+
+
+def test_all_materials_can_be_drawn_and_hold_their_click():
+    things = [thing for parts in outlines("materials").values() for thing in parts]
+    assert len(things) == 20
+    for thing in things:
+        mask = drawn(thing, (512, 512))
+        x, y = thing["click"]
+        assert mask[int(y), int(x)] and mask.sum() >= 400, thing["name"]
+
+
+def test_a_surplus_is_clicked_where_somebody_would(monkeypatch):
+    mask = np.zeros((40, 60), bool)
+    mask[5:35, 5:30] = True
+    wide = mask.copy()
+    wide[5:35, 30:45] = True
+    asked = []
+
+    def select(scene, click, same_material, exclude=()):
+        asked.append((same_material, list(exclude)))
+        if len(exclude) > 1:
+            raise InputError("It cannot be told from the rest.")
+        thin = mask | (np.indices(mask.shape)[1] == 30)
+        return thin if same_material else mask | (wide & (np.arange(60) < 38)) if exclude else wide
+
+    monkeypatch.setattr(bench, "select", select)
+    rows = list(bench._narrowed(None, mask, (10, 10)))
+    assert [name for name, _ in rows][:3] == [
+        "one click",
+        "one click, one excluded",
+        "one click, two excluded",
+    ]
+    assert 32 <= asked[1][1][0][0] <= 42
+    assert (rows[2][1] == rows[1][1]).all()  # refused
+    assert sum(same for same, _ in asked) == 1  # a border is not clicked

@@ -19,6 +19,7 @@ pixels within 8 native ones of the border) are the matte's errors, `fringe` is t
 when the mesh is painted anew.
 """
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -51,6 +52,8 @@ from materialist_lab.procedural.synthetic import make_sample
 
 RIM = 1 / 64
 """Longer sides on both sides of a border within which colours are judged."""
+THIN = 2.5
+"""Pixels from its border that a surplus has to have for a click on it."""
 METHODS = ("network", "grabcut")
 """Ways to select that need nothing but the package."""
 
@@ -258,11 +261,11 @@ def _narrowed(scene: Scene, mask: Array, click: tuple[int, int]) -> Iterator[tup
             surplus = distance_transform_edt(np.pad(region & ~mask, 1))[1:-1, 1:-1]
             row, column = np.unravel_index(int(surplus.argmax()), surplus.shape)
             more = [*excluded, (int(column), int(row))]
-            try:
-                region = select(scene, click=click, same_material=same_material, exclude=more)
-                excluded = more
-            except InputError:  # it cannot be told from the rest
-                pass
+            # Nobody clicks on what is as thin as a border.
+            if surplus.max() >= THIN:
+                with contextlib.suppress(InputError):  # it cannot be told from the rest
+                    region = select(scene, click=click, same_material=same_material, exclude=more)
+                    excluded = more
             yield f"{name}, {count} excluded", region
 
 
