@@ -111,7 +111,6 @@ def invert(
         if isinstance(value, Scene):
             report("save", 0, 1)
             mt.save_scene(value, scene)
-            _leave_cores()
         else:
             _show(report, folder, name, value)
 
@@ -125,13 +124,6 @@ def invert(
         replace_rerender(done, scene)
     else:
         mt.save_scene(done, scene)
-
-
-def _leave_cores() -> None:
-    """Let what follows in this process use half of the cores: the preview of the scene is built beside it."""
-    import drjit as dr
-
-    dr.set_thread_count(max(1, dr.thread_count() // 2))
 
 
 def _show(report: Reporter, folder: Path, name: str, value: Any) -> None:
