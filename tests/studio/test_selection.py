@@ -9,6 +9,7 @@ from studio_scenes import block, room
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.select import select
 from materialist.errors import InputError
+from materialist.studio.live import PreviewLost
 from materialist.studio.selection import Selection
 
 CHOOSE = partial(select, room())
@@ -93,3 +94,41 @@ def test_only_what_has_the_material_of_the_click():
         narrow.of_material(scene)
     with pytest.raises(InputError, match="Click an object first"):
         Selection((whole,)).of_material(scene)
+
+
+def test_alt_takes_a_thing_from_the_part_it_lies_in():
+    scene = room()
+    left = np.zeros((48, 64), bool)
+    left[8:44, 2:40] = True
+    right = np.zeros((48, 64), bool)
+    right[36:44, 50:60] = True
+    asked = []
+
+    def choose(click, extent="auto"):
+        asked.append((click, extent))
+        if extent != "small":
+            return left.copy()
+        thing = np.zeros((48, 64), bool)
+        thing[34:44, 2:20] = True
+        return thing
+
+    two = Selection((right,)).click(scene, 25, 12, "add", choose)
+    after = two.click(scene, 10, 40, "remove", choose)
+    assert asked[-1] == ((10, 40), "small")
+    assert np.array_equal(after.parts[0], right)
+    assert not after.parts[1][36:44, 2:18].any() and after.parts[1][10:30, 4:38].all()
+    assert after.clicked == (25, 12)  # S goes on from there
+    # On the small part nothing is left of it, and the other stays; the last click is still that of the other.
+    rest = two.click(scene, 55, 40, "remove", choose)
+    assert len(rest.parts) == 1 and np.array_equal(rest.parts[0], left)
+    # On its own click the piece of one colour goes, and the click with it.
+    gone = two.click(scene, 25, 12, "remove", choose)
+    assert gone.clicked is None and not gone.mask[12, 25] and gone.mask[40, 55]
+
+
+def test_alt_without_a_preview_changes_nothing():
+    def lost(**_):
+        raise PreviewLost("The live preview has ended.")
+
+    with pytest.raises(PreviewLost):
+        Selection((block(),)).click(room(), 25, 24, "remove", lost)

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 
 from materialist.edits.select.extents import LARGER, next_region
-from materialist.edits.select.parts import of_material, without
+from materialist.edits.select.parts import of_material, piece_at, without
 from materialist.errors import InputError
+from materialist.studio.live import PreviewLost
 from materialist.types import Array, Scene
 
 ADD = "add"
@@ -142,22 +143,25 @@ class Selection:
         return Selection((*self.parts, region) if mode == ADD else (region,))
 
     def _reduced(self, scene: Scene, choose: Choose, row: int, column: int) -> Selection:
-        """Without the object, or the piece of one colour, at a pixel of it; without the parts of which that is most."""
+        """Without the thing, or else what is of one colour, at a pixel of it."""
         try:
             thing = choose(click=(column, row), extent="small")
+        except PreviewLost:
+            raise
         except InputError:  # the network sees none there
             thing = None
+        albedo = scene.materials.albedo
+        point = (column, row)
+        last = self.clicked
         parts = []
         for part in self.parts:
             rest: Array | None = part
             if part[row, column]:
-                rest = without(scene.materials.albedo, part, (column, row), thing)
-            if rest is not None:
-                parts.append(rest)
+                rest = without(albedo, part, point, thing, [last] if last else [])
+            parts.append(part & ~piece_at(albedo, part, point) if rest is None else rest)
         # The last click still is that of the last part, where it lies on it.
-        last = self.clicked
-        held = last is not None and bool(parts) and bool(parts[-1][last[1], last[0]])
-        return Selection(tuple(parts), last if held else None)
+        held = last is not None and bool(parts[-1][last[1], last[0]])
+        return Selection(tuple(p for p in parts if p.any()), last if held else None)
 
     def _without(self, region: Array) -> Selection:
         left = tuple(p & ~region for p in self.parts)

@@ -101,6 +101,15 @@ def test_what_is_left_has_no_slivers():
     assert kept is not None and not kept[LEGS].any() and kept[THING & ~LEGS].all()
     held = without(albedo(), THING, (30, 70), ring, [(50, 79)])
     assert held is not None and held[79, 50]
+    # Pieces beside it are crumbs; what is thin or small elsewhere is no sliver of it.
+    crumb = ring.copy()
+    crumb[66:69, 50:53] = False
+    pole = THING.copy()
+    pole[5:10, 40:42] = True
+    pole[2:5, 110:113] = True
+    kept = without(albedo(), pole, (30, 70), crumb)
+    assert kept is not None and not kept[66:69, 50:53].any()
+    assert kept[5:10, 40:42].all() and kept[2:5, 110:113].all()
 
 
 def test_select_narrows_what_it_found(monkeypatch):

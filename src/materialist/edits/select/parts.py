@@ -92,29 +92,31 @@ def without(
     thing: [H, W] bool, or None where no thing is known there. What is most of the mask, or holds a point of `keep`, is
     not meant; None where nothing else is there.
     """
-    for gone in (thing, _piece(albedo, mask, point)):
+    for gone in (thing, piece_at(albedo, mask, point)):
         if gone is None or not (mask & gone)[point[1], point[0]]:
             continue
         few = (mask & gone).sum() < SETTINGS.most * mask.sum()
         if few and not any(gone[y, x] for x, y in keep):
-            return _without_slivers(mask & ~gone, keep)
+            return _without_slivers(mask & ~gone, gone, keep)
     return None
 
 
-def _without_slivers(mask: Array, keep: Sequence[Point]) -> Array:
-    """[H, W] bool: a mask without what is thin or small in it; what is around a point of `keep` stays."""
+def _without_slivers(mask: Array, gone: Array, keep: Sequence[Point]) -> Array:
+    """[H, W] bool: a mask without what is thin or small beside what is gone; what is around a point of `keep` stays."""
     longer = max(mask.shape)
     size = int(SETTINGS.crumb * mask.sum())
     opened = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, _disc(longer))
     opened = remove_small_objects(opened > 0, max_size=size)
-    # The corners that opening rounds off come back.
-    whole = mask & (cv2.dilate(opened.astype(np.uint8), _disc(longer)) > 0)
+    # The corners that opening rounds off come back, and so does what lies elsewhere.
+    whole = cv2.dilate(opened.astype(np.uint8), _disc(longer)) > 0
+    beside = cv2.dilate(gone.astype(np.uint8), _disc(longer), iterations=3) > 0
+    result = mask & (whole | ~beside)
     for point in keep:
-        whole |= mask & _near(mask.shape, point, SETTINGS.kept * longer)
-    return whole if whole.any() else mask
+        result |= mask & _near(mask.shape, point, SETTINGS.kept * longer)
+    return result
 
 
-def _piece(albedo: Array, mask: Array, point: Point) -> Array:
+def piece_at(albedo: Array, mask: Array, point: Point) -> Array:
     """[H, W] bool: what is of one colour with a pixel of a mask [H, W] bool, and joined to it within that."""
     box = window(mask)
     colour = cv2.bilateralFilter(_lab(albedo[box]), 5, 10, 3)
