@@ -44,7 +44,7 @@ SETTINGS = SelectionPartSettings()
 def of_material(albedo: Array, mask: Array, points: Sequence[Point]) -> Array:
     """[H, W] bool: what of a mask has the material that it has at one of the points on it.
 
-    albedo: [H, W, 3] linear. mask: [H, W] bool. Seen is the albedo, so that a shadow is no other material.
+    albedo: [H, W, 3] linear, in which soft shadows are gone. mask: [H, W] bool.
     """
     # --- Only the part of the picture around the mask ---
     box = window(mask)
