@@ -60,19 +60,19 @@ class Run(Computing):
     force: bool = option(False, "Replace the output when it exists.", kind="switch")
 
 
+def pixels(about: str, called: str) -> Any:
+    """An option that may be given several times, a pixel (x, y) each."""
+    shown = {"called": called, "metavar": "X,Y"}
+    return option((), about, kind="numbers", count=2, many=True, **shown)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Place(OperationOptions):
     """A region of the photo."""
 
     mask: Path | None = option(None, "The region: white inside.", kind="file", metavar="PNG")
-    click: tuple[tuple[float, float], ...] = option(
-        (),
-        "A pixel of the object, at working size; more than one helps.",
-        kind="numbers",
-        count=2,
-        many=True,
-        called="--click",
-        metavar="X,Y",
+    click: tuple[tuple[float, float], ...] = pixels(
+        "A pixel of the object, at working size; more than one helps.", "--click"
     )
     box: tuple[float, float, float, float] | None = option(
         None,
@@ -106,14 +106,8 @@ class Region(Place):
     same_material: bool = option(
         False, "Of the object only what has the material of a click.", kind="switch"
     )
-    exclude: tuple[tuple[float, float], ...] = option(
-        (),
-        "A pixel of what is taken away again.",
-        kind="numbers",
-        count=2,
-        many=True,
-        called="--exclude",
-        metavar="X,Y",
+    exclude: tuple[tuple[float, float], ...] = pixels(
+        "A pixel of what is taken away again.", "--exclude"
     )
 
 

@@ -238,14 +238,13 @@ def region_of(scene: Scene, step: Step) -> Array:
     """[H, W] bool of the step's mask, click or box. Raises InputError."""
     options = step.options
     where: dict[str, Any] = {}
-    if "click" in options:
-        where["click"] = [parse_numbers(click, 2, "click") for click in several(options["click"])]
+    for name in ("click", "exclude"):
+        if name in options:
+            where[name] = [parse_numbers(pixel, 2, name) for pixel in several(options[name])]
     if "box" in options:
         where["box"] = parse_numbers(options["box"], 4, "box")
     if "mask" in options:
         where["mask"] = beside(step.folder, "mask", options["mask"])
-    if "exclude" in options:
-        where["exclude"] = [parse_numbers(at, 2, "exclude") for at in several(options["exclude"])]
     where["same_material"] = str(options.get("same_material", "false")).lower() in ON
     names = {"method": "with", "extent": "extent"}
     where |= {name: options[key] for name, key in names.items() if key in options}

@@ -92,13 +92,13 @@ def without(
     thing: [H, W] bool, or None where no thing is known there. What is most of the mask, or holds a point of `keep`, is
     not meant; None where nothing else is there.
     """
-    for gone in (thing, piece_at(albedo, mask, point)):
-        if gone is None or not (mask & gone)[point[1], point[0]]:
-            continue
+
+    def is_meant(gone: Array) -> bool:
         few = (mask & gone).sum() < SETTINGS.most * mask.sum()
-        if few and not any(gone[y, x] for x, y in keep):
-            return _without_slivers(mask & ~gone, gone, keep)
-    return None
+        return bool(few and gone[point[1], point[0]]) and not any(gone[y, x] for x, y in keep)
+
+    gone = thing if thing is not None and is_meant(thing) else piece_at(albedo, mask, point)
+    return _without_slivers(mask & ~gone, gone, keep) if is_meant(gone) else None
 
 
 def _without_slivers(mask: Array, gone: Array, keep: Sequence[Point]) -> Array:
