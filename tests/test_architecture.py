@@ -174,7 +174,7 @@ def _imports(tree: ast.AST, top_only: bool = False) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"relative import of {node.module}"
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
-        else:
+        elif not isinstance(node, ast.expr):  # no import is in an expression
             yield from _imports(node, top_only)
 
 

@@ -9,7 +9,7 @@ from render_scenes import empty, wall
 from materialist.render.bodies import is_transparent
 from materialist.render.pixels import coverage, first_hits, radiance
 from materialist.render.scene import GLASS_DEPTH, RenderScene
-from materialist.types import Body, Camera, Surface
+from materialist.types import Body, Camera, Materials, Surface
 from materialist_lab.procedural.objects import shapes
 
 CAMERA = Camera(48, 32, 40.0)
@@ -139,3 +139,23 @@ def test_radiance_is_that_of_the_rays_that_meet_the_body_first():
     left = disc() & (columns < CAMERA.width // 2 - 1)
     right = disc() & (columns > CAMERA.width // 2)
     assert (seen[left] == 0).all() and seen[right].min() > 0.1
+
+
+def test_the_camera_looks_through_an_unseen_body_that_takes_the_light():
+    """A black ball before a wall takes the share (R / d)^2 of the light of the point behind it."""
+    wide = 1.6 * DISTANCE
+    target = RenderScene(wall(CAMERA, wide), CAMERA, bodies=(sphere(surface(0.0, 1.0)),))
+    bare = RenderScene(wall(CAMERA, wide), CAMERA)
+    one = np.ones((CAMERA.height, CAMERA.width), np.float32)
+    for scene in (target, bare):
+        scene.set_materials(Materials(np.stack([one] * 3, -1), one, 0 * one))
+        scene.set_envmap(uniform())
+    middle = np.zeros((CAMERA.height, CAMERA.width), bool)
+    middle[CAMERA.height // 2, CAMERA.width // 2] = True
+    options = {"spp": 1024, "max_depth": 2, "where": middle}
+    seen = target.render(**options)[middle].mean()
+    behind = target.render(**options, unseen=("body0",))[middle].mean()
+    alone = bare.render(**options)[middle].mean()
+    assert seen < 0.1 * alone
+    share = (RADIUS / (wide - DISTANCE)) ** 2
+    assert behind / alone == pytest.approx(1 - share, abs=0.02)

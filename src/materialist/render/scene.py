@@ -1,5 +1,6 @@
 """A scene that is built once and rendered many times: geometry fixed, materials and light exchanged."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -103,18 +104,27 @@ class RenderScene:
         self.params.update()
 
     def render(
-        self, *, spp: int, seed: int = 0, max_depth: int = MAX_DEPTH, where: Array | None = None
+        self,
+        *,
+        spp: int,
+        seed: int = 0,
+        max_depth: int = MAX_DEPTH,
+        where: Array | None = None,
+        unseen: Sequence[str] = (),
     ) -> Array:
         """[H, W, 3] float32 linear radiance, path-traced.
 
         spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
         max_depth: path length; 2 is direct light alone, 1 the sky alone.
         where: [H, W] bool: the pixels that are traced, at a cost in proportion; the others are 0. None: all.
+        unseen: names of bodies and lamps that the camera looks through; they still cast shadows.
         """
         _check_options(spp, max_depth)
         where = np.ones((self.camera.height, self.camera.width), bool) if where is None else where
         picture = np.zeros((*where.shape, 3), np.float32)
-        picture[where] = radiance(self, where.shape, where, spp=spp, seed=seed, max_depth=max_depth)
+        picture[where] = radiance(
+            self, where.shape, where, spp=spp, seed=seed, max_depth=max_depth, unseen=unseen
+        )
         return picture
 
     def render_torch(

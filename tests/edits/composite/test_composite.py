@@ -296,15 +296,14 @@ def test_shade_goes_on_under_the_rim_of_a_body_where_a_replaced_surface_ends():
     changed[20, :14] = changed[20, 34:] = False
     share = np.kron(inside >= 1, np.ones((4, 4))).astype(np.float32)
     base = np.full_like(grey.linear, 0.6)
-    edited = np.where(inside[..., None] > 0, 5, 0.3).astype(
-        np.float32
-    )  # all in shade, but for the body
+    edited = np.full_like(base, 0.3)  # all in shade
+    edited[12:18, 16:32] = 5  # nothing is traced deep under the body
     layers = Layers(
         base,
         edited,
         everywhere,
         changed,
-        native=NativeLayer(inside, window(share >= 0), share, 0 * grey.original),
+        native=NativeLayer(inside, window(share >= 0), share, 0 * grey.original, ()),
     )
     out = into_photo(grey, layers)
     np.testing.assert_allclose(out[80:84, 64:128], 0.3, atol=0.02)

@@ -126,6 +126,22 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box, bump):
     assert soft.sum() < 2.2 * ConvexHull(place * 4).area  # one native pixel wide
 
 
+def test_the_shadow_goes_on_to_the_foot(box):
+    """What a body leaves of its rim's pixels is the ground in its shadow, not the ground beside that."""
+    scene = floor_scene(96, 72)
+    edited = insert(scene, box, (48.0, 50.0), material="0.5,0.5,0.5")
+    renderer = EditRenderer(scene)
+    body = native_layer(renderer, edited, RenderOptions(64, denoise=False))
+    share = whole(body, body.share, scene.depth.shape)
+    rows, columns = np.nonzero(share > 0)
+    foot = np.zeros(share.shape, bool)
+    foot[rows.max() : rows.max() + 2, columns.min() : columns.max() + 1] = True
+    out = composite(scene, edited, spp=128, denoise=False)
+    base, plain = (picture(256, 3) for picture in renderer.pair(edited))
+    expected = scene.photo.original * plain / base
+    np.testing.assert_allclose(out[foot].mean(), expected[foot].mean(), rtol=0.03)
+
+
 def test_a_body_looks_as_in_the_plain_rendering(box):
     """Its radiance at native size is that of the scene's own light and surfaces."""
     scene = floor_scene()

@@ -212,6 +212,6 @@ def test_dimmed_lights_keep_what_is_seen_in_them():
     before = np.zeros((30, 40), np.float32)
     before[7, 20:28] = 1
     nothing = np.zeros((30, 40), bool)
-    native = NativeLayer(before, window(before >= 0), before, np.full_like(original, 0.5))
+    native = NativeLayer(before, window(before >= 0), before, np.full_like(original, 0.5), ())
     layers = Layers(original, original, nothing, nothing, native=native)
     np.testing.assert_array_equal(into_photo(photo, layers, (LIGHT, found))[7, 20:28], 0.5)

@@ -86,7 +86,9 @@ def _change(out: Array, photo: Photo, layers: Layers, tick: Progress) -> None:
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     native = photo.original.shape[:2]
-    clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside == 0
+    clear = np.ones_like(layers.changed)
+    if layers.native is not None:
+        clear = grown(layers.native.inside < 1, 2 * SETTINGS.mixed_pixels)
     sides = [
         _alone(stack, photo.linear, side & clear, native)
         for side in (layers.changed, ~layers.changed)

@@ -64,7 +64,7 @@ class Layers:
     relit: bool = False
     """Whether the light is another one."""
     native: NativeLayer | None = None
-    """New bodies at native size, which stand before all this; the maps above are unfit for use under them."""
+    """New bodies at native size, which stand before all this; the maps above show what is behind them."""
     diffuse: Array | None = None
     """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
     covered: Array | None = None
@@ -79,7 +79,6 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
     """
     # --- Both renderings, and the pixels whose surface the edit replaces ---
     scene = renderer.scene
-    base, other = renderer.pair(edited)
     relit = is_relit(scene, edited)
     changed = changed_pixels(scene, edited)
     if not changed.any() and same_shapes(scene, edited):
@@ -96,13 +95,14 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
         anything = renderer.covered(edited)
         covered = anything if alone is None else anything & (alone.inside == 0)
         changed = changed | covered
+        if options.denoise:
+            guides[1] = renderer.guides(edited, covered)
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
         if alone is not None:
             hidden = inner(alone.inside == 1)
-        if options.denoise:
-            guides[1] = renderer.guides(edited, anything)
 
-    # --- Everything else, at working size ---
+    # --- Everything else, at working size: what is behind the new bodies, in their shadow ---
+    base, other = renderer.pair(edited, alone.names if alone else ())
     layers = difference(
         base, other, changed, guides if options.denoise else None, options, hidden=hidden
     )

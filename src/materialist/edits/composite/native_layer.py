@@ -51,6 +51,8 @@ class NativeLayer:
     """[h0, w0] float32: the same of each native pixel of the box."""
     picture: Array
     """[h0, w0, 3] float32 linear: their radiance, of nothing else; 0 away from them."""
+    names: tuple[str, ...]
+    """Of these bodies and lamps, as `RenderScene` names them."""
 
 
 def native_layer(
@@ -128,7 +130,7 @@ def native_layer(
     if lamps or any(body and max(body.surface.emission) > 1 for body in chosen.values()):
         # A corner of what glows that is too small to be met by a ray outshines its pixel.
         small = np.asarray(cv2.dilate(small, np.ones((3, 3), np.uint8)))
-    return NativeLayer(small, there, bodies_share, colours)
+    return NativeLayer(small, there, bodies_share, colours, tuple(names))
 
 
 def _traced_size(native: tuple[int, ...], box: Box, largest: float) -> tuple[tuple[int, int], Box]:

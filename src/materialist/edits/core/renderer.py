@@ -86,8 +86,11 @@ class EditRenderer:
         self._base: dict[tuple, Pictures] = {}
         self._sky: Array | None = None
 
-    def pair(self, edited: Scene) -> tuple[Render, Render]:
-        """The renderings of the base and of `edited`, with paths of equal length."""
+    def pair(self, edited: Scene, unseen: tuple[str, ...] = ()) -> tuple[Render, Render]:
+        """The renderings of the base and of `edited`, with paths of equal length.
+
+        unseen: names of bodies and lamps of `edited` that the camera looks through.
+        """
         # --- The photo's sky in both or in neither, and paths of equal length: noise cancels ---
         scene = self.lit(self.scene, edited)
         edited = self.lit(edited, edited)
@@ -97,7 +100,7 @@ class EditRenderer:
         # Only the pictures are kept: a `Render` of its own would keep this renderer alive.
         pictures = self._base.setdefault(key, {})
         base = Render(partial(self._render, scene, depth), shape, pictures)
-        return base, Render(partial(self._render, edited, depth), shape)
+        return base, Render(partial(self._render, edited, depth, unseen=unseen), shape)
 
     def lit(self, shown: Scene, edited: Scene) -> Scene:
         """The scene `shown` as `edited` needs it: before new glass the photo's own sky is part of the light."""
