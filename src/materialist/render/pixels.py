@@ -15,10 +15,6 @@ from materialist.types import Array, Body, Camera
 
 GRID = 4
 """Rays along each side of a pixel."""
-BEFORE_SURFACE = 1e-4
-"""Share of the distance at which paths begin before a surface that is looked at through others."""
-COVERED_WEIGHT = 1e-4
-"""Of a path that begins behind a shape that the camera does not see, beside one that passes it by."""
 _RAYS = 2**20
 """Rays that look for bodies together: bounds the memory."""
 _PATHS = 2**23
@@ -255,8 +251,7 @@ def radiance(
     size: (H, W) of the whole picture. where: a box, or a mask [H, W] bool, whose pixels come in rows [N, 3]. Paths have
     random numbers by seed and pixel, whatever else of the picture is traced.
     names: of shapes; the mean is then over the rays that meet one of them first, and 0 where none does.
-    unseen: of shapes that the camera does not see; they still cast shadows and are reflected. The mean is over what
-    they leave of a pixel; where they cover all of it, over what is behind them.
+    unseen: of shapes; rays that meet one of them first do not count. They still cast shadows and are reflected.
     at_once: paths traced together; the random numbers follow from it, too.
     """
     mi = target.mi
@@ -270,10 +265,6 @@ def radiance(
     sampler = mi.load_dict({"type": "multijitter", "sample_count": paths})
     sampler.set_samples_per_wavefront(paths)
     pixels_at_once = max(1, at_once // paths)  # bounded wavefronts
-    behind = None
-    if unseen:
-        ids = [shape.id() for shape in target.mi_scene.shapes()]
-        behind = only(target.mi_scene, [name for name in ids if name not in unseen])
     # Strips are numbered over the whole picture, so that a pixel's seed does not depend on the
     # mask.
     for k, first in enumerate(range(0, pixels.size, pixels_at_once)):
@@ -289,10 +280,10 @@ def radiance(
                 sampler,
                 paths,
                 names,
-                behind,
+                unseen,
             )
     # --- Mean over the paths that count ---
-    mean = (total[:, :3] / np.maximum(total[:, 3:], 1e-9)).astype(np.float32)
+    mean = (total[:, :3] / np.maximum(total[:, 3:], 1)).astype(np.float32)
     return mean[traced] if masked else mean.reshape(*pixels.shape, 3)
 
 
@@ -311,12 +302,9 @@ def _sums(
     sampler,
     paths: int,
     names: Sequence[str] | None,
-    behind: Any,
+    unseen: Sequence[str],
 ) -> Array:
-    """[n, 4]: of the wanted pixels' rays that count, the weighted sum of what they bring, and that of the weights.
-
-    behind: a Mitsuba scene of the shapes that the camera sees; None for all.
-    """
+    """[n, 4]: of the wanted pixels' rays that count, the sum of what they bring, and their number."""
     import drjit as dr
 
     mi = target.mi
@@ -330,28 +318,18 @@ def _sums(
     )
     ray = mi.RayDifferential3f(mi.Point3f(0), way)
     counts = dr.gather(mi.UInt32, integers(mi, traced), slot) != 0
-    # --- Paths begin close to what the camera sees: nothing before it is met ---
-    weight = mi.Float(1)
-    if behind is not None:
-        met = scene.ray_intersect_preliminary(ray).t
-        start = behind.ray_intersect_preliminary(ray).t * (1 - BEFORE_SURFACE)
-        # Behind an unseen shape only where the pixel shows nothing else.
-        weight = dr.select(met < start, COVERED_WEIGHT, 1)
-        far = dr.opaque(mi.Float, 4 * scene.bbox().bounding_sphere().radius)
-        ray.o = dr.minimum(start, far) * way
-    # --- With names, only rays count that meet one of these shapes first ---
-    if names is not None:
+    # --- With names, rays count by the shape that they meet first ---
+    if names is not None or unseen:
         first = scene.ray_intersect_preliminary(ray)
-        known = mi.Bool(False)
+        named = mi.Bool(False)
         for shape in scene.shapes():
-            if shape.id() in names:
-                known |= first.shape == mi.ShapePtr(shape)
-        counts &= known
+            if shape.id() in (unseen if names is None else names):
+                named |= first.shape == mi.ShapePtr(shape)
+        counts &= named if names is not None else ~named
     # --- Radiance along the paths, summed by pixel ---
     with recording():
         light = integrator.sample(scene, sampler, ray, None, counts)[0]
-        sums = (*(weight * light), weight)
-        values = [dr.select(counts, value, 0) for value in sums]
+        values = [dr.select(counts, value, 0) for value in (light.x, light.y, light.z, mi.Float(1))]
     dr.eval(values)  # together, or each sum would trace the paths again
     return np.stack([np.array(dr.block_sum(value, paths)) for value in values], -1).astype(
         np.float64

@@ -117,7 +117,7 @@ class RenderScene:
         spp: samples per pixel, at least this many. seed: equal seeds give equal pictures.
         max_depth: path length; 2 is direct light alone, 1 the sky alone.
         where: [H, W] bool: the pixels that are traced, at a cost in proportion; the others are 0. None: all.
-        unseen: names of bodies and lamps that the camera looks through; they still cast shadows.
+        unseen: names of bodies and lamps whose rays do not count, see `pixels.radiance`.
         """
         _check_options(spp, max_depth)
         where = np.ones((self.camera.height, self.camera.width), bool) if where is None else where

@@ -9,6 +9,7 @@ from scipy.spatial import ConvexHull
 
 from materialist.camera import project
 from materialist.edits.composite.composite import composite
+from materialist.edits.composite.layers import render_layers
 from materialist.edits.composite.native_layer import native_layer
 from materialist.edits.core.renderer import EditRenderer, RenderOptions
 from materialist.edits.insert.insert import insert, picture_width, put, support_at
@@ -126,16 +127,20 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box, bump):
     assert soft.sum() < 2.2 * ConvexHull(place * 4).area  # one native pixel wide
 
 
-def test_the_shadow_goes_on_to_the_foot(box):
-    """What a body leaves of its rim's pixels is the ground in its shadow, not the ground beside that."""
+@pytest.mark.parametrize("grey", [0.05, 0.9])
+def test_the_shadow_goes_on_to_the_foot(box, grey):
+    """What a body leaves of its rim's pixels is the ground in its shadow: neither the body nor the ground beside."""
     scene = floor_scene(96, 72)
-    edited = insert(scene, box, (48.0, 50.0), material="0.5,0.5,0.5")
+    edited = insert(scene, box, (48.0, 50.0), material=f"{grey},{grey},{grey}")
     renderer = EditRenderer(scene)
     body = native_layer(renderer, edited, RenderOptions(64, denoise=False))
     share = whole(body, body.share, scene.depth.shape)
     rows, columns = np.nonzero(share > 0)
     foot = np.zeros(share.shape, bool)
     foot[rows.max() : rows.max() + 2, columns.min() : columns.max() + 1] = True
+    # Under the body its surroundings go on.
+    layers = render_layers(renderer, edited, RenderOptions(64, denoise=False))
+    assert layers.edited[body.inside == 1].min() > 0.05
     out = composite(scene, edited, spp=128, denoise=False)
     base, plain = (picture(256, 3) for picture in renderer.pair(edited))
     expected = scene.photo.original * plain / base

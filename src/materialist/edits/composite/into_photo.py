@@ -86,11 +86,9 @@ def _change(out: Array, photo: Photo, layers: Layers, tick: Progress) -> None:
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
     native = photo.original.shape[:2]
-    clear = np.ones_like(layers.changed)
-    if layers.native is not None:
-        clear = grown(layers.native.inside < 1, 2 * SETTINGS.mixed_pixels)
+    clear = np.ones_like(layers.changed) if layers.native is None else layers.native.inside < 1
     sides = [
-        _alone(stack, photo.linear, side & clear, native)
+        _alone(stack, photo.linear, side, clear, native)
         for side in (layers.changed, ~layers.changed)
     ]
     # Beyond its own pixels a change goes as far as the border may move.
@@ -141,15 +139,18 @@ def _wider(side: slice, margin: int, size: int) -> slice:
     return slice(max(side.start - margin, 0), min(side.stop + margin, size))
 
 
-def _alone(stack: Array, guide: Array, side: Array, native: tuple[int, ...]) -> GuidedUpsample:
+def _alone(
+    stack: Array, guide: Array, side: Array, clear: Array, native: tuple[int, ...]
+) -> GuidedUpsample:
     """The terms [H, W, 9] of one side [H, W] bool of a border, carried on over the other; 0 where it has no pixel.
 
-    Maps of pixels at the border mix both sides: those inside of them speak for them.
+    Maps of pixels at the border mix both sides: those inside of them speak for them. clear: [H, W] bool: pixels whose
+    terms are known.
     """
     size = SETTINGS.mixed_pixels
-    pure = cv2.erode(side.astype(np.uint8), disc(size), borderValue=1)
+    pure = cv2.erode(side.astype(np.uint8), disc(size), borderValue=1) * clear.astype(np.uint8)
     # What is too thin to have an inside speaks for itself.
-    thin = side & (cv2.dilate(pure, disc(2 * size)) == 0)
+    thin = side & clear & (cv2.dilate(pure, disc(2 * size)) == 0)
     known = (pure > 0) | thin
     if not known.any():
         return GuidedUpsample(np.zeros_like(stack), guide, native)

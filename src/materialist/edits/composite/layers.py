@@ -21,6 +21,7 @@ from materialist.edits.core.renderer import (
     same_shapes,
 )
 from materialist.errors import InputError
+from materialist.geometry.membrane import nearest
 from materialist.geometry.silhouette import grown, window
 from materialist.types import Array, Scene
 
@@ -40,6 +41,7 @@ class LayerSettings:
     min_sigmas: float = 3.0  # standard errors that it must exceed; derived: 1 in 400 by chance
     min_gain: float = 0.25  # below it a difference is none
     denoiser_margin: int = 16  # pixels around it that the denoiser sees
+    min_rays: int = 4  # of a probed pixel that pass the new bodies; with fewer its neighbour counts
 
     # Fireflies.
     min_firefly: float = 1.0  # radiance; below white a sparkle does no harm; derived
@@ -89,7 +91,6 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
     # --- Bodies and lamps that only one scene has: at native size, with their own outline ---
     alone = None
     covered = None
-    hidden = None
     if (scene.bodies, scene.lamps) != (edited.bodies, edited.lamps) or (relit and edited.lamps):
         alone = native_layer(renderer, edited, options)
         anything = renderer.covered(edited)
@@ -98,13 +99,16 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
         if options.denoise:
             guides[1] = renderer.guides(edited, covered)
         covered = covered & ~renderer.emitter_pixels(edited)  # `in_photo` lays them on the photo
-        if alone is not None:
-            hidden = inner(alone.inside == 1)
 
-    # --- Everything else, at working size: what is behind the new bodies, in their shadow ---
+    # --- Everything else, at working size: what new bodies leave of a pixel lies in their shadow ---
     base, other = renderer.pair(edited, alone.names if alone else ())
     layers = difference(
-        base, other, changed, guides if options.denoise else None, options, hidden=hidden
+        base,
+        other,
+        changed,
+        guides if options.denoise else None,
+        options,
+        hidden=alone.inside if alone else None,
     )
     if relit:
         rendered = settled([layers.base, layers.edited], scene.depth, scene.photo.linear)
@@ -153,7 +157,8 @@ def difference(
 
     Args:
         changed: [H, W] bool: pixels that the edit replaces.
-        hidden: [H, W] bool: pixels that nothing shows of either picture.
+        hidden: [H, W] share of each pixel that neither picture shows; one that is too small has the values of the
+            pixel nearest to it.
         guides: albedo and normal [H, W, 3] of the base, and of the edited scene, with which both pictures are denoised
             before they are compared, where the denoiser is installed; None: as they are.
     """
@@ -165,7 +170,9 @@ def difference(
     seeds = (2 * options.seed, 2 * options.seed + 1)
     done = count()
     steps = 2 * (1 + (not changed.all()) + (half > probe_paths))
-    shown_pixels = np.ones_like(changed) if hidden is None else ~hidden
+    shown_pixels = np.ones_like(changed)
+    if hidden is not None:
+        shown_pixels = hidden <= max(0.0, 1 - SETTINGS.min_rays / probe_paths)
 
     def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
         options.tick("render", next(done), steps)
@@ -199,7 +206,10 @@ def difference(
             added = traced(half - probe_paths, k + 2, near, near)
             share = (half - probe_paths) / half * near[..., None]
             pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
-        pairs.append((pair[0], np.where(near[..., None], pair[1], pair[0])))
+        pair[1] = np.where(near[..., None], pair[1], pair[0])
+        pairs.append(
+            pair if shown_pixels.all() else [picture[nearest(shown_pixels)] for picture in pair]
+        )
     options.tick("render", steps, steps)
 
     # --- What the halves agree on is the edit, what they disagree on is noise ---

@@ -89,7 +89,7 @@ class EditRenderer:
     def pair(self, edited: Scene, unseen: tuple[str, ...] = ()) -> tuple[Render, Render]:
         """The renderings of the base and of `edited`, with paths of equal length.
 
-        unseen: names of bodies and lamps of `edited` that the camera looks through.
+        unseen: names of bodies and lamps of `edited` that the camera does not see; pixels full of them are 0.
         """
         # --- The photo's sky in both or in neither, and paths of equal length: noise cancels ---
         scene = self.lit(self.scene, edited)
