@@ -8,7 +8,6 @@ from typing import Any
 
 from materialist.edits.core.operation import PLACE, Operation, Placement, Target
 from materialist.edits.registry import OPERATIONS
-from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole
 from materialist.io.text import read_text
@@ -248,6 +247,8 @@ def region_of(scene: Scene, step: Step) -> Array:
     where["same_material"] = str(options.get("same_material", "false")).lower() in ON
     names = {"method": "with", "extent": "extent"}
     where |= {name: options[key] for name, key in names.items() if key in options}
+    from materialist.edits.select.select import select  # its libraries take longer to load than a list to read
+
     return select(scene, device=step.device, **where)
 
 
