@@ -148,10 +148,21 @@ def clicked():
 
 @pytest.fixture(scope="module")
 def clicks_once(clicked):
-    """The same click on the same scene asks the networks once: they take seconds for a photo that they do not know."""
-    from materialist.edits.select import select
+    """The same click on the same scene is answered once, and MobileSAM, which takes seconds, by what has one colour.
+
+    `edits/select` and `predict/sam` test the networks.
+    """
+    import numpy as np
+
+    from materialist.edits.select import objects, select
 
     at_points = select.object_at_points
+
+    def of_one_colour(rgb, clicks=(), *, box=None):
+        places = [((box[0] + box[2]) // 2, (box[1] + box[3]) // 2)] if box else clicks
+        alike = [np.abs(rgb - rgb[int(y), int(x)]).max(-1) < 0.05 for x, y in places]
+        masks = np.where(np.any(alike, 0), 1, -1)[None].repeat(3, 0)
+        return masks.astype(np.float32), np.ones(3)
 
     def known(scene, points, **options):
         key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr((points, options)))
@@ -161,6 +172,7 @@ def clicks_once(clicked):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(select, "object_at_points", known)
+        patch.setattr(objects.sam, "masks", of_one_colour)
         yield
 
 
