@@ -235,6 +235,9 @@ def _placement(step: Step) -> Placement:
 
 def region_of(scene: Scene, step: Step) -> Array:
     """[H, W] bool of the step's mask, click or box. Raises InputError."""
+    # Its libraries take longer to load than a list to read.
+    from materialist.edits.select.select import select
+
     options = step.options
     where: dict[str, Any] = {}
     for name in ("click", "exclude"):
@@ -247,8 +250,6 @@ def region_of(scene: Scene, step: Step) -> Array:
     where["same_material"] = str(options.get("same_material", "false")).lower() in ON
     names = {"method": "with", "extent": "extent"}
     where |= {name: options[key] for name, key in names.items() if key in options}
-    from materialist.edits.select.select import select  # its libraries take longer to load than a list to read
-
     return select(scene, device=step.device, **where)
 
 
