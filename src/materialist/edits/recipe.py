@@ -8,6 +8,7 @@ from typing import Any
 
 from materialist.edits.core.operation import PLACE, Operation, Placement, Target
 from materialist.edits.registry import OPERATIONS
+from materialist.edits.select.select import select
 from materialist.errors import InputError
 from materialist.io.atomic import write_whole
 from materialist.io.text import read_text
@@ -235,9 +236,6 @@ def _placement(step: Step) -> Placement:
 
 def region_of(scene: Scene, step: Step) -> Array:
     """[H, W] bool of the step's mask, click or box. Raises InputError."""
-    # Its libraries take longer to load than a list to read.
-    from materialist.edits.select.select import select
-
     options = step.options
     where: dict[str, Any] = {}
     for name in ("click", "exclude"):
