@@ -159,10 +159,16 @@ def clicks_once(clicked):
     at_points = select.object_at_points
 
     def of_one_colour(rgb, clicks=(), *, box=None):
-        places = [((box[0] + box[2]) // 2, (box[1] + box[3]) // 2)] if box else clicks
-        alike = [np.abs(rgb - rgb[int(y), int(x)]).max(-1) < 0.05 for x, y in places]
-        masks = np.where(np.any(alike, 0), 1, -1)[None].repeat(3, 0)
-        return masks.astype(np.float32), np.ones(3)
+        def alike(x, y):
+            return np.abs(rgb - rgb[int(y), int(x)]).max(-1) < 0.05
+
+        if box is None:
+            mask = np.any([alike(*click) for click in clicks], 0)
+        else:
+            # What is in the middle of the box, or at its corner, by which fits it.
+            middle = alike((box[0] + box[2]) // 2, (box[1] + box[3]) // 2)
+            mask = max(middle, alike(*box[:2]), key=lambda one: objects.box_overlap(one, box))
+        return np.where(mask, 1, -1)[None].repeat(3, 0).astype(np.float32), np.ones(3)
 
     def known(scene, points, **options):
         key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr((points, options)))
