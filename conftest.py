@@ -148,10 +148,27 @@ def clicked():
 
 @pytest.fixture(scope="module")
 def clicks_once(clicked):
-    """The same click on the same scene asks the networks once: they take seconds for a photo that they do not know."""
-    from materialist.edits.select import select
+    """The same click on the same scene is answered once, and MobileSAM, which takes seconds, by what has one colour.
+
+    `edits/select` and `predict/sam` test the networks.
+    """
+    import numpy as np
+
+    from materialist.edits.select import objects, select
 
     at_points = select.object_at_points
+
+    def of_one_colour(rgb, clicks=(), *, box=None):
+        def alike(x, y):
+            return np.abs(rgb - rgb[int(y), int(x)]).max(-1) < 0.05
+
+        if box is None:
+            mask = np.any([alike(*click) for click in clicks], 0)
+        else:
+            # What is in the middle of the box, or at its corner, by which fits it.
+            middle = alike((box[0] + box[2]) // 2, (box[1] + box[3]) // 2)
+            mask = max(middle, alike(*box[:2]), key=lambda one: objects.box_overlap(one, box))
+        return np.where(mask, 1, -1)[None].repeat(3, 0).astype(np.float32), np.ones(3)
 
     def known(scene, points, **options):
         key = (scene.photo.linear.tobytes(), scene.depth.tobytes(), repr((points, options)))
@@ -161,6 +178,7 @@ def clicks_once(clicked):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(select, "object_at_points", known)
+        patch.setattr(objects.sam, "masks", of_one_colour)
         yield
 
 

@@ -54,7 +54,7 @@ def test_results_do_not_depend_on_the_number_of_workers_or_what_ran_before(tmp_p
 
 def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     source = photos(tmp_path / "in", "a", "b", "c", "d")
-    first = run(source, tmp_path / "runs")
+    first = run(source, tmp_path / "runs", workers=1)
     written = (tmp_path / "runs/a.scene/scene.json").stat().st_mtime_ns
     (tmp_path / "runs/b.scene/maps/albedo.exr").unlink()
     Image.fromarray(np.random.default_rng(9).integers(0, 256, (16, 24, 3)).astype(np.uint8)).save(
@@ -64,11 +64,13 @@ def test_finished_photos_are_kept_and_all_others_redone(tmp_path):
     photos(source, "x", "new")  # the first is only there to make the second another picture
     (source / "x.png").unlink()
     with pytest.raises(InputError, match="resume=True"):
-        run(source, tmp_path / "runs")
-    again = run(source, tmp_path / "runs", resume=True)
+        run(source, tmp_path / "runs", workers=1)
+    again = run(source, tmp_path / "runs", resume=True, workers=1)
     assert again.kept == 1 and again.exit_code == 0 and again.count("done") == 4
     assert (tmp_path / "runs/a.scene/scene.json").stat().st_mtime_ns == written
-    assert again.hash != first.hash and again.hash == run(source, tmp_path / "fresh").hash
+    assert (
+        again.hash != first.hash and again.hash == run(source, tmp_path / "fresh", workers=1).hash
+    )
 
 
 @pytest.mark.slow

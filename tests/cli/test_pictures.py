@@ -10,6 +10,7 @@ from PIL import Image
 
 from materialist.color import linear_to_srgb, srgb_levels
 from materialist.edits.insert.insert import insert
+from materialist.edits.select import objects
 from materialist.io import package
 from materialist.io.exr import read_exr, write_exr
 from materialist.io.package import load_scene, save_scene
@@ -186,14 +187,18 @@ def test_a_film_is_judged_by_the_frame_that_changes_most(
     assert str(outcome["warnings"]).count("of 255 levels") == notes
 
 
-def test_select_writes_a_mask_that_edit_reads(done, folder, tmp_path):
+def test_select_writes_a_mask_that_edit_reads(done, folder, tmp_path, monkeypatch):
     select = ["select", folder / "a.scene"]
     assert (
         done(*select, "--mask", folder / "block.png", "-o", tmp_path / "m.png")["pixels"]
         == MASK.sum()
     )
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "m.png"))[..., 0] == 255, MASK)
+    # In place of MobileSAM, which takes seconds.
+    found = np.where(MASK, 1, -1)[None].repeat(3, 0).astype(np.float32)
+    monkeypatch.setattr(objects.sam, "masks", lambda *_, **__: (found, np.ones(3)))
     done(*select, "--click", "17,17", "--native", "-o", tmp_path / "n.png")
+    assert np.asarray(Image.open(tmp_path / "n.png"))[17, 17, 0] == 255
 
 
 def test_a_region_takes_its_options_to_select(done, folder, tmp_path, monkeypatch):

@@ -14,6 +14,7 @@ from studio_scenes import package
 
 from materialist.darkroom.app import application
 from materialist.jobs.queue import JobQueue
+from materialist.studio import uploads
 from materialist.studio.studio import Studio
 from materialist.studio.workspace import WorkFolder
 
@@ -58,7 +59,13 @@ def local(tmp_path_factory, clicks_once):
     studio.start = work.new("Room", "me", scene=package(folder))
     gate = application(studio, host="127.0.0.1", port=7860)
     headers = {"x-materialist-page": "b" * 32, "origin": ADDRESS}
-    with live_here(), TestClient(gate, base_url=ADDRESS, headers=headers) as client:
+    with (
+        live_here(),
+        pytest.MonkeyPatch.context() as patch,
+        TestClient(gate, base_url=ADDRESS, headers=headers) as client,
+    ):
+        # `shared` opens uploads in a process of its own.
+        patch.setattr(uploads, "run_limited", lambda task, limits, **given: task(None, **given))
         # With the channel the page is open between the tests, too.
         client.get("/")
         state = client.get("/api/arrive").json()

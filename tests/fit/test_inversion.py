@@ -14,8 +14,8 @@ from materialist.fit.invert import invert, stacked
 from materialist.fit.settings import DEFAULT, PAPER, MaterialStage, Schedule
 from materialist.types import Camera
 
-SMALL_PAPER = replace(PAPER, light=replace(PAPER.light, height=32))
-"""The paper's fit with a small light: most of its time goes to 512 x 256 texels."""
+SMALL_PAPER = replace(PAPER, light=replace(PAPER.light, height=32), light_grid=16)
+"""The paper's fit with a small light: most of its time goes to 512 x 256 texels, and to a ray through each."""
 
 
 @pytest.fixture(scope="module")

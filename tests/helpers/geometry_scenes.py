@@ -93,13 +93,19 @@ def trace(mesh, origin, directions, slack: float = 1e-7):
     face = np.full(len(directions), -1)
     for start in range(0, len(directions), 256):
         rays = directions[start : start + 256]
-        volumes = np.stack([rays @ side.T for side in sides])  # [3, n, F]
-        size = np.maximum(np.abs(volumes).max(0), 1e-300)
-        inside = (volumes >= -slack * size).all(0) | (volumes <= slack * size).all(0)
-        facing = rays @ normal.T
+        one, two, three = (rays @ side.T for side in sides)  # [n, F]
+        low = np.minimum(np.minimum(one, two), three)
+        high = np.maximum(np.maximum(one, two), three)
+        size = slack * np.maximum(high, -low)
+        # Few rays pass within a triangle.
+        ray, hit = np.nonzero((low >= -size) | (high <= size))
+        facing = (rays[ray] * normal[hit]).sum(-1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            t = np.where(inside & (np.abs(facing) > 1e-12 * scale), height / facing, np.inf)
+            t = np.where(np.abs(facing) > 1e-12 * scale[hit], height[hit] / facing, np.inf)
         t = np.where(t > 1e-6, t, np.inf)
-        face[start : start + 256] = np.where(np.isfinite(t.min(1)), t.argmin(1), -1)
-        distance[start : start + 256] = t.min(1)
+        ray += start
+        np.minimum.at(distance, ray, t)
+        # Of triangles at one distance the first.
+        nearest = np.flatnonzero(np.isfinite(t) & (t == distance[ray]))[::-1]
+        face[ray[nearest]] = hit[nearest]
     return distance, face

@@ -45,8 +45,9 @@ class LiveNowhere(Live):
 def _in_place(double):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("materialist.studio.session.Live", double)
-        # Nor does one get ready for the next photo.
+        # Nor does one get ready for the next photo, or for glass, at whatever is selected.
         patch.setattr("materialist.studio.studio.warmed", lambda device: None)
+        patch.setattr("materialist.studio.glass.GlassClient.get_ready", lambda self: None)
         yield
 
 

@@ -26,15 +26,22 @@ def plate(mask, camera=None):
 
 def solid_of(shell):
     """Its mesh, whose front, back and wall are joined where they meet: every edge is run through once each way."""
-    assert np.isfinite(shell.vertices).all() and len(np.unique(shell.faces)) == len(shell.vertices)
+    uses = np.bincount(shell.faces.ravel(), minlength=len(shell.vertices))
+    assert np.isfinite(shell.vertices).all() and len(uses) == len(shell.vertices) and uses.all()
     mesh = trimesh.Trimesh(np.round(shell.vertices, 7), shell.faces)  # merges vertices
     assert mesh.is_watertight and mesh.is_winding_consistent
     return mesh
 
 
-def test_a_ball_has_the_volume_and_the_normals_of_a_ball():
+@pytest.fixture(scope="module")
+def whole_ball():
+    """The ball's shell and its mesh."""
     shell = closed_proxy(*before_a_wall(), CAMERA)
-    solid = solid_of(shell)
+    return shell, solid_of(shell)
+
+
+def test_a_ball_has_the_volume_and_the_normals_of_a_ball(whole_ball):
+    shell, solid = whole_ball
     assert solid.euler_number == 2
     assert solid.volume == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.02)
     out = (shell.vertices - [0.1, 0, -3]) / 0.6
@@ -56,10 +63,12 @@ def test_a_back_has_the_normals_that_are_known_of_it():
     assert np.quantile((shell.normals * out).sum(-1)[inner & (out[:, 2] > 0)], 0.01) > 0.99
 
 
-def test_hollow_is_a_wall_around_a_cavity():
-    solid, hollow = (closed_proxy(*before_a_wall(), CAMERA, wall=wall) for wall in (None, 0.1))
-    assert solid_of(hollow).euler_number == 4
-    cavity = solid_of(solid).volume - solid_of(hollow).volume
+def test_hollow_is_a_wall_around_a_cavity(whole_ball):
+    solid, solid_mesh = whole_ball
+    hollow = closed_proxy(*before_a_wall(), CAMERA, wall=0.1)
+    hollow_mesh = solid_of(hollow)
+    assert hollow_mesh.euler_number == 4
+    cavity = solid_mesh.volume - hollow_mesh.volume
     assert cavity == pytest.approx(4 / 3 * np.pi * 0.5**3, rel=0.12)
     inner = np.s_[len(solid.vertices) :]
     outwards = ((hollow.vertices[inner] - [0.1, 0, -3]) * hollow.normals[inner]).sum(-1)

@@ -73,7 +73,7 @@ def _tensors(materials: Materials):
 
 @pytest.fixture(scope="module")
 def comparison():
-    return Comparison(*furnished_room(96), windowed_sky())
+    return Comparison(*furnished_room(64), windowed_sky())
 
 
 @pytest.fixture(scope="module", params=["levels", "own roughness"])
@@ -82,7 +82,7 @@ def either(request, comparison):
     return (
         comparison
         if request.param == "levels"
-        else Comparison(*furnished_room(96), windowed_sky(), own=True)
+        else Comparison(*furnished_room(64), windowed_sky(), own=True)
     )
 
 

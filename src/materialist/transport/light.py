@@ -103,11 +103,11 @@ def light_matrix(
         pi = scene.ray_intersect_preliminary(batch.ray, coherent=False)
         slots_met = dr.gather(mi.UInt32, cache.slots, pi.prim_index, pi.is_valid())
         slot = np.array(dr.select(pi.is_valid(), slots_met, MISS))  # [N] radiance slot of each ray
-        index, share = texels_around(np.array(batch.ray.d).T, shape)
         # Rays that leave the scene fill T (of T E + b), those that hit a surface give b.
         leaves = slot == MISS
+        index, share = texels_around(np.array(batch.ray.d).T[leaves], shape)
         for part, weight in zip(parts, batch.weights, strict=True):
-            add_footprints(part, index[leaves], share[leaves], weight[leaves], batch.row[leaves])
+            add_footprints(part, index, share, weight[leaves], batch.row[leaves])
         hits.append((batch.row[~leaves], slot[~leaves], np.stack(batch.weights, -1)[~leaves]))
 
     # --- One list of the rays that hit a surface ---

@@ -75,13 +75,12 @@ def _ridges(rng):
 
 def _hammered(rng):
     """Dents side by side: the distance to the nearest of many points."""
-    points = rng.uniform(0, SIDE, (60, 3))
-    place = np.stack(np.meshgrid(*[np.arange(SIDE)] * 3, indexing="ij"), -1)
     nearest = np.full((SIDE,) * 3, np.inf)
-    for point in points:
+    for point in rng.uniform(0, SIDE, (60, 3)):
         # The shorter way around the block, which repeats.
-        away = np.abs(place - point)
-        nearest = np.minimum(nearest, (np.minimum(away, SIDE - away) ** 2).sum(-1))
+        away = np.abs(np.arange(SIDE)[:, None] - point)
+        x, y, z = (np.minimum(away, SIDE - away) ** 2).T
+        nearest = np.minimum(nearest, x[:, None, None] + y[:, None] + z)
     return nearest / nearest.std()
 
 

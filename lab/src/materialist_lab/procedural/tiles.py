@@ -36,13 +36,14 @@ def noise(rng: np.random.Generator, slope: float, stretch: tuple[float, float] =
 
     A `stretch` (down, right) above 1 draws the noise out along that axis.
     """
-    frequency = np.fft.fftfreq(SIZE)
-    f = np.hypot(frequency[:, None] * stretch[0], frequency[None, :] * stretch[1])
+    down = np.fft.fftfreq(SIZE)[:, None]
+    right = np.fft.rfftfreq(SIZE)[None]
+    f = np.hypot(down * stretch[0], right * stretch[1])
     # White noise, coloured in the Fourier domain, is periodic: its tiles have no seams.
     f[0, 0] = 1
-    spectrum = np.fft.fft2(rng.normal(size=(SIZE, SIZE))) / f**slope
+    spectrum = np.fft.rfft2(rng.normal(size=(SIZE, SIZE))) / f**slope
     spectrum[0, 0] = 0
-    field = np.fft.ifft2(spectrum).real
+    field = np.fft.irfft2(spectrum)
     return np.clip(0.5 + field / (5 * field.std()), 0, 1)
 
 
